@@ -1,0 +1,38 @@
+"""Container unloading via reinforcement learning: the paper's task, agent and figures."""
+
+import gymnasium
+
+from unload import policies
+from unload.agent import DQN, Greedy, load_policy, save_policy
+from unload.env import ContainerEnv
+from unload.equalization import equalize
+from unload.evaluate import evaluate, success_rate
+from unload.highest_item import HighestItemEnv
+from unload.network import PEQNetwork
+from unload.substacks import Load, build_load, stack_load
+from unload.train import TrainConfig, train
+from unload.view import view
+
+__version__ = "0.1.0"
+__all__ = [
+    "DQN",
+    "ContainerEnv",
+    "Greedy",
+    "HighestItemEnv",
+    "Load",
+    "PEQNetwork",
+    "TrainConfig",
+    "build_load",
+    "equalize",
+    "evaluate",
+    "load_policy",
+    "policies",
+    "save_policy",
+    "stack_load",
+    "success_rate",
+    "train",
+    "view",
+]
+
+gymnasium.register(id="unload/Container-v0", entry_point="unload.env:ContainerEnv")
+gymnasium.register(id="unload/HighestItem-v0", entry_point="unload.highest_item:HighestItemEnv")

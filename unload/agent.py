@@ -1,0 +1,215 @@
+"""The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+from torch.nn.functional import smooth_l1_loss
+
+from unload import checks
+from unload.equalization import TIES, equalize
+from unload.network import PEQNetwork
+from unload.policies import check_batch, random
+
+# Rows of a batch per backward pass: what one pass stores stays in the cache.
+CHUNK = 64
+
+
+class DQN:
+    """Deep Q-learning on masked actions, with a target network.
+
+    The mask acts wherever an action is chosen: in exploration, in the greedy choice and
+    in the maximum of the bootstrap target.
+
+    Args:
+        network: (batch, items, 3) → (batch, items) action values.
+        learning_rate: of Adam.
+        gamma: discount factor; 0 in the paper (Sec. III-E), where the target is the
+            reward alone and the target network is not asked.
+        beta: threshold of the smooth-L1 loss (Sec. III-G); 1 in the paper.
+    """
+
+    def __init__(
+        self,
+        network: torch.nn.Module,
+        learning_rate: float = 1e-3,
+        gamma: float = 0.0,
+        beta: float = 1.0,
+    ) -> None:
+        self.network = network
+        self.gamma = checks.real("gamma", gamma, 0, 1)
+        self.beta = checks.real("beta", beta, 0)
+        self.optimizer = torch.optim.Adam(
+            network.parameters(), lr=checks.real("learning_rate", learning_rate, 0)
+        )
+        self.target = {name: value.clone() for name, value in network.state_dict().items()}
+
+    def act(
+        self,
+        observations: np.ndarray,
+        masks: np.ndarray,
+        epsilon: float,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """Choose actions ε-greedily.
+
+        Args:
+            observations: (batch, items, 3) float32.
+            masks: (batch, items), nonzero where an item may be picked.
+            epsilon: probability of a random allowed action.
+            rng: draws who explores, and what.
+
+        Returns:
+            (batch,) int64.
+
+        Raises:
+            ValueError: shapes do not fit, or a mask allows nothing.
+        """
+        explore = rng.random(len(observations)) < checks.real("epsilon", epsilon, 0, 1)
+        actions = random(observations, masks, rng)
+        if not explore.all():
+            exploit = ~explore
+            actions[exploit] = greedy_actions(self.network, observations[exploit], masks[exploit])
+        return actions
+
+    def update(self, batch: dict[str, np.ndarray]) -> float:
+        """One step of Adam on a batch from ``ReplayBuffer.sample``.
+
+        Returns:
+            The loss before the step.
+
+        Raises:
+            FloatingPointError: the loss is not finite; the weights are left as they were.
+        """
+        batch = {name: torch.from_numpy(array) for name, array in batch.items()}
+        targets = self._targets(batch)
+        size = len(targets)
+        self.optimizer.zero_grad(set_to_none=True)
+        total = 0.0
+        for start in range(0, size, CHUNK):
+            rows = slice(start, start + CHUNK)
+            values = self.network(batch["observations"][rows])
+            chosen = values.gather(1, batch["actions"][rows, None]).squeeze(1)
+            loss = smooth_l1_loss(chosen, targets[rows], reduction="sum", beta=self.beta) / size
+            loss.backward()
+            total += loss.item()
+        if not np.isfinite(total):
+            raise FloatingPointError(f"the loss is {total}; expected a finite number")
+        self.optimizer.step()
+        return total
+
+    @torch.no_grad()
+    def _targets(self, batch: dict[str, torch.Tensor]) -> torch.Tensor:
+        """r + γ max over the allowed actions of the target network, (batch,)."""
+        if self.gamma == 0:
+            return batch["rewards"]
+        values = torch.func.functional_call(
+            self.network, self.target, (batch["next_observations"],)
+        )
+        best = values.masked_fill(~batch["next_masks"], -torch.inf).amax(dim=1)
+        return batch["rewards"] + self.gamma * torch.where(batch["terminations"], 0.0, best)
+
+    def update_target(self) -> None:
+        """Copy the network's weights to the target network."""
+        self.target = {name: value.clone() for name, value in self.network.state_dict().items()}
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Weights, target weights and optimizer state as arrays, to go on from later."""
+        arrays = {f"network.{k}": v.numpy().copy() for k, v in self.network.state_dict().items()}
+        arrays |= {f"target.{k}": v.numpy().copy() for k, v in self.target.items()}
+        for number, moments in self.optimizer.state_dict()["state"].items():
+            arrays |= {f"adam.{number}.{k}": v.numpy().copy() for k, v in moments.items()}
+        return arrays
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` returned."""
+        groups: dict[str, dict] = {"network": {}, "target": {}, "adam": {}}
+        for name, array in arrays.items():
+            group, _, rest = name.partition(".")
+            groups[group][rest] = torch.from_numpy(np.array(array))
+        self.network.load_state_dict(groups["network"])
+        self.target = groups["target"]
+        moments: dict[int, dict[str, torch.Tensor]] = {}
+        for name, tensor in groups["adam"].items():
+            number, _, key = name.partition(".")
+            moments.setdefault(int(number), {})[key] = tensor
+        optimizer = self.optimizer.state_dict()
+        self.optimizer.load_state_dict({**optimizer, "state": moments})
+
+
+@torch.no_grad()
+def greedy_actions(
+    network: torch.nn.Module, observations: np.ndarray, masks: np.ndarray
+) -> np.ndarray:
+    """The allowed action of the highest value, (batch,) int64."""
+    observations, allowed = check_batch(observations, masks)
+    values = network(torch.as_tensor(observations, dtype=torch.float32))
+    return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
+
+
+class Greedy:
+    """The policy of a trained network: the allowed item of the highest value.
+
+    Called like the functions of ``unload.policies``, on observations that are not
+    equalized; it equalizes them itself if the network was trained so.
+
+    Args:
+        network: the trained network.
+        equalize: whether the network expects equalized observations.
+        ties: see ``unload.equalize``.
+    """
+
+    def __init__(self, network: PEQNetwork, equalize: bool, ties: str = "noise") -> None:
+        checks.one_of("equalize", equalize, (False, True))
+        checks.one_of("ties", ties, TIES)
+        self.network, self.equalize, self.ties = network.eval(), equalize, ties
+
+    def __call__(
+        self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        if self.equalize:
+            observations = equalize(observations, self.ties)
+        return greedy_actions(self.network, observations, masks)
+
+
+def save_policy(policy: Greedy, path: str | Path) -> None:
+    """Write a policy's weights and how to use them, as safetensors, in one atomic step."""
+    path = Path(path)
+    settings = {
+        "network": type(policy.network).__name__,
+        "n_features": str(policy.network.n_features),
+        "equalize": str(policy.equalize),
+        "ties": policy.ties,
+    }
+    partial = path.with_name(path.name + ".partial")
+    tensors = {name: value.contiguous() for name, value in policy.network.state_dict().items()}
+    save_file(tensors, partial, metadata=settings)
+    os.replace(partial, path)
+
+
+def load_policy(path: str | Path) -> Greedy:
+    """Read a policy that ``save_policy`` wrote.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file is not one of a policy, or its tensors do not fit.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
+    try:
+        with safe_open(path, framework="pt") as file:
+            settings = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}
+    except SafetensorError as error:
+        raise ValueError(f"{path} is not a safetensors file: {error}") from error
+    try:
+        network = PEQNetwork(int(settings["n_features"]))
+        network.load_state_dict(tensors)
+        equalized = {"True": True, "False": False}[settings["equalize"]]
+        return Greedy(network, equalized, settings["ties"])
+    except (KeyError, RuntimeError) as error:
+        raise ValueError(f"{path} does not hold a policy of unload: {error}") from error

@@ -1,0 +1,233 @@
+"""The container as a Gymnasium environment (Sec. III-A to III-D)."""
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+
+from unload import checks, observation, task
+from unload.physics import make_physics
+from unload.picking import POSITION_NOISE, PickingEnv
+from unload.render import Camera
+from unload.substacks import Load, stack_load
+
+class ContainerEnv(PickingEnv):
+    """Unload a container by choosing, at each step, the item to pick.
+
+    ## Description
+    A container of 7.0 × 2.5 × 2.5 m holds 800–1000 boxes, stacked in walls. At each step
+    the agent chooses one of the 128 boxes nearest to the entrance. It is pulled upwards
+    with 20 N for 0.3 s; if it moved at least 0.2 m it is unloaded, else the container
+    stays as it was.
+
+    ## Action space
+    ``Discrete(128)``: the row of the observation to pick. A row that failed before may be
+    picked again, and fails again.
+
+    ## Observation space
+    ``Box(-1, 1, (128, 3), float32)``: centres of the 128 nearest boxes, nearest first,
+    scaled to the container; with ``equalize=True`` their equalized ranks instead.
+
+    | Column | Observation | -1 | 1 |
+    |---|---|---|---|
+    | 0 | x | rear wall | entrance |
+    | 1 | y | left side wall | right side wall |
+    | 2 | z | floor | ceiling |
+
+    ## Rewards
+    +1 if the item was unloaded, -1 if not.
+
+    ## Starting state
+    A new random load from ``stack``, each position blurred once by the drift that a full
+    simulation shows (0.5 mm, and 1 mm down).
+
+    ## Episode end
+    Truncation after ``max_picks`` picks; there is no termination.
+
+    ## Information
+    ``reset`` and ``step`` return a dict with
+
+    - ``action_mask``: (128,) int8, 0 for rows that failed since the last successful pick;
+    - ``unloaded``: int, items unloaded in this episode;
+
+    and ``step`` also
+
+    - ``item``: int, the picked item's number in the load;
+    - ``distance``: float, how far it moved in m.
+
+    Args:
+        physics: who answers a lift: ``"local"`` (the situation of the chosen box),
+            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered).
+        after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
+        equalize: give equalized observations (Alg. 1).
+        ties: see ``unload.equalize``.
+        max_picks: length of an episode.
+        position_noise: standard deviation of the blur in m. It applies where the boxes
+            stay where they were put; ``"full"`` physics that is not restored drifts by
+            itself, and its boxes are seen where they are.
+        stack: makes a ``Load`` from a ``numpy.random.Generator``; it must hold at least
+            128 items more than can be unloaded in an episode.
+        render_mode: ``"rgb_array"`` for pictures by PyBullet's TinyRenderer, or None.
+
+    Attributes:
+        visible: (128,) int64, the item in each row of the observation.
+
+    Raises:
+        TypeError, ValueError: an argument, an action or a load is not as described.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step``
+            after the end of an episode.
+        gymnasium.error.ClosedEnvironmentError: use after ``close``.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(
+        self,
+        physics: str = "local",
+        after_pick: str = "restore",
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = POSITION_NOISE,
+        stack: Callable[[np.random.Generator], Load] = stack_load,
+        render_mode: str | None = None,
+    ) -> None:
+        super().__init__(equalize, ties, max_picks, position_noise, render_mode)
+        if not callable(stack):
+            raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+        self.stack = stack
+        self.physics = make_physics(physics, after_pick)
+        self._camera: Camera | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Fill the container anew; ``options={"load": load}`` gives the load to use."""
+        self._check_open()
+        options = {} if options is None else options
+        for name in options:
+            checks.one_of("options", name, ("load",))
+        super().reset(seed=seed)
+        self._fill(options["load"] if "load" in options else self.stack(self.np_random))
+        self._look()
+        return self._observation.copy(), self._info()
+
+    def step(self, action: int):
+        """Pick the item in row ``action`` of the observation."""
+        self._check_running()
+        item = int(self.visible[self._row(action)])
+        distance = self.physics.lift(item)
+        success = distance >= task.LIFT_THRESHOLD
+        self._picks += 1
+        if success:
+            self.physics.remove(item)
+            self._unloaded += 1
+            self._failed[:] = False
+        else:
+            self._failed[item] = True
+        if success or not self.physics.exact:
+            self._look()
+        truncated = self._picks == self.max_picks
+        if truncated:
+            self._state = "finished"
+        info = self._info() | {"item": item, "distance": distance}
+        return self._observation.copy(), 1.0 if success else -1.0, False, truncated, info
+
+    def action_masks(self) -> np.ndarray:
+        """(128,) bool, False for rows that failed since the last successful pick."""
+        self._check_started()
+        return ~self._failed[self.visible]
+
+    def liftable(self) -> np.ndarray:
+        """(128,) bool, which rows of the observation can be unloaded now.
+
+        Raises:
+            ValueError: the physics is not restored after a pick, so that asking would
+                change the container.
+        """
+        self._check_started()
+        if not self.physics.exact:
+            raise ValueError("after_pick lets lifts move other boxes; expected 'restore'")
+        lifts = [self.physics.lift(item) for item in self.visible.tolist()]
+        return np.array(lifts) >= task.LIFT_THRESHOLD
+
+    def get_state(self) -> dict[str, np.ndarray]:
+        """All that ``set_state`` needs to go on from here, as plain arrays.
+
+        Raises:
+            ValueError: the physics is not restored after a pick, so that the boxes'
+                motion is part of the state.
+        """
+        self._check_started()
+        if not self.physics.exact:
+            raise ValueError("after_pick lets boxes drift; expected 'restore'")
+        load = self.physics.load
+        return {
+            "positions": load.positions,
+            "sizes": load.sizes,
+            "packages": load.packages,
+            "walls": load.walls,
+            "present": self.physics.present.copy(),
+            "blur": self._blur.copy(),
+            "failed": self._failed.copy(),
+            "counts": np.array([self._picks, self._unloaded]),
+            "rng": np.array(json.dumps(self.np_random.bit_generator.state)),
+        }
+
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what ``get_state`` returned, here or in another environment."""
+        self._check_open()
+        fields = ("positions", "sizes", "packages", "walls")
+        self._fill(Load(**{name: state[name] for name in fields}))
+        for item in np.flatnonzero(~state["present"]).tolist():
+            self.physics.remove(item)
+        self._blur, self._failed = state["blur"].copy(), state["failed"].copy()
+        self._picks, self._unloaded = state["counts"].tolist()
+        self.np_random.bit_generator.state = json.loads(str(state["rng"]))
+        if self._picks == self.max_picks:
+            self._state = "finished"
+        self._look()
+
+    def render(self) -> np.ndarray | None:
+        """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
+        self._check_started()
+        if self.render_mode is None:
+            return None
+        if self._camera is None:
+            self._camera = Camera()
+        return self._camera.picture(self.physics.load, self.physics.present)
+
+    def close(self) -> None:
+        self.physics.close()
+        if self._camera is not None:
+            self._camera.close()
+        super().close()
+
+    def _fill(self, load: Load) -> None:
+        if not isinstance(load, Load):
+            raise TypeError(f"load is {load!r}; expected an unload.Load")
+        least = task.N_VISIBLE + self.max_picks
+        if len(load) < least:
+            raise ValueError(
+                f"load holds {len(load)} items; expected at least {least}, "
+                f"{task.N_VISIBLE} visible ones after max_picks={self.max_picks} picks"
+            )
+        self.physics.reset(load)
+        self._blur = self._drift(len(load))
+        self._failed = np.zeros(len(load), dtype=bool)
+        self._picks = self._unloaded = 0
+        self._state = "running"
+
+    def _look(self) -> None:
+        """Update which items are visible, and the observation of them."""
+        present = np.flatnonzero(self.physics.present)
+        positions = self.physics.positions()[present]
+        if self.physics.exact:
+            positions = positions + self._blur[present]
+        rows = observation.nearest(positions)
+        self.visible = present[rows]
+        # A box that was knocked out of the container is seen at its edge.
+        scaled = np.clip(observation.scale(positions[rows]), -1, 1)
+        self._observation = self._features(scaled)
+
+    def _info(self) -> dict:
+        mask = (~self._failed[self.visible]).astype(np.int8)
+        return {"action_mask": mask, "unloaded": self._unloaded}

@@ -1,0 +1,57 @@
+"""Picking policies that need no learning.
+
+A policy is a function ``policy(observations, masks, rng) -> actions`` on a batch:
+observations (batch, 128, 3) float as ``unload/Container-v0`` gives them, nearest item
+first and not equalized; masks (batch, 128), nonzero where a row may be picked; ``rng`` a
+``numpy.random.Generator``; actions (batch,) int64. ``unload.Greedy`` is a learned one.
+"""
+
+import numpy as np
+
+from unload import checks
+
+
+def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the observations as an array and the masks as bool.
+
+    Raises:
+        ValueError: shapes that are not (batch, items, 3) and (batch, items), or a mask
+            that allows no item at all.
+    """
+    observations, masks = np.asarray(observations), np.asarray(masks)
+    if observations.ndim != 3 or observations.shape[-1] != 3:
+        raise ValueError(
+            f"observations has shape {observations.shape}; expected (batch, items, 3)"
+        )
+    if masks.shape != observations.shape[:2]:
+        raise ValueError(f"masks has shape {masks.shape}; expected {observations.shape[:2]}")
+    allowed = masks.astype(bool)
+    if not allowed.any(axis=1).all():
+        row = int(np.argmin(allowed.any(axis=1)))
+        raise ValueError(f"masks is all zero in row {row}; expected at least one item to pick")
+    return observations, allowed
+
+
+def random(
+    observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """Any allowed item, each with the same probability."""
+    _, allowed = check_batch(observations, masks)
+    draws = checks.generator("rng", rng).random(allowed.shape)
+    return np.where(allowed, draws, -1.0).argmax(axis=1)
+
+
+def nearest(
+    observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """The allowed item nearest to the entrance, by the distance of Sec. III-B."""
+    _, allowed = check_batch(observations, masks)
+    return allowed.argmax(axis=1)
+
+
+def highest(
+    observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    """The allowed item whose centre is highest; in a neat load nothing lies on it."""
+    observations, allowed = check_batch(observations, masks)
+    return np.where(allowed, observations[..., 2], -np.inf).argmax(axis=1)

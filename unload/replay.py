@@ -1,0 +1,74 @@
+"""Memory of past picks to learn from."""
+
+import numpy as np
+
+from unload import checks
+
+
+class ReplayBuffer:
+    """The last ``size`` picks, in arrays.
+
+    What follows a pick is kept only if it is needed: with gamma = 0 the target is the
+    reward alone (Sec. III-E).
+
+    Args:
+        size: number of picks kept; older ones are overwritten.
+        items: items per observation.
+        next_state: keep the observation and mask after each pick, and whether the task
+            ended there.
+
+    Attributes:
+        arrays: name → array whose first axis is the slot. ``observations`` (size, items, 3)
+            float32, ``actions`` (size,) int64, ``rewards`` (size,) float32; with
+            ``next_state`` also ``next_observations`` (size, items, 3) float32,
+            ``next_masks`` (size, items) bool and ``terminations`` (size,) bool.
+        total: picks ever added.
+    """
+
+    def __init__(self, size: int, items: int, next_state: bool = False) -> None:
+        self.size = checks.integer("size", size, 1)
+        checks.integer("items", items, 1)
+        self.total = 0
+        self.arrays = {
+            "observations": np.empty((size, items, 3), np.float32),
+            "actions": np.empty(size, np.int64),
+            "rewards": np.empty(size, np.float32),
+        }
+        if next_state:
+            self.arrays |= {
+                "next_observations": np.empty((size, items, 3), np.float32),
+                "next_masks": np.empty((size, items), bool),
+                "terminations": np.empty(size, bool),
+            }
+
+    def __len__(self) -> int:
+        return min(self.total, self.size)
+
+    def add(self, **batch: np.ndarray) -> None:
+        """Add a batch of picks; the names are those of ``arrays``, the first axis the batch.
+
+        Raises:
+            ValueError: a name is missing or unknown, or a shape does not fit.
+        """
+        if batch.keys() != self.arrays.keys():
+            raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
+        count = len(batch["rewards"])
+        for name, values in batch.items():
+            expected = (count, *self.arrays[name].shape[1:])
+            if np.shape(values) != expected:
+                raise ValueError(f"{name} has shape {np.shape(values)}; expected {expected}")
+        slots = np.arange(self.total, self.total + count) % self.size
+        for name, values in batch.items():
+            self.arrays[name][slots] = values
+        self.total += count
+
+    def sample(self, batch_size: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Draw picks uniformly, with replacement.
+
+        Raises:
+            ValueError: nothing has been added yet.
+        """
+        if not len(self):
+            raise ValueError("the replay buffer is empty; add picks before sampling")
+        slots = rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))
+        return {name: array[slots] for name, array in self.arrays.items()}

@@ -1,0 +1,122 @@
+"""Which boxes decide whether a box can be lifted.
+
+A box is held down by what rests on it, directly or over others. It may rub against its
+neighbours in the same wall, and it can tip aside only what its surroundings let fall.
+All else in the container is left out.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from unload import task
+from unload.substacks import Load, slabs
+
+TOLERANCE = 1e-4  # m, faces this close touch
+RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The surroundings of one box, relative to it, in whole micrometres.
+
+    Attributes:
+        boxes: (m, 6) int32, centre relative to the chosen box and edge lengths, both
+            along x, y, z. Row 0 is the chosen box, the next are those on top of it.
+        dynamic: how many of the rows can move: the chosen box and all on top of it.
+        floor: z of the floor if the chosen box stands on it, else None.
+        sides: y of the container's side walls that a box of the situation touches.
+    """
+
+    boxes: np.ndarray
+    dynamic: int
+    floor: int | None
+    sides: tuple[int, ...]
+
+    @cached_property
+    def key(self) -> bytes:
+        """Equal for equal situations: its integers in a row, to look a lift up by."""
+        floor = () if self.floor is None else (self.floor,)
+        head = np.array([self.dynamic, len(floor), *floor, *self.sides], dtype=np.int32)
+        return head.tobytes() + self.boxes.tobytes()
+
+    @property
+    def on_top(self) -> int:
+        """Number of boxes that rest on the chosen one, directly or over others."""
+        return self.dynamic - 1
+
+
+class Surroundings:
+    """The situations of all boxes of a load, as it is unloaded.
+
+    Who touches whom is computed once; picks only take boxes away.
+
+    Attributes:
+        load: the load.
+        present: (n,) bool, False for boxes that have been removed. Owned by the caller.
+    """
+
+    def __init__(self, load: Load, present: np.ndarray) -> None:
+        self.load = load
+        self.present = present
+        self._above, self._below, self._beside = _contacts(load)
+        geometry = np.hstack([load.positions, load.sizes])
+        self._geometry = np.rint(geometry / RESOLUTION).astype(np.int32)
+        self._low = load.positions - load.sizes / 2
+        self._high = load.positions + load.sizes / 2
+
+    def on_top(self, item: int) -> list[int]:
+        """The present boxes that rest on ``item``, directly or over others, in index order."""
+        found, frontier = set(), [item]
+        while frontier:
+            for box in self._above[frontier.pop()]:
+                if self.present[box] and box not in found:
+                    found.add(box)
+                    frontier.append(box)
+        return sorted(found)
+
+    def situation(self, item: int) -> Situation:
+        """What decides the lift of ``item``."""
+        dynamic = [item, *self.on_top(item)]
+        static = {
+            box
+            for mover in dynamic
+            for box in (*self._below[mover], *self._beside[mover])
+            if self.present[box]
+        }
+        members = [*dynamic, *sorted(static.difference(dynamic))]
+        boxes = self._geometry[members]
+        centre = boxes[0, :3].copy()
+        boxes[:, :3] -= centre
+        floor = -int(centre[2]) if self._low[item, 2] <= TOLERANCE else None
+        width = task.CONTAINER[1]
+        walls = []
+        if self._low[dynamic, 1].min() <= TOLERANCE:
+            walls.append(0.0)
+        if self._high[dynamic, 1].max() >= width - TOLERANCE:
+            walls.append(width)
+        sides = tuple(round(wall / RESOLUTION) - int(centre[1]) for wall in walls)
+        return Situation(boxes, len(dynamic), floor, sides)
+
+
+def _contacts(load: Load) -> tuple[list[list[int]], list[list[int]], list[list[int]]]:
+    """For each box, the boxes that stand on it, that it stands on, and at its sides."""
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    above, below, beside = ([[] for _ in range(len(load))] for _ in range(3))
+    for slab in slabs(low[:, 0] + TOLERANCE, high[:, 0]):
+        starts, ends = low[slab], high[slab]
+        # [i, j, axis]: the boxes share a stretch of the axis; i begins where j ends.
+        overlap = np.minimum(ends[:, None], ends) - np.maximum(starts[:, None], starts) > TOLERANCE
+        touch = np.abs(starts[:, None] - ends) <= TOLERANCE
+        in_line = overlap[..., 0]
+        stands_on = in_line & overlap[..., 1] & touch[..., 2]
+        right_of = in_line & overlap[..., 2] & touch[..., 1]
+        for lists, relation in (
+            (below, stands_on),
+            (above, stands_on.T),
+            (beside, right_of | right_of.T),
+        ):
+            for box, other in slab[np.argwhere(relation)].tolist():
+                lists[box].append(other)
+    return above, below, beside

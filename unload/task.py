@@ -1,0 +1,31 @@
+"""The paper's numbers, each once and with its source.
+
+Lengths in metres, forces in newtons, times in seconds. The container's axes are
+x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
+"""
+
+import numpy as np
+
+# Sec. III-A, scaling of the observation: inner size of the container.
+CONTAINER = np.array([7.0, 2.5, 2.5])
+# Sec. III-A: number of items in a full container.
+MIN_ITEMS, MAX_ITEMS = 800, 1000
+# Sec. III-A and appendix: every item has the same mass (kg).
+MASS = 1.0
+GRAVITY = 9.81
+
+# Sec. III-B: only the items nearest to the viewpoint are observed.
+N_VISIBLE = 128
+VIEWPOINT = np.array([7.0, 1.25, 2.5])
+# Sec. III-B, diagonal of W: y does not count, z counts more than x.
+DISTANCE_WEIGHTS = np.array([1.0, 0.0, 4.0])
+
+# Sec. III-C and appendix: one attempt to lift an item.
+PICK_FORCE = 20.0
+LIFT_TIME = 0.3
+# The text has "at least", the equation of Sec. III-D "more than"; we follow the text.
+LIFT_THRESHOLD = 0.2
+# Sec. III-C: picks per episode.
+MAX_PICKS = 500
+# Sec. III-A, Fig. 2: environments simulated side by side.
+NUM_ENVS = 64

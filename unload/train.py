@@ -1,0 +1,289 @@
+"""The training loop: vector environment, replay, updates, curves, checkpoints (Sec. IV-B)."""
+
+import json
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import gymnasium
+import numpy as np
+import pandas as pd
+import torch
+from gymnasium.vector import AutoresetMode
+from tqdm import tqdm
+
+from unload import checks, files, task
+from unload.agent import DQN, Greedy, save_policy
+from unload.equalization import TIES
+from unload.network import PEQNetwork
+from unload.replay import ReplayBuffer
+
+ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """One training run. The defaults are the paper's (Sec. IV-B); * marks our own choice."""
+
+    env: str = "unload/Container-v0"
+    picks: int = 20_000_000  # K, over all environments
+    seed: int = 0  # * of loads, exploration, replay and weights
+    num_envs: int = 64  # Fig. 2
+    learning_rate: float = 1e-3  # μ
+    batch_size: int = 2048  # b
+    replay_size: int = 2**20
+    epsilon_init: float = 1.0
+    epsilon_final: float = 0.0
+    epsilon_fraction: float = 0.5  # K_ε / K
+    gamma: float = 0.0  # Sec. III-E
+    beta: float = 1.0  # Sec. III-G
+    n_features: int = 64  # * n
+    equalize: bool = True  # Sec. III-F
+    ties: str = "noise"  # * see unload.equalize
+    mask: bool = False  # * whether failed items are masked during training too
+    gradient_steps: int = 1  # * updates per step of all environments
+    target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
+    log_interval: int = 500  # * steps of all environments per point of the curves
+    checkpoint_interval: float = 60.0  # * seconds
+    env_kwargs: dict = field(default_factory=lambda: {"physics": "table"})  # *
+
+    def __post_init__(self) -> None:
+        checks.one_of("env", self.env, ENVS)
+        checks.one_of("ties", self.ties, TIES)
+        for name in ("equalize", "mask"):
+            checks.one_of(name, getattr(self, name), (False, True))
+        for name in (
+            "picks", "num_envs", "batch_size", "replay_size", "n_features",
+            "target_update_interval", "log_interval",
+        ):  # fmt: skip
+            checks.integer(name, getattr(self, name), 1)
+        checks.integer("seed", self.seed, 0)
+        checks.integer("gradient_steps", self.gradient_steps, 0)
+        for name in ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"):
+            checks.real(name, getattr(self, name), 0, 1)
+        for name in ("learning_rate", "beta", "checkpoint_interval"):
+            checks.real(name, getattr(self, name), 0)
+        if self.picks % self.num_envs:
+            raise ValueError(
+                f"picks is {self.picks}; expected a multiple of num_envs={self.num_envs}"
+            )
+        if self.replay_size < self.num_envs:
+            raise ValueError(
+                f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
+            )
+
+    def epsilon(self, picks: int) -> float:
+        """Exploration rate after ``picks`` picks: linear from init to final, then constant."""
+        span = self.epsilon_fraction * self.picks
+        progress = min(1.0, picks / span) if span else 1.0
+        return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
+
+
+class TrainResult(NamedTuple):
+    """What a training run leaves.
+
+    Attributes:
+        policy: the trained network, as a greedy policy.
+        curve: one row per ``log_interval`` steps, means over it: ``picks`` so far,
+            ``mean_reward``, ``success_rate`` (MSR of the exploring agent), ``loss`` (NaN
+            before the first update), ``epsilon``, and ``wall_time`` in s since the epoch.
+    """
+
+    policy: Greedy
+    curve: pd.DataFrame
+
+
+CURVE_COLUMNS = ("picks", "mean_reward", "success_rate", "loss", "epsilon", "wall_time")
+
+
+def train(config: TrainConfig, run_dir: str | Path, progress: bool = True) -> TrainResult:
+    """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
+
+    A run that was interrupted and resumed gives the same weights and curves, bit by bit,
+    as one that was not. Ctrl-C writes a checkpoint first.
+
+    Args:
+        config: what to train.
+        run_dir: folder for ``checkpoint.npz``, and at the end ``config.json``,
+            ``curve.csv`` and ``policy.safetensors``.
+        progress: show picks/s, MSR, loss and the time left.
+
+    Raises:
+        TypeError: ``config`` is not a ``TrainConfig``.
+        ValueError: ``run_dir`` holds a run of another configuration.
+    """
+    if not isinstance(config, TrainConfig):
+        raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
+    run = _Run(config, Path(run_dir))
+    try:
+        run.go(progress)
+    finally:
+        run.envs.close()
+    policy = Greedy(run.agent.network, config.equalize, config.ties)
+    curve = pd.DataFrame(run.curve, columns=CURVE_COLUMNS)
+    save_policy(policy, run.folder / "policy.safetensors")
+    files.write_text(run.folder / "curve.csv", curve.to_csv(index=False))
+    files.write_json(run.folder / "config.json", asdict(config))
+    return TrainResult(policy, curve)
+
+
+class _Run:
+    """A training run in progress: everything a checkpoint must hold."""
+
+    def __init__(self, config: TrainConfig, folder: Path) -> None:
+        self.config, self.folder = config, folder
+        self.checkpoint = folder / "checkpoint.npz"
+        env_seed, rng_seed, torch_seed = np.random.SeedSequence(config.seed).generate_state(3)
+        self.rng = np.random.default_rng(rng_seed)
+        weights = torch.Generator().manual_seed(int(torch_seed))
+        self.agent = DQN(
+            PEQNetwork(config.n_features, weights),
+            config.learning_rate,
+            config.gamma,
+            config.beta,
+        )
+        size = min(config.replay_size, config.picks)
+        self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
+        env_kwargs = config.env_kwargs if config.env == ENVS[0] else {}
+        self.envs = gymnasium.make_vec(
+            config.env,
+            config.num_envs,
+            vectorization_mode="sync",
+            vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP},
+            equalize=config.equalize,
+            ties=config.ties,
+            **env_kwargs,
+        )
+        self.picks = 0
+        self.curve: list[tuple[float, ...]] = []
+        self.rewards: list[float] = []  # since the last point of the curve
+        self.losses: list[float] = []
+        stored = self._read_checkpoint()
+        self.observations, infos = self.envs.reset(seed=int(env_seed))
+        self.masks = self._usable(infos["action_mask"])
+        if stored is not None:
+            self._restore(stored)
+
+    def go(self, progress: bool) -> None:
+        saved = time.monotonic()
+        with tqdm(
+            total=self.config.picks,
+            initial=self.picks,
+            unit="pick",
+            unit_scale=True,
+            mininterval=1.0,
+            disable=not progress,
+            ncols=100,
+        ) as bar:
+            try:
+                while self.picks < self.config.picks:
+                    self._step()
+                    bar.update(self.config.num_envs)
+                    if not self.rewards:
+                        _, _, msr, loss, *_ = self.curve[-1]
+                        bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
+                    if time.monotonic() - saved > self.config.checkpoint_interval:
+                        self._save()
+                        saved = time.monotonic()
+            except KeyboardInterrupt:
+                self._save()
+                raise KeyboardInterrupt(
+                    f"stopped after {self.picks} picks; call train again with "
+                    f"run_dir={str(self.folder)!r} to go on"
+                ) from None
+        self._save()
+
+    def _step(self) -> None:
+        """One pick in every environment, and the updates that follow it."""
+        config = self.config
+        epsilon = config.epsilon(self.picks)
+        actions = self.agent.act(self.observations, self.masks, epsilon, self.rng)
+        following, rewards, terminations, truncations, infos = self.envs.step(actions)
+        following_masks = self._usable(infos["action_mask"])
+        batch = {"observations": self.observations, "actions": actions, "rewards": rewards}
+        if config.gamma > 0:
+            batch |= self._next_state(following, following_masks, terminations, infos)
+        self.replay.add(**batch)
+        self.observations, self.masks = following, following_masks
+        before, self.picks = self.picks, self.picks + config.num_envs
+        self.rewards.append(float(np.mean(rewards)))
+        if len(self.replay) >= min(config.batch_size, self.replay.size):
+            for _ in range(config.gradient_steps):
+                batch = self.replay.sample(config.batch_size, self.rng)
+                self.losses.append(self.agent.update(batch))
+        interval = config.target_update_interval
+        if config.gamma > 0 and before // interval != self.picks // interval:
+            self.agent.update_target()
+        if len(self.rewards) == config.log_interval or self.picks == config.picks:
+            mean_reward = float(np.mean(self.rewards))
+            loss = float(np.mean(self.losses)) if self.losses else float("nan")
+            self.curve.append(
+                (self.picks, mean_reward, (mean_reward + 1) / 2, loss, epsilon, time.time())
+            )
+            self.rewards, self.losses = [], []
+
+    def _usable(self, masks: np.ndarray) -> np.ndarray:
+        return masks.astype(bool) if self.config.mask else np.ones(masks.shape, dtype=bool)
+
+    def _next_state(self, observations, masks, terminations, infos) -> dict[str, np.ndarray]:
+        """What followed each pick; at an episode's end the last sight of it, not the reset's."""
+        observations, masks = observations.copy(), masks.copy()
+        for env in np.flatnonzero(infos.get("_final_obs", [])):
+            observations[env] = infos["final_obs"][env]
+            masks[env] = self._usable(infos["final_info"]["action_mask"][env])
+        return {
+            "next_observations": observations,
+            "next_masks": masks,
+            "terminations": terminations,
+        }
+
+    def _save(self) -> None:
+        arrays = {f"agent.{name}": array for name, array in self.agent.state().items()}
+        filled = len(self.replay)
+        arrays |= {f"replay.{name}": a[:filled] for name, a in self.replay.arrays.items()}
+        for number, env in enumerate(self.envs.envs):
+            for name, array in env.unwrapped.get_state().items():
+                arrays[f"env.{number}.{name}"] = array
+        arrays |= {
+            "observations": self.observations,
+            "masks": self.masks,
+            "curve": np.array(self.curve, dtype=np.float64).reshape(-1, len(CURVE_COLUMNS)),
+            "rewards": np.array(self.rewards),
+            "losses": np.array(self.losses),
+            "total": np.array(self.replay.total),
+            "picks": np.array(self.picks),
+            "rng": np.array(json.dumps(self.rng.bit_generator.state)),
+            "config": np.array(json.dumps(asdict(self.config))),
+        }
+        files.write_arrays(self.checkpoint, arrays)
+
+    def _read_checkpoint(self) -> dict[str, np.ndarray] | None:
+        if not self.checkpoint.exists():
+            return None
+        stored = files.read_arrays(self.checkpoint)
+        there, here = json.loads(str(stored["config"])), asdict(self.config)
+        differing = [name for name in here if there.get(name) != here[name]]
+        if differing:
+            details = ", ".join(f"{n} ({there.get(n)!r}, not {here[n]!r})" for n in differing)
+            raise ValueError(
+                f"run_dir {str(self.folder)!r} holds a run of another configuration: {details}; "
+                "expected the same one or an empty folder"
+            )
+        return stored
+
+    def _restore(self, stored: dict[str, np.ndarray]) -> None:
+        def under(prefix: str) -> dict[str, np.ndarray]:
+            return {k.removeprefix(prefix): v for k, v in stored.items() if k.startswith(prefix)}
+
+        self.agent.load_state(under("agent."))
+        for name, array in under("replay.").items():
+            self.replay.arrays[name][: len(array)] = array
+        self.replay.total = int(stored["total"])
+        for number, env in enumerate(self.envs.envs):
+            env.unwrapped.set_state(under(f"env.{number}."))
+        self.observations, self.masks = stored["observations"], stored["masks"]
+        self.curve = [tuple(row) for row in stored["curve"].tolist()]
+        self.rewards, self.losses = stored["rewards"].tolist(), stored["losses"].tolist()
+        self.picks = int(stored["picks"])
+        self.rng.bit_generator.state = json.loads(str(stored["rng"]))
