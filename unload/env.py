@@ -216,12 +216,16 @@ class ContainerEnv(PickingEnv):
         self._picks = self._unloaded = 0
         self._state = "running"
 
+    def observed_positions(self) -> np.ndarray:
+        """(n, 3) float64, where all items of the load are seen to be, in m."""
+        self._check_started()
+        positions = self.physics.positions()
+        return positions + self._blur if self.physics.exact else positions
+
     def _look(self) -> None:
         """Update which items are visible, and the observation of them."""
         present = np.flatnonzero(self.physics.present)
-        positions = self.physics.positions()[present]
-        if self.physics.exact:
-            positions = positions + self._blur[present]
+        positions = self.observed_positions()[present]
         rows = observation.nearest(positions)
         self.visible = present[rows]
         # A box that was knocked out of the container is seen at its edge.

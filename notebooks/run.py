@@ -1,0 +1,97 @@
+"""Run the notebooks through papermill.
+
+    python notebooks/run.py              reduced counts, results in build/notebooks
+    python notebooks/run.py --in-place   the notebooks' own counts, results kept in them
+    python notebooks/run.py 03 08        only those whose names start so
+
+The reduced counts stand in reduced.toml. A cell that fails ends the run with its error and
+a non-zero exit status.
+"""
+
+import argparse
+import logging
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import nbformat
+import papermill
+
+HERE = Path(__file__).resolve().parent
+BUILD = HERE.parent / "build" / "notebooks"
+
+
+def notebooks() -> list[Path]:
+    """All notebooks in reading order, each before its solutions."""
+    return sorted(HERE.glob("*.ipynb")) + sorted((HERE / "solutions").glob("*.ipynb"))
+
+
+def reduced_parameters(notebook: Path) -> dict:
+    """The values of reduced.toml for a notebook; none if it is not listed."""
+    return tomllib.loads((HERE / "reduced.toml").read_text()).get(notebook.stem, {})
+
+
+def run(notebook: Path, output: Path, parameters: dict) -> None:
+    """Execute a notebook with some of its parameters changed.
+
+    Raises:
+        ValueError: it has no parameter of a given name.
+        papermill.PapermillExecutionError: a cell failed.
+    """
+    known = papermill.inspect_notebook(str(notebook))
+    for name in parameters:
+        if name not in known:
+            raise ValueError(f"{notebook.name} has no parameter {name}; it has {sorted(known)}")
+    output.parent.mkdir(parents=True, exist_ok=True)
+    papermill.execute_notebook(
+        str(notebook),
+        str(output),
+        parameters=parameters,
+        cwd=str(notebook.parent),
+        kernel_name="python3",
+        progress_bar=False,
+    )
+    tidy(output)
+
+
+def tidy(notebook: Path) -> None:
+    """Drop what says where and when a notebook ran, so that the same run gives the same file."""
+    content = nbformat.read(notebook, as_version=4)
+    for holder in (content, *content.cells):
+        holder.metadata.pop("papermill", None)
+        holder.metadata.pop("execution", None)
+    nbformat.write(content, notebook)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("names", nargs="*", help="beginnings of notebook names; all if none")
+    parser.add_argument("--in-place", action="store_true", help="keep the results in the notebooks")
+    options = parser.parse_args()
+    logging.getLogger("papermill").setLevel(logging.ERROR)
+    chosen = [
+        path
+        for path in notebooks()
+        if not options.names or any(path.name.startswith(name) for name in options.names)
+    ]
+    if not chosen:
+        parser.error(f"no notebook starts with {options.names}")
+    for number, path in enumerate(chosen, start=1):
+        label = path.relative_to(HERE)
+        print(f"[{number}/{len(chosen)}] {label} …", end=" ", flush=True)
+        start = time.monotonic()
+        parameters = {} if options.in_place else reduced_parameters(path)
+        output = path if options.in_place else BUILD / label
+        try:
+            run(path, output, parameters)
+        except papermill.PapermillExecutionError as error:
+            print("failed")
+            print(error, file=sys.stderr)
+            return 1
+        print(f"{time.monotonic() - start:.0f} s", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
