@@ -1,8 +1,8 @@
 """Run the notebooks through papermill.
 
-    python notebooks/run.py              reduced counts, results in build/notebooks
-    python notebooks/run.py --in-place   the notebooks' own counts, results kept in them
-    python notebooks/run.py 03 08        only those whose names start so
+    python notebooks/run.py                    reduced counts, results in build/notebooks
+    python notebooks/run.py --in-place         their own counts, results kept in them
+    python notebooks/run.py 03 solutions/08    only those whose names start so
 
 The reduced counts stand in reduced.toml. A cell that fails ends the run with its error and
 a non-zero exit status.
@@ -27,9 +27,14 @@ def notebooks() -> list[Path]:
     return sorted(HERE.glob("*.ipynb")) + sorted((HERE / "solutions").glob("*.ipynb"))
 
 
+def key(notebook: Path) -> str:
+    """A notebook's name in reduced.toml, such as ``03_lifting`` or ``solutions/03_lifting``."""
+    return notebook.relative_to(HERE).with_suffix("").as_posix()
+
+
 def reduced_parameters(notebook: Path) -> dict:
     """The values of reduced.toml for a notebook; none if it is not listed."""
-    return tomllib.loads((HERE / "reduced.toml").read_text()).get(notebook.stem, {})
+    return tomllib.loads((HERE / "reduced.toml").read_text()).get(key(notebook), {})
 
 
 def run(notebook: Path, output: Path, parameters: dict) -> None:
@@ -51,6 +56,8 @@ def run(notebook: Path, output: Path, parameters: dict) -> None:
         cwd=str(notebook.parent),
         kernel_name="python3",
         progress_bar=False,
+        extra_arguments=["--log-level=CRITICAL"],  # of the kernel; it warns of local TCP
+        coalesce_streams=True,  # a progress bar leaves its last line only
     )
     tidy(output)
 
@@ -73,7 +80,7 @@ def main() -> int:
     chosen = [
         path
         for path in notebooks()
-        if not options.names or any(path.name.startswith(name) for name in options.names)
+        if not options.names or any(key(path).startswith(name) for name in options.names)
     ]
     if not chosen:
         parser.error(f"no notebook starts with {options.names}")

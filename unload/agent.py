@@ -1,15 +1,14 @@
 """The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
 
-import os
 from pathlib import Path
 
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch.nn.functional import smooth_l1_loss
 
-from unload import checks
+from unload import checks, files, fused
 from unload.equalization import TIES, equalize
 from unload.network import PEQNetwork
 from unload.policies import check_batch, random
@@ -30,6 +29,10 @@ class DQN:
         gamma: discount factor; 0 in the paper (Sec. III-E), where the target is the
             reward alone and the target network is not asked.
         beta: threshold of the smooth-L1 loss (Sec. III-G); 1 in the paper.
+        fused_update: update by ``unload.fused`` instead of PyTorch; wherever it applies if None.
+
+    Raises:
+        ValueError: ``fused_update`` is asked for and does not apply.
     """
 
     def __init__(
@@ -38,8 +41,14 @@ class DQN:
         learning_rate: float = 1e-3,
         gamma: float = 0.0,
         beta: float = 1.0,
+        fused_update: bool | None = None,
     ) -> None:
         self.network = network
+        self.fused_update = fused.applies(network) if fused_update is None else fused_update
+        if self.fused_update and not fused.applies(network):
+            raise ValueError(
+                "fused_update is True; expected a PEQNetwork in float32 on the CPU with it"
+            )
         self.gamma = checks.real("gamma", gamma, 0, 1)
         self.beta = checks.real("beta", beta, 0)
         self.optimizer = torch.optim.Adam(
@@ -84,33 +93,47 @@ class DQN:
         Raises:
             FloatingPointError: the loss is not finite; the weights are left as they were.
         """
-        batch = {name: torch.from_numpy(array) for name, array in batch.items()}
+        if self.fused_update:
+            loss = fused.loss_and_gradients(
+                self.network,
+                batch["observations"],
+                batch["actions"],
+                self._targets(batch).numpy(),
+                self.beta,
+            )
+        else:
+            loss = self._loss_and_gradients(batch)
+        self.optimizer.step()
+        return loss
+
+    def _loss_and_gradients(self, batch: dict[str, np.ndarray]) -> float:
+        """The smooth-L1 loss, its gradients left in ``.grad``: plain PyTorch."""
         targets = self._targets(batch)
-        size = len(targets)
-        self.optimizer.zero_grad(set_to_none=True)
+        observations = torch.from_numpy(batch["observations"])
+        actions = torch.from_numpy(batch["actions"])
+        self.optimizer.zero_grad()
         total = 0.0
-        for start in range(0, size, CHUNK):
+        for start in range(0, len(targets), CHUNK):
             rows = slice(start, start + CHUNK)
-            values = self.network(batch["observations"][rows])
-            chosen = values.gather(1, batch["actions"][rows, None]).squeeze(1)
-            loss = smooth_l1_loss(chosen, targets[rows], reduction="sum", beta=self.beta) / size
-            loss.backward()
-            total += loss.item()
+            values = self.network(observations[rows])
+            chosen = values.gather(1, actions[rows, None]).squeeze(1)
+            loss = smooth_l1_loss(chosen, targets[rows], reduction="sum", beta=self.beta)
+            (loss / len(targets)).backward()
+            total += loss.item() / len(targets)
         if not np.isfinite(total):
             raise FloatingPointError(f"the loss is {total}; expected a finite number")
-        self.optimizer.step()
         return total
 
     @torch.no_grad()
-    def _targets(self, batch: dict[str, torch.Tensor]) -> torch.Tensor:
-        """r + γ max over the allowed actions of the target network, (batch,)."""
+    def _targets(self, batch: dict[str, np.ndarray]) -> torch.Tensor:
+        """r + γ max over the allowed actions of the target network, (batch,) float32."""
+        rewards = torch.from_numpy(batch["rewards"])
         if self.gamma == 0:
-            return batch["rewards"]
-        values = torch.func.functional_call(
-            self.network, self.target, (batch["next_observations"],)
-        )
-        best = values.masked_fill(~batch["next_masks"], -torch.inf).amax(dim=1)
-        return batch["rewards"] + self.gamma * torch.where(batch["terminations"], 0.0, best)
+            return rewards
+        following = torch.from_numpy(batch["next_observations"])
+        values = torch.func.functional_call(self.network, self.target, (following,))
+        best = values.masked_fill(torch.from_numpy(~batch["next_masks"]), -torch.inf).amax(dim=1)
+        return rewards + self.gamma * best.masked_fill(torch.from_numpy(batch["terminations"]), 0)
 
     def update_target(self) -> None:
         """Copy the network's weights to the target network."""
@@ -146,6 +169,8 @@ def greedy_actions(
 ) -> np.ndarray:
     """The allowed action of the highest value, (batch,) int64."""
     observations, allowed = check_batch(observations, masks)
+    if fused.applies(network):
+        return fused.greedy_actions(network, observations, allowed)
     values = network(torch.as_tensor(observations, dtype=torch.float32))
     return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
 
@@ -177,17 +202,14 @@ class Greedy:
 
 def save_policy(policy: Greedy, path: str | Path) -> None:
     """Write a policy's weights and how to use them, as safetensors, in one atomic step."""
-    path = Path(path)
     settings = {
         "network": type(policy.network).__name__,
         "n_features": str(policy.network.n_features),
         "equalize": str(policy.equalize),
         "ties": policy.ties,
     }
-    partial = path.with_name(path.name + ".partial")
-    tensors = {name: value.contiguous() for name, value in policy.network.state_dict().items()}
-    save_file(tensors, partial, metadata=settings)
-    os.replace(partial, path)
+    content = save(policy.network.state_dict(), metadata=settings)
+    files.write_atomically(path, lambda file: file.write(content))
 
 
 def load_policy(path: str | Path) -> Greedy:

@@ -7,6 +7,7 @@ observations or rewards.
 import os
 from collections.abc import Sequence
 from contextlib import contextmanager
+from importlib.metadata import version
 
 import numpy as np
 
@@ -37,6 +38,18 @@ DAMPING = 0.04
 # Boxes are made this much narrower (x and y), so that neighbours do not rub: side by
 # side without a gap, 3–9 % of the free boxes of a fresh world jam.
 GAP = 0.001  # m
+# All that a lift's outcome depends on besides the boxes.
+SETTINGS = {
+    "pybullet": version("pybullet"),
+    "time_step": TIME_STEP,
+    "friction": FRICTION,
+    "damping": DAMPING,
+    "gap": GAP,
+    "mass": task.MASS,
+    "gravity": task.GRAVITY,
+    "force": task.PICK_FORCE,
+    "lift_time": task.LIFT_TIME,
+}
 
 
 class World:
@@ -102,13 +115,10 @@ class World:
 
     def place(self, body: int, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
         """Put a body at rest at ``position`` (m) with ``orientation`` (quaternion x, y, z, w)."""
+        # This call also sets the velocities to zero.
         pybullet.resetBasePositionAndOrientation(
             body, position, orientation, physicsClientId=self._client
         )
-        pybullet.resetBaseVelocity(body, (0, 0, 0), (0, 0, 0), physicsClientId=self._client)
-
-    def set_mass(self, body: int, mass: float) -> None:
-        pybullet.changeDynamics(body, -1, mass=mass, physicsClientId=self._client)
 
     def pose(self, body: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Position (m) and orientation (quaternion x, y, z, w) of a body."""
@@ -136,9 +146,7 @@ class World:
 
     def paint(self, body: int, colour: tuple[float, float, float]) -> None:
         """Give a body a colour, RGB in [0, 1]."""
-        pybullet.changeVisualShape(
-            body, -1, rgbaColor=(*colour, 1), physicsClientId=self._client
-        )
+        pybullet.changeVisualShape(body, -1, rgbaColor=(*colour, 1), physicsClientId=self._client)
 
     def picture(self, eye, target, width: int, height: int) -> np.ndarray:
         """(height, width, 3) uint8, the world seen from ``eye`` towards ``target`` (m)."""

@@ -11,6 +11,7 @@ from unload.picking import POSITION_NOISE, PickingEnv
 from unload.render import Camera
 from unload.substacks import Load, stack_load
 
+
 class ContainerEnv(PickingEnv):
     """Unload a container by choosing, at each step, the item to pick.
 

@@ -8,6 +8,7 @@ from unload import observation, task
 from unload.picking import POSITION_NOISE, PickingEnv
 from unload.substacks import COLUMNS, ROWS, WALLS, build_load
 
+TOLERANCE = 1e-6  # m, places this close are at the same height
 # Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
 GRID = np.concatenate(
     [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
@@ -19,8 +20,8 @@ class HighestItemEnv(PickingEnv):
 
     ## Description
     At each step 128 items are put at random places that a load's items can take, blurred
-    as in ``unload/Container-v0``, so that one of them is the highest. There is no physics:
-    the environment finds hyperparameters quickly, for one picking rule that is optimal.
+    as in ``unload/Container-v0``. There is no physics: the environment finds
+    hyperparameters quickly, for one picking rule that is optimal in the container, too.
 
     ## Action space
     ``Discrete(128)``: the row of the observation to pick.
@@ -30,7 +31,9 @@ class HighestItemEnv(PickingEnv):
     first, scaled to the container; with ``equalize=True`` their equalized ranks instead.
 
     ## Rewards
-    +1 if the chosen item has the highest z, -1 if not.
+    +1 if no item's place is higher than that of the chosen one, -1 else. On the grid
+    several items, 12 on average, share the greatest height, and each of them counts: the
+    blur is not a matter of the task.
 
     ## Starting state
     Random items. Every step shows new ones, whatever was chosen before.
@@ -45,8 +48,7 @@ class HighestItemEnv(PickingEnv):
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: length of an episode.
-        position_noise: standard deviation of the blur in m. With 0, several items may be
-            highest, and the first of them counts.
+        position_noise: standard deviation of the blur in m.
         render_mode: None; there is nothing to draw.
 
     Raises:
@@ -79,7 +81,7 @@ class HighestItemEnv(PickingEnv):
     def step(self, action: int):
         """Choose row ``action`` of the observation."""
         self._check_running()
-        reward = 1.0 if self._row(action) == self._highest else -1.0
+        reward = 1.0 if self._highest[self._row(action)] else -1.0
         self._picks += 1
         truncated = self._picks == self.max_picks
         if truncated:
@@ -94,23 +96,25 @@ class HighestItemEnv(PickingEnv):
         """All that ``set_state`` needs to go on from here, as plain arrays."""
         self._check_started()
         return {
-            "counts": np.array([self._picks, self._highest]),
+            "picks": np.array(self._picks),
+            "highest": self._highest.copy(),
             "rng": np.array(json.dumps(self.np_random.bit_generator.state)),
         }
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
         """Go on from what ``get_state`` returned, here or in another environment."""
         self._check_open()
-        self._picks, self._highest = state["counts"].tolist()
+        self._picks, self._highest = int(state["picks"]), state["highest"].copy()
         self.np_random.bit_generator.state = json.loads(str(state["rng"]))
         self._state = "finished" if self._picks == self.max_picks else "running"
 
     def _draw(self) -> np.ndarray:
-        positions = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
-        positions = positions + self._drift(task.N_VISIBLE)
-        scaled = observation.scale(positions[observation.nearest(positions)])
-        self._highest = int(np.argmax(scaled[:, 2]))
-        return self._features(scaled)
+        places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
+        positions = places + self._drift(task.N_VISIBLE)
+        rows = observation.nearest(positions)
+        heights = places[rows, 2]
+        self._highest = heights > heights.max() - TOLERANCE
+        return self._features(observation.scale(positions[rows]))
 
     def _info(self) -> dict:
         return {"action_mask": np.ones(task.N_VISIBLE, dtype=np.int8)}

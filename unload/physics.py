@@ -10,16 +10,21 @@ unloaded if that is at least ``task.LIFT_THRESHOLD``.
 """
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from functools import cache
 
 import numpy as np
 
-from unload import checks, task
-from unload.bullet import GAP, World
+from unload import checks, files, task
+from unload.bullet import TIME_STEP, World
+from unload.lift import lift, slim
+from unload.lift_table import LiftTable
 from unload.situation import RESOLUTION, Situation, Surroundings
 from unload.substacks import Load
 
 AFTER_PICK = ("restore", "restore_failure", "keep")
+LIFTS = files.DATA / "lifts.npz"
+DEPOT = -100.0  # m, height of the floor far below on which spare boxes wait
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # quaternion x, y, z, w
 
 
@@ -104,44 +109,29 @@ class LocalPhysics(Physics):
 
     def simulate(self, situation: Situation) -> float:
         """Lift the chosen box of a situation; how far it moved, in m."""
-        boxes = situation.boxes * RESOLUTION
-        world = self._world
-        bodies = [
-            world.add_box(box[:3], _slim(box[3:]), task.MASS if row < situation.dynamic else 0.0)
-            for row, box in enumerate(boxes)
-        ]
-        if situation.floor is not None:
-            bodies.append(world.add_box((0, 0, situation.floor * RESOLUTION - 0.5), (9, 9, 1), 0))
-        for side in situation.sides:
-            outwards = np.sign(side) * 0.5
-            bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-        distance = world.pull(bodies[0])
-        for body in reversed(bodies):
-            world.remove(body)
-        return distance
+        return lift(self._world, situation)
 
     def close(self) -> None:
         self._world.close()
 
 
-class TablePhysics(LocalPhysics):
+class TablePhysics(Physics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
     Args:
-        table: distances in m by ``Situation.key``; filled as situations are met. Share
-            one table among environments to share their experience.
+        table: filled as situations are met. Share one among environments to share their
+            experience; a new one if None.
     """
 
-    def __init__(self, table: dict[bytes, float] | None = None) -> None:
+    def __init__(self, table: LiftTable | None = None) -> None:
         super().__init__()
-        self.table = {} if table is None else table
+        self.table = LiftTable() if table is None else table
+
+    def _reset(self) -> None:
+        self.surroundings = Surroundings(self.load, self.present)
 
     def _lift(self, item: int) -> float:
-        situation = self.surroundings.situation(item)
-        distance = self.table.get(situation.key)
-        if distance is None:
-            distance = self.table[situation.key] = self.simulate(situation)
-        return distance
+        return self.table.lift(self.surroundings.situation(item))
 
 
 class FullPhysics(Physics):
@@ -160,45 +150,50 @@ class FullPhysics(Physics):
         super().__init__()
         self.after_pick = after_pick
         self.exact = after_pick == "restore"
-        self._world = World()
-        self._pool: dict[tuple[int, ...], list[int]] = {}
-        self._bodies: list[int | None] = []
-        self._sizes: list[tuple[int, ...]] = []
+        # Moving a multibody is cheap; plain rigid bodies would be faster to lift, but each
+        # move rebuilds a part of Bullet's search tree: slower than creating them anew.
+        self._world = World(maximal_coordinates=False)
+        self._bodies_of_size: dict[tuple[int, ...], list[int]] = {}  # by edges in micrometres
+        self._bodies: list[int] = []  # of the load's items
         length, width, height = task.CONTAINER
         for position, size in (
             ((length / 2, width / 2, -0.5), (length + 2, width + 2, 1)),  # floor
             ((length / 2, -0.5, height / 2), (length + 2, 1, height)),  # side walls
             ((length / 2, width + 0.5, height / 2), (length + 2, 1, height)),
             ((-0.5, width / 2, height / 2), (1, width + 2, height)),  # rear wall
+            ((0, 0, DEPOT - 0.5), (2000, 2000, 1)),
         ):
             self._world.add_box(position, size, 0)
 
     def _reset(self) -> None:
-        for body, size in zip(self._bodies, self._sizes):
-            self._park(body, size)
-        micrometres = np.rint(self.load.sizes / RESOLUTION).astype(int)
-        self._sizes = [tuple(size) for size in micrometres.tolist()]
+        # A time step with an empty container makes Bullet forget the contacts of the old
+        # load. Without it boxes are flung by up to a metre.
+        for body in self._bodies:
+            self._park(body)
+        self._world.step(TIME_STEP)
+        sizes = np.rint(self.load.sizes / RESOLUTION).astype(int).tolist()
         self._poses = [(tuple(position), UPRIGHT) for position in self.load.positions.tolist()]
-        self._bodies = [
-            self._take(position, size) for (position, _), size in zip(self._poses, self._sizes)
-        ]
+        self._bodies = []
+        used: Counter[tuple[int, ...]] = Counter()
+        for (position, _), edges in zip(self._poses, sizes):
+            size = tuple(edges)
+            self._bodies.append(self._take(size, used[size], position))
+            used[size] += 1
 
-    def _take(self, position: tuple[float, ...], size: tuple[int, ...]) -> int:
-        """A body of the given size (micrometres) from the pool, or a new one."""
-        pool = self._pool.setdefault(size, [])
-        if not pool:
-            return self._world.add_box(position, _slim(np.array(size) * RESOLUTION), task.MASS)
-        body = pool.pop()
-        self._world.set_mass(body, task.MASS)
-        self._world.place(body, position)
-        return body
+    def _take(self, size: tuple[int, ...], number: int, position: tuple[float, ...]) -> int:
+        """Put the body of this size and number in its place; create it if there is none."""
+        bodies = self._bodies_of_size.setdefault(size, [])
+        if number == len(bodies):
+            edges = slim(np.array(size) * RESOLUTION)
+            bodies.append(self._world.add_box(position, edges, task.MASS))
+            return bodies[number]
+        self._world.place(bodies[number], position)
+        return bodies[number]
 
-    def _park(self, body: int | None, size: tuple[int, ...]) -> None:
-        """Put a body back into the pool: immovable, and far from all others."""
-        if body is not None:
-            self._world.set_mass(body, 0)
-            self._world.place(body, (10.0 * body, 0.0, -100.0))
-            self._pool[size].append(body)
+    def _park(self, body: int) -> None:
+        """Keep a body for a later load, on a place of its own in the depot."""
+        row, column = divmod(body, 100)
+        self._world.place(body, (8.0 * row, 3.0 * column, DEPOT + task.CONTAINER[2] / 2))
 
     def settle(self, seconds: float) -> None:
         """Let time pass without a pick, and take the poses reached for the load's own."""
@@ -221,19 +216,13 @@ class FullPhysics(Physics):
             self._poses[index] = self._world.pose(self._bodies[index])
 
     def _remove(self, item: int) -> None:
-        self._park(self._bodies[item], self._sizes[item])
-        self._bodies[item] = None
+        self._park(self._bodies[item])
 
     def positions(self) -> np.ndarray:
         return np.array([position for position, _ in self._poses])
 
     def close(self) -> None:
         self._world.close()
-
-
-def _slim(size: np.ndarray) -> np.ndarray:
-    """A box's edges with half the gap taken off each of its sides in x and y."""
-    return size - np.array([GAP, GAP, 0.0])
 
 
 def make_physics(name: str, after_pick: str = "restore") -> Physics:
@@ -257,6 +246,6 @@ def make_physics(name: str, after_pick: str = "restore") -> Physics:
 
 
 @cache
-def shared_table() -> dict[bytes, float]:
-    """The lifts known to this process, shared by all its environments."""
-    return {}
+def shared_table() -> LiftTable:
+    """The lifts known to this process: those of ``data/lifts.npz``, and all made since."""
+    return LiftTable.load(LIFTS) if LIFTS.exists() else LiftTable()

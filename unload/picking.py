@@ -55,6 +55,8 @@ class PickingEnv(gymnasium.Env):
         return drift
 
     def _row(self, action: int) -> int:
+        if isinstance(action, np.ndarray) and action.ndim == 0:
+            action = action.item()  # what Stable-Baselines3's predict returns
         return checks.integer("action", action, 0, task.N_VISIBLE - 1)
 
     def _check_open(self) -> None:

@@ -20,9 +20,7 @@ def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray
     """
     observations, masks = np.asarray(observations), np.asarray(masks)
     if observations.ndim != 3 or observations.shape[-1] != 3:
-        raise ValueError(
-            f"observations has shape {observations.shape}; expected (batch, items, 3)"
-        )
+        raise ValueError(f"observations has shape {observations.shape}; expected (batch, items, 3)")
     if masks.shape != observations.shape[:2]:
         raise ValueError(f"masks has shape {masks.shape}; expected {observations.shape[:2]}")
     allowed = masks.astype(bool)
@@ -32,26 +30,20 @@ def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray
     return observations, allowed
 
 
-def random(
-    observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
-) -> np.ndarray:
+def random(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Any allowed item, each with the same probability."""
     _, allowed = check_batch(observations, masks)
     draws = checks.generator("rng", rng).random(allowed.shape)
     return np.where(allowed, draws, -1.0).argmax(axis=1)
 
 
-def nearest(
-    observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
-) -> np.ndarray:
+def nearest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The allowed item nearest to the entrance, by the distance of Sec. III-B."""
     _, allowed = check_batch(observations, masks)
     return allowed.argmax(axis=1)
 
 
-def highest(
-    observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
-) -> np.ndarray:
+def highest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The allowed item whose centre is highest; in a neat load nothing lies on it."""
     observations, allowed = check_batch(observations, masks)
     return np.where(allowed, observations[..., 2], -np.inf).argmax(axis=1)

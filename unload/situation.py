@@ -61,8 +61,7 @@ class Surroundings:
         self.load = load
         self.present = present
         self._above, self._below, self._beside = _contacts(load)
-        geometry = np.hstack([load.positions, load.sizes])
-        self._geometry = np.rint(geometry / RESOLUTION).astype(np.int32)
+        self._geometry = np.hstack([load.positions, load.sizes])
         self._low = load.positions - load.sizes / 2
         self._high = load.positions + load.sizes / 2
 
@@ -88,16 +87,19 @@ class Surroundings:
         members = [*dynamic, *sorted(static.difference(dynamic))]
         boxes = self._geometry[members]
         centre = boxes[0, :3].copy()
-        boxes[:, :3] -= centre
-        floor = -int(centre[2]) if self._low[item, 2] <= TOLERANCE else None
-        width = task.CONTAINER[1]
-        walls = []
+        boxes[:, :3] -= centre  # before rounding: equal situations are equal wherever they are
+        floor = -centre[2] if self._low[item, 2] <= TOLERANCE else None
+        sides = []
         if self._low[dynamic, 1].min() <= TOLERANCE:
-            walls.append(0.0)
-        if self._high[dynamic, 1].max() >= width - TOLERANCE:
-            walls.append(width)
-        sides = tuple(round(wall / RESOLUTION) - int(centre[1]) for wall in walls)
-        return Situation(boxes, len(dynamic), floor, sides)
+            sides.append(-centre[1])
+        if self._high[dynamic, 1].max() >= task.CONTAINER[1] - TOLERANCE:
+            sides.append(task.CONTAINER[1] - centre[1])
+        return Situation(
+            boxes=np.rint(boxes / RESOLUTION).astype(np.int32),
+            dynamic=len(dynamic),
+            floor=None if floor is None else round(floor / RESOLUTION),
+            sides=tuple(round(side / RESOLUTION) for side in sides),
+        )
 
 
 def _contacts(load: Load) -> tuple[list[list[int]], list[list[int]], list[list[int]]]:

@@ -6,7 +6,7 @@ substacks interlock like the steps of a stair: the columns start at 0, 6, 16 and
 cells and together fill 36 cells of width, which we take to be the container's 2.5 m.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,7 +50,7 @@ RIGHT = (
 COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Load:
     """The boxes of one container, before anything is unloaded.
 
@@ -68,8 +68,8 @@ class Load:
 
     positions: np.ndarray
     sizes: np.ndarray
-    packages: np.ndarray = field(repr=False)
-    walls: np.ndarray = field(repr=False)
+    packages: np.ndarray
+    walls: np.ndarray
 
     def __post_init__(self) -> None:
         positions = checks.finite_array("positions", self.positions, (None, 3))
@@ -98,6 +98,9 @@ class Load:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    def __repr__(self) -> str:
+        return f"Load({len(self)} items in {len(np.unique(self.walls))} walls)"
 
 
 def _check_inside(positions: np.ndarray, sizes: np.ndarray, tolerance: float = 1e-6) -> None:

@@ -1,7 +1,12 @@
 """The training loop: vector environment, replay, updates, curves, checkpoints (Sec. IV-B)."""
 
 import json
+import signal
+import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from unload import checks, files, task
-from unload.agent import DQN, Greedy, save_policy
+from unload.agent import DQN, Greedy, load_policy, save_policy
 from unload.equalization import TIES
 from unload.network import PEQNetwork
 from unload.replay import ReplayBuffer
@@ -101,31 +106,69 @@ def train(config: TrainConfig, run_dir: str | Path, progress: bool = True) -> Tr
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
     A run that was interrupted and resumed gives the same weights and curves, bit by bit,
-    as one that was not. Ctrl-C writes a checkpoint first.
+    as one that was not. Ctrl-C writes a checkpoint first. A finished run is not repeated.
 
     Args:
         config: what to train.
-        run_dir: folder for ``checkpoint.npz``, and at the end ``config.json``,
-            ``curve.csv`` and ``policy.safetensors``.
+        run_dir: folder of the run: ``checkpoint.npz`` while it lasts, and at its end
+            ``policy.safetensors``, ``curve.csv`` and ``config.json``.
         progress: show picks/s, MSR, loss and the time left.
 
     Raises:
         TypeError: ``config`` is not a ``TrainConfig``.
         ValueError: ``run_dir`` holds a run of another configuration.
+        KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
     """
     if not isinstance(config, TrainConfig):
         raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
-    run = _Run(config, Path(run_dir))
+    folder = Path(run_dir)
+    if not (folder / "config.json").exists():
+        _train(config, folder, progress)
+    _check_same(json.loads((folder / "config.json").read_text()), config, folder)
+    return TrainResult(
+        load_policy(folder / "policy.safetensors"), pd.read_csv(folder / "curve.csv")
+    )
+
+
+def _train(config: TrainConfig, folder: Path, progress: bool) -> None:
+    run = _Run(config, folder)
     try:
         run.go(progress)
     finally:
         run.envs.close()
-    policy = Greedy(run.agent.network, config.equalize, config.ties)
+    save_policy(
+        Greedy(run.agent.network, config.equalize, config.ties), folder / "policy.safetensors"
+    )
     curve = pd.DataFrame(run.curve, columns=CURVE_COLUMNS)
-    save_policy(policy, run.folder / "policy.safetensors")
-    files.write_text(run.folder / "curve.csv", curve.to_csv(index=False))
-    files.write_json(run.folder / "config.json", asdict(config))
-    return TrainResult(policy, curve)
+    files.write_text(folder / "curve.csv", curve.to_csv(index=False))
+    files.write_json(folder / "config.json", asdict(config))  # last: it marks the run as finished
+    run.checkpoint.unlink(missing_ok=True)
+
+
+def _check_same(stored: dict, config: TrainConfig, folder: Path) -> None:
+    """Raise unless a stored configuration is ``config``."""
+    wanted = json.loads(json.dumps(asdict(config)))
+    differing = [name for name in wanted if stored.get(name) != wanted[name]]
+    if differing:
+        details = ", ".join(f"{n} ({stored.get(n)!r}, not {wanted[n]!r})" for n in differing)
+        raise ValueError(
+            f"run_dir {str(folder)!r} holds a run of another configuration: {details}; "
+            "expected the same one or an empty folder"
+        )
+
+
+@contextmanager
+def _interrupt_later() -> Iterator[list[int]]:
+    """Collect Ctrl-C in a list instead of raising, so that no step is left half done."""
+    received: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield received  # only the main thread receives signals
+        return
+    previous = signal.signal(signal.SIGINT, lambda number, frame: received.append(number))
+    try:
+        yield received
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 class _Run:
@@ -166,8 +209,9 @@ class _Run:
             self._restore(stored)
 
     def go(self, progress: bool) -> None:
+        """Train to the end, with a checkpoint now and then and on Ctrl-C."""
         saved = time.monotonic()
-        with tqdm(
+        bar = tqdm(
             total=self.config.picks,
             initial=self.picks,
             unit="pick",
@@ -175,24 +219,23 @@ class _Run:
             mininterval=1.0,
             disable=not progress,
             ncols=100,
-        ) as bar:
-            try:
-                while self.picks < self.config.picks:
-                    self._step()
-                    bar.update(self.config.num_envs)
-                    if not self.rewards:
-                        _, _, msr, loss, *_ = self.curve[-1]
-                        bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
-                    if time.monotonic() - saved > self.config.checkpoint_interval:
-                        self._save()
-                        saved = time.monotonic()
-            except KeyboardInterrupt:
-                self._save()
-                raise KeyboardInterrupt(
-                    f"stopped after {self.picks} picks; call train again with "
-                    f"run_dir={str(self.folder)!r} to go on"
-                ) from None
-        self._save()
+            file=sys.stdout,
+        )
+        with bar, _interrupt_later() as interrupts:
+            while self.picks < self.config.picks:
+                self._step()
+                bar.update(self.config.num_envs)
+                if not self.rewards:
+                    _, _, msr, loss, *_ = self.curve[-1]
+                    bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
+                if interrupts or time.monotonic() - saved > self.config.checkpoint_interval:
+                    self._save()
+                    saved = time.monotonic()
+                if interrupts:
+                    raise KeyboardInterrupt(
+                        f"stopped after {self.picks} picks; call train again with "
+                        f"run_dir={str(self.folder)!r} to go on"
+                    )
 
     def _step(self) -> None:
         """One pick in every environment, and the updates that follow it."""
@@ -262,14 +305,7 @@ class _Run:
         if not self.checkpoint.exists():
             return None
         stored = files.read_arrays(self.checkpoint)
-        there, here = json.loads(str(stored["config"])), asdict(self.config)
-        differing = [name for name in here if there.get(name) != here[name]]
-        if differing:
-            details = ", ".join(f"{n} ({there.get(n)!r}, not {here[n]!r})" for n in differing)
-            raise ValueError(
-                f"run_dir {str(self.folder)!r} holds a run of another configuration: {details}; "
-                "expected the same one or an empty folder"
-            )
+        _check_same(json.loads(str(stored["config"])), self.config, self.folder)
         return stored
 
     def _restore(self, stored: dict[str, np.ndarray]) -> None:

@@ -40,7 +40,7 @@ def view(
         height: of the figure in pixels.
 
     Raises:
-        TypeError: ``load`` is not a ``Load``.
+        TypeError: ``load`` is not a ``Load``, or a group does not hold integers.
         ValueError: ``present`` has another shape, more than four groups, or a group
             holds a number that is no item.
     """
@@ -89,10 +89,17 @@ def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.nda
         raise ValueError(f"groups has {len(groups)} entries; expected at most {len(GROUP_COLOURS)}")
     colours, legend = np.tile(PALE, (count, 1)), {}
     for (name, items), colour in zip(groups.items(), GROUP_COLOURS):
-        items = np.asarray(items, dtype=int)
-        if items.size and not (0 <= items.min() and items.max() < count):
-            raise ValueError(f"groups[{name!r}] holds {items.max()}; expected 0 to {count - 1}")
-        colours[items], legend[name] = colour, colour
+        items = np.asarray(items)
+        legend[name] = colour
+        if not items.size:
+            continue
+        if items.dtype.kind not in "iu":
+            raise TypeError(f"groups[{name!r}] has dtype {items.dtype}; expected item numbers")
+        if not (0 <= items.min() and items.max() < count):
+            raise ValueError(
+                f"groups[{name!r}] holds {items.min()} to {items.max()}; expected 0 to {count - 1}"
+            )
+        colours[items] = colour
     return colours, legend
 
 

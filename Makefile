@@ -1,0 +1,41 @@
+# make help lists the targets.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+
+.DEFAULT_GOAL := help
+.PHONY: help figures test lab notebooks data bench clean
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
+
+figures: $(VENV)/ready  ## run every notebook at reduced counts and write figures/ (sets all up first)
+	$(BIN)/python notebooks/run.py
+
+test: $(VENV)/ready  ## run the tests
+	$(BIN)/python -m pytest
+
+lab: $(VENV)/ready  ## open the notebooks in JupyterLab
+	$(BIN)/jupyter lab --notebook-dir=notebooks
+
+notebooks: $(VENV)/ready  ## run every notebook at its own counts and keep the outputs in it
+	$(BIN)/python notebooks/run.py --in-place
+
+data: $(VENV)/ready  ## compute data/ again (about an hour; goes on where it was stopped)
+	$(BIN)/python -m unload.reproduce all
+
+bench: $(VENV)/ready  ## measure speeds and print their ratios
+	$(BIN)/python benchmarks/run.py
+
+clean:  ## remove the virtual environment and all intermediate results
+	rm -rf $(VENV) build runs
+
+# The stamp is written last, so that an installation that was broken off is done again.
+$(VENV)/ready: environment.txt pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
+	|| { echo "Python 3.11 is needed (PyBullet has no wheels for later ones)," \
+	     "but $(PYTHON) is $$($(PYTHON) --version). Try: make PYTHON=/path/to/python3.11"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $@

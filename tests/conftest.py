@@ -1,0 +1,61 @@
+"""What several test modules share: the `slow` marker, loads, environments, bad values."""
+
+from collections.abc import Callable, Iterator
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+
+import unload
+
+torch.set_num_threads(1)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "slow: takes more than about ten seconds")
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@pytest.fixture(scope="session")
+def full_load() -> unload.Load:
+    """A load of the paper: 12 walls."""
+    return unload.stack_load(np.random.default_rng(0))
+
+
+@pytest.fixture(scope="session")
+def small_load() -> unload.Load:
+    """A load of one wall, for tests that simulate every box."""
+    return unload.stack_load(np.random.default_rng(0), walls=1)
+
+
+@pytest.fixture
+def boxes() -> Callable[..., unload.Load]:
+    """``boxes((y, z), ...)``: a load of cubes of 0.4 m in the plane x = 3.5 m."""
+
+    def build(*centres: tuple[float, float]) -> unload.Load:
+        positions = np.array([(3.5, y, z) for y, z in centres])
+        labels = np.zeros(len(centres), dtype=int)
+        return unload.Load(positions, np.full((len(centres), 3), 0.4), labels, labels)
+
+    return build
+
+
+@pytest.fixture
+def make_env() -> Iterator[Callable[..., gymnasium.Env]]:
+    """``make_env(id, **kwargs)``: ``gymnasium.make`` that is closed after the test."""
+    made = []
+
+    def make(env_id: str = "unload/Container-v0", **kwargs) -> gymnasium.Env:
+        if env_id == "unload/Container-v0":
+            kwargs.setdefault("physics", "table")
+        made.append(gymnasium.make(env_id, **kwargs))
+        return made[-1]
+
+    yield make
+    for env in made:
+        env.close()

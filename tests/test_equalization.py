@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+
+from unload import equalize
+
+
+def column(*values: float) -> np.ndarray:
+    return np.array(values)[:, None]
+
+
+def equalized(*values: float, **kwargs) -> list[float]:
+    return equalize(column(*values), **kwargs)[:, 0].tolist()
+
+
+def test_table_one():
+    result = equalized(0.10, 0.12, 0.11, 0.20, 0.19, 0.18, 0.30)
+    # The table cuts off after two digits.
+    assert result == pytest.approx([-1, -0.33, -0.66, 0.66, 0.33, 0, 1], abs=0.01)
+
+
+def test_it_is_the_rank_and_not_the_sort_order():
+    """Table I's permutation is its own inverse; this cycle of three tells the two apart."""
+    values = (0.3, 0.1, 0.2)
+    assert np.argsort(values).tolist() == [1, 2, 0]
+    assert equalized(*values) == [1, -1, 0]
+
+
+def test_algorithm_one_for_128_items(rng):
+    values = rng.permutation(128) * 0.01
+    ranks = np.rint(values / 0.01)
+    expected = (2 * ranks - 127) / 127
+    assert equalized(*values) == pytest.approx(expected.tolist(), abs=1e-7)
+
+
+def test_each_axis_and_each_batch_is_its_own(rng):
+    positions = rng.normal(size=(2, 3, 10, 3))
+    result = equalize(positions)
+    assert result.shape == positions.shape and result.dtype == np.float32
+    for index in np.ndindex(2, 3):
+        for axis in range(3):
+            alone = equalize(positions[index][:, [axis]])
+            assert (result[index][:, [axis]] == alone).all()
+
+
+def test_order_stays_and_values_are_even(rng):
+    values = np.sort(rng.normal(size=50))
+    result = np.array(equalized(*values))
+    assert np.diff(result) == pytest.approx(np.full(49, 2 / 49), abs=1e-6)
+    assert (result[0], result[-1]) == (-1, 1)
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_two_items(ties):
+    assert equalized(5.0, -5.0, ties=ties) == [1, -1]
+
+
+def test_noise_decides_among_near_ties_and_equal_values_keep_their_order():
+    assert equalized(0.5, 0.4999, 0.1) == [1, 0, -1]
+    assert equalized(0.5, 0.5, 0.5) == [-1, 0, 1]
+
+
+def test_average_gives_ties_the_mean_rank():
+    assert equalized(0.5, 0.1, 0.504, 0.9, 0.497, ties="average") == [0, -1, 0, 1, 0]
+    assert equalized(0.5, 0.5, ties="average") == [0, 0]
+
+
+def test_average_joins_chains_within_the_tolerance():
+    steps = (0.0, 0.004, 0.008, 0.1)
+    assert equalized(*steps, ties="average") == pytest.approx([-1 / 3, -1 / 3, -1 / 3, 1])
+    assert equalized(*steps, ties="average", tolerance=0.001) == pytest.approx(
+        [-1, -1 / 3, 1 / 3, 1]
+    )
+
+
+def test_average_on_a_load_gives_each_height_one_value(make_env):
+    observation, _ = make_env().reset(seed=0)
+    heights = equalize(observation, ties="average")[:, 2]
+    levels = np.rint((observation[:, 2] + 1) * 1.25 / (1.25 / 36))  # half cells
+    for level in np.unique(levels):
+        assert len(np.unique(heights[levels == level])) == 1
+    assert len(np.unique(heights)) == len(np.unique(levels))
+
+
+def test_the_input_stays_as_it_was(rng):
+    positions = rng.normal(size=(5, 3))
+    before = positions.copy()
+    equalize(positions, ties="average")
+    assert (positions == before).all()
+
+
+@pytest.mark.parametrize(
+    ("positions", "kwargs", "error", "message"),
+    [
+        (np.zeros((1, 3)), {}, ValueError, r"positions has shape \(1, 3\).*items >= 2"),
+        (np.zeros((0, 3)), {}, ValueError, r"positions has shape \(0, 3\)"),
+        (np.zeros(5), {}, ValueError, r"positions has shape \(5,\)"),
+        ([[0, np.nan], [1, 1]], {}, ValueError, r"positions holds nan at index \(0, 1\)"),
+        ([["a"], ["b"]], {}, TypeError, "positions has dtype"),
+        (np.zeros((2, 1)), {"ties": "coin"}, ValueError, "ties is 'coin'; expected one of"),
+        (np.zeros((2, 1)), {"tolerance": -1}, ValueError, "tolerance is -1"),
+    ],
+)
+def test_bad_input_is_refused(positions, kwargs, error, message):
+    with pytest.raises(error, match=message):
+        equalize(positions, **kwargs)

@@ -1,0 +1,109 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload import evaluate, policies, success_rate
+
+COLUMNS = ["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
+
+
+def lowest(observations, masks, rng) -> np.ndarray:
+    """A policy that goes for blocked items first."""
+    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
+
+
+@pytest.mark.parametrize(
+    ("rewards", "rate"),
+    [
+        ([1.0], 1.0),
+        ([-1.0], 0.0),
+        ([1, -1], 0.5),
+        (np.full((3, 4), 1), 1.0),
+        ([1, -1, -1, -1], 0.25),
+    ],
+)
+def test_success_rate(rewards, rate):
+    assert success_rate(rewards) == rate
+
+
+@pytest.mark.parametrize(
+    ("rewards", "message"),
+    [([], "rewards is empty"), ([1, 0], r"rewards holds 0\.0"), ([1, np.nan], "rewards holds nan")],
+)
+def test_success_rate_refuses(rewards, message):
+    with pytest.raises(ValueError, match=message):
+        success_rate(rewards)
+
+
+def test_one_row_per_episode():
+    frame = evaluate(policies.random, episodes=3, seed=1, max_picks=40)
+    assert list(frame.columns) == COLUMNS and len(frame) == 3
+    assert (frame["success_rate"] == frame["unloaded"] / 40).all()
+    assert frame["success_rate"].between(0.05, 0.7).all()
+
+
+def test_the_highest_item_is_always_liftable():
+    frame = evaluate(policies.highest, episodes=2, max_picks=150)
+    assert (frame["success_rate"] == 1).all() and (frame["unloaded"] == 150).all()
+    assert (frame[["deadlocked", "longest_deadlock"]] == 0).all(axis=None)
+
+
+def test_a_stubborn_policy_sits_in_a_deadlock_without_the_mask():
+    frame = evaluate(lowest, episodes=2, mask=False, max_picks=20)
+    assert (frame["success_rate"] == 0).all()
+    assert frame["deadlocked"].tolist() == [19 / 20] * 2
+    assert frame["longest_deadlock"].tolist() == [19, 19]
+
+
+def test_with_the_mask_it_does_not():
+    frame = evaluate(lowest, episodes=2, mask=True, max_picks=110)
+    assert (frame["deadlocked"] == 0).all() and (frame["longest_deadlock"] == 0).all()
+    assert (frame["unloaded"] > 0).all()
+
+
+def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
+    calls = iter([0, 0, 0, 1, 0, 0, 0, 0, 1, 0] * 2)
+
+    def sometimes_higher(observations, masks, rng):
+        return (policies.highest if next(calls) else lowest)(observations, masks, rng)
+
+    (row,) = evaluate(sometimes_higher, 1, mask=False, max_picks=10).to_dict("records")
+    # A success forgives the failed items, so the first try after it is no deadlock.
+    assert row["unloaded"] == 2
+    assert row["longest_deadlock"] == 3 and row["deadlocked"] == (2 + 3) / 10
+
+
+def test_an_episode_does_not_depend_on_how_many_there_are():
+    few, many = (evaluate(policies.random, n, seed=3, max_picks=30) for n in (2, 4))
+    pd.testing.assert_frame_equal(few, many.iloc[:2])
+
+
+def test_the_seed_decides():
+    first, same, other = (
+        evaluate(policies.random, 3, seed=seed, max_picks=60) for seed in (1, 1, 2)
+    )
+    pd.testing.assert_frame_equal(first, same)
+    assert not first.equals(other)
+
+
+def test_local_and_table_agree():
+    frames = [evaluate(policies.random, 1, physics=p, max_picks=40) for p in ("local", "table")]
+    pd.testing.assert_frame_equal(*frames)
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "message"),
+    [
+        ({"policy": "random"}, TypeError, "policy is 'random'; expected a function"),
+        ({"episodes": 0}, ValueError, "episodes is 0"),
+        ({"episodes": 2.0}, TypeError, "episodes is 2.0"),
+        ({"seed": -1}, ValueError, "seed is -1"),
+        ({"mask": None}, ValueError, "mask is None; expected one of False, True"),
+        ({"physics": "none"}, ValueError, "physics is 'none'"),
+        ({"max_picks": 0}, ValueError, "max_picks is 0"),
+        ({"ties": "coin"}, ValueError, "ties is 'coin'"),
+    ],
+)
+def test_bad_arguments_are_refused(kwargs, error, message):
+    with pytest.raises(error, match=message):
+        evaluate(**({"policy": policies.random, "episodes": 1} | kwargs))

@@ -1,0 +1,74 @@
+"""The figures of the paper: what they show comes from the data."""
+
+import json
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from unload import files
+from unload.figures import observation, training, tuning
+from unload.figures.mdp import fig01_mdp
+from unload.figures.network import fig07_network
+from unload.figures.style import save
+from unload.figures.substacks import fig03_substacks
+
+matplotlib.use("Agg")
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    yield
+    plt.close("all")
+
+
+FROM_DATA = [
+    observation.fig04_observation,
+    observation.fig05_histogram,
+    observation.fig06_equalized,
+    tuning.fig08_learning_rate,
+    tuning.fig09_batch_size,
+    tuning.fig10_loss,
+    training.fig11_loss,
+    training.fig12_reward,
+]
+
+
+@pytest.mark.parametrize("draw", [fig01_mdp, fig03_substacks, fig07_network, *FROM_DATA])
+def test_figure_is_saved_as_the_same_bytes(draw, tmp_path):
+    for folder in ("a", "b"):
+        save(draw(), draw.__name__, tmp_path / folder)
+    for suffix in ("png", "pdf"):
+        first, second = (tmp_path / folder / f"{draw.__name__}.{suffix}" for folder in "ab")
+        assert first.read_bytes() == second.read_bytes()
+        assert first.stat().st_size > 5000
+
+
+@pytest.mark.parametrize("draw", FROM_DATA)
+def test_missing_data_names_the_command_that_makes_it(draw, tmp_path):
+    with pytest.raises(FileNotFoundError, match="python -m unload.reproduce"):
+        draw(tmp_path)
+
+
+def test_learning_rate_figure_draws_the_stored_curves():
+    axes = tuning.fig08_learning_rate().axes[0]
+    raw = [line.get_ydata() for line in axes.lines if line.get_alpha()]
+    stored = tuning.read_curve(files.DATA, "hitrate_curve_bz_1024_lr_0.001_agent_5")
+    assert any(np.array_equal(curve, stored) for curve in raw)
+
+
+@pytest.mark.parametrize("reduced", [True, False])
+def test_a_reduced_run_says_so(tmp_path, reduced):
+    for name in ("loss_function_agent.csv", "training.provenance.json"):
+        (tmp_path / name).write_text((files.DATA / name).read_text())
+    path = tmp_path / "training.provenance.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"reduced": reduced}))
+    note = training.fig11_loss(tmp_path).get_supxlabel()
+    assert ("reduced run" in note) == reduced
+
+
+def test_every_figure_of_the_paper_is_committed():
+    for suffix in ("png", "pdf"):
+        numbers = sorted(path.name[:5] for path in files.FIGURES.glob(f"fig*.{suffix}"))
+        assert numbers == [f"fig{number:02d}" for number in range(1, 13)]

@@ -1,0 +1,76 @@
+import numpy as np
+import pytest
+import torch
+
+from unload import PEQNetwork
+
+
+def network(n_features: int = 5, seed: int = 0) -> PEQNetwork:
+    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
+
+
+def numpy_forward(peq: PEQNetwork, items: np.ndarray) -> np.ndarray:
+    """Sec. III-G for one observation, item by item; (items, 3) → (items,)."""
+    weights = {name: value.numpy() for name, value in peq.state_dict().items()}
+    kernels, offsets = weights["extractor.weight"], weights["extractor.bias"]
+    features = np.array(
+        [[max(0, k @ item + o) for k, o in zip(kernels, offsets)] for item in items]
+    )
+    context = [features.min(axis=0), features.max(axis=0), features.mean(axis=0)]
+    scores = []
+    for own in features:
+        enhanced = np.concatenate([own, *context])
+        scores.append(np.tanh(weights["scorer.bias"][0] + weights["scorer.weight"][0] @ enhanced))
+    return np.array(scores)
+
+
+@pytest.mark.parametrize("n", [1, 32, 64])
+def test_parameter_count(n):
+    assert sum(p.numel() for p in network(n).parameters()) == 4 * n + 4 * n + 1
+
+
+@pytest.mark.parametrize("items", [1, 2, 7, 128, 300])
+def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
+    peq = network()
+    batch = rng.uniform(-1, 1, (3, items, 3)).astype(np.float32)
+    values = peq(torch.from_numpy(batch)).detach()
+    assert values.shape == (3, items) and values.dtype == torch.float32
+    expected = [numpy_forward(peq, observation) for observation in batch]
+    assert values.numpy() == pytest.approx(np.array(expected), abs=1e-6)
+    assert values.abs().max() < 1
+
+
+def test_permuting_the_items_permutes_the_values(rng):
+    peq = network(64)
+    batch = torch.from_numpy(rng.uniform(-1, 1, (4, 128, 3)).astype(np.float32))
+    order = torch.from_numpy(rng.permutation(128))
+    assert torch.allclose(peq(batch[:, order]), peq(batch)[:, order], atol=1e-6)
+
+
+def test_values_depend_on_the_other_items(rng):
+    peq = network(64)
+    batch = torch.from_numpy(rng.uniform(-1, 1, (1, 8, 3)).astype(np.float32))
+    changed = batch.clone()
+    changed[0, 7] = 5.0
+    assert (peq(batch)[0, :7] != peq(changed)[0, :7]).all()
+
+
+def test_the_generator_decides_the_weights():
+    first, same, other = network(seed=3), network(seed=3), network(seed=4)
+    for name, value in first.state_dict().items():
+        assert torch.equal(value, same.state_dict()[name])
+        assert not torch.equal(value, other.state_dict()[name])
+    assert first.extractor.weight.abs().max() <= 3**-0.5
+    assert first.scorer.weight.abs().max() <= 20**-0.5
+
+
+@pytest.mark.parametrize("shape", [(4, 3), (2, 4, 2), (2, 0, 3), (2, 4, 3, 1)])
+def test_other_shapes_are_refused(shape):
+    with pytest.raises(ValueError, match=r"observations has shape .*expected \(batch, items, 3\)"):
+        network()(torch.zeros(shape))
+
+
+@pytest.mark.parametrize(("n", "error"), [(0, ValueError), (1.5, TypeError), (True, TypeError)])
+def test_bad_numbers_of_features_are_refused(n, error):
+    with pytest.raises(error, match="n_features is"):
+        PEQNetwork(n)

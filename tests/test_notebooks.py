@@ -1,0 +1,96 @@
+"""Every notebook: its form, its parameters, and that it runs from end to end."""
+
+import json
+import re
+import tomllib
+
+import pytest
+
+from notebooks import run
+
+NOTEBOOKS = run.notebooks()
+CHAPTERS = [path for path in NOTEBOOKS if path.parent.name != "solutions"]
+
+
+def cells(path, kind):
+    content = json.loads(path.read_text())
+    return [cell for cell in content["cells"] if cell["cell_type"] == kind]
+
+
+def text(cell):
+    return "".join(cell["source"])
+
+
+def name(path):
+    return str(path.relative_to(run.HERE))
+
+
+def test_every_chapter_has_solutions():
+    solutions = {path.stem for path in NOTEBOOKS if path.parent.name == "solutions"}
+    assert {path.stem for path in CHAPTERS} == solutions
+    assert [path.stem[:2] for path in CHAPTERS] == [f"{n:02d}" for n in range(1, len(CHAPTERS) + 1)]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
+def test_has_one_parameters_cell_of_upper_case_names(path):
+    tagged = [
+        cell for cell in cells(path, "code") if "parameters" in cell["metadata"].get("tags", [])
+    ]
+    assert len(tagged) == 1
+    names = re.findall(r"^(\w+) *=", text(tagged[0]), flags=re.MULTILINE)
+    assert names
+    assert all(each.isupper() for each in names)
+
+
+@pytest.mark.parametrize("path", CHAPTERS, ids=name)
+def test_chapter_tells_what_one_learns_and_closes_with_exercises(path):
+    prose = [text(cell) for cell in cells(path, "markdown")]
+    assert prose[0].startswith(f"# {path.stem[:2]} · ")
+    assert "**What you will learn**" in prose[0]
+    assert "**Time**" in prose[0]
+    ending = "\n".join(prose[-3:])
+    assert "## Summary" in ending
+    assert "## Exercises" in ending
+    assert f"solutions/{path.name}" in ending
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
+def test_committed_outputs_are_clean(path):
+    code = [cell for cell in cells(path, "code") if text(cell).strip()]
+    assert all(cell["execution_count"] for cell in code), "committed without outputs"
+    outputs = [output for cell in code for output in cell["outputs"]]
+    assert not [output for output in outputs if output["output_type"] == "error"]
+    assert not [output for output in outputs if output.get("name") == "stderr"]
+    assert path.stat().st_size < 1_500_000
+
+
+def test_reduced_parameters_belong_to_notebooks():
+    tables = tomllib.loads((run.HERE / "reduced.toml").read_text())
+    assert set(tables) <= {run.key(path) for path in NOTEBOOKS}
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
+def test_reduced_parameters_exist(path):
+    (tagged,) = [
+        cell for cell in cells(path, "code") if "parameters" in cell["metadata"].get("tags", [])
+    ]
+    names = re.findall(r"^(\w+) *=", text(tagged), flags=re.MULTILINE)
+    assert set(run.reduced_parameters(path)) <= set(names)
+
+
+def test_unknown_parameter_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="has no parameter NONSENSE"):
+        run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
+
+
+def test_failing_cell_fails_the_run(tmp_path):
+    new = run.nbformat.v4
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    broken = new.new_notebook(metadata={"kernelspec": kernel})
+    broken.cells = [
+        new.new_code_cell("X = 1", metadata={"tags": ["parameters"]}),
+        new.new_code_cell("raise RuntimeError(f'broken with {X}')"),
+    ]
+    run.nbformat.write(broken, tmp_path / "broken.ipynb")
+    with pytest.raises(run.papermill.PapermillExecutionError, match="broken with 2"):
+        run.run(tmp_path / "broken.ipynb", tmp_path / "out.ipynb", {"X": 2})

@@ -1,0 +1,266 @@
+import itertools
+import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload import TrainConfig, evaluate, load_policy, train
+from unload.train import CURVE_COLUMNS, ENVS
+
+# Small runs that still meet every event: episode ends, updates, points of the curve and,
+# with gamma > 0, updates of the target network.
+SMALL = {"num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5}
+CONTAINER = SMALL | {
+    "picks": 200,
+    "env_kwargs": {"physics": "table", "max_picks": 12},
+    "target_update_interval": 24,
+}
+RUNS = {
+    "container": CONTAINER,
+    "container, masked": CONTAINER | {"mask": True, "equalize": False, "gradient_steps": 2},
+    "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
+    "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100, "gradient_steps": 1},
+}
+
+
+class Breakdown(Exception):
+    """A crash at a moment of the test's choosing."""
+
+
+@pytest.fixture(params=RUNS)
+def config(request) -> TrainConfig:
+    return TrainConfig(**RUNS[request.param])
+
+
+@contextmanager
+def at_step(number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Do something right after a training step; steps are counted from 1."""
+    run_class = import_module("unload.train")._Run  # unload.train itself is the function
+    step, count = run_class._step, itertools.count(1)
+
+    def watched(run) -> None:
+        step(run)
+        if next(count) == number:
+            action()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_class, "_step", watched)
+        yield
+
+
+def crash() -> None:
+    raise Breakdown
+
+
+def interrupt() -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
+    """Start a run and press Ctrl-C after some steps."""
+    message = f"stopped after {4 * steps} picks; call train again with run_dir='.*{folder.name}'"
+    with at_step(steps, interrupt), pytest.raises(KeyboardInterrupt, match=message):
+        train(config, folder, progress=False)
+
+
+def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
+    """What a run leaves, but for the time of day."""
+    curve = pd.read_csv(folder / "curve.csv").drop(columns="wall_time")
+    return (folder / "policy.safetensors").read_bytes(), curve
+
+
+def assert_same(one: Path, other: Path) -> None:
+    (weights, curve), (other_weights, other_curve) = content(one), content(other)
+    pd.testing.assert_frame_equal(curve, other_curve, check_exact=True)
+    assert weights == other_weights
+
+
+# --- results ------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path, config):
+    for name in ("a", "b"):
+        train(config, tmp_path / name, progress=False)
+    assert_same(tmp_path / "a", tmp_path / "b")
+
+
+def test_another_seed_gives_other_weights(tmp_path):
+    for seed in (0, 1):
+        train(TrainConfig(**CONTAINER, seed=seed), tmp_path / str(seed), progress=False)
+    assert content(tmp_path / "0")[0] != content(tmp_path / "1")[0]
+
+
+def test_what_a_run_leaves(tmp_path, config):
+    result = train(config, tmp_path / "run", progress=False)
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {
+        "policy.safetensors", "curve.csv", "config.json"
+    }  # fmt: skip
+    curve = result.curve
+    assert tuple(curve.columns) == CURVE_COLUMNS
+    interval = config.log_interval * config.num_envs
+    assert curve["picks"].tolist() == list(range(interval, config.picks + 1, interval))
+    assert curve["success_rate"].tolist() == ((curve["mean_reward"] + 1) / 2).tolist()
+    assert curve["loss"].iloc[1:].between(0, 2).all()
+    assert (curve["wall_time"].diff().dropna() >= 0).all()
+    last_step = curve["picks"] - config.num_envs
+    assert curve["epsilon"].tolist() == pytest.approx(
+        [config.epsilon(picks) for picks in last_step]
+    )
+    loaded = load_policy(tmp_path / "run" / "policy.safetensors")
+    assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
+    stored = json.loads((tmp_path / "run" / "config.json").read_text())
+    assert TrainConfig(**stored) == config
+
+
+def test_a_finished_run_is_not_repeated(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    first = train(config, tmp_path, progress=False)
+    with at_step(1, crash):
+        again = train(config, tmp_path, progress=False)
+    pd.testing.assert_frame_equal(first.curve, again.curve)
+
+
+@pytest.mark.slow
+def test_the_agent_learns_to_choose_the_highest_item(tmp_path):
+    config = TrainConfig(
+        env="unload/HighestItem-v0", picks=64 * 700, batch_size=512, replay_size=20_000,
+        learning_rate=1e-2, n_features=16, log_interval=50, equalize=False,
+    )  # fmt: skip
+    curve = train(config, tmp_path, progress=False).curve
+    assert curve["success_rate"].iloc[0] < 0.2
+    assert curve["success_rate"].iloc[-1] > 0.8
+    frame = evaluate(load_policy(tmp_path / "policy.safetensors"), episodes=1, max_picks=60)
+    assert frame["success_rate"].item() > 0.8
+
+
+# --- interruption -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("steps", [1, 17, 31])
+def test_an_interrupted_run_goes_on_to_the_same_result(tmp_path, config, steps):
+    train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "broken", steps)
+    assert (tmp_path / "broken" / "checkpoint.npz").exists()
+    assert not (tmp_path / "broken" / "config.json").exists()
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_a_crashed_run_goes_on_from_its_last_checkpoint(tmp_path):
+    config = TrainConfig(**CONTAINER, checkpoint_interval=0)
+    train(config, tmp_path / "straight", progress=False)
+    for number in (9, 14):  # twice
+        with at_step(number, crash), pytest.raises(Breakdown):
+            train(config, tmp_path / "broken", progress=False)
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_ctrl_c_works_again_after_a_run(tmp_path):
+    handler = signal.getsignal(signal.SIGINT)
+    train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
+    train(TrainConfig(**CONTAINER), tmp_path, progress=True)
+    shown = capsys.readouterr()
+    assert "MSR=" in shown.out and "loss=" in shown.out and "pick/s" in shown.out
+    assert shown.err == ""
+    train(TrainConfig(**CONTAINER), tmp_path / "quiet", progress=False)
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_run_of_another_configuration_is_refused(tmp_path, finished):
+    if finished:
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    else:
+        interrupt_run(TrainConfig(**CONTAINER), tmp_path, 3)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    other = TrainConfig(**CONTAINER | {"seed": 5, "learning_rate": 0.5})
+    message = r"another configuration: seed \(0, not 5\), learning_rate \(0.001, not 0.5\)"
+    with pytest.raises(ValueError, match=message):
+        train(other, tmp_path, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("kept", [0, 0.5, 0.99])
+def test_a_damaged_checkpoint_is_refused_by_name(tmp_path, kept):
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 3)
+    path = tmp_path / "checkpoint.npz"
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(kept * len(whole))])
+    with pytest.raises(ValueError, match="checkpoint.npz is not a readable .npz file"):
+        train(config, tmp_path, progress=False)
+
+
+def test_a_foreign_checkpoint_is_refused_by_name(tmp_path):
+    np.savez(tmp_path / "checkpoint.npz", a=np.zeros(3))
+    with pytest.raises(ValueError, match="checkpoint.npz"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+# --- configuration ------------------------------------------------------------------
+
+
+def test_the_papers_configuration_is_the_default():
+    config = TrainConfig()
+    assert (config.picks, config.num_envs, config.learning_rate) == (20_000_000, 64, 1e-3)
+    assert (config.batch_size, config.replay_size) == (2048, 2**20)
+    assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
+    assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
+
+
+def test_epsilon_falls_linearly_and_stays():
+    config = TrainConfig(picks=6400, epsilon_init=0.9, epsilon_final=0.1, epsilon_fraction=0.5)
+    values = [config.epsilon(picks) for picks in (0, 1600, 3200, 3201, 6400)]
+    assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
+    assert TrainConfig(picks=64, epsilon_fraction=0).epsilon(0) == 0
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [
+        ("env", "CartPole-v1", ValueError),
+        ("ties", "coin", ValueError),
+        ("picks", 0, ValueError),
+        ("picks", 100, ValueError),  # no multiple of 64
+        ("picks", 6.4e3, TypeError),
+        ("seed", -1, ValueError),
+        ("seed", None, TypeError),
+        ("num_envs", 0, ValueError),
+        ("learning_rate", -1e-3, ValueError),
+        ("learning_rate", "fast", TypeError),
+        ("batch_size", 0, ValueError),
+        ("replay_size", 63, ValueError),  # less than a step of all environments
+        ("epsilon_init", 1.1, ValueError),
+        ("epsilon_final", -0.1, ValueError),
+        ("epsilon_fraction", 2, ValueError),
+        ("gamma", float("nan"), ValueError),
+        ("gamma", True, TypeError),
+        ("beta", float("inf"), ValueError),
+        ("n_features", 0, ValueError),
+        ("equalize", "no", ValueError),
+        ("mask", None, ValueError),
+        ("gradient_steps", -1, ValueError),
+        ("target_update_interval", 0, ValueError),
+        ("log_interval", 0, ValueError),
+        ("checkpoint_interval", -1, ValueError),
+    ],
+)
+def test_bad_values_are_refused_by_name(field, value, error):
+    with pytest.raises(error, match=f"^{field} is "):
+        TrainConfig(**{field: value})
+
+
+def test_a_configuration_is_needed(tmp_path):
+    with pytest.raises(TypeError, match="config is {}; expected an unload.TrainConfig"):
+        train({}, tmp_path)

@@ -1,0 +1,223 @@
+"""The update and the greedy choice of a ``PEQNetwork`` in one pass each, on the CPU.
+
+PyTorch stores every feature of every item of the batch several times over; the memory
+traffic takes nearly all of an update's time. Two facts of this network make that needless:
+
+- ReLU is monotone, so a feature's minimum and maximum over the items are those of the
+  value before the ReLU, and their gradients need only the items where they stand.
+- The mean of a feature needs only the sum of the inputs of the items where it is active:
+  mean ReLU(w·x + b) = (w·Σx + b·count) / items, and its gradient is that sum itself.
+
+So each item is read once, and only sums over items are kept. ``DQN`` uses these functions
+where ``applies`` says so; they give PyTorch's gradients up to rounding.
+"""
+
+import numba
+import numpy as np
+import torch
+
+from unload.network import PEQNetwork
+
+CHUNK = 32  # samples whose gradients are summed in single precision
+
+WIDTH = 16  # features handled together
+SUMS = 8  # numbers kept of each feature, see _reduce_items
+FLAGS = {"contract", "nsz"}  # fused multiply-add; no reordering, so that bits are stable
+ZERO, ONE = np.float32(0), np.float32(1)
+
+
+def applies(network: torch.nn.Module) -> bool:
+    """The rule: a ``PEQNetwork`` itself (no subclass), in float32 on the CPU."""
+    return type(network) is PEQNetwork and all(
+        p.device.type == "cpu" and p.dtype == torch.float32 for p in network.parameters()
+    )
+
+
+def loss_and_gradients(
+    network: PEQNetwork,
+    observations: np.ndarray,
+    actions: np.ndarray,
+    targets: np.ndarray,
+    beta: float = 1.0,
+) -> float:
+    """Mean smooth-L1 loss of the chosen actions' values, its gradients left in ``.grad``.
+
+    Args:
+        network: whose parameters' ``.grad`` are set.
+        observations: (batch, items, 3) float32.
+        actions: (batch,) int64, in 0 … items-1.
+        targets: (batch,) float32.
+        beta: of the smooth-L1 loss, > 0.
+
+    Returns:
+        The loss.
+
+    Raises:
+        FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
+    """
+    weights = _weights(network)
+    partial = np.zeros((-(-len(actions) // CHUNK), 8 * network.n_features + 2), np.float32)
+    _chunks(observations, actions, targets, np.float32(beta), *weights, partial)
+    total = partial.sum(axis=0, dtype=np.float64) / len(actions)
+    if not np.isfinite(total).all():
+        raise FloatingPointError(
+            f"the loss is {total[-1]} and its gradients are not all finite; "
+            "expected finite observations, targets and weights"
+        )
+    n = network.n_features
+    gradients = torch.from_numpy(total[:-1].astype(np.float32))
+    network.extractor.weight.grad = gradients[: 3 * n].view(3, n).T.contiguous()
+    network.extractor.bias.grad = gradients[3 * n : 4 * n].clone()
+    network.scorer.weight.grad = gradients[4 * n : 8 * n].view(1, 4 * n).clone()
+    network.scorer.bias.grad = gradients[8 * n :].clone()
+    return float(total[-1])
+
+
+def greedy_actions(
+    network: PEQNetwork, observations: np.ndarray, allowed: np.ndarray
+) -> np.ndarray:
+    """The allowed action of the highest value.
+
+    The global features add the same to every item's score and tanh keeps the order, so
+    the item's own features decide.
+
+    Args:
+        network: the network.
+        observations: (batch, items, 3) float32.
+        allowed: (batch, items) bool, at least one per row.
+
+    Returns:
+        (batch,) int64.
+    """
+    weight, bias, score, _ = _weights(network)
+    actions = np.empty(len(observations), np.int64)
+    _best(observations, allowed, weight, bias, score[0], actions)
+    return actions
+
+
+def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
+    """Extractor weights (3, n) and biases (n,), scorer weights (4, n) and bias."""
+    with torch.no_grad():
+        return (
+            np.ascontiguousarray(network.extractor.weight.numpy().T),
+            network.extractor.bias.numpy(),
+            network.scorer.weight.numpy().reshape(4, -1),
+            np.float32(network.scorer.bias.item()),
+        )
+
+
+@numba.njit(fastmath=FLAGS, cache=True)
+def _chunks(observations, actions, targets, beta, weight, bias, score, score_bias, partial):
+    """Sum the gradients of each chunk of samples into its row of ``partial``."""
+    blocks = _blocks(weight, bias)
+    for chunk in range(len(partial)):
+        sums = np.empty((len(blocks), SUMS * WIDTH), np.float32)
+        for sample in range(chunk * CHUNK, min((chunk + 1) * CHUNK, len(actions))):
+            for block in range(len(blocks)):
+                _reduce_items(observations[sample], blocks[block], sums[block])
+            _add_sample(
+                observations[sample], actions[sample], targets[sample], beta,
+                weight, bias, score, score_bias, sums, partial[chunk],
+            )  # fmt: skip
+
+
+@numba.njit(cache=True)
+def _blocks(weight, bias):
+    """The extractor's weights in blocks of ``WIDTH`` features, (blocks, 4 * WIDTH)."""
+    blocks = np.zeros((-(-len(bias) // WIDTH), 4 * WIDTH), np.float32)
+    for f in range(len(bias)):
+        block, place = f // WIDTH, f % WIDTH
+        for axis in range(3):
+            blocks[block, axis * WIDTH + place] = weight[axis, f]
+        blocks[block, 3 * WIDTH + place] = bias[f]
+    return blocks
+
+
+@numba.njit(fastmath=FLAGS, cache=True)
+def _reduce_items(x, block, sums):
+    """What is needed of all items, for ``WIDTH`` features at once.
+
+    ``sums`` holds, ``WIDTH`` numbers each: the lowest value before the ReLU and its item,
+    the highest and its item, the number of active items and the sums of their x, y, z.
+    Constant widths let the compiler use vector instructions.
+    """
+    for f in range(WIDTH):
+        sums[f], sums[2 * WIDTH + f] = np.inf, -np.inf
+        for row in (1, 3, 4, 5, 6, 7):
+            sums[row * WIDTH + f] = 0
+    for i in range(len(x)):
+        a, b, c, item = x[i, 0], x[i, 1], x[i, 2], np.float32(i)
+        for f in range(WIDTH):
+            value = block[f] * a + block[WIDTH + f] * b + block[2 * WIDTH + f] * c
+            value += block[3 * WIDTH + f]
+            low, high = sums[f], sums[2 * WIDTH + f]
+            sums[f] = value if value < low else low
+            sums[WIDTH + f] = item if value < low else sums[WIDTH + f]
+            sums[2 * WIDTH + f] = value if value > high else high
+            sums[3 * WIDTH + f] = item if value > high else sums[3 * WIDTH + f]
+            active = ONE if value > 0 else ZERO
+            sums[4 * WIDTH + f] += active
+            sums[5 * WIDTH + f] += active * a
+            sums[6 * WIDTH + f] += active * b
+            sums[7 * WIDTH + f] += active * c
+
+
+@numba.njit(fastmath=FLAGS, cache=True)
+def _add_sample(x, action, target, beta, weight, bias, score, score_bias, sums, out):
+    """Forward and backward through what one sample's items were reduced to."""
+    n, share = len(bias), ONE / np.float32(len(x))
+    features = np.empty((4, n), np.float32)  # own, minimum, maximum, mean
+    logit = score_bias
+    for f in range(n):
+        place, row = f % WIDTH, sums[f // WIDTH]
+        own, mean = bias[f], bias[f] * row[4 * WIDTH + place]
+        for axis in range(3):
+            own += weight[axis, f] * x[action, axis]
+            mean += weight[axis, f] * row[(5 + axis) * WIDTH + place]
+        features[0, f] = max(own, ZERO)
+        features[1, f] = max(row[place], ZERO)
+        features[2, f] = max(row[2 * WIDTH + place], ZERO)
+        features[3, f] = mean * share
+        for kind in range(4):
+            logit += score[kind, f] * features[kind, f]
+    value = np.tanh(logit)
+    error = value - target
+    if abs(error) < beta:
+        loss, slope = error * error / (2 * beta), error / beta
+    else:
+        loss, slope = abs(error) - beta / 2, np.sign(error)
+    slope *= ONE - value * value
+    for f in range(n):
+        place, row = f % WIDTH, sums[f // WIDTH]
+        low_item, high_item = int(row[WIDTH + place]), int(row[3 * WIDTH + place])
+        to_own = slope * score[0, f] if features[0, f] > 0 else ZERO
+        to_low = slope * score[1, f] if features[1, f] > 0 else ZERO
+        to_high = slope * score[2, f] if features[2, f] > 0 else ZERO
+        to_mean = slope * score[3, f] * share
+        for axis in range(3):
+            out[axis * n + f] += (
+                to_own * x[action, axis]
+                + to_low * x[low_item, axis]
+                + to_high * x[high_item, axis]
+                + to_mean * row[(5 + axis) * WIDTH + place]
+            )
+        out[3 * n + f] += to_own + to_low + to_high + to_mean * row[4 * WIDTH + place]
+        for kind in range(4):
+            out[(4 + kind) * n + f] += slope * features[kind, f]
+    out[8 * n] += slope
+    out[8 * n + 1] += loss
+
+
+@numba.njit(fastmath={"contract", "nsz", "reassoc"}, cache=True)
+def _best(observations, allowed, weight, bias, score, actions):
+    for sample in range(len(actions)):
+        best = -np.inf
+        for i in range(observations.shape[1]):
+            if allowed[sample, i]:
+                a, b, c = observations[sample, i]
+                logit = np.float32(0)
+                for f in range(len(bias)):
+                    value = weight[0, f] * a + weight[1, f] * b + weight[2, f] * c + bias[f]
+                    logit += score[f] * max(value, np.float32(0))
+                if logit > best:
+                    best, actions[sample] = logit, i
