@@ -1,5 +1,6 @@
 """The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -204,11 +205,12 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     """Write a policy's weights and how to use them, as safetensors, in one atomic step."""
     settings = {
         "network": type(policy.network).__name__,
-        "n_features": str(policy.network.n_features),
-        "equalize": str(policy.equalize),
+        "n_features": policy.network.n_features,
+        "equalize": policy.equalize,
         "ties": policy.ties,
     }
-    content = save(policy.network.state_dict(), metadata=settings)
+    # One entry only: safetensors writes several in random order.
+    content = save(policy.network.state_dict(), metadata={"policy": json.dumps(settings)})
     files.write_atomically(path, lambda file: file.write(content))
 
 
@@ -224,14 +226,16 @@ def load_policy(path: str | Path) -> Greedy:
         raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
     try:
         with safe_open(path, framework="pt") as file:
-            settings = file.metadata() or {}
+            metadata = file.metadata() or {}
             tensors = {name: file.get_tensor(name) for name in file.keys()}
     except SafetensorError as error:
         raise ValueError(f"{path} is not a safetensors file: {error}") from error
     try:
-        network = PEQNetwork(int(settings["n_features"]))
+        settings = json.loads(metadata["policy"])
+        network = PEQNetwork(settings["n_features"])
         network.load_state_dict(tensors)
-        equalized = {"True": True, "False": False}[settings["equalize"]]
-        return Greedy(network, equalized, settings["ties"])
-    except (KeyError, RuntimeError) as error:
+        if not all(tensor.isfinite().all() for tensor in tensors.values()):
+            raise ValueError("a weight is not finite")
+        return Greedy(network, settings["equalize"], settings["ties"])
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise ValueError(f"{path} does not hold a policy of unload: {error}") from error

@@ -305,6 +305,8 @@ class _Run:
         if not self.checkpoint.exists():
             return None
         stored = files.read_arrays(self.checkpoint)
+        if "config" not in stored:
+            raise ValueError(f"{self.checkpoint} holds {sorted(stored)}; expected a checkpoint")
         _check_same(json.loads(str(stored["config"])), self.config, self.folder)
         return stored
 
@@ -319,7 +321,7 @@ class _Run:
         for number, env in enumerate(self.envs.envs):
             env.unwrapped.set_state(under(f"env.{number}."))
         self.observations, self.masks = stored["observations"], stored["masks"]
-        self.curve = [tuple(row) for row in stored["curve"].tolist()]
+        self.curve = [(int(picks), *means) for picks, *means in stored["curve"].tolist()]
         self.rewards, self.losses = stored["rewards"].tolist(), stored["losses"].tolist()
         self.picks = int(stored["picks"])
         self.rng.bit_generator.state = json.loads(str(stored["rng"]))
