@@ -87,6 +87,28 @@ def test_input_that_is_not_finite_is_refused(batch, name, value):
     assert all(parameter.grad is None for parameter in net.parameters())
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("actions", np.full(BATCH, ITEMS), "actions holds 128 to 128"),
+        ("actions", np.full(BATCH, -1), "actions holds -1"),
+        ("actions", np.zeros(BATCH), "actions has shape .* dtype float64"),
+        ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
+        ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
+        ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
+    ],
+)
+def test_bad_batches_are_refused(batch, name, value, message):
+    with pytest.raises(ValueError, match=message):
+        fused.loss_and_gradients(network(4), *(batch | {name: value}).values())
+
+
+def test_choice_among_nothing_finite_is_refused():
+    observations = np.full((2, ITEMS, 3), np.nan, np.float32)
+    with pytest.raises(FloatingPointError, match="no allowed action of a finite value"):
+        fused.greedy_actions(network(4), observations, np.ones((2, ITEMS), bool))
+
+
 class Subclass(PEQNetwork):
     pass
 

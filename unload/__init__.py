@@ -4,13 +4,14 @@ import gymnasium
 
 from unload import policies
 from unload.agent import DQN, Greedy, load_policy, save_policy
+from unload.config import TrainConfig
 from unload.env import ContainerEnv
 from unload.equalization import equalize
 from unload.evaluate import evaluate, success_rate
 from unload.highest_item import HighestItemEnv
 from unload.network import PEQNetwork
 from unload.substacks import Load, build_load, stack_load
-from unload.train import TrainConfig, train
+from unload.train import train
 from unload.view import view
 
 __version__ = "0.1.0"

@@ -171,7 +171,7 @@ def greedy_actions(
     """The allowed action of the highest value, (batch,) int64."""
     observations, allowed = check_batch(observations, masks)
     if fused.applies(network):
-        return fused.greedy_actions(network, observations, allowed)
+        return fused.greedy_actions(network, observations.astype(np.float32, copy=False), allowed)
     values = network(torch.as_tensor(observations, dtype=torch.float32))
     return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
 

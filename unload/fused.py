@@ -53,8 +53,20 @@ def loss_and_gradients(
         The loss.
 
     Raises:
+        ValueError: an array's shape or dtype is another, or an action is out of range.
         FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
     """
+    size, items = _check(observations)
+    for name, array, dtype in (("actions", actions, np.int64), ("targets", targets, np.float32)):
+        if array.shape != (size,) or array.dtype != dtype:
+            raise ValueError(
+                f"{name} has shape {array.shape} and dtype {array.dtype}; "
+                f"expected ({size},) {np.dtype(dtype)}"
+            )
+    if actions.min() < 0 or actions.max() >= items:
+        raise ValueError(
+            f"actions holds {actions.min()} to {actions.max()}; expected 0 to {items - 1}"
+        )
     weights = _weights(network)
     partial = np.zeros((-(-len(actions) // CHUNK), 8 * network.n_features + 2), np.float32)
     _chunks(observations, actions, targets, np.float32(beta), *weights, partial)
@@ -88,11 +100,41 @@ def greedy_actions(
 
     Returns:
         (batch,) int64.
+
+    Raises:
+        ValueError: an array's shape or dtype is another.
+        FloatingPointError: a row has no allowed action of a finite value.
     """
+    size, items = _check(observations)
+    if allowed.shape != (size, items) or allowed.dtype != bool:
+        raise ValueError(
+            f"allowed has shape {allowed.shape} and dtype {allowed.dtype}; "
+            f"expected ({size}, {items}) bool"
+        )
     weight, bias, score, _ = _weights(network)
-    actions = np.empty(len(observations), np.int64)
+    actions = np.full(size, -1)
     _best(observations, allowed, weight, bias, score[0], actions)
+    if (actions < 0).any():
+        raise FloatingPointError(
+            f"row {int(np.argmin(actions))} has no allowed action of a finite value; "
+            "expected finite observations and weights"
+        )
     return actions
+
+
+def _check(observations: np.ndarray) -> tuple[int, int]:
+    """Batch size and number of items of (batch, items, 3) float32 observations."""
+    if (
+        observations.ndim != 3
+        or 0 in observations.shape
+        or observations.shape[2] != 3
+        or observations.dtype != np.float32
+    ):
+        raise ValueError(
+            f"observations has shape {observations.shape} and dtype {observations.dtype}; "
+            "expected (batch, items, 3) float32, not empty"
+        )
+    return observations.shape[:2]
 
 
 def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:

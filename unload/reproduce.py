@@ -20,12 +20,13 @@ import pandas as pd
 
 from unload import checks, files, observation, policies, task
 from unload.agent import save_policy
+from unload.config import TrainConfig
 from unload.equalization import equalize
 from unload.evaluate import evaluate
 from unload.physics import shared_table
 from unload.provenance import write_provenance
 from unload.sweep import STEPS, export_curves, run_folder, run_sweep, tuning_config
-from unload.train import TrainConfig, train
+from unload.train import train
 
 COMMAND = "python -m unload.reproduce"
 # The runs that the paper's Figs. 8–10 show: batch size, learning rate, run, equalized.

@@ -9,7 +9,8 @@ import torch
 from joblib import Parallel, delayed, parallel_config
 
 from unload import checks, files, task
-from unload.train import TrainConfig, train
+from unload.config import TrainConfig
+from unload.train import train
 
 LEARNING_RATES = (1e-1, 1e-2, 1e-3)
 BATCH_SIZES = (64, 256, 1024, 2048)

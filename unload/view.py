@@ -73,12 +73,13 @@ def view(
     figure.update_layout(
         height=height,
         margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        legend={"x": 0, "y": 1},
         scene={
             "aspectmode": "data",
             "xaxis": {"title": "x (m)", "range": [0, length]},
             "yaxis": {"title": "y (m)", "range": [0, width]},
             "zaxis": {"title": "z (m)", "range": [0, top]},
-            "camera": {"eye": {"x": 1.5, "y": -0.9, "z": 0.7}},
+            "camera": {"eye": {"x": 1.9, "y": -1.3, "z": 0.85}},
         },
     )
     return figure

@@ -1,0 +1,66 @@
+"""The configuration of a training run (Sec. IV-B)."""
+
+from dataclasses import dataclass, field
+
+from unload import checks
+from unload.equalization import TIES
+
+ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """One training run. The defaults are the paper's (Sec. IV-B); * marks our own choice."""
+
+    env: str = "unload/Container-v0"
+    picks: int = 20_000_000  # K, over all environments
+    seed: int = 0  # * of loads, exploration, replay and weights
+    num_envs: int = 64  # Fig. 2
+    learning_rate: float = 1e-3  # μ
+    batch_size: int = 2048  # b
+    replay_size: int = 2**20
+    epsilon_init: float = 1.0
+    epsilon_final: float = 0.0
+    epsilon_fraction: float = 0.5  # K_ε / K
+    gamma: float = 0.0  # Sec. III-E
+    beta: float = 1.0  # Sec. III-G
+    n_features: int = 64  # * n
+    equalize: bool = True  # Sec. III-F
+    ties: str = "noise"  # * see unload.equalize
+    mask: bool = False  # * whether failed items are masked during training too
+    gradient_steps: int = 1  # * updates per step of all environments
+    target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
+    log_interval: int = 500  # * steps of all environments per point of the curves
+    checkpoint_interval: float = 60.0  # * seconds
+    env_kwargs: dict = field(default_factory=lambda: {"physics": "table"})  # *
+
+    def __post_init__(self) -> None:
+        checks.one_of("env", self.env, ENVS)
+        checks.one_of("ties", self.ties, TIES)
+        for name in ("equalize", "mask"):
+            checks.one_of(name, getattr(self, name), (False, True))
+        for name in (
+            "picks", "num_envs", "batch_size", "replay_size", "n_features",
+            "target_update_interval", "log_interval",
+        ):  # fmt: skip
+            checks.integer(name, getattr(self, name), 1)
+        checks.integer("seed", self.seed, 0)
+        checks.integer("gradient_steps", self.gradient_steps, 0)
+        for name in ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"):
+            checks.real(name, getattr(self, name), 0, 1)
+        for name in ("learning_rate", "beta", "checkpoint_interval"):
+            checks.real(name, getattr(self, name), 0)
+        if self.picks % self.num_envs:
+            raise ValueError(
+                f"picks is {self.picks}; expected a multiple of num_envs={self.num_envs}"
+            )
+        if self.replay_size < self.num_envs:
+            raise ValueError(
+                f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
+            )
+
+    def epsilon(self, picks: int) -> float:
+        """Exploration rate after ``picks`` picks: linear from init to final, then constant."""
+        span = self.epsilon_fraction * self.picks
+        progress = min(1.0, picks / span) if span else 1.0
+        return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
