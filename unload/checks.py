@@ -14,6 +14,13 @@ def one_of(name: str, value: object, options: Iterable[object]) -> None:
         raise ValueError(f"{name} is {value!r}; expected one of {known}")
 
 
+def boolean(name: str, value: object) -> bool:
+    """Return ``value`` as bool; raise TypeError unless it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"{name} is {value!r}; expected True or False")
+    return bool(value)
+
+
 def integer(name: str, value: object, low: int, high: int | None = None) -> int:
     """Return ``value`` as int; raise unless it is an integer in [low, high]."""
     upper = "" if high is None else f" and <= {high}"
