@@ -21,7 +21,7 @@ lab: $(VENV)/ready  ## open the notebooks in JupyterLab
 notebooks: $(VENV)/ready  ## run every notebook at its own counts and keep the outputs in it
 	$(BIN)/python notebooks/run.py --in-place
 
-data: $(VENV)/ready  ## compute data/ again (about an hour; goes on where it was stopped)
+data: $(VENV)/ready  ## compute data/ again (about 15 minutes; goes on where it was stopped)
 	$(BIN)/python -m unload.reproduce all
 
 bench: $(VENV)/ready  ## measure speeds and print their ratios

@@ -10,6 +10,7 @@ a non-zero exit status.
 
 import argparse
 import logging
+import shutil
 import sys
 import time
 import tomllib
@@ -20,6 +21,7 @@ import papermill
 
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
+RUNS = HERE.parent / "runs"
 
 
 def notebooks() -> list[Path]:
@@ -49,6 +51,7 @@ def run(notebook: Path, output: Path, parameters: dict) -> None:
         if name not in known:
             raise ValueError(f"{notebook.name} has no parameter {name}; it has {sorted(known)}")
     output.parent.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(RUNS / notebook.stem, ignore_errors=True)  # of an earlier state of the code
     papermill.execute_notebook(
         str(notebook),
         str(output),

@@ -48,6 +48,18 @@ def test_gradients_are_those_of_pytorch(batch, n_features, beta):
         assert error < 1e-5 * max(gradient.abs().max().item(), 1e-2)
 
 
+@pytest.mark.parametrize("items", [1, 2, 5, 127])
+def test_any_number_of_items_will_do(batch, items):
+    batch["observations"] = np.ascontiguousarray(batch["observations"][:, :items])
+    batch["actions"] %= items
+    net = network(16)
+    loss = fused.loss_and_gradients(net, *batch.values())
+    expected_loss, expected = reference(net, batch, beta=1.0)
+    assert loss == pytest.approx(expected_loss, rel=1e-5)
+    for parameter, gradient in zip(net.parameters(), expected):
+        assert torch.allclose(parameter.grad.double(), gradient, atol=1e-6)
+
+
 def test_choice_is_that_of_the_network(batch, rng):
     net = network(64)
     allowed = rng.random((BATCH, ITEMS)) < 0.3

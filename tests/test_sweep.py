@@ -66,6 +66,18 @@ def test_exported_curves_have_one_value_per_step(configs, tmp_path):
     assert (folder / "loss_curve_bz_8_lr_0.001_agent_0.csv").read_text().count("\n") == 4
 
 
+def test_runs_that_would_share_a_folder_are_refused(configs, tmp_path):
+    twins = [configs[0], dataclasses.replace(configs[0], n_features=5)]
+    with pytest.raises(ValueError, match="2 runs for .*bz_8_lr_0.001_agent_0"):
+        sweep.run_sweep(twins, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_only_configurations_are_run(tmp_path):
+    with pytest.raises(TypeError, match="configs holds 1"):
+        sweep.run_sweep([1], tmp_path)
+
+
 @pytest.mark.parametrize("steps", [0, -1, 2.5])
 def test_bad_steps(steps):
     with pytest.raises((TypeError, ValueError), match="steps"):

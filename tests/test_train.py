@@ -3,6 +3,7 @@ import json
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import TrainConfig, evaluate, load_policy, train
+from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.train import CURVE_COLUMNS, ENVS
 
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
@@ -18,7 +19,7 @@ from unload.train import CURVE_COLUMNS, ENVS
 SMALL = {"num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5}
 CONTAINER = SMALL | {
     "picks": 200,
-    "env_kwargs": {"physics": "table", "max_picks": 12},
+    "max_picks": 12,
     "target_update_interval": 24,
 }
 RUNS = {
@@ -264,3 +265,41 @@ def test_bad_values_are_refused_by_name(field, value, error):
 def test_a_configuration_is_needed(tmp_path):
     with pytest.raises(TypeError, match="config is {}; expected an unload.TrainConfig"):
         train({}, tmp_path)
+
+
+def test_own_loads_are_trained_on(tmp_path):
+    seen = []
+
+    def stack(rng):
+        seen.append(stack_load(rng, walls=10))
+        return seen[-1]
+
+    train(TrainConfig(**CONTAINER), tmp_path, progress=False, stack=stack)
+    assert len(seen) >= 4
+
+
+def test_loads_for_an_environment_without_loads_are_refused(tmp_path):
+    config = TrainConfig(**RUNS["highest item"])
+    with pytest.raises(ValueError, match="stack is given"):
+        train(config, tmp_path, progress=False, stack=stack_load)
+
+
+def test_run_dir_that_is_a_file_is_refused_before_training(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(ValueError, match="a file; expected a folder"):
+        train(TrainConfig(), tmp_path / "file", progress=False)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "\xff"])
+def test_damaged_config_is_refused_by_name(tmp_path, content):
+    (tmp_path / "config.json").write_text(content)
+    with pytest.raises(ValueError, match="config.json"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+def test_numpy_numbers_make_the_same_configuration():
+    config = TrainConfig(picks=np.int64(6400), learning_rate=np.float32(0.5))
+    assert json.dumps(asdict(config)) == json.dumps(
+        asdict(TrainConfig(picks=6400, learning_rate=0.5))
+    )

@@ -1,6 +1,6 @@
 """The configuration of a training run (Sec. IV-B)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from unload import checks
 from unload.equalization import TIES
@@ -16,6 +16,7 @@ class TrainConfig:
     picks: int = 20_000_000  # K, over all environments
     seed: int = 0  # * of loads, exploration, replay and weights
     num_envs: int = 64  # Fig. 2
+    max_picks: int = 500  # of an episode, Sec. III-C
     learning_rate: float = 1e-3  # μ
     batch_size: int = 2048  # b
     replay_size: int = 2**20
@@ -27,29 +28,30 @@ class TrainConfig:
     n_features: int = 64  # * n
     equalize: bool = True  # Sec. III-F
     ties: str = "noise"  # * see unload.equalize
-    mask: bool = False  # * whether failed items are masked during training too
+    mask: bool = False  # * whether failed items are masked during training, everywhere
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
     checkpoint_interval: float = 60.0  # * seconds
-    env_kwargs: dict = field(default_factory=lambda: {"physics": "table"})  # *
+    physics: str = "table"  # * of the container: "table" or "local"
 
     def __post_init__(self) -> None:
         checks.one_of("env", self.env, ENVS)
         checks.one_of("ties", self.ties, TIES)
+        checks.one_of("physics", self.physics, ("table", "local"))
         for name in ("equalize", "mask"):
             checks.one_of(name, getattr(self, name), (False, True))
         for name in (
-            "picks", "num_envs", "batch_size", "replay_size", "n_features",
+            "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
             "target_update_interval", "log_interval",
         ):  # fmt: skip
-            checks.integer(name, getattr(self, name), 1)
-        checks.integer("seed", self.seed, 0)
-        checks.integer("gradient_steps", self.gradient_steps, 0)
+            self._set(name, checks.integer(name, getattr(self, name), 1))
+        for name in ("seed", "gradient_steps"):
+            self._set(name, checks.integer(name, getattr(self, name), 0))
         for name in ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"):
-            checks.real(name, getattr(self, name), 0, 1)
+            self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
-            checks.real(name, getattr(self, name), 0)
+            self._set(name, checks.real(name, getattr(self, name), 0))
         if self.picks % self.num_envs:
             raise ValueError(
                 f"picks is {self.picks}; expected a multiple of num_envs={self.num_envs}"
@@ -58,6 +60,10 @@ class TrainConfig:
             raise ValueError(
                 f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
             )
+
+    def _set(self, name: str, value: float) -> None:
+        """Keep a checked value as Python's own number, which JSON can hold."""
+        object.__setattr__(self, name, value)
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""

@@ -33,11 +33,29 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], None]) -> Non
 
 
 def write_text(path: str | Path, text: str) -> None:
+    """Write UTF-8 text in one atomic step."""
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
 def write_json(path: str | Path, value: object) -> None:
+    """Write a value as indented JSON in one atomic step."""
     write_text(path, json.dumps(value, indent=2) + "\n")
+
+
+def read_json(path: str | Path) -> dict:
+    """Read a JSON file that holds an object.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is damaged or holds something else.
+    """
+    try:
+        value = json.loads(Path(path).read_text())
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path} is not a readable JSON file: {error}") from error
+    if not isinstance(value, dict):
+        raise ValueError(f"{path} holds {value!r}; expected an object")
+    return value
 
 
 def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:

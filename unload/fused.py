@@ -187,21 +187,37 @@ def _reduce_items(x, block, sums):
         sums[f], sums[2 * WIDTH + f] = np.inf, -np.inf
         for row in (1, 3, 4, 5, 6, 7):
             sums[row * WIDTH + f] = 0
-    for i in range(len(x)):
-        a, b, c, item = x[i, 0], x[i, 1], x[i, 2], np.float32(i)
+    last = len(x) - 1
+    for i in range(0, len(x), 4):
+        # Four items at a time; the last one is repeated, with weight 0, to fill up.
+        i1, i2, i3 = min(i + 1, last), min(i + 2, last), min(i + 3, last)
+        w1, w2, w3 = np.float32(i + 1 <= last), np.float32(i + 2 <= last), np.float32(i + 3 <= last)
+        x0, y0, z0, n0 = x[i, 0], x[i, 1], x[i, 2], np.float32(i)
+        x1, y1, z1, n1 = x[i1, 0], x[i1, 1], x[i1, 2], np.float32(i1)
+        x2, y2, z2, n2 = x[i2, 0], x[i2, 1], x[i2, 2], np.float32(i2)
+        x3, y3, z3, n3 = x[i3, 0], x[i3, 1], x[i3, 2], np.float32(i3)
         for f in range(WIDTH):
-            value = block[f] * a + block[WIDTH + f] * b + block[2 * WIDTH + f] * c
-            value += block[3 * WIDTH + f]
-            low, high = sums[f], sums[2 * WIDTH + f]
-            sums[f] = value if value < low else low
-            sums[WIDTH + f] = item if value < low else sums[WIDTH + f]
-            sums[2 * WIDTH + f] = value if value > high else high
-            sums[3 * WIDTH + f] = item if value > high else sums[3 * WIDTH + f]
-            active = ONE if value > 0 else ZERO
-            sums[4 * WIDTH + f] += active
-            sums[5 * WIDTH + f] += active * a
-            sums[6 * WIDTH + f] += active * b
-            sums[7 * WIDTH + f] += active * c
+            wx, wy, wz = block[f], block[WIDTH + f], block[2 * WIDTH + f]
+            bias = block[3 * WIDTH + f]
+            v0, v1 = wx * x0 + wy * y0 + wz * z0 + bias, wx * x1 + wy * y1 + wz * z1 + bias
+            v2, v3 = wx * x2 + wy * y2 + wz * z2 + bias, wx * x3 + wy * y3 + wz * z3 + bias
+            low, low_item = _lower(*_lower(v0, n0, v1, n1), *_lower(v2, n2, v3, n3))
+            high, high_item = _lower(*_lower(-v0, n0, -v1, n1), *_lower(-v2, n2, -v3, n3))
+            sums[f], sums[WIDTH + f] = _lower(sums[f], sums[WIDTH + f], low, low_item)
+            high, high_item = _lower(-sums[2 * WIDTH + f], sums[3 * WIDTH + f], high, high_item)
+            sums[2 * WIDTH + f], sums[3 * WIDTH + f] = -high, high_item
+            a0, a1 = ONE if v0 > 0 else ZERO, w1 if v1 > 0 else ZERO
+            a2, a3 = w2 if v2 > 0 else ZERO, w3 if v3 > 0 else ZERO
+            sums[4 * WIDTH + f] += (a0 + a1) + (a2 + a3)
+            sums[5 * WIDTH + f] += (a0 * x0 + a1 * x1) + (a2 * x2 + a3 * x3)
+            sums[6 * WIDTH + f] += (a0 * y0 + a1 * y1) + (a2 * y2 + a3 * y3)
+            sums[7 * WIDTH + f] += (a0 * z0 + a1 * z1) + (a2 * z2 + a3 * z3)
+
+
+@numba.njit(fastmath=FLAGS, cache=True)
+def _lower(value, item, other, other_item):
+    """The lower of two values, and the item where it stands; the first if they are equal."""
+    return (value, item) if value <= other else (other, other_item)
 
 
 @numba.njit(fastmath=FLAGS, cache=True)

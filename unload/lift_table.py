@@ -3,8 +3,9 @@
 A lift depends on its situation alone, so PyBullet needs to be asked once for each. The
 table is only as good as the physics that filled it: a file of another physics is refused.
 
-A box with three or more others on it is held down without asking: of 1,723 such situations
-PyBullet moved none by more than 4 mm. They are the ones that hardly ever repeat.
+A box with three or more others on it is held down without asking. Such situations hardly
+ever repeat, and of 7,374 distinct ones PyBullet moved no box by the 0.2 m of a success:
+one by 0.132 m, all but four by less than 4 mm.
 """
 
 import json

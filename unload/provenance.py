@@ -1,6 +1,5 @@
 """Where a data file comes from, written beside it."""
 
-import json
 import os
 import platform
 import subprocess
@@ -44,7 +43,7 @@ def read_provenance(folder: str | Path, name: str) -> dict:
     Raises:
         FileNotFoundError: the data has no provenance.
     """
-    return json.loads((Path(folder) / f"{name}.provenance.json").read_text())
+    return files.read_json(Path(folder) / f"{name}.provenance.json")
 
 
 def _revision() -> str:

@@ -1,5 +1,6 @@
 """The hyperparameter grid of Sec. IV-A, and running many configurations at once."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -39,7 +40,6 @@ def tuning_config(
     checks.integer("steps", steps, 1)
     return TrainConfig(
         env="unload/HighestItem-v0",
-        env_kwargs={},
         picks=steps * task.NUM_ENVS,
         batch_size=batch_size,
         learning_rate=learning_rate,
@@ -96,9 +96,22 @@ def run_sweep(
     Returns:
         One row per run, in the order given: ``folder`` of the run, ``error`` (what went
         wrong, or empty), and the configuration's fields.
+
+    Raises:
+        TypeError: one of ``configs`` is not a ``TrainConfig``.
+        ValueError: two of them would share a folder.
     """
     configs = list(configs)
+    for config in configs:
+        if not isinstance(config, TrainConfig):
+            raise TypeError(f"configs holds {config!r}; expected only unload.TrainConfig")
     folders = [run_folder(config, folder) for config in configs]
+    for place, count in Counter(folders).items():
+        if count > 1:
+            raise ValueError(
+                f"configs holds {count} runs for {str(place)!r}; expected runs that differ in "
+                "batch size, learning rate, seed or equalization, or a folder for each"
+            )
     with parallel_config(backend=backend, n_jobs=n_jobs):
         errors = Parallel()(delayed(_run)(*job) for job in zip(configs, folders))
     rows = [

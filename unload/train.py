@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
@@ -23,6 +23,7 @@ from unload.agent import DQN, Greedy, load_policy, save_policy
 from unload.config import ENVS, TrainConfig
 from unload.network import PEQNetwork
 from unload.replay import ReplayBuffer
+from unload.substacks import Load
 
 
 class TrainResult(NamedTuple):
@@ -42,36 +43,49 @@ class TrainResult(NamedTuple):
 CURVE_COLUMNS = ("picks", "mean_reward", "success_rate", "loss", "epsilon", "wall_time")
 
 
-def train(config: TrainConfig, run_dir: str | Path, progress: bool = True) -> TrainResult:
+def train(
+    config: TrainConfig,
+    run_dir: str | Path,
+    progress: bool = True,
+    stack: Callable[[np.random.Generator], Load] | None = None,
+) -> TrainResult:
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
-    A run that was interrupted and resumed gives the same weights and curves, bit by bit,
-    as one that was not. Ctrl-C writes a checkpoint first. A finished run is not repeated.
+    A run that was interrupted and resumed gives the same weights and curves, bit by bit but
+    for the wall times, as one that was not. Ctrl-C writes a checkpoint first. A finished run is not repeated.
 
     Args:
         config: what to train.
         run_dir: folder of the run: ``checkpoint.npz`` while it lasts, and at its end
             ``policy.safetensors``, ``curve.csv`` and ``config.json``.
         progress: show picks/s, MSR, loss and the time left.
+        stack: makes the loads, see ``ContainerEnv``; the paper's if None. It is not part
+            of the configuration: pass the same one to go on.
 
     Raises:
         TypeError: ``config`` is not a ``TrainConfig``.
-        ValueError: ``run_dir`` holds a run of another configuration.
+        ValueError: ``run_dir`` is not a folder, or holds a run of another configuration
+            or damaged files; ``stack`` is given for an environment without loads.
         KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
     """
     if not isinstance(config, TrainConfig):
         raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
+    if stack is not None and config.env != ENVS[0]:
+        raise ValueError(f"stack is given; expected None for env={config.env!r}")
     folder = Path(run_dir)
+    if folder.exists() and not folder.is_dir():
+        raise ValueError(f"run_dir is {str(folder)!r}, a file; expected a folder")
+    folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "config.json").exists():
-        _train(config, folder, progress)
-    _check_same(json.loads((folder / "config.json").read_text()), config, folder)
+        _train(config, folder, progress, stack)
+    _check_same(files.read_json(folder / "config.json"), config, folder)
     return TrainResult(
         load_policy(folder / "policy.safetensors"), pd.read_csv(folder / "curve.csv")
     )
 
 
-def _train(config: TrainConfig, folder: Path, progress: bool) -> None:
-    run = _Run(config, folder)
+def _train(config: TrainConfig, folder: Path, progress: bool, stack: Callable | None) -> None:
+    run = _Run(config, folder, stack)
     try:
         run.go(progress)
     finally:
@@ -114,7 +128,7 @@ def _interrupt_later() -> Iterator[list[int]]:
 class _Run:
     """A training run in progress: everything a checkpoint must hold."""
 
-    def __init__(self, config: TrainConfig, folder: Path) -> None:
+    def __init__(self, config: TrainConfig, folder: Path, stack: Callable | None) -> None:
         self.config, self.folder = config, folder
         self.checkpoint = folder / "checkpoint.npz"
         env_seed, rng_seed, torch_seed = np.random.SeedSequence(config.seed).generate_state(3)
@@ -128,7 +142,9 @@ class _Run:
         )
         size = min(config.replay_size, config.picks)
         self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
-        env_kwargs = config.env_kwargs if config.env == ENVS[0] else {}
+        container = {"physics": config.physics} if config.env == ENVS[0] else {}
+        if stack is not None:
+            container["stack"] = stack
         self.envs = gymnasium.make_vec(
             config.env,
             config.num_envs,
@@ -136,7 +152,8 @@ class _Run:
             vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP},
             equalize=config.equalize,
             ties=config.ties,
-            **env_kwargs,
+            max_picks=config.max_picks,
+            **container,
         )
         self.picks = 0
         self.curve: list[tuple[float, ...]] = []

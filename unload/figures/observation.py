@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from unload import files
 from unload.figures.style import styled
-from unload.reproduce import COMMAND
 
 FOLDER = "obs_hist_equal"
 # The paper's colours, in this repository's shades.
@@ -35,7 +34,7 @@ def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
     """
     path = Path(folder) / FOLDER / f"{name}.csv"
     if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; make it with: {COMMAND} observation")
+        raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce observation computes it")
     table = pd.read_csv(path)
     if list(table.columns) != ["x", "y"]:
         raise ValueError(f"{path} has columns {list(table.columns)}; expected ['x', 'y']")

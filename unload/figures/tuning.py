@@ -13,7 +13,7 @@ from unload import files
 from unload.figures.style import mark_reduced, styled
 from unload.sweep import STEPS, set_name
 
-WINDOW = 50  # steps of the running mean drawn over the raw curve
+WINDOW = 25  # steps of the running mean drawn over the raw curve
 
 
 @styled
@@ -67,20 +67,27 @@ def read_curve(folder: str | Path, name: str, equalize: bool = True) -> np.ndarr
 
     Raises:
         FileNotFoundError: the curve is missing; the message says how to compute it.
+        ValueError: the file is not one column of numbers.
     """
     path = Path(folder) / set_name(equalize) / f"{name}.csv"
     if not path.is_file():
         raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce tuning computes it")
-    return pd.read_csv(path, header=None, skip_blank_lines=False)[0].to_numpy(float)
+    try:
+        curve = pd.read_csv(path, header=None, skip_blank_lines=False, dtype=float)
+    except ValueError as error:
+        raise ValueError(f"{path} is not a column of numbers: {error}") from error
+    if curve.shape[1] != 1:
+        raise ValueError(f"{path} has {curve.shape[1]} columns; expected one")
+    return curve[0].to_numpy()
 
 
 @styled
 def draw_curves(axes: Axes, curves: Mapping[str, np.ndarray], label: str) -> None:
-    """Draw curves over their steps: raw ones pale, running means of 50 steps on top."""
+    """Draw curves over their steps: raw ones pale, running means of 25 steps on top."""
     for number, (name, values) in enumerate(curves.items()):
         steps = np.arange(len(values))
         axes.plot(steps, values, color=f"C{number}", alpha=0.2, linewidth=0.6)
-        smooth = pd.Series(values).rolling(WINDOW, min_periods=1).mean()
+        smooth = pd.Series(values).rolling(WINDOW, min_periods=1, center=True).mean()
         axes.plot(steps, smooth, color=f"C{number}", label=name)
     axes.set(xlabel="step $k$", ylabel=label)
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
@@ -89,6 +96,6 @@ def draw_curves(axes: Axes, curves: Mapping[str, np.ndarray], label: str) -> Non
 def _figure(curves: Mapping[str, np.ndarray], label: str, folder: str | Path) -> Figure:
     figure, axes = plt.subplots()
     draw_curves(axes, curves, label)
-    axes.set(xlim=(0, STEPS), ylim=(0, 1) if label == "MSR" else (0, 0.6))
+    axes.set(xlim=(0, STEPS), ylim=(0, 1.02) if label == "MSR" else (0, 0.6))
     mark_reduced(figure, folder, "tuning")
     return figure
