@@ -1,4 +1,4 @@
-"""What several test modules share: the `slow` marker, loads, environments, bad values."""
+"""What several test modules share: loads, environments, bad values."""
 
 from collections.abc import Callable, Iterator
 
@@ -10,10 +10,6 @@ import torch
 import unload
 
 torch.set_num_threads(1)
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "slow: takes more than about ten seconds")
 
 
 @pytest.fixture

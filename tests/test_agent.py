@@ -4,7 +4,7 @@ import torch
 from safetensors.torch import save_file
 from torch.nn.functional import smooth_l1_loss
 
-from unload import DQN, Greedy, PEQNetwork, equalize, load_policy, save_policy
+from unload import DQN, Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
 from unload.agent import greedy_actions
 
 
@@ -98,6 +98,15 @@ def test_epsilon_is_the_share_of_random_actions(rng):
 def test_bad_calls_of_act_are_refused(rng, masks, epsilon, message):
     with pytest.raises(ValueError, match=message):
         DQN(HeightNetwork()).act(np.zeros((2, 4, 3), np.float32), masks, epsilon, rng)
+
+
+def test_act_takes_lists_and_needs_a_generator(rng):
+    agent, observations = DQN(HeightNetwork()), np.zeros((2, 3, 3))
+    observations[:, 1, 2] = 1
+    masks = [[1, 1, 1], [1, 0, 1]]
+    assert agent.act(observations.tolist(), masks, 0.0, rng).tolist() == [1, 0]
+    with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
+        agent.act(observations, masks, 0.0, None)
 
 
 # --- learning -----------------------------------------------------------------------
@@ -230,6 +239,31 @@ def test_learning_finds_the_highest_item(rng):
 def test_bad_settings_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
         DQN(peq(), **kwargs)
+
+
+def test_what_is_no_network_or_no_batch_is_refused():
+    for kind in (DQN, lambda network: Greedy(network, equalize=False)):
+        with pytest.raises(TypeError, match="network is None; expected a torch.nn.Module"):
+            kind(None)
+    with pytest.raises(TypeError, match="fused_update is 1; expected True or False"):
+        DQN(peq(), fused_update=1)
+    with pytest.raises(ValueError, match="batch has no actions, observations, rewards"):
+        DQN(peq()).update({})
+    with pytest.raises(TypeError, match="equalize is 1.0; expected True or False"):
+        Greedy(peq(), equalize=1.0)
+
+
+def test_only_learned_policies_are_saved(tmp_path):
+    for policy in (policies.highest, Greedy(HeightNetwork(), equalize=False)):
+        with pytest.raises(TypeError, match="policy is .*; expected a Greedy of a PEQNetwork"):
+            save_policy(policy, tmp_path / "policy.safetensors")
+    assert not list(tmp_path.iterdir())
+
+
+def test_bootstrapping_needs_what_follows(rng):
+    batch = without_next(make_batch(rng))
+    with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
+        DQN(peq(), gamma=0.9).update(batch)
 
 
 def test_a_fused_update_of_another_network_is_refused():

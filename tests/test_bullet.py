@@ -133,3 +133,36 @@ def test_importing_is_silent():
     command = [sys.executable, "-c", "import unload"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"position": (0, 0, np.nan)}, ValueError, "position holds nan"),
+        ({"position": (0, 0)}, ValueError, r"position has shape \(2,\); expected \(3,\)"),
+        ({"size": (1, -1, 1)}, ValueError, r"size is \[1.0, -1.0, 1.0\]; expected three edges > 0"),
+        ({"size": "big"}, TypeError, "size has dtype"),
+        ({"mass": -1}, ValueError, "mass is -1"),
+        ({"mass": None}, TypeError, "mass is None"),
+    ],
+)
+def test_bad_boxes_are_refused(make_world, changes, error, message):
+    world, _ = make_world()
+    with pytest.raises(error, match=message):
+        world.add_box(**({"position": (0, 0, 3), "size": (1, 1, 1), "mass": 1} | changes))
+
+
+def test_bad_times_and_forces_are_refused(make_world):
+    world, (box,) = make_world()
+    for call, message in (
+        (lambda: World(0), "time_step is 0"),
+        (lambda: World(float("nan")), "time_step is nan"),
+        (lambda: world.step(-1), "seconds is -1"),
+        (lambda: world.pull(box, seconds=-1), "seconds is -1"),
+        (lambda: world.pull(box, float("nan")), "force is nan"),
+        (lambda: world.pull(box, -5), "force is -5"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
+    with pytest.raises(TypeError, match="force is '20'"):
+        world.pull(box, "20")

@@ -375,7 +375,9 @@ def test_nothing_works_before_reset_or_after_close(call):
         ({"physics": "table", "after_pick": "keep"}, ValueError, "expected 'restore'"),
         ({"render_mode": "human"}, ValueError, "render_mode is 'human'; .*None, 'rgb_array'"),
         ({"ties": "coin"}, ValueError, "ties is 'coin'"),
-        ({"equalize": "yes"}, ValueError, "equalize is 'yes'; expected one of False, True"),
+        ({"equalize": "yes"}, TypeError, "equalize is 'yes'; expected True or False"),
+        ({"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
+        ({"ties": np.zeros(2)}, ValueError, "ties is array"),
         ({"max_picks": 0}, ValueError, "max_picks is 0"),
         ({"max_picks": 1.5}, TypeError, "max_picks is 1.5"),
         ({"position_noise": -1}, ValueError, "position_noise is -1"),
@@ -394,6 +396,8 @@ def test_bad_settings_are_refused(kwargs, error, message):
         ({"lode": None}, ValueError, "options is 'lode'; expected one of 'load'"),
         ({"load": None}, TypeError, "load is None; expected an unload.Load"),
         ({"load": tall_load()}, ValueError, "expected at least 628, 128 visible ones after"),
+        (["load"], TypeError, r"options is \['load'\]; expected a dict"),
+        ("load", TypeError, "options is 'load'; expected a dict"),
     ],
 )
 def test_bad_options_leave_the_episode_as_it_was(options, error, message):
@@ -402,10 +406,46 @@ def test_bad_options_leave_the_episode_as_it_was(options, error, message):
     env.step(0)
     before = env.get_state()
     with pytest.raises(error, match=message):
-        env.reset(options=options)
+        env.reset(seed=99, options=options)
     after = env.get_state()
     assert all((after[name] == before[name]).all() for name in before)
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"present": np.ones(3, bool)}, ValueError, r"state\['present'\] has shape \(3,\)"),
+        ({"present": "all"}, TypeError, r"state\['present'\] has dtype"),
+        ({"failed": np.zeros(128, bool)}, ValueError, r"state\['failed'\] has shape \(128,\)"),
+        ({"blur": np.zeros((9, 3))}, ValueError, r"state\['blur'\] has shape \(9, 3\)"),
+        ({"counts": [501, 1]}, ValueError, r"counts'\]\[0\] is 501; .* >= 1 and <= 500"),
+        ({"counts": [0, 1]}, ValueError, r"counts'\]\[0\] is 0; .* >= 1"),
+        ({"counts": [9, 0]}, ValueError, r"counts'\]\[1\] is 0; .* >= 1 and <= 1"),
+        ({"counts": [1.0, 1.0]}, TypeError, r"state\['counts'\] has dtype float64"),
+        ({"rng": np.array("{}")}, ValueError, r"state\['rng'\] is .*expected what get_state"),
+        ({"rng": np.array("dice")}, ValueError, r"state\['rng'\] is .*expected what get_state"),
+        ({"sizes": np.ones((2, 2))}, ValueError, "sizes has shape"),
+    ],
+)
+def test_bad_states_leave_the_episode_as_it_was(changes, error, message):
+    env = ContainerEnv(physics="table")
+    first, _ = env.reset(seed=0)
+    env.step(int(np.argmax(first[:, 2])))
+    before = env.get_state()
+    with pytest.raises(error, match=message):
+        env.set_state(before | changes)
+    after = env.get_state()
+    assert all((after[name] == before[name]).all() for name in before)
+    env.close()
+
+
+def test_a_state_must_be_a_whole_dict(make_env):
+    env = make_env().unwrapped
+    with pytest.raises(ValueError, match="state has no blur, counts, .*expected positions,"):
+        env.set_state({})
+    with pytest.raises(TypeError, match="state is None; expected a dict"):
+        env.set_state(None)
 
 
 def test_a_stack_of_something_else_is_refused(make_env):

@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import evaluate, policies, success_rate
+from unload import ContainerEnv, evaluate, policies, success_rate
 
 COLUMNS = ["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
 
@@ -28,7 +28,12 @@ def test_success_rate(rewards, rate):
 
 @pytest.mark.parametrize(
     ("rewards", "message"),
-    [([], "rewards is empty"), ([1, 0], r"rewards holds 0\.0"), ([1, np.nan], "rewards holds nan")],
+    [
+        ([], "rewards is empty"),
+        ([1, 0], r"rewards holds 0\.0"),
+        ([1, np.nan], "rewards holds nan"),
+        ([[1], [1, 1]], "rewards has rows of different lengths"),
+    ],
 )
 def test_success_rate_refuses(rewards, message):
     with pytest.raises(ValueError, match=message):
@@ -98,7 +103,8 @@ def test_local_and_table_agree():
         ({"episodes": 0}, ValueError, "episodes is 0"),
         ({"episodes": 2.0}, TypeError, "episodes is 2.0"),
         ({"seed": -1}, ValueError, "seed is -1"),
-        ({"mask": None}, ValueError, "mask is None; expected one of False, True"),
+        ({"mask": None}, TypeError, "mask is None; expected True or False"),
+        ({"mask": 1}, TypeError, "mask is 1; expected True or False"),
         ({"physics": "none"}, ValueError, "physics is 'none'"),
         ({"max_picks": 0}, ValueError, "max_picks is 0"),
         ({"ties": "coin"}, ValueError, "ties is 'coin'"),
@@ -107,3 +113,24 @@ def test_local_and_table_agree():
 def test_bad_arguments_are_refused(kwargs, error, message):
     with pytest.raises(error, match=message):
         evaluate(**({"policy": policies.random, "episodes": 1} | kwargs))
+
+
+@pytest.mark.parametrize(
+    ("returned", "error", "message"),
+    [
+        ([3.7], TypeError, "what policy returned has dtype float64; expected integers"),
+        (3, ValueError, r"what policy returned has shape \(\); expected \(1,\)"),
+        ([3, 4], ValueError, r"what policy returned has shape \(2,\); expected \(1,\)"),
+        ([128], ValueError, "what policy returned is 128; expected an integer >= 0 and <= 127"),
+        ([-1], ValueError, "what policy returned is -1"),
+        (None, TypeError, "what policy returned has dtype object"),
+    ],
+)
+def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(
+    monkeypatch, returned, error, message
+):
+    closed = []
+    monkeypatch.setattr(ContainerEnv, "close", lambda env: closed.append(env))
+    with pytest.raises(error, match=message):
+        evaluate(lambda *_: returned, 1)
+    assert len(closed) == 1

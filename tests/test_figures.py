@@ -9,10 +9,12 @@ import pytest
 
 from unload import files
 from unload.figures import observation, training, tuning
+from unload.figures.lifting import lift_sequences
 from unload.figures.mdp import fig01_mdp
 from unload.figures.network import fig07_network
 from unload.figures.style import save
-from unload.figures.substacks import fig03_substacks
+from unload.figures.substacks import fig03_substacks, rows
+from unload.sweep import set_name
 
 matplotlib.use("Agg")
 
@@ -56,6 +58,56 @@ def test_learning_rate_figure_draws_the_stored_curves():
     raw = [line.get_ydata() for line in axes.lines if line.get_alpha()]
     stored = tuning.read_curve(files.DATA, "hitrate_curve_bz_1024_lr_0.001_agent_5")
     assert any(np.array_equal(curve, stored) for curve in raw)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("Step,Value\n1,2\n", r"has columns \['Step', 'Value'\]; expected \['Wall time', "),
+        ("Wall time,Step,Value\n", "has no rows; expected at least one"),
+        ("Wall time,Step,Value\n1,2,\n", "holds nan"),
+    ],
+)
+def test_bad_training_curves_are_refused(tmp_path, content, message):
+    (tmp_path / "loss_function_agent.csv").write_text(content)
+    with pytest.raises(ValueError, match=f"loss_function_agent.csv {message}"):
+        training.read_curve(tmp_path, "loss_function_agent")
+
+
+@pytest.mark.parametrize("content", ["", "a\nb\n", "1,2\n3,4\n"])
+def test_bad_tuning_curves_are_refused(tmp_path, content):
+    path = tmp_path / set_name(True) / "curve.csv"
+    path.parent.mkdir()
+    path.write_text(content)
+    with pytest.raises(ValueError, match="curve.csv (is not a column of numbers|has 2 columns)"):
+        tuning.read_curve(tmp_path, "curve")
+
+
+@pytest.mark.parametrize(
+    ("combinations", "message"),
+    [
+        ([(0, 0, 0, -1)], "combinations holds -1 to 0; expected 0 to 2"),
+        ([(0,)], r"combinations has shape \(1, 1\); expected \(any, 4\)"),
+        ([], "combinations has shape"),
+    ],
+)
+def test_bad_rows_are_refused(combinations, message):
+    with pytest.raises(ValueError, match=message):
+        rows(combinations)
+    assert len(rows([(0, 1, 2, 0)]).axes) == 1
+
+
+def test_bad_lift_sequences_are_refused():
+    sizes, poses = np.ones((2, 2)), np.zeros((1, 2, 3))
+    for lifts, times, error, message in (
+        ({}, [0.0], ValueError, "lifts has 0 and times 1 entries; expected at least one"),
+        ({"a": (sizes, poses)}, [], ValueError, "lifts has 1 and times 0 entries"),
+        ([1], [0.0], TypeError, r"lifts is \[1\]; expected a dict"),
+        ({"a": (sizes, poses)}, [0.0, 0.1], ValueError, "poses of 'a' has shape"),
+    ):
+        with pytest.raises(error, match=message):
+            lift_sequences(lifts, times)
+    assert len(lift_sequences({"a": (sizes, poses)}, [0.0]).axes) == 1
 
 
 @pytest.mark.parametrize("reduced", [True, False])

@@ -100,14 +100,42 @@ def test_a_random_load_is_no_load_of_this_environment(make_env, rng):
 
 def test_calls_out_of_order_are_refused():
     env = HighestItemEnv()
-    for call in (lambda: env.step(0), env.get_state):
+    for call in (lambda: env.step(0), env.get_state, env.action_masks, env.render):
         with pytest.raises(ResetNeeded, match="the episode is not started"):
             call()
     env.reset(seed=0)
+    assert env.render() is None
     env.close()
-    for call in (lambda: env.step(0), env.get_state, env.reset):
+    for call in (lambda: env.step(0), env.get_state, env.action_masks, env.render, env.reset):
         with pytest.raises(ClosedEnvironmentError):
             call()
+
+
+@pytest.mark.parametrize(
+    ("state", "error", "message"),
+    [
+        (None, TypeError, "state is None; expected a dict"),
+        ({}, ValueError, "state has no highest, picks, rng"),
+        ({"picks": 7}, ValueError, r"state\['picks'\] is 7; expected an integer >= 0 and <= 6"),
+        ({"picks": 1.0}, TypeError, r"state\['picks'\] has dtype float64"),
+        ({"highest": np.ones(3)}, ValueError, r"state\['highest'\] has shape \(3,\)"),
+        ({"rng": "dice"}, ValueError, r"state\['rng'\] is 'dice'"),
+    ],
+)
+def test_bad_states_leave_the_episode_as_it_was(state, error, message):
+    env = HighestItemEnv(max_picks=6)
+    env.reset(seed=0)
+    before = env.get_state()
+    with pytest.raises(error, match=message):
+        env.set_state(before | state if state else state)
+    after = env.get_state()
+    assert all((after[name] == before[name]).all() for name in before)
+
+
+def test_strongly_blurred_items_stay_in_the_observation_space():
+    env = HighestItemEnv(position_noise=5.0)
+    seen, _ = env.reset(seed=0)
+    assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
 
 
 @pytest.mark.parametrize("action", [128, -1, 3.5, float("nan"), True, None])
@@ -143,3 +171,15 @@ def test_stable_baselines_dqn_learns(make_env):
     model.learn(2_000)
     assert model.num_timesteps == 2_000
     assert any((p != q).any() for p, q in zip(model.q_net.parameters(), before))
+
+
+@pytest.mark.slow
+def test_maskable_ppo_learns(make_env):
+    contrib = pytest.importorskip("sb3_contrib")
+    model = contrib.MaskablePPO(
+        "MlpPolicy", make_env(ENV_ID), n_steps=500, batch_size=100, seed=0, device="cpu"
+    )
+    before = [p.clone() for p in model.policy.parameters()]
+    model.learn(2_000)
+    assert model.num_timesteps == 2_000
+    assert any((p != q).any() for p, q in zip(model.policy.parameters(), before))

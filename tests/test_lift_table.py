@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from unload import files
+from unload import files, task
 from unload.bullet import SETTINGS
 from unload.lift_table import HELD_DOWN, LiftTable
 from unload.physics import LIFTS, LocalPhysics
@@ -37,7 +37,7 @@ def test_boxes_under_three_others_are_held_down_in_local_physics_too(situations)
     assert len(heavy) > 15
     for situation in heavy:
         assert table.lift(situation) == 0
-        assert local.simulate(situation) < 0.02
+        assert local.simulate(situation) < task.LIFT_THRESHOLD
     assert len(table) == 0
     local.close()
 

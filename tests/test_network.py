@@ -70,6 +70,19 @@ def test_other_shapes_are_refused(shape):
         network()(torch.zeros(shape))
 
 
+@pytest.mark.parametrize(
+    ("observations", "message"),
+    [
+        (np.zeros((1, 4, 3), np.float32), "observations is a ndarray; expected a tensor"),
+        (torch.zeros((1, 4, 3), dtype=int), "dtype torch.int64; expected torch.float32"),
+        (torch.zeros((1, 4, 3)).double(), "dtype torch.float64; expected torch.float32"),
+    ],
+)
+def test_other_types_are_refused(observations, message):
+    with pytest.raises(TypeError, match=message):
+        network()(observations)
+
+
 @pytest.mark.parametrize(("n", "error"), [(0, ValueError), (1.5, TypeError), (True, TypeError)])
 def test_bad_numbers_of_features_are_refused(n, error):
     with pytest.raises(error, match="n_features is"):

@@ -324,12 +324,35 @@ def test_bad_items_are_refused(make, boxes, kind, call, item, error, message):
     assert physics.present.tolist() == [True, False]
 
 
+def calls_of(physics: Physics) -> list[Callable]:
+    calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
+    if isinstance(physics, FullPhysics):
+        calls.append(lambda: physics.settle(0.1))
+    return calls
+
+
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_empty_physics_has_no_items(kind):
-    physics = KINDS[kind]()
-    with pytest.raises(ValueError, match="item is 0"):
-        physics.lift(0)
+def test_calls_out_of_order_are_refused(boxes, kind):
+    physics, load = KINDS[kind](), boxes((1.2, 0.2))
+    for call in calls_of(physics):
+        with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
+            call()
+    physics.reset(load)
+    if kind == "local":
+        situation = physics.surroundings.situation(0)
     physics.close()
+    physics.close()
+    calls = [*calls_of(physics), lambda: physics.reset(load)]
+    if kind == "local":
+        calls.append(lambda: physics.simulate(situation))
+    for call in calls:
+        with pytest.raises(RuntimeError, match="the physics is closed; make a new one"):
+            call()
+
+
+def test_a_table_is_needed():
+    with pytest.raises(TypeError, match="table is 3; expected a LiftTable or None"):
+        TablePhysics(3)
 
 
 @pytest.mark.parametrize("kind", KINDS)

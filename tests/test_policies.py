@@ -50,17 +50,32 @@ def test_highest_takes_the_highest_allowed_row(rng):
 
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize(
-    ("observations", "masks", "message"),
+    ("observations", "masks", "error", "message"),
     [
-        (np.zeros((2, 4, 3)), [[1, 0, 0, 0], [0, 0, 0, 0]], "masks is all zero in row 1"),
-        (np.zeros((2, 4, 3)), np.ones((2, 5)), r"masks has shape \(2, 5\); expected \(2, 4\)"),
-        (np.zeros((2, 4, 3)), np.ones(4), r"masks has shape \(4,\)"),
-        (np.zeros((4, 3)), np.ones(4), r"observations has shape \(4, 3\)"),
-        (np.zeros((2, 4, 2)), np.ones((2, 4)), r"observations has shape \(2, 4, 2\)"),
+        (
+            np.zeros((2, 4, 3)),
+            [[1, 0, 0, 0], [0, 0, 0, 0]],
+            ValueError,
+            "masks is all zero in row 1",
+        ),
+        (
+            np.zeros((2, 4, 3)),
+            np.ones((2, 5)),
+            ValueError,
+            r"masks has shape \(2, 5\); expected \(2, 4\)",
+        ),
+        (np.zeros((2, 4, 3)), np.ones(4), ValueError, r"masks has shape \(4,\)"),
+        (np.zeros((4, 3)), np.ones(4), ValueError, r"observations has shape \(4, 3\)"),
+        (np.zeros((2, 4, 2)), np.ones((2, 4)), ValueError, r"observations has shape \(2, 4, 2\)"),
+        (np.full((1, 1, 3), np.nan), [[1]], ValueError, "observations holds nan"),
+        (np.zeros((1, 2, 3)), [[1, np.nan]], ValueError, "masks holds nan; expected bool, or 0"),
+        (np.zeros((1, 2, 3)), [[1, -1]], ValueError, "masks holds -1"),
+        (np.zeros((1, 2, 3)), [["0", "1"]], TypeError, "masks has dtype <U1"),
+        ([[["a", "b", "c"]]], [[1]], TypeError, "observations has dtype <U1"),
     ],
 )
-def test_bad_batches_are_refused(policy, observations, masks, message, rng):
-    with pytest.raises(ValueError, match=message):
+def test_bad_batches_are_refused(policy, observations, masks, error, message, rng):
+    with pytest.raises(error, match=message):
         policy(observations, masks, rng)
 
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from unload.render import Camera
+from unload.substacks import build_load
 
 
 @pytest.fixture
@@ -30,6 +31,42 @@ def test_another_load_is_drawn_anew(camera, small_load, boxes):
     assert (other != first).any()
     again = camera.picture(small_load, np.ones(len(small_load), dtype=bool))
     assert (again == first).all()
+
+
+def test_boxes_are_drawn_where_they_are(camera, boxes):
+    load, moved = boxes((0.8, 0.2)), boxes((1.6, 0.2))
+    present = np.ones(1, dtype=bool)
+    neat = camera.picture(load, present)
+    drifted = camera.picture(load, present, moved.positions)
+    assert (drifted != neat).any()
+    assert (camera.picture(load, present) == neat).all()
+    assert (camera.picture(moved, present) == drifted).all()
+    with pytest.raises(ValueError, match="positions has shape"):
+        camera.picture(load, present, np.zeros((2, 3)))
+
+
+def test_an_item_may_come_back(camera, small_load):
+    present = np.ones(len(small_load), dtype=bool)
+    full = camera.picture(small_load, present)
+    assert (camera.picture(small_load, ~present) != full).any()
+    assert (camera.picture(small_load, present) == full).all()
+
+
+def test_the_environment_draws_drifted_boxes(make_env):
+    env = make_env(
+        physics="full",
+        after_pick="keep",
+        stack=lambda rng: build_load(np.zeros((2, 3, 4), dtype=int)),
+        max_picks=3,
+        render_mode="rgb_array",
+    )
+    env.reset(seed=0)
+    before = env.render()
+    physics = env.unwrapped.physics
+    item = int(np.argmax(physics.positions()[:, 2]))
+    place, turn = physics._poses[item]
+    physics._poses[item] = (place[0] + 0.5, *place[1:]), turn
+    assert (env.render() != before).any()
 
 
 def test_packages_differ_in_colour(camera, small_load):

@@ -84,6 +84,14 @@ def test_bad_batches_change_nothing():
     ):
         with pytest.raises(ValueError, match=message):
             replay.add(**batch)
+    for changes, error, message in (
+        ({"actions": np.full(3, 1.7)}, TypeError, "actions has dtype float64; expected integers"),
+        ({"rewards": np.full(3, np.nan)}, ValueError, "rewards holds nan"),
+        ({"observations": np.full((3, 4, 3), np.inf)}, ValueError, "observations holds inf"),
+        ({"rewards": 1.0}, ValueError, r"rewards has shape \(\)"),
+    ):
+        with pytest.raises(error, match=message):
+            replay.add(**good | changes)
     assert len(replay) == replay.total == 2
     assert (replay.arrays["observations"][:2] == picks(0, 2)["observations"]).all()
 
@@ -95,6 +103,17 @@ def test_sampling_refuses(rng):
     replay.add(**picks(0, 2))
     with pytest.raises(ValueError, match="batch_size is 0"):
         replay.sample(0, rng)
+    with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
+        replay.sample(1, None)
+
+
+def test_masks_and_ends_are_flags():
+    replay = ReplayBuffer(10, 4, next_state=True)
+    good = picks(0, 3, next_state=True)
+    replay.add(**good | {"next_masks": good["next_masks"].astype(np.int8)})
+    assert (replay.arrays["next_masks"][:3] == good["next_masks"]).all()
+    with pytest.raises(ValueError, match="next_masks holds 2"):
+        replay.add(**good | {"next_masks": np.full((3, 4), 2)})
 
 
 @pytest.mark.parametrize(("size", "items", "name"), [(0, 4, "size"), (4, 0, "items")])

@@ -119,6 +119,11 @@ def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
     assert load.positions.tolist() == [[3.5, 1.25, 0.5]]
 
 
+def test_loads_are_compared_by_identity():
+    first, second = one_box(), one_box()
+    assert first == first and first != second and len({first, second}) == 2
+
+
 def test_touching_boxes_are_accepted(boxes):
     assert len(boxes((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))) == 3
 
@@ -128,6 +133,7 @@ def test_touching_boxes_are_accepted(boxes):
     [
         ({"positions": np.zeros((0, 3))}, ValueError, "positions is empty"),
         ({"positions": np.zeros((1, 2))}, ValueError, r"positions has shape \(1, 2\)"),
+        ({"positions": [[1], [1, 2]]}, ValueError, "positions has rows of different lengths"),
         ({"positions": [[np.nan, 1, 1]]}, ValueError, "positions holds nan"),
         ({"positions": [["a", "b", "c"]]}, TypeError, "positions has dtype"),
         ({"positions": [[6.6, 1.25, 0.5]]}, ValueError, "box 0 reaches from"),
@@ -161,18 +167,20 @@ def test_overlapping_boxes_are_refused(step):
 
 
 @pytest.mark.parametrize(
-    ("variants", "message"),
+    ("variants", "error", "message"),
     [
-        (np.zeros((3, 4), dtype=int), r"expected \(walls, rows, 4\)"),
-        (np.zeros((0, 3, 4), dtype=int), r"expected \(walls, rows, 4\)"),
-        (np.zeros((1, 3, 5), dtype=int), r"expected integers of shape \(rows, 4\)"),
-        (np.zeros((1, 3, 4)), "dtype float64; expected integers"),
-        (np.full((1, 3, 4), 3), "variants holds 3 to 3; expected 0 to 2"),
-        (np.full((1, 3, 4), -1), "variants holds -1 to -1; expected 0 to 2"),
+        (np.zeros((3, 4), dtype=int), ValueError, r"shape \(3, 4\); expected \(any, any, 4\)"),
+        (np.zeros((0, 3, 4), dtype=int), ValueError, "variants has no walls"),
+        (np.zeros((12, 0, 4), dtype=int), ValueError, "variants has no rows"),
+        (np.zeros((1, 3, 5), dtype=int), ValueError, r"expected \(any, any, 4\)"),
+        ([[[0, 0, 0, 0], [0]]], ValueError, "variants has rows of different lengths"),
+        (np.zeros((1, 3, 4)), TypeError, "dtype float64; expected integers"),
+        (np.full((1, 3, 4), 3), ValueError, "variants holds 3 to 3; expected 0 to 2"),
+        (np.full((1, 3, 4), -1), ValueError, "variants holds -1 to -1; expected 0 to 2"),
     ],
 )
-def test_bad_variants_are_refused(variants, message):
-    with pytest.raises(ValueError, match=message):
+def test_bad_variants_are_refused(variants, error, message):
+    with pytest.raises(error, match=message):
         build_load(variants)
 
 

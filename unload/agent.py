@@ -33,7 +33,8 @@ class DQN:
         fused_update: update by ``unload.fused`` instead of PyTorch; wherever it applies if None.
 
     Raises:
-        ValueError: ``fused_update`` is asked for and does not apply.
+        TypeError, ValueError: an argument is not as described, or ``fused_update`` is asked
+            for and does not apply.
     """
 
     def __init__(
@@ -44,8 +45,10 @@ class DQN:
         beta: float = 1.0,
         fused_update: bool | None = None,
     ) -> None:
-        self.network = network
-        self.fused_update = fused.applies(network) if fused_update is None else fused_update
+        self.network = _check_network(network)
+        if fused_update is None:
+            fused_update = fused.applies(network)
+        self.fused_update = checks.boolean("fused_update", fused_update)
         if self.fused_update and not fused.applies(network):
             raise ValueError(
                 "fused_update is True; expected a PEQNetwork in float32 on the CPU with it"
@@ -68,7 +71,7 @@ class DQN:
 
         Args:
             observations: (batch, items, 3) float32.
-            masks: (batch, items), nonzero where an item may be picked.
+            masks: (batch, items), bool or 0 and 1, where an item may be picked.
             epsilon: probability of a random allowed action.
             rng: draws who explores, and what.
 
@@ -76,8 +79,11 @@ class DQN:
             (batch,) int64.
 
         Raises:
-            ValueError: shapes do not fit, or a mask allows nothing.
+            TypeError, ValueError: see ``unload.policies.check_batch``; ``epsilon`` is no
+                number in [0, 1], or ``rng`` no generator.
         """
+        observations, masks = check_batch(observations, masks)
+        checks.generator("rng", rng)
         explore = rng.random(len(observations)) < checks.real("epsilon", epsilon, 0, 1)
         actions = random(observations, masks, rng)
         if not explore.all():
@@ -92,8 +98,11 @@ class DQN:
             The loss before the step.
 
         Raises:
+            TypeError, ValueError: ``batch`` is no dict, or an array is missing.
             FloatingPointError: the loss is not finite; the weights are left as they were.
         """
+        names = ("next_observations", "next_masks", "terminations") if self.gamma else ()
+        checks.entries("batch", batch, ("observations", "actions", "rewards", *names))
         if self.fused_update:
             loss = fused.loss_and_gradients(
                 self.network,
@@ -164,6 +173,12 @@ class DQN:
         self.optimizer.load_state_dict({**optimizer, "state": moments})
 
 
+def _check_network(network: torch.nn.Module) -> torch.nn.Module:
+    if not isinstance(network, torch.nn.Module):
+        raise TypeError(f"network is {network!r}; expected a torch.nn.Module")
+    return network
+
+
 @torch.no_grad()
 def greedy_actions(
     network: torch.nn.Module, observations: np.ndarray, masks: np.ndarray
@@ -189,9 +204,10 @@ class Greedy:
     """
 
     def __init__(self, network: PEQNetwork, equalize: bool, ties: str = "noise") -> None:
-        checks.one_of("equalize", equalize, (False, True))
+        self.network = _check_network(network).eval()
+        self.equalize = checks.boolean("equalize", equalize)
         checks.one_of("ties", ties, TIES)
-        self.network, self.equalize, self.ties = network.eval(), equalize, ties
+        self.ties = ties
 
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
@@ -202,7 +218,13 @@ class Greedy:
 
 
 def save_policy(policy: Greedy, path: str | Path) -> None:
-    """Write a policy's weights and how to use them, as safetensors, in one atomic step."""
+    """Write a policy's weights and how to use them, as safetensors, in one atomic step.
+
+    Raises:
+        TypeError: ``policy`` is no ``Greedy`` of a ``PEQNetwork``.
+    """
+    if not (isinstance(policy, Greedy) and isinstance(policy.network, PEQNetwork)):
+        raise TypeError(f"policy is {policy!r}; expected a Greedy of a PEQNetwork")
     settings = {
         "network": type(policy.network).__name__,
         "n_features": policy.network.n_features,

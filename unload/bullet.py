@@ -11,7 +11,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from unload import task
+from unload import checks, task
 
 
 @contextmanager
@@ -36,7 +36,7 @@ FRICTION = 0.5
 # Bullet's default for multibodies, stated here because maximal coordinates default to 0.
 DAMPING = 0.04
 # Boxes are made this much narrower (x and y), so that neighbours do not rub: side by
-# side without a gap, free boxes of a fresh world jam.
+# side without a gap, free boxes rise less, and in a full simulation many jam.
 GAP = 0.001  # m
 # All that a lift's outcome depends on besides the boxes.
 SETTINGS = {
@@ -62,10 +62,13 @@ class World:
         time_step: s per ``stepSimulation``.
         maximal_coordinates: plain rigid bodies instead of Featherstone multibodies;
             1.6 times as fast, with the same answers.
+
+    Raises:
+        TypeError, ValueError: ``time_step`` is no number from 1e-6 to 1.
     """
 
     def __init__(self, time_step: float = TIME_STEP, maximal_coordinates: bool = True) -> None:
-        self.time_step = time_step
+        self.time_step = checks.real("time_step", time_step, 1e-6, 1)
         self._maximal = maximal_coordinates
         self._shapes: dict[tuple[float, ...], int] = {}
         self._client = pybullet.connect(pybullet.DIRECT)
@@ -83,11 +86,19 @@ class World:
             position: (3,) centre in m.
             size: (3,) edge lengths in m.
             mass: kg.
+
+        Raises:
+            TypeError: an argument does not hold numbers.
+            ValueError: a number is not finite, an edge is not > 0, or the mass is < 0.
         """
+        position = checks.finite_array("position", position, (3,)).tolist()
+        size = checks.finite_array("size", size, (3,)).tolist()
+        if min(size) <= 0:
+            raise ValueError(f"size is {size}; expected three edges > 0")
         body = pybullet.createMultiBody(
-            mass,
-            self._shape(tuple(float(edge) for edge in size)),
-            basePosition=[float(x) for x in position],
+            checks.real("mass", mass, 0),
+            self._shape(tuple(size)),
+            basePosition=position,
             useMaximalCoordinates=self._maximal,
             physicsClientId=self._client,
         )
@@ -111,6 +122,7 @@ class World:
         return self._shapes[size]
 
     def remove(self, body: int) -> None:
+        """Take a body out of the world; its number is not given again."""
         pybullet.removeBody(body, physicsClientId=self._client)
 
     def place(self, body: int, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
@@ -125,13 +137,36 @@ class World:
         return pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
 
     def step(self, seconds: float) -> None:
-        for _ in range(round(seconds / self.time_step)):
+        """Let time pass, rounded to whole time steps.
+
+        Raises:
+            TypeError, ValueError: ``seconds`` is no finite number >= 0.
+        """
+        for _ in range(self._steps(seconds)):
             pybullet.stepSimulation(physicsClientId=self._client)
 
-    def pull(self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME):
-        """Pull a body upwards at its centre of mass (Sec. III-C) and return how far it moved, m."""
+    def _steps(self, seconds: float) -> int:
+        return round(checks.real("seconds", seconds, 0) / self.time_step)
+
+    def pull(
+        self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
+    ) -> float:
+        """Pull a body upwards at its centre of mass (Sec. III-C).
+
+        Args:
+            body: which one.
+            force: N.
+            seconds: how long, rounded to whole time steps.
+
+        Returns:
+            How far the body moved, in m.
+
+        Raises:
+            TypeError, ValueError: ``force`` or ``seconds`` is no finite number >= 0.
+        """
+        force = checks.real("force", force, 0)
         start = np.array(self.pose(body)[0])
-        for _ in range(round(seconds / self.time_step)):
+        for _ in range(self._steps(seconds)):
             # The force acts for one step only, so it is applied anew before each.
             pybullet.applyExternalForce(
                 body,
@@ -165,5 +200,6 @@ class World:
         return np.reshape(pixels, (height, width, 4))[:, :, :3].astype(np.uint8)
 
     def close(self) -> None:
+        """Disconnect the client; may be called again."""
         if pybullet.isConnected(self._client):
             pybullet.disconnect(self._client)

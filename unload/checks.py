@@ -1,15 +1,18 @@
 """Errors for bad input: each names the argument, its value and what was expected."""
 
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable, Mapping
 from numbers import Integral, Real
 
 import numpy as np
+
+# Of an array: None on an axis admits any length, None alone any shape.
+Shape = tuple[int | None, ...] | None
 
 
 def one_of(name: str, value: object, options: Iterable[object]) -> None:
     """Raise ValueError unless ``value`` is one of ``options``."""
     options = list(options)
-    if not any(value is option or value == option for option in options):
+    if not (isinstance(value, Hashable) and value in options):  # an array is not hashable
         known = ", ".join(repr(option) for option in options)
         raise ValueError(f"{name} is {value!r}; expected one of {known}")
 
@@ -50,21 +53,51 @@ def generator(name: str, value: object) -> np.random.Generator:
     return value
 
 
-def finite_array(name: str, value: object, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Return ``value`` as a float64 array; raise unless it is finite and has ``shape``.
+def entries(name: str, value: object, required: Iterable[str]) -> None:
+    """Raise unless ``value`` is a mapping that holds all ``required`` names."""
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{name} is {value!r}; expected a dict")
+    missing = sorted(set(required) - set(value))
+    if missing:
+        raise ValueError(f"{name} has no {', '.join(missing)}; expected {', '.join(required)}")
 
-    ``None`` in ``shape`` admits any length on that axis.
-    """
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} has dtype {array.dtype}; expected real numbers")
-    fits = array.ndim == len(shape) and all(
-        want is None or have == want for have, want in zip(array.shape, shape)
-    )
-    if not fits:
-        expected = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-        raise ValueError(f"{name} has shape {array.shape}; expected {expected}")
+
+def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
+    """Return ``value`` as a float64 array; raise unless it is finite and has ``shape``."""
+    array = _array(name, value, shape, "fiu", "real numbers").astype(np.float64)
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{name} holds {array[where]} at index {where}; expected finite numbers")
-    return array.astype(np.float64)
+    return array
+
+
+def integer_array(name: str, value: object, shape: Shape) -> np.ndarray:
+    """Return ``value`` as an int64 array; raise unless it holds integers and has ``shape``."""
+    return _array(name, value, shape, "iu", "integers").astype(np.int64)
+
+
+def flag_array(name: str, value: object, shape: Shape) -> np.ndarray:
+    """Return ``value`` as a bool array; raise unless it holds 0 and 1 only, and has ``shape``."""
+    array = _array(name, value, shape, "biuf", "bool, or 0 and 1")
+    wrong = array[(array != 0) & (array != 1)]
+    if wrong.size:
+        raise ValueError(f"{name} holds {wrong[0]}; expected bool, or 0 and 1")
+    return array.astype(bool)
+
+
+def _array(name: str, value: object, shape: Shape, kinds: str, expected: str) -> np.ndarray:
+    """``value`` as an array of one of the NumPy dtype ``kinds``; an empty one has any dtype."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} has rows of different lengths; expected an array") from error
+    if array.size and array.dtype.kind not in kinds:
+        raise TypeError(f"{name} has dtype {array.dtype}; expected {expected}")
+    fits = shape is None or (
+        array.ndim == len(shape)
+        and all(want is None or have == want for have, want in zip(array.shape, shape))
+    )
+    if not fits:
+        wanted = str(shape).replace("None", "any")
+        raise ValueError(f"{name} has shape {array.shape}; expected {wanted}")
+    return array

@@ -40,7 +40,7 @@ class TrainConfig:
         checks.one_of("ties", self.ties, TIES)
         checks.one_of("physics", self.physics, ("table", "local"))
         for name in ("equalize", "mask"):
-            checks.one_of(name, getattr(self, name), (False, True))
+            checks.boolean(name, getattr(self, name))
         for name in (
             "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
             "target_update_interval", "log_interval",

@@ -1,6 +1,5 @@
 """The container as a Gymnasium environment (Sec. III-A to III-D)."""
 
-import json
 from collections.abc import Callable
 
 import numpy as np
@@ -10,6 +9,8 @@ from unload.physics import make_physics
 from unload.picking import POSITION_NOISE, PickingEnv
 from unload.render import Camera
 from unload.substacks import Load, stack_load
+
+LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
 
 
 class ContainerEnv(PickingEnv):
@@ -58,14 +59,16 @@ class ContainerEnv(PickingEnv):
 
     Args:
         physics: who answers a lift: ``"local"`` (the situation of the chosen box),
-            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered).
+            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered, and 0
+            without asking PyBullet if three or more boxes rest on the chosen one).
         after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: length of an episode.
-        position_noise: standard deviation of the blur in m. It applies where the boxes
-            stay where they were put; ``"full"`` physics that is not restored drifts by
-            itself, and its boxes are seen where they are.
+        position_noise: standard deviation of the blur in m; 0 also switches off the
+            1 mm down. It applies where the boxes stay where they were put; ``"full"``
+            physics that is not restored drifts by itself, and its boxes are seen where
+            they are.
         stack: makes a ``Load`` from a ``numpy.random.Generator``; it must hold at least
             128 items more than can be unloaded in an episode.
         render_mode: ``"rgb_array"`` for pictures by PyBullet's TinyRenderer, or None.
@@ -104,8 +107,11 @@ class ContainerEnv(PickingEnv):
         """Fill the container anew; ``options={"load": load}`` gives the load to use."""
         self._check_open()
         options = {} if options is None else options
+        checks.entries("options", options, ())
         for name in options:
             checks.one_of("options", name, ("load",))
+        if "load" in options:  # before the generator is seeded
+            self._check_load(options["load"])
         super().reset(seed=seed)
         self._fill(options["load"] if "load" in options else self.stack(self.np_random))
         self._look()
@@ -170,19 +176,35 @@ class ContainerEnv(PickingEnv):
             "blur": self._blur.copy(),
             "failed": self._failed.copy(),
             "counts": np.array([self._picks, self._unloaded]),
-            "rng": np.array(json.dumps(self.np_random.bit_generator.state)),
+            "rng": self._rng_state(),
         }
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what ``get_state`` returned, here or in another environment."""
+        """Go on from what ``get_state`` returned, here or in another environment.
+
+        Raises:
+            TypeError, ValueError: ``state`` is something else, or does not fit this
+                environment's ``max_picks``. The episode stays as it was.
+        """
         self._check_open()
-        fields = ("positions", "sizes", "packages", "walls")
-        self._fill(Load(**{name: state[name] for name in fields}))
-        for item in np.flatnonzero(~state["present"]).tolist():
+        checks.entries("state", state, (*LOAD, "present", "blur", "failed", "counts", "rng"))
+        load = Load(**{name: state[name] for name in LOAD})
+        self._check_load(load)
+        count = len(load)
+        present = checks.flag_array("state['present']", state["present"], (count,))
+        failed = checks.flag_array("state['failed']", state["failed"], (count,))
+        blur = checks.finite_array("state['blur']", state["blur"], (count, 3))
+        counts = checks.integer_array("state['counts']", state["counts"], (2,)).tolist()
+        removed = int((~present).sum())
+        picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
+        unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
+        rng_state = self._read_rng_state(state["rng"])
+        self._fill(load)
+        for item in np.flatnonzero(~present).tolist():
             self.physics.remove(item)
-        self._blur, self._failed = state["blur"].copy(), state["failed"].copy()
-        self._picks, self._unloaded = state["counts"].tolist()
-        self.np_random.bit_generator.state = json.loads(str(state["rng"]))
+        self._blur, self._failed = blur, failed
+        self._picks, self._unloaded = picks, unloaded
+        self.np_random.bit_generator.state = rng_state
         if self._picks == self.max_picks:
             self._state = "finished"
         self._look()
@@ -194,7 +216,8 @@ class ContainerEnv(PickingEnv):
             return None
         if self._camera is None:
             self._camera = Camera()
-        return self._camera.picture(self.physics.load, self.physics.present)
+        physics = self.physics
+        return self._camera.picture(physics.load, physics.present, physics.positions())
 
     def close(self) -> None:
         self.physics.close()
@@ -202,7 +225,7 @@ class ContainerEnv(PickingEnv):
             self._camera.close()
         super().close()
 
-    def _fill(self, load: Load) -> None:
+    def _check_load(self, load: Load) -> None:
         if not isinstance(load, Load):
             raise TypeError(f"load is {load!r}; expected an unload.Load")
         least = task.N_VISIBLE + self.max_picks
@@ -211,6 +234,9 @@ class ContainerEnv(PickingEnv):
                 f"load holds {len(load)} items; expected at least {least}, "
                 f"{task.N_VISIBLE} visible ones after max_picks={self.max_picks} picks"
             )
+
+    def _fill(self, load: Load) -> None:
+        self._check_load(load)
         self.physics.reset(load)
         self._blur = self._drift(len(load))
         self._failed = np.zeros(len(load), dtype=bool)
@@ -229,9 +255,7 @@ class ContainerEnv(PickingEnv):
         positions = self.observed_positions()[present]
         rows = observation.nearest(positions)
         self.visible = present[rows]
-        # A box that was knocked out of the container is seen at its edge.
-        scaled = np.clip(observation.scale(positions[rows]), -1, 1)
-        self._observation = self._features(scaled)
+        self._observation = self._features(positions[rows])
 
     def _info(self) -> dict:
         mask = (~self._failed[self.visible]).astype(np.int8)

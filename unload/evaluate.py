@@ -19,9 +19,10 @@ def success_rate(rewards: np.ndarray) -> float:
         rewards: any shape, not empty, each +1 or -1.
 
     Raises:
+        TypeError: ``rewards`` does not hold numbers.
         ValueError: ``rewards`` is empty or holds another value.
     """
-    rewards = np.asarray(rewards, dtype=np.float64)
+    rewards = checks.finite_array("rewards", rewards, None)
     if rewards.size == 0:
         raise ValueError("rewards is empty; expected at least one reward")
     if not (np.abs(rewards) == 1).all():
@@ -57,19 +58,25 @@ def evaluate(
     Returns:
         One row per episode: ``success_rate``, ``unloaded`` (items), ``deadlocked``
         (share of picks) and ``longest_deadlock`` (deadlocked picks in a row).
+
+    Raises:
+        TypeError, ValueError: an argument is not as described, or ``policy`` returns
+            something other than one row of the observation.
     """
     checks.integer("episodes", episodes, 1)
     checks.integer("seed", seed, 0)
-    checks.one_of("mask", mask, (False, True))
+    checks.boolean("mask", mask)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
     env = ContainerEnv(physics=physics, max_picks=max_picks, **env_kwargs)
     rows = []
-    for sequence in np.random.SeedSequence(seed).spawn(episodes):
-        load_seed, policy_seed = sequence.generate_state(2)
-        rng = np.random.default_rng(policy_seed)
-        rows.append(_episode(env, policy, int(load_seed), rng, mask))
-    env.close()
+    try:
+        for sequence in np.random.SeedSequence(seed).spawn(episodes):
+            load_seed, policy_seed = sequence.generate_state(2)
+            rng = np.random.default_rng(policy_seed)
+            rows.append(_episode(env, policy, int(load_seed), rng, mask))
+    finally:
+        env.close()
     return pd.DataFrame(rows)
 
 
@@ -81,7 +88,9 @@ def _episode(
     truncated = False
     while not truncated:
         allowed = info["action_mask"] if mask else np.ones_like(info["action_mask"])
-        action = int(policy(observation[None], allowed[None], rng)[0])
+        chosen = policy(observation[None], allowed[None], rng)
+        (action,) = checks.integer_array("what policy returned", chosen, (1,)).tolist()
+        checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
         deadlocked.append(not info["action_mask"][action])
         observation, reward, _, truncated, info = env.step(action)
         rewards.append(reward)

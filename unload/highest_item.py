@@ -1,10 +1,8 @@
 """The hyperparameter-tuning environment: choose the highest item (Sec. IV-A)."""
 
-import json
-
 import numpy as np
 
-from unload import observation, task
+from unload import checks, observation, task
 from unload.picking import POSITION_NOISE, PickingEnv
 from unload.substacks import COLUMNS, ROWS, WALLS, build_load
 
@@ -48,12 +46,14 @@ class HighestItemEnv(PickingEnv):
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: length of an episode.
-        position_noise: standard deviation of the blur in m.
+        position_noise: standard deviation of the blur in m; 0 also switches off the
+            1 mm down.
         render_mode: None; there is nothing to draw.
 
     Raises:
         TypeError, ValueError: an argument or an action is not as described.
-        gymnasium.error.ResetNeeded: ``step`` before ``reset`` or after the episode's end.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step``
+            after the end of an episode.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
@@ -90,6 +90,7 @@ class HighestItemEnv(PickingEnv):
 
     def action_masks(self) -> np.ndarray:
         """(128,) bool, all True."""
+        self._check_started()
         return np.ones(task.N_VISIBLE, dtype=bool)
 
     def get_state(self) -> dict[str, np.ndarray]:
@@ -98,15 +99,28 @@ class HighestItemEnv(PickingEnv):
         return {
             "picks": np.array(self._picks),
             "highest": self._highest.copy(),
-            "rng": np.array(json.dumps(self.np_random.bit_generator.state)),
+            "rng": self._rng_state(),
         }
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what ``get_state`` returned, here or in another environment."""
+        """Go on from what ``get_state`` returned, here or in another environment.
+
+        Raises:
+            TypeError, ValueError: ``state`` is something else, or does not fit this
+                environment's ``max_picks``. The episode stays as it was.
+        """
         self._check_open()
-        self._picks, self._highest = int(state["picks"]), state["highest"].copy()
-        self.np_random.bit_generator.state = json.loads(str(state["rng"]))
-        self._state = "finished" if self._picks == self.max_picks else "running"
+        checks.entries("state", state, ("picks", "highest", "rng"))
+        picks = checks.integer_array("state['picks']", state["picks"], ()).item()
+        picks = checks.integer("state['picks']", picks, 0, self.max_picks)
+        highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
+        self.np_random.bit_generator.state = self._read_rng_state(state["rng"])
+        self._picks, self._highest = picks, highest
+        self._state = "finished" if picks == self.max_picks else "running"
+
+    def render(self) -> None:
+        """None: there is nothing to draw."""
+        self._check_started()
 
     def _draw(self) -> np.ndarray:
         places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
@@ -114,7 +128,7 @@ class HighestItemEnv(PickingEnv):
         rows = observation.nearest(positions)
         heights = places[rows, 2]
         self._highest = heights > heights.max() - TOLERANCE
-        return self._features(observation.scale(positions[rows]))
+        return self._features(positions[rows])
 
     def _info(self) -> dict:
         return {"action_mask": np.ones(task.N_VISIBLE, dtype=np.int8)}

@@ -41,14 +41,20 @@ class PEQNetwork(nn.Module):
         """Action values.
 
         Args:
-            observations: (batch, items, 3) float32.
+            observations: (batch, items, 3) of the weights' dtype, float32.
 
         Returns:
-            (batch, items) float32 in [-1, 1].
+            (batch, items), of the same dtype, in [-1, 1].
 
         Raises:
+            TypeError: no tensor, or another dtype.
             ValueError: another shape, or no items.
         """
+        if not isinstance(observations, torch.Tensor):
+            raise TypeError(f"observations is a {type(observations).__name__}; expected a tensor")
+        dtype = next(self.parameters()).dtype
+        if observations.dtype != dtype:
+            raise TypeError(f"observations has dtype {observations.dtype}; expected {dtype}")
         if observations.ndim != 3 or observations.shape[1] == 0 or observations.shape[2] != 3:
             raise ValueError(
                 f"observations has shape {tuple(observations.shape)}; "

@@ -1,12 +1,15 @@
 """Three ways to ask PyBullet whether an item can be lifted.
 
-All have the same interface: ``reset(load)``, ``lift(item)``, ``remove(item)``,
-``positions()`` and ``close()``. ``lift`` answers how far the item moved, and it is
-unloaded if that is at least ``task.LIFT_THRESHOLD``.
+All have ``reset(load)``, ``lift(item)``, ``remove(item)``, ``positions()`` and
+``close()``. ``lift`` answers how far the item moved, and it is unloaded if that is at
+least ``task.LIFT_THRESHOLD``.
 
-- ``FullPhysics``: every box of the container is simulated. The reference, and slow.
-- ``LocalPhysics``: only the situation of the chosen box is simulated.
-- ``TablePhysics``: ``LocalPhysics`` with a memory; each situation is simulated once.
+- ``FullPhysics``: every box of the container is simulated. The reference, and slow. It
+  alone has ``settle(seconds)``.
+- ``LocalPhysics``: only the situation of the chosen box is simulated. It alone has
+  ``simulate(situation)``.
+- ``TablePhysics``: ``LocalPhysics`` with a memory; each situation is simulated once. If
+  three or more boxes rest on the chosen one, it answers 0 without asking PyBullet.
 """
 
 from abc import ABC, abstractmethod
@@ -33,16 +36,27 @@ class Physics(ABC):
 
     Attributes:
         exact: True where unlifted boxes stay exactly where the load put them.
+        load: the load, None before the first ``reset``.
         present: (n,) bool, False for items that have been removed.
+
+    Raises:
+        RuntimeError: a method is called before ``reset`` or after ``close``.
     """
 
     exact = True
 
     def __init__(self) -> None:
+        self.load: Load | None = None
         self.present = np.zeros(0, dtype=bool)
+        self._closed = False
 
     def reset(self, load: Load) -> None:
-        """Fill the container with ``load``."""
+        """Fill the container with ``load``.
+
+        Raises:
+            TypeError: ``load`` is not a ``Load``.
+        """
+        self._check_open()
         if not isinstance(load, Load):
             raise TypeError(f"load is {load!r}; expected an unload.Load")
         self.load = load
@@ -69,12 +83,24 @@ class Physics(ABC):
 
     def positions(self) -> np.ndarray:
         """(n, 3) float64, the centre of each item in m; removed items keep their last one."""
-        return self.load.positions
+        self._check_filled()
+        return self._positions()
 
     def close(self) -> None:
-        """Free the simulator."""
+        """Free the simulator; may be called again."""
+        self._closed = True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise RuntimeError("the physics is closed; make a new one")
+
+    def _check_filled(self) -> None:
+        self._check_open()
+        if self.load is None:
+            raise RuntimeError("the physics holds no load; call reset first")
 
     def _check(self, item: int) -> int:
+        self._check_filled()
         item = checks.integer("item", item, 0, len(self.present) - 1)
         if not self.present[item]:
             raise ValueError(f"item {item} has been removed; expected an item in the container")
@@ -88,8 +114,18 @@ class Physics(ABC):
 
     def _remove(self, item: int) -> None: ...
 
+    def _positions(self) -> np.ndarray:
+        return self.load.positions
 
-class LocalPhysics(Physics):
+
+class SituationPhysics(Physics):
+    """Base of those that ask for the situation of the chosen box only."""
+
+    def _reset(self) -> None:
+        self.surroundings = Surroundings(self.load, self.present)
+
+
+class LocalPhysics(SituationPhysics):
     """Simulates the situation of the chosen box, on the load's exact grid.
 
     The chosen box and all that rests on it are free to move; what they stand on, their
@@ -101,34 +137,37 @@ class LocalPhysics(Physics):
         super().__init__()
         self._world = World()
 
-    def _reset(self) -> None:
-        self.surroundings = Surroundings(self.load, self.present)
-
     def _lift(self, item: int) -> float:
         return self.simulate(self.surroundings.situation(item))
 
     def simulate(self, situation: Situation) -> float:
         """Lift the chosen box of a situation; how far it moved, in m."""
+        self._check_open()
         return lift(self._world, situation)
 
     def close(self) -> None:
+        super().close()
         self._world.close()
 
 
-class TablePhysics(Physics):
+class TablePhysics(SituationPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
+
+    A box with three or more others on it is held down without asking, see ``LiftTable``.
 
     Args:
         table: filled as situations are met. Share one among environments to share their
             experience; a new one if None.
+
+    Raises:
+        TypeError: ``table`` is something else.
     """
 
     def __init__(self, table: LiftTable | None = None) -> None:
         super().__init__()
         self.table = LiftTable() if table is None else table
-
-    def _reset(self) -> None:
-        self.surroundings = Surroundings(self.load, self.present)
+        if not isinstance(self.table, LiftTable):
+            raise TypeError(f"table is {table!r}; expected a LiftTable or None")
 
     def _lift(self, item: int) -> float:
         return self.table.lift(self.surroundings.situation(item))
@@ -197,7 +236,7 @@ class FullPhysics(Physics):
 
     def settle(self, seconds: float) -> None:
         """Let time pass without a pick, and take the poses reached for the load's own."""
-        checks.real("seconds", seconds, 0)
+        self._check_filled()
         self._world.step(seconds)
         self._keep()
 
@@ -218,10 +257,11 @@ class FullPhysics(Physics):
     def _remove(self, item: int) -> None:
         self._park(self._bodies[item])
 
-    def positions(self) -> np.ndarray:
+    def _positions(self) -> np.ndarray:
         return np.array([position for position, _ in self._poses])
 
     def close(self) -> None:
+        super().close()
         self._world.close()
 
 

@@ -1,10 +1,12 @@
 """What the two environments share: spaces, settings, and the order of calls."""
 
+import json
+
 import gymnasium
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
-from unload import checks, task
+from unload import checks, observation, task
 from unload.equalization import TIES, equalize
 
 # Drift of the boxes of a settled full simulation, measured in notebook 04: how far they
@@ -28,10 +30,10 @@ class PickingEnv(gymnasium.Env):
         position_noise: float,
         render_mode: str | None,
     ) -> None:
-        checks.one_of("equalize", equalize, (False, True))
+        self.equalize = checks.boolean("equalize", equalize)
         checks.one_of("ties", ties, TIES)
         checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        self.equalize, self.ties = equalize, ties
+        self.ties = ties
         self.max_picks = checks.integer("max_picks", max_picks, 1)
         self.position_noise = checks.real("position_noise", position_noise, 0)
         self.render_mode = render_mode
@@ -43,9 +45,11 @@ class PickingEnv(gymnasium.Env):
         """Free what the environment holds; may be called again."""
         self._state = "closed"
 
-    def _features(self, scaled: np.ndarray) -> np.ndarray:
-        """A new observation from scaled positions, equalized if asked for."""
-        return equalize(scaled, self.ties) if self.equalize else scaled.copy()
+    def _features(self, positions: np.ndarray) -> np.ndarray:
+        """The observation of items at ``positions`` (128, 3) in m, equalized if asked for."""
+        # An item that is outside the container is seen at its edge.
+        scaled = np.clip(observation.scale(positions), -1, 1)
+        return equalize(scaled, self.ties) if self.equalize else scaled
 
     def _drift(self, count: int) -> np.ndarray:
         """(count, 3) float64, how far a simulator's boxes are from where they were put, m."""
@@ -53,6 +57,20 @@ class PickingEnv(gymnasium.Env):
         if self.position_noise:
             drift[:, 2] -= SINK
         return drift
+
+    def _rng_state(self) -> np.ndarray:
+        """The state of ``np_random`` as a plain array."""
+        return np.array(json.dumps(self.np_random.bit_generator.state))
+
+    @staticmethod
+    def _read_rng_state(state: np.ndarray) -> dict:
+        """What ``_rng_state`` wrote; raise ValueError if it is something else."""
+        try:
+            content = json.loads(str(state))
+            np.random.PCG64().state = content
+        except (KeyError, OverflowError, TypeError, ValueError) as error:
+            raise ValueError(f"state['rng'] is {state!r}; expected what get_state wrote") from error
+        return content
 
     def _row(self, action: int) -> int:
         if isinstance(action, np.ndarray) and action.ndim == 0:

@@ -2,7 +2,7 @@
 
 A policy is a function ``policy(observations, masks, rng) -> actions`` on a batch:
 observations (batch, 128, 3) float as ``unload/Container-v0`` gives them, nearest item
-first and not equalized; masks (batch, 128), nonzero where a row may be picked; ``rng`` a
+first and not equalized; masks (batch, 128), bool or 0 and 1, where a row may be picked; ``rng`` a
 ``numpy.random.Generator``; actions (batch,) int64. ``unload.Greedy`` is a learned one.
 """
 
@@ -12,18 +12,15 @@ from unload import checks
 
 
 def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the observations as an array and the masks as bool.
+    """Return the observations as a float64 array and the masks as bool.
 
     Raises:
-        ValueError: shapes that are not (batch, items, 3) and (batch, items), or a mask
-            that allows no item at all.
+        TypeError: observations or masks that are not numbers.
+        ValueError: shapes that are not (batch, items, 3) and (batch, items), an observation
+            that is not finite, a mask other than 0 and 1, or one that allows no item at all.
     """
-    observations, masks = np.asarray(observations), np.asarray(masks)
-    if observations.ndim != 3 or observations.shape[-1] != 3:
-        raise ValueError(f"observations has shape {observations.shape}; expected (batch, items, 3)")
-    if masks.shape != observations.shape[:2]:
-        raise ValueError(f"masks has shape {masks.shape}; expected {observations.shape[:2]}")
-    allowed = masks.astype(bool)
+    observations = checks.finite_array("observations", observations, (None, None, 3))
+    allowed = checks.flag_array("masks", masks, observations.shape[:2])
     if not allowed.any(axis=1).all():
         row = int(np.argmin(allowed.any(axis=1)))
         raise ValueError(f"masks is all zero in row {row}; expected at least one item to pick")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from unload import task
+from unload import checks, task
 from unload.bullet import World
 from unload.palette import package_colour
 from unload.substacks import Load
@@ -23,14 +23,28 @@ class Camera:
         self._load: Load | None = None
         self._world: World | None = None
 
-    def picture(self, load: Load, present: np.ndarray) -> np.ndarray:
-        """(480, 640, 3) uint8, the items of ``load`` for which ``present`` (n,) is True."""
-        if load is not self._load:
+    def picture(
+        self, load: Load, present: np.ndarray, positions: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(480, 640, 3) uint8, a picture of some items of a load, all of them upright.
+
+        Args:
+            load: the items.
+            present: (n,) bool, which of them are drawn.
+            positions: (n, 3) float, where their centres are in m; the load's if None.
+        """
+        positions = load.positions if positions is None else positions
+        positions = checks.finite_array("positions", positions, (len(load), 3))
+        if load is not self._load or any(
+            self._bodies[item] is None for item in np.flatnonzero(present)
+        ):
             self._build(load)
         for item in np.flatnonzero(~present):
             if self._bodies[item] is not None:
                 self._world.remove(self._bodies[item])
                 self._bodies[item] = None
+        for item in np.flatnonzero(present):
+            self._world.place(self._bodies[item], positions[item])
         return self._world.picture(EYE, TARGET, WIDTH, HEIGHT)
 
     def _build(self, load: Load) -> None:

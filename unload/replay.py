@@ -4,6 +4,9 @@ import numpy as np
 
 from unload import checks
 
+# By the kind of an array's dtype: what may be written into it.
+CHECKS = {"f": checks.finite_array, "i": checks.integer_array, "b": checks.flag_array}
+
 
 class ReplayBuffer:
     """The last ``size`` picks, in arrays.
@@ -28,6 +31,7 @@ class ReplayBuffer:
     def __init__(self, size: int, items: int, next_state: bool = False) -> None:
         self.size = checks.integer("size", size, 1)
         checks.integer("items", items, 1)
+        checks.boolean("next_state", next_state)
         self.total = 0
         self.arrays = {
             "observations": np.empty((size, items, 3), np.float32),
@@ -48,17 +52,19 @@ class ReplayBuffer:
         """Add a batch of picks; the names are those of ``arrays``, the first axis the batch.
 
         Raises:
-            ValueError: a name is missing or unknown, or a shape does not fit.
+            TypeError: an array holds something else, such as actions that are not integers.
+            ValueError: a name is missing or unknown, a shape does not fit, or a number is
+                not finite. Nothing is added.
         """
         if batch.keys() != self.arrays.keys():
             raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
-        count = len(batch["rewards"])
-        for name, values in batch.items():
-            expected = (count, *self.arrays[name].shape[1:])
-            if np.shape(values) != expected:
-                raise ValueError(f"{name} has shape {np.shape(values)}; expected {expected}")
+        count = len(checks.finite_array("rewards", batch["rewards"], (None,)))
+        checked = {
+            name: CHECKS[array.dtype.kind](name, batch[name], (count, *array.shape[1:]))
+            for name, array in self.arrays.items()
+        }
         slots = np.arange(self.total, self.total + count) % self.size
-        for name, values in batch.items():
+        for name, values in checked.items():
             self.arrays[name][slots] = values
         self.total += count
 
@@ -66,8 +72,10 @@ class ReplayBuffer:
         """Draw picks uniformly, with replacement.
 
         Raises:
+            TypeError: ``rng`` is not a ``numpy.random.Generator``.
             ValueError: nothing has been added yet.
         """
+        checks.generator("rng", rng)
         if not len(self):
             raise ValueError("the replay buffer is empty; add picks before sampling")
         slots = rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))

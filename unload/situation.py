@@ -17,7 +17,7 @@ TOLERANCE = 1e-4  # m, faces this close touch
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # equal situations have equal keys
 class Situation:
     """The surroundings of one box, relative to it, in whole micrometres.
 

@@ -50,7 +50,7 @@ RIGHT = (
 COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
 class Load:
     """The boxes of one container, before anything is unloaded.
 
@@ -82,14 +82,9 @@ class Load:
             raise ValueError(f"sizes of box {item} are {sizes[item]}; expected all > 0")
         labels = {}
         for name in ("packages", "walls"):
-            array = np.asarray(getattr(self, name))
-            if array.dtype.kind not in "iu":
-                raise TypeError(f"{name} has dtype {array.dtype}; expected integers")
-            if array.shape != (count,):
-                raise ValueError(f"{name} has shape {array.shape}; expected ({count},)")
-            if (array < 0).any():
-                raise ValueError(f"{name} holds {array.min()}; expected numbers >= 0")
-            labels[name] = array.astype(np.int64)
+            labels[name] = checks.integer_array(name, getattr(self, name), (count,))
+            if (labels[name] < 0).any():
+                raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
         _check_inside(positions, sizes)
         _check_disjoint(positions, sizes)
         for name, array in {"positions": positions, "sizes": sizes, **labels}.items():
@@ -141,6 +136,21 @@ def slabs(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
     return np.split(order, np.flatnonzero(low[order][1:] >= reach[:-1]) + 1)
 
 
+def check_variants(name: str, variants: object) -> np.ndarray:
+    """Return ``variants`` as a (rows, 4) int64 array.
+
+    Raises:
+        TypeError: it does not hold integers.
+        ValueError: another shape, no rows, or an unknown variant.
+    """
+    variants = checks.integer_array(name, variants, (None, len(COLUMNS)))
+    if not len(variants):
+        raise ValueError(f"{name} has no rows; expected at least one")
+    if not (0 <= variants.min() and variants.max() <= 2):
+        raise ValueError(f"{name} holds {variants.min()} to {variants.max()}; expected 0 to 2")
+    return variants
+
+
 def wall_cells(variants: np.ndarray) -> np.ndarray:
     """One item wall on the grid.
 
@@ -151,16 +161,9 @@ def wall_cells(variants: np.ndarray) -> np.ndarray:
         (n, 3) int64: package number, left edge and lower edge of each item in cells.
 
     Raises:
-        ValueError: ``variants`` has another shape or holds an unknown variant.
+        TypeError, ValueError: see ``check_variants``.
     """
-    variants = np.asarray(variants)
-    if variants.ndim != 2 or variants.shape[1] != len(COLUMNS) or variants.dtype.kind not in "iu":
-        raise ValueError(
-            f"variants has shape {variants.shape} and dtype {variants.dtype}; "
-            f"expected integers of shape (rows, {len(COLUMNS)})"
-        )
-    if variants.size and not (0 <= variants.min() and variants.max() <= 2):
-        raise ValueError(f"variants holds {variants.min()} to {variants.max()}; expected 0 to 2")
+    variants = check_variants("variants", variants)
     return np.array(
         [
             (package, column_left + left, row * ROWS_HIGH + lower)
@@ -180,10 +183,13 @@ def build_load(variants: np.ndarray) -> Load:
 
     Returns:
         The load, its walls filling the container from the rear to the entrance.
+
+    Raises:
+        TypeError, ValueError: see ``check_variants``; there must be a wall, too.
     """
-    variants = np.asarray(variants)
-    if variants.ndim != 3 or len(variants) == 0:
-        raise ValueError(f"variants has shape {variants.shape}; expected (walls, rows, 4)")
+    variants = checks.integer_array("variants", variants, (None, None, len(COLUMNS)))
+    if not len(variants):
+        raise ValueError("variants has no walls; expected at least one")
     cells = [wall_cells(wall) for wall in variants]
     walls = np.repeat(np.arange(len(cells)), [len(wall) for wall in cells])
     packages, left, lower = np.concatenate(cells).T

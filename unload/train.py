@@ -52,7 +52,8 @@ def train(
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
-    for the wall times, as one that was not. Ctrl-C writes a checkpoint first. A finished run is not repeated.
+    for the wall times, as one that was not. Ctrl-C writes a checkpoint first. A finished
+    run is not repeated.
 
     Args:
         config: what to train.

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from unload import task
+from unload import checks, task
 from unload.palette import package_colour
 from unload.substacks import Load
 
@@ -40,7 +40,8 @@ def view(
         height: of the figure in pixels.
 
     Raises:
-        TypeError: ``load`` is not a ``Load``, or a group does not hold integers.
+        TypeError: ``load`` is not a ``Load``, ``groups`` no dict, or a group does not hold
+            integers.
         ValueError: ``present`` has another shape, more than four groups, or a group
             holds a number that is no item.
     """
@@ -86,6 +87,7 @@ def view(
 
 
 def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict]:
+    checks.entries("groups", groups, ())
     if len(groups) > len(GROUP_COLOURS):
         raise ValueError(f"groups has {len(groups)} entries; expected at most {len(GROUP_COLOURS)}")
     colours, legend = np.tile(PALE, (count, 1)), {}

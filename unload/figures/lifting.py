@@ -29,10 +29,20 @@ def lift_sequences(
             of rotation about the x axis in rad.
         times: when the poses were taken, s.
         dynamic: how many of the boxes move; the others are grey.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described, or there is nothing to draw.
     """
+    checks.entries("lifts", lifts, ())
+    times = checks.finite_array("times", times, (None,))
+    if not lifts or not len(times):
+        raise ValueError(
+            f"lifts has {len(lifts)} and times {len(times)} entries; expected at least one each"
+        )
     for label, (sizes, poses) in lifts.items():
         boxes = len(checks.finite_array(f"sizes of {label!r}", sizes, (None, 2)))
         checks.finite_array(f"poses of {label!r}", poses, (len(times), boxes, 3))
+        checks.integer("dynamic", dynamic, 1, boxes)
     figure, grid = plt.subplots(
         len(lifts), len(times), figsize=(10, 2.05 * len(lifts)), squeeze=False
     )

@@ -34,7 +34,9 @@ def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
     """
     path = Path(folder) / FOLDER / f"{name}.csv"
     if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce observation computes it")
+        raise FileNotFoundError(
+            f"{path} is missing; python -m unload.reproduce observation computes it"
+        )
     table = pd.read_csv(path)
     if list(table.columns) != ["x", "y"]:
         raise ValueError(f"{path} has columns {list(table.columns)}; expected ['x', 'y']")

@@ -10,7 +10,17 @@ from matplotlib.patches import Rectangle
 
 from unload.figures.style import styled
 from unload.palette import package_colour
-from unload.substacks import CELL, CELLS_WIDE, COLUMNS, LEFT, MID, PACKAGES, RIGHT, ROWS_HIGH
+from unload.substacks import (
+    CELL,
+    CELLS_WIDE,
+    COLUMNS,
+    LEFT,
+    MID,
+    PACKAGES,
+    RIGHT,
+    ROWS_HIGH,
+    check_variants,
+)
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
 INK = "#333333"
@@ -69,8 +79,11 @@ def rows(combinations: Iterable[Sequence[int]]) -> Figure:
     Args:
         combinations: for each row the variants (0–2) of its left, two mid and right
             substacks.
+
+    Raises:
+        TypeError, ValueError: see ``check_variants``.
     """
-    combinations = list(combinations)
+    combinations = check_variants("combinations", list(combinations))
     lines = -(-len(combinations) // 2)
     figure, grid = plt.subplots(lines, 2, figsize=(8.6, 1.6 * lines), squeeze=False)
     for axes in grid.flat[len(combinations) :]:
@@ -87,7 +100,11 @@ def draw_row(axes: Axes, variants: Sequence[int]) -> None:
     Args:
         axes: where to draw; both axes are in m.
         variants: (4,) int, variant 0–2 of the left, the two mid and the right substack.
+
+    Raises:
+        TypeError, ValueError: see ``check_variants``.
     """
+    (variants,) = check_variants("variants", [variants])
     for (column, substacks), variant in zip(COLUMNS, variants):
         _draw_substack(axes, substacks[variant], column * CELL, 0.0, fontsize=7)
     width, height = CELLS_WIDE * CELL, ROWS_HIGH * CELL

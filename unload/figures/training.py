@@ -7,8 +7,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from unload import files, task
+from unload import checks, files, task
 from unload.figures.style import mark_reduced, styled
+
+COLUMNS = ["Wall time", "Step", "Value"]
 
 
 @styled
@@ -20,7 +22,7 @@ def fig11_loss(folder: str | Path = files.DATA) -> Figure:
             writes.
 
     Raises:
-        FileNotFoundError: the data is missing.
+        FileNotFoundError, ValueError: see ``read_curve``.
     """
     curve = read_curve(folder, "loss_function_agent")
     return _figure(curve["Step"], curve["Value"], r"loss $\ell$", (0, 0.6), folder)
@@ -42,13 +44,20 @@ def read_curve(folder: str | Path, name: str) -> pd.DataFrame:
 
     Raises:
         FileNotFoundError: it is missing; the message says how to compute it.
+        ValueError: the file has other columns, no rows, or values that are not finite.
     """
     path = Path(folder) / f"{name}.csv"
     if not path.is_file():
         raise FileNotFoundError(
             f"{path} is missing; python -m unload.reproduce training computes it"
         )
-    return pd.read_csv(path)
+    table = pd.read_csv(path)
+    if list(table.columns) != COLUMNS:
+        raise ValueError(f"{path} has columns {list(table.columns)}; expected {COLUMNS}")
+    checks.finite_array(f"{path}", table, (None, len(COLUMNS)))
+    if table.empty:
+        raise ValueError(f"{path} has no rows; expected at least one")
+    return table
 
 
 def _figure(
