@@ -267,6 +267,20 @@ def test_a_configuration_is_needed(tmp_path):
         train({}, tmp_path)
 
 
+@pytest.mark.parametrize("mask", [False, True])
+def test_the_bootstrap_maximum_obeys_the_mask(tmp_path, mask):
+    """A failed item is out of the next state's maximum, whether training masks choices or not."""
+    config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
+    run = import_module("unload.train")._Run(config, tmp_path, None)
+    for _ in range(12):
+        run._step()
+    run.envs.close()
+    stored = run.replay.arrays
+    failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
+    assert len(failed) > 10
+    assert not stored["next_masks"][failed, stored["actions"][failed]].any()
+
+
 def test_own_loads_are_trained_on(tmp_path):
     seen = []
 

@@ -28,7 +28,7 @@ class TrainConfig:
     n_features: int = 64  # * n
     equalize: bool = True  # Sec. III-F
     ties: str = "noise"  # * see unload.equalize
-    mask: bool = False  # * whether failed items are masked during training, everywhere
+    mask: bool = False  # * whether failed items are masked in training's choices, too
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves

@@ -201,12 +201,11 @@ class _Run:
         epsilon = config.epsilon(self.picks)
         actions = self.agent.act(self.observations, self.masks, epsilon, self.rng)
         following, rewards, terminations, truncations, infos = self.envs.step(actions)
-        following_masks = self._usable(infos["action_mask"])
         batch = {"observations": self.observations, "actions": actions, "rewards": rewards}
         if config.gamma > 0:
-            batch |= self._next_state(following, following_masks, terminations, infos)
+            batch |= self._next_state(following, terminations, infos)
         self.replay.add(**batch)
-        self.observations, self.masks = following, following_masks
+        self.observations, self.masks = following, self._usable(infos["action_mask"])
         before, self.picks = self.picks, self.picks + config.num_envs
         self.rewards.append(float(np.mean(rewards)))
         if len(self.replay) >= min(config.batch_size, self.replay.size):
@@ -225,14 +224,15 @@ class _Run:
             self.rewards, self.losses = [], []
 
     def _usable(self, masks: np.ndarray) -> np.ndarray:
+        """What the agent may choose from: the mask is part of training only if asked for."""
         return masks.astype(bool) if self.config.mask else np.ones(masks.shape, dtype=bool)
 
-    def _next_state(self, observations, masks, terminations, infos) -> dict[str, np.ndarray]:
+    def _next_state(self, observations, terminations, infos) -> dict[str, np.ndarray]:
         """What followed each pick; at an episode's end the last sight of it, not the reset's."""
-        observations, masks = observations.copy(), masks.copy()
+        observations, masks = observations.copy(), infos["action_mask"].astype(bool)
         for env in np.flatnonzero(infos.get("_final_obs", [])):
             observations[env] = infos["final_obs"][env]
-            masks[env] = self._usable(infos["final_info"]["action_mask"][env])
+            masks[env] = infos["final_info"]["action_mask"][env]
         return {
             "next_observations": observations,
             "next_masks": masks,
