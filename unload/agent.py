@@ -88,7 +88,7 @@ class DQN:
         actions = random(observations, masks, rng)
         if not explore.all():
             exploit = ~explore
-            actions[exploit] = greedy_actions(self.network, observations[exploit], masks[exploit])
+            actions[exploit] = _best_actions(self.network, observations[exploit], masks[exploit])
         return actions
 
     def update(self, batch: dict[str, np.ndarray]) -> float:
@@ -179,12 +179,18 @@ def _check_network(network: torch.nn.Module) -> torch.nn.Module:
     return network
 
 
-@torch.no_grad()
 def greedy_actions(
     network: torch.nn.Module, observations: np.ndarray, masks: np.ndarray
 ) -> np.ndarray:
     """The allowed action of the highest value, (batch,) int64."""
-    observations, allowed = check_batch(observations, masks)
+    return _best_actions(network, *check_batch(observations, masks))
+
+
+@torch.no_grad()
+def _best_actions(
+    network: torch.nn.Module, observations: np.ndarray, allowed: np.ndarray
+) -> np.ndarray:
+    """``greedy_actions`` on what ``check_batch`` has returned."""
     if fused.applies(network):
         return fused.greedy_actions(network, observations.astype(np.float32, copy=False), allowed)
     values = network(torch.as_tensor(observations, dtype=torch.float32))
