@@ -423,8 +423,8 @@ def test_bad_options_leave_the_episode_as_it_was(options, error, message):
         ({"counts": [0, 1]}, ValueError, r"counts'\]\[0\] is 0; .* >= 1"),
         ({"counts": [9, 0]}, ValueError, r"counts'\]\[1\] is 0; .* >= 1 and <= 1"),
         ({"counts": [1.0, 1.0]}, TypeError, r"state\['counts'\] has dtype float64"),
-        ({"rng": np.array("{}")}, ValueError, r"state\['rng'\] is .*expected what get_state"),
-        ({"rng": np.array("dice")}, ValueError, r"state\['rng'\] is .*expected what get_state"),
+        ({"rng": np.array("{}")}, ValueError, r"state\['rng'\] is .*expected a generator"),
+        ({"rng": np.array("dice")}, ValueError, r"state\['rng'\] is .*expected a generator"),
         ({"sizes": np.ones((2, 2))}, ValueError, "sizes has shape"),
     ],
 )

@@ -15,7 +15,6 @@ from unload.substacks import (
     WALLS,
     Load,
     build_load,
-    slabs,
     stack_load,
     wall_cells,
 )
@@ -189,18 +188,3 @@ def test_bad_arguments_of_stack_load_are_refused(rng):
         stack_load(0)
     with pytest.raises(ValueError, match="walls is 0"):
         stack_load(rng, walls=0)
-
-
-def test_slabs_are_the_walls(full_load):
-    low = full_load.positions[:, 0] - full_load.sizes[:, 0] / 2 + 1e-6
-    high = full_load.positions[:, 0] + full_load.sizes[:, 0] / 2 - 1e-6
-    groups = slabs(low, high)
-    assert len(groups) == WALLS
-    for number, group in enumerate(groups):
-        assert (full_load.walls[group] == number).all()
-    assert sorted(np.concatenate(groups).tolist()) == list(range(len(full_load)))
-
-
-def test_slabs_join_what_overlaps_in_a_chain():
-    groups = slabs(np.array([0.0, 5.0, 0.5, 1.5]), np.array([1.0, 6.0, 2.0, 3.0]))
-    assert [sorted(group.tolist()) for group in groups] == [[0, 2, 3], [1]]

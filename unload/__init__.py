@@ -35,5 +35,13 @@ __all__ = [
     "view",
 ]
 
-gymnasium.register(id="unload/Container-v0", entry_point="unload.env:ContainerEnv")
-gymnasium.register(id="unload/HighestItem-v0", entry_point="unload.highest_item:HighestItemEnv")
+gymnasium.register(
+    id="unload/Container-v0",
+    entry_point="unload.env:ContainerEnv",
+    vector_entry_point="unload.vector_env:ContainerVectorEnv",
+)
+gymnasium.register(
+    id="unload/HighestItem-v0",
+    entry_point="unload.highest_item:HighestItemEnv",
+    vector_entry_point="unload.vector_env:HighestItemVectorEnv",
+)

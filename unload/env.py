@@ -4,13 +4,31 @@ from collections.abc import Callable
 
 import numpy as np
 
-from unload import checks, observation, task
+from unload import checks, generators, observation, task
 from unload.physics import make_physics
 from unload.picking import POSITION_NOISE, PickingEnv
 from unload.render import Camera
 from unload.substacks import Load, stack_load
 
 LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
+
+
+def check_stack(stack: object) -> None:
+    """Raise TypeError unless ``stack`` can make a load."""
+    if not callable(stack):
+        raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+
+
+def check_load(load: object, max_picks: int) -> None:
+    """Raise unless ``load`` is a ``Load`` with enough items for an episode."""
+    if not isinstance(load, Load):
+        raise TypeError(f"load is {load!r}; expected an unload.Load")
+    least = task.N_VISIBLE + max_picks
+    if len(load) < least:
+        raise ValueError(
+            f"load holds {len(load)} items; expected at least {least}, "
+            f"{task.N_VISIBLE} visible ones after max_picks={max_picks} picks"
+        )
 
 
 class ContainerEnv(PickingEnv):
@@ -97,8 +115,7 @@ class ContainerEnv(PickingEnv):
         render_mode: str | None = None,
     ) -> None:
         super().__init__(equalize, ties, max_picks, position_noise, render_mode)
-        if not callable(stack):
-            raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+        check_stack(stack)
         self.stack = stack
         self.physics = make_physics(physics, after_pick)
         self._camera: Camera | None = None
@@ -111,7 +128,7 @@ class ContainerEnv(PickingEnv):
         for name in options:
             checks.one_of("options", name, ("load",))
         if "load" in options:  # before the generator is seeded
-            self._check_load(options["load"])
+            check_load(options["load"], self.max_picks)
         super().reset(seed=seed)
         self._fill(options["load"] if "load" in options else self.stack(self.np_random))
         self._look()
@@ -189,7 +206,7 @@ class ContainerEnv(PickingEnv):
         self._check_open()
         checks.entries("state", state, (*LOAD, "present", "blur", "failed", "counts", "rng"))
         load = Load(**{name: state[name] for name in LOAD})
-        self._check_load(load)
+        check_load(load, self.max_picks)
         count = len(load)
         present = checks.flag_array("state['present']", state["present"], (count,))
         failed = checks.flag_array("state['failed']", state["failed"], (count,))
@@ -198,13 +215,13 @@ class ContainerEnv(PickingEnv):
         removed = int((~present).sum())
         picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
         unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
-        rng_state = self._read_rng_state(state["rng"])
+        generators.check_state_text("state['rng']", state["rng"])
         self._fill(load)
         for item in np.flatnonzero(~present).tolist():
             self.physics.remove(item)
         self._blur, self._failed = blur, failed
         self._picks, self._unloaded = picks, unloaded
-        self.np_random.bit_generator.state = rng_state
+        generators.set_state_text(state["rng"], self.np_random)
         if self._picks == self.max_picks:
             self._state = "finished"
         self._look()
@@ -225,18 +242,8 @@ class ContainerEnv(PickingEnv):
             self._camera.close()
         super().close()
 
-    def _check_load(self, load: Load) -> None:
-        if not isinstance(load, Load):
-            raise TypeError(f"load is {load!r}; expected an unload.Load")
-        least = task.N_VISIBLE + self.max_picks
-        if len(load) < least:
-            raise ValueError(
-                f"load holds {len(load)} items; expected at least {least}, "
-                f"{task.N_VISIBLE} visible ones after max_picks={self.max_picks} picks"
-            )
-
     def _fill(self, load: Load) -> None:
-        self._check_load(load)
+        check_load(load, self.max_picks)
         self.physics.reset(load)
         self._blur = self._drift(len(load))
         self._failed = np.zeros(len(load), dtype=bool)

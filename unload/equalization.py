@@ -5,9 +5,12 @@ import numpy as np
 from unload import checks
 
 TIES = ("noise", "average")
+# Suits scaled positions: noise of a few mm is bridged, the 3.5 cm between the grid's heights
+# (0.028 scaled) are not.
+TOLERANCE = 0.005
 
 
-def equalize(positions: np.ndarray, ties: str = "noise", tolerance: float = 0.005) -> np.ndarray:
+def equalize(positions: np.ndarray, ties: str = "noise", tolerance: float = TOLERANCE) -> np.ndarray:
     """Replace each coordinate by its rank among the items, spread evenly over [-1, 1].
 
     The item of rank r = 0 … N-1 along an axis gets (2 r - (N-1)) / (N-1): the order of the
@@ -20,9 +23,7 @@ def equalize(positions: np.ndarray, ties: str = "noise", tolerance: float = 0.00
             simulator's inaccuracy decides among them; exactly equal values are ranked
             in the order of the items. ``"average"``: items whose sorted neighbours
             differ by at most ``tolerance`` share the mean of their ranks.
-        tolerance: for ``ties="average"``, in the unit of ``positions``. The default
-            suits scaled positions: noise of a few mm is bridged, the 3.5 cm between the
-            grid's heights (0.028 scaled) are not.
+        tolerance: for ``ties="average"``, in the unit of ``positions``.
 
     Returns:
         Same shape, float32 in [-1, 1].

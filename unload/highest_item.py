@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from unload import checks, observation, task
+from unload import checks, generators, observation, task
 from unload.picking import POSITION_NOISE, PickingEnv
 from unload.substacks import COLUMNS, ROWS, WALLS, build_load
 
@@ -11,6 +11,12 @@ TOLERANCE = 1e-6  # m, places this close are at the same height
 GRID = np.concatenate(
     [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
 )
+
+
+def highest_places(places: np.ndarray) -> np.ndarray:
+    """(..., items) bool, which of the (..., items, 3) places in m no other one is higher than."""
+    heights = places[..., 2]
+    return heights > heights.max(axis=-1, keepdims=True) - TOLERANCE
 
 
 class HighestItemEnv(PickingEnv):
@@ -114,7 +120,8 @@ class HighestItemEnv(PickingEnv):
         picks = checks.integer_array("state['picks']", state["picks"], ()).item()
         picks = checks.integer("state['picks']", picks, 0, self.max_picks)
         highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
-        self.np_random.bit_generator.state = self._read_rng_state(state["rng"])
+        generators.check_state_text("state['rng']", state["rng"])
+        generators.set_state_text(state["rng"], self.np_random)
         self._picks, self._highest = picks, highest
         self._state = "finished" if picks == self.max_picks else "running"
 
@@ -126,8 +133,7 @@ class HighestItemEnv(PickingEnv):
         places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
         positions = places + self._drift(task.N_VISIBLE)
         rows = observation.nearest(positions)
-        heights = places[rows, 2]
-        self._highest = heights > heights.max() - TOLERANCE
+        self._highest = highest_places(places)[rows]
         return self._features(positions[rows])
 
     def _info(self) -> dict:

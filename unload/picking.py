@@ -1,18 +1,32 @@
 """What the two environments share: spaces, settings, and the order of calls."""
 
-import json
-
 import gymnasium
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 
-from unload import checks, observation, task
+from unload import checks, generators, observation, task
 from unload.equalization import TIES, equalize
 
 # Drift of the boxes of a settled full simulation, measured in notebook 04: how far they
 # spread around the places they were put at, and how far they sink in the mean (m).
 POSITION_NOISE = 0.0005
 SINK = 0.001
+
+
+def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
+    """How far a simulator's boxes are from where they were put, (count, 3) float64 in m."""
+    offsets = rng.normal(0, position_noise, (count, 3))
+    if position_noise:
+        offsets[:, 2] -= SINK
+    return offsets
+
+
+def scaled(positions: np.ndarray) -> np.ndarray:
+    """``observation.scale`` of (n, 3) positions in m, within [-1, 1].
+
+    An item that is outside the container is seen at its edge.
+    """
+    return np.clip(observation.scale(positions), -1, 1)
 
 
 class PickingEnv(gymnasium.Env):
@@ -47,30 +61,15 @@ class PickingEnv(gymnasium.Env):
 
     def _features(self, positions: np.ndarray) -> np.ndarray:
         """The observation of items at ``positions`` (128, 3) in m, equalized if asked for."""
-        # An item that is outside the container is seen at its edge.
-        scaled = np.clip(observation.scale(positions), -1, 1)
-        return equalize(scaled, self.ties) if self.equalize else scaled
+        seen = scaled(positions)
+        return equalize(seen, self.ties) if self.equalize else seen
 
     def _drift(self, count: int) -> np.ndarray:
-        """(count, 3) float64, how far a simulator's boxes are from where they were put, m."""
-        drift = self.np_random.normal(0, self.position_noise, (count, 3))
-        if self.position_noise:
-            drift[:, 2] -= SINK
-        return drift
+        return drift(count, self.position_noise, self.np_random)
 
     def _rng_state(self) -> np.ndarray:
         """The state of ``np_random`` as a plain array."""
-        return np.array(json.dumps(self.np_random.bit_generator.state))
-
-    @staticmethod
-    def _read_rng_state(state: np.ndarray) -> dict:
-        """What ``_rng_state`` wrote; raise ValueError if it is something else."""
-        try:
-            content = json.loads(str(state))
-            np.random.PCG64().state = content
-        except (KeyError, OverflowError, TypeError, ValueError) as error:
-            raise ValueError(f"state['rng'] is {state!r}; expected what get_state wrote") from error
-        return content
+        return np.array(generators.state_text(self.np_random))
 
     def _row(self, action: int) -> int:
         if isinstance(action, np.ndarray) and action.ndim == 0:

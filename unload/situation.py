@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from unload import task
-from unload.substacks import Load, slabs
+from unload.boxes import ABOVE, BELOW, BESIDE, TOLERANCE
+from unload.substacks import Load
 
-TOLERANCE = 1e-4  # m, faces this close touch
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 
 
@@ -50,7 +50,7 @@ class Situation:
 class Surroundings:
     """The situations of all boxes of a load, as it is unloaded.
 
-    Who touches whom is computed once; picks only take boxes away.
+    Who touches whom is known to the load; picks only take boxes away.
 
     Attributes:
         load: the load.
@@ -60,7 +60,6 @@ class Surroundings:
     def __init__(self, load: Load, present: np.ndarray) -> None:
         self.load = load
         self.present = present
-        self._above, self._below, self._beside = _contacts(load)
         self._geometry = np.hstack([load.positions, load.sizes])
         self._low = load.positions - load.sizes / 2
         self._high = load.positions + load.sizes / 2
@@ -69,7 +68,7 @@ class Surroundings:
         """The present boxes that rest on ``item``, directly or over others, in index order."""
         found, frontier = set(), [item]
         while frontier:
-            for box in self._above[frontier.pop()]:
+            for box in self.load.contacts.of(ABOVE, frontier.pop()).tolist():
                 if self.present[box] and box not in found:
                     found.add(box)
                     frontier.append(box)
@@ -81,7 +80,8 @@ class Surroundings:
         static = {
             box
             for mover in dynamic
-            for box in (*self._below[mover], *self._beside[mover])
+            for kind in (BELOW, BESIDE)
+            for box in self.load.contacts.of(kind, mover).tolist()
             if self.present[box]
         }
         members = [*dynamic, *sorted(static.difference(dynamic))]
@@ -100,25 +100,3 @@ class Surroundings:
             floor=None if floor is None else round(floor / RESOLUTION),
             sides=tuple(round(side / RESOLUTION) for side in sides),
         )
-
-
-def _contacts(load: Load) -> tuple[list[list[int]], list[list[int]], list[list[int]]]:
-    """For each box, the boxes that stand on it, that it stands on, and at its sides."""
-    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
-    above, below, beside = ([[] for _ in range(len(load))] for _ in range(3))
-    for slab in slabs(low[:, 0] + TOLERANCE, high[:, 0]):
-        starts, ends = low[slab], high[slab]
-        # [i, j, axis]: the boxes share a stretch of the axis; i begins where j ends.
-        overlap = np.minimum(ends[:, None], ends) - np.maximum(starts[:, None], starts) > TOLERANCE
-        touch = np.abs(starts[:, None] - ends) <= TOLERANCE
-        in_line = overlap[..., 0]
-        stands_on = in_line & overlap[..., 1] & touch[..., 2]
-        right_of = in_line & overlap[..., 2] & touch[..., 1]
-        for lists, relation in (
-            (below, stands_on),
-            (above, stands_on.T),
-            (beside, right_of | right_of.T),
-        ):
-            for box, other in slab[np.argwhere(relation)].tolist():
-                lists[box].append(other)
-    return above, below, beside

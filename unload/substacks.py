@@ -6,11 +6,13 @@ substacks interlock like the steps of a stair: the columns start at 0, 6, 16 and
 cells and together fill 36 cells of width, which we take to be the container's 2.5 m.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numba
 import numpy as np
 
 from unload import checks, task
+from unload.boxes import Contacts, contacts
 
 CELLS_WIDE = 36
 ROWS_HIGH = 10  # cells of height per row of substacks
@@ -48,6 +50,13 @@ RIGHT = (
 )  # fmt: skip
 # One row of a wall, from left to right: (left edge in cells, variants of the substack).
 COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
+# The same in arrays for compiled code, by column and variant, filled up with zeros: package,
+# left edge in the row and lower edge of each item; and the number of items.
+COUNTS = np.array([[len(variant) for variant in substacks] for _, substacks in COLUMNS])
+CELLS = np.zeros((*COUNTS.shape, COUNTS.max(), 3), np.int64)
+for _column, (_left, _substacks) in enumerate(COLUMNS):
+    for _number, _variant in enumerate(_substacks):
+        CELLS[_column, _number, : len(_variant)] = np.array(_variant) + (0, _left, 0)
 
 
 @dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
@@ -59,6 +68,7 @@ class Load:
         sizes: (n, 3) float64, edge lengths along x, y and z in m, positive.
         packages: (n,) int64, package number (0–12 in the paper's loads).
         walls: (n,) int64, number of the item wall, 0 at the rear.
+        contacts: which boxes touch, found from the others.
 
     Raises:
         TypeError: a field's dtype is not numeric.
@@ -70,6 +80,7 @@ class Load:
     sizes: np.ndarray
     packages: np.ndarray
     walls: np.ndarray
+    contacts: Contacts = field(init=False)
 
     def __post_init__(self) -> None:
         positions = checks.finite_array("positions", self.positions, (None, 3))
@@ -85,8 +96,9 @@ class Load:
             labels[name] = checks.integer_array(name, getattr(self, name), (count,))
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
-        _check_inside(positions, sizes)
-        _check_disjoint(positions, sizes)
+        low, high = positions - sizes / 2, positions + sizes / 2
+        _check_inside(low, high)
+        object.__setattr__(self, "contacts", contacts(low, high))
         for name, array in {"positions": positions, "sizes": sizes, **labels}.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -98,42 +110,15 @@ class Load:
         return f"Load({len(self)} items in {len(np.unique(self.walls))} walls)"
 
 
-def _check_inside(positions: np.ndarray, sizes: np.ndarray, tolerance: float = 1e-6) -> None:
-    low, high = positions - sizes / 2, positions + sizes / 2
+def _check_inside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> None:
+    if low.min() >= -tolerance and (high.max(axis=0) <= task.CONTAINER + tolerance).all():
+        return
     outside = ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
-    if outside.any():
-        item = int(np.argmax(outside))
-        raise ValueError(
-            f"box {item} reaches from {low[item]} to {high[item]} m; "
-            f"expected it inside the container, [0 0 0] to {task.CONTAINER}"
-        )
-
-
-def _check_disjoint(positions: np.ndarray, sizes: np.ndarray, tolerance: float = 1e-6) -> None:
-    low, high = positions - sizes / 2 + tolerance, positions + sizes / 2 - tolerance
-    for slab in slabs(low[:, 0], high[:, 0]):
-        overlap = np.ones((len(slab), len(slab)), dtype=bool)
-        for axis in range(3):
-            starts_before_end = low[slab, None, axis] < high[None, slab, axis]
-            overlap &= starts_before_end & starts_before_end.T
-        np.fill_diagonal(overlap, False)
-        if overlap.any():
-            first, second = (int(slab[i]) for i in np.argwhere(overlap)[0])
-            raise ValueError(f"boxes {first} and {second} overlap; expected disjoint boxes")
-
-
-def slabs(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """Split intervals into groups between which there is no overlap, such as item walls.
-
-    Args:
-        low, high: (n,) start and end of each interval, for example along x.
-
-    Returns:
-        A list of index arrays that together hold each of 0 … n-1 once.
-    """
-    order = np.argsort(low, kind="stable")
-    reach = np.maximum.accumulate(high[order])
-    return np.split(order, np.flatnonzero(low[order][1:] >= reach[:-1]) + 1)
+    item = int(np.argmax(outside))
+    raise ValueError(
+        f"box {item} reaches from {low[item]} to {high[item]} m; "
+        f"expected it inside the container, [0 0 0] to {task.CONTAINER}"
+    )
 
 
 def check_variants(name: str, variants: object) -> np.ndarray:
@@ -163,15 +148,23 @@ def wall_cells(variants: np.ndarray) -> np.ndarray:
     Raises:
         TypeError, ValueError: see ``check_variants``.
     """
-    variants = check_variants("variants", variants)
-    return np.array(
-        [
-            (package, column_left + left, row * ROWS_HIGH + lower)
-            for row, chosen in enumerate(variants)
-            for (column_left, substacks), variant in zip(COLUMNS, chosen)
-            for package, left, lower in substacks[variant]
-        ]
-    )
+    return _cells(check_variants("variants", variants)[np.newaxis])[:, 1:]
+
+
+@numba.njit(cache=True)
+def _cells(variants):
+    """Items of (walls, rows, 4) variants, (n, 4) int64: wall, package, left and lower edge."""
+    walls, rows, columns = variants.shape
+    cells, count = np.empty((variants.size * CELLS.shape[2], 4), np.int64), 0
+    for wall in range(walls):
+        for row in range(rows):
+            for column in range(columns):
+                variant = variants[wall, row, column]
+                for number in range(COUNTS[column, variant]):
+                    package, left, lower = CELLS[column, variant, number]
+                    cells[count] = wall, package, left, lower + row * ROWS_HIGH
+                    count += 1
+    return cells[:count].copy()
 
 
 def build_load(variants: np.ndarray) -> Load:
@@ -190,11 +183,10 @@ def build_load(variants: np.ndarray) -> Load:
     variants = checks.integer_array("variants", variants, (None, None, len(COLUMNS)))
     if not len(variants):
         raise ValueError("variants has no walls; expected at least one")
-    cells = [wall_cells(wall) for wall in variants]
-    walls = np.repeat(np.arange(len(cells)), [len(wall) for wall in cells])
-    packages, left, lower = np.concatenate(cells).T
+    check_variants("variants", variants.reshape(-1, len(COLUMNS)))
+    walls, packages, left, lower = _cells(variants).T
     width, height = PACKAGES[packages].T
-    depth = task.CONTAINER[0] / len(cells)
+    depth = task.CONTAINER[0] / len(variants)
     positions = np.column_stack(
         [(walls + 0.5) * depth, (left + width / 2) * CELL, (lower + height / 2) * CELL]
     )

@@ -1,0 +1,129 @@
+"""Axis-aligned boxes: which of them overlap, and which touch.
+
+Boxes are given by their lower and upper corners, ``low`` and ``high``, (n, 3) float64 in m.
+"""
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+TOLERANCE = 1e-4  # m, faces this close touch
+OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
+ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
+
+
+def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Number groups of intervals between which there is no overlap, such as item walls.
+
+    Args:
+        low, high: (n,) start and end of each interval, for example along x.
+
+    Returns:
+        (n,) int64, each interval's group, 0 being the lowest.
+    """
+    order = np.argsort(low, kind="stable")
+    reach = np.maximum.accumulate(high[order])
+    groups = np.empty(len(low), np.int64)
+    groups[order] = np.append(0, np.cumsum(low[order][1:] >= reach[:-1]))
+    return groups
+
+
+class Contacts(NamedTuple):
+    """Lists of touching boxes, one after the other in one array.
+
+    The boxes above (0), below (1) or beside (2) box ``b`` are
+    ``boxes[starts[kind, b] : starts[kind, b + 1]]``.
+
+    Attributes:
+        starts: (3, n + 1) int32.
+        boxes: (m,) int32.
+    """
+
+    starts: np.ndarray
+    boxes: np.ndarray
+
+    def of(self, kind: int, box: int) -> np.ndarray:
+        """The boxes that touch ``box``, (k,) int32."""
+        return self.boxes[self.starts[kind, box] : self.starts[kind, box + 1]]
+
+
+def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
+    """Who stands on whom, and who stands side by side.
+
+    Boxes touch only where they share a stretch of depth, and of height or width.
+
+    Raises:
+        ValueError: two boxes overlap.
+    """
+    groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
+    left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
+    found, first, second = _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
+    if first != second:
+        pair = min(first, second), max(first, second)
+        raise ValueError(f"boxes {pair[0]} and {pair[1]} overlap; expected disjoint boxes")
+    return Contacts(*_lists(found, len(low)))
+
+
+@numba.njit(cache=True)
+def _find(low, high, order, ends):
+    """Rows (kind, box, the box that touches it so), and two boxes that overlap, or 0 twice.
+
+    Args:
+        low, high: corners.
+        order, ends: the boxes, slab by slab, from left to right in each; where the slabs end.
+    """
+    found, count = np.empty((8 * len(order) + 4, 3), np.int32), 0
+    low, high = low[order], high[order]
+    start = 0
+    for end in ends:
+        for i in range(start, end):
+            for j in range(i + 1, end):
+                across = _shared(low, high, i, j, 1)
+                if across < -TOLERANCE:
+                    break  # j begins to the right of i, and so do all further ones
+                along, upwards = _shared(low, high, i, j, 0), _shared(low, high, i, j, 2)
+                # One branch in place of many, whose outcome the processor could not foretell.
+                contact = (min(across, upwards) >= -TOLERANCE) & (max(across, upwards) > TOLERANCE)
+                if not contact & (along > OVERLAP):
+                    continue
+                if min(across, upwards) > OVERLAP:
+                    return found[:count], order[i], order[j]
+                if along <= TOLERANCE:
+                    continue
+                if count + 2 > len(found):
+                    found = np.concatenate((found, np.empty_like(found)))
+                one, other = BESIDE, BESIDE  # what j is to i, and i to j
+                if across > TOLERANCE:
+                    one, other = (ABOVE, BELOW) if low[j, 2] > low[i, 2] else (BELOW, ABOVE)
+                found[count, 0], found[count, 1], found[count, 2] = one, order[i], order[j]
+                count += 1
+                found[count, 0], found[count, 1], found[count, 2] = other, order[j], order[i]
+                count += 1
+        start = end
+    return found[:count], 0, 0
+
+
+@numba.njit(cache=True)
+def _shared(low, high, i, j, axis):
+    """Length of the stretch of the axis that two boxes share; below 0 the gap between them."""
+    return min(high[i, axis], high[j, axis]) - max(low[i, axis], low[j, axis])
+
+
+@numba.njit(cache=True)
+def _lists(found, count):
+    """``starts`` and ``boxes`` of ``Contacts``."""
+    starts = np.zeros((3, count + 1), np.int32)
+    for row in range(len(found)):
+        starts[found[row, 0], found[row, 1]] += 1
+    total = 0
+    for kind in range(3):  # from the number of a box's contacts to the end of its list
+        for box in range(count + 1):
+            total += starts[kind, box]
+            starts[kind, box] = total
+    boxes = np.empty(total, np.int32)
+    for row in range(len(found)):  # fills each list from its end, which leaves its start
+        kind, box = found[row, 0], found[row, 1]
+        starts[kind, box] -= 1
+        boxes[starts[kind, box]] = found[row, 2]
+    return starts, boxes
