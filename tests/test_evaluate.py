@@ -2,7 +2,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import ContainerEnv, evaluate, policies, success_rate
+from unload import evaluate, policies, success_rate
+from unload.vector_env import ContainerVectorEnv
 
 COLUMNS = ["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
 
@@ -78,8 +79,8 @@ def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
     assert row["longest_deadlock"] == 3 and row["deadlocked"] == (2 + 3) / 10
 
 
-def test_an_episode_does_not_depend_on_how_many_there_are():
-    few, many = (evaluate(policies.random, n, seed=3, max_picks=30) for n in (2, 4))
+def test_a_load_does_not_depend_on_how_many_there_are():
+    few, many = (evaluate(lowest, n, seed=3, max_picks=30) for n in (2, 70))
     pd.testing.assert_frame_equal(few, many.iloc[:2])
 
 
@@ -130,7 +131,7 @@ def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(
     monkeypatch, returned, error, message
 ):
     closed = []
-    monkeypatch.setattr(ContainerEnv, "close", lambda env: closed.append(env))
+    monkeypatch.setattr(ContainerVectorEnv, "close", lambda env: closed.append(env))
     with pytest.raises(error, match=message):
         evaluate(lambda *_: returned, 1)
     assert len(closed) == 1

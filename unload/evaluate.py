@@ -5,9 +5,11 @@ from collections.abc import Callable
 import gymnasium
 import numpy as np
 import pandas as pd
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from unload import checks, task
 from unload.env import ContainerEnv
+from unload.vector_env import ContainerVectorEnv
 
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
 
@@ -48,9 +50,10 @@ def evaluate(
     Args:
         policy: see ``unload.policies``.
         episodes: number of containers.
-        seed: of the loads and of the policy's random numbers; episode i is the same
-            whatever the number of episodes.
-        physics: see ``ContainerEnv``.
+        seed: of the loads and of the policy's random numbers; load i is the same whatever
+            the number of episodes.
+        physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
+            one after the other.
         mask: whether the policy is told which items failed since the last success.
         max_picks: picks per episode.
         **env_kwargs: further arguments of ``ContainerEnv``.
@@ -66,45 +69,59 @@ def evaluate(
     checks.integer("episodes", episodes, 1)
     checks.integer("seed", seed, 0)
     checks.boolean("mask", mask)
+    checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
-    env = ContainerEnv(physics=physics, max_picks=max_picks, **env_kwargs)
-    rows = []
-    try:
-        for sequence in np.random.SeedSequence(seed).spawn(episodes):
-            load_seed, policy_seed = sequence.generate_state(2)
-            rng = np.random.default_rng(policy_seed)
-            rows.append(_episode(env, policy, int(load_seed), rng, mask))
-    finally:
-        env.close()
-    return pd.DataFrame(rows)
+    at_once = task.NUM_ENVS if physics == "table" else 1
+    load_seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
+    frames = []
+    for first in range(0, episodes, at_once):
+        seeds = load_seeds[first : first + at_once]
+        envs = _side_by_side(len(seeds), physics, max_picks=max_picks, **env_kwargs)
+        try:
+            frames.append(_play(envs, policy, seeds, max_picks, mask))
+        finally:
+            envs.close()
+    return pd.concat(frames, ignore_index=True)
 
 
-def _episode(
-    env: gymnasium.Env, policy: Policy, seed: int, rng: np.random.Generator, mask: bool
-) -> dict[str, float]:
-    observation, info = env.reset(seed=seed)
-    rewards, deadlocked = [], []
-    truncated = False
-    while not truncated:
-        allowed = info["action_mask"] if mask else np.ones_like(info["action_mask"])
-        chosen = policy(observation[None], allowed[None], rng)
-        (action,) = checks.integer_array("what policy returned", chosen, (1,)).tolist()
-        checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
-        deadlocked.append(not info["action_mask"][action])
-        observation, reward, _, truncated, info = env.step(action)
-        rewards.append(reward)
-    return {
-        "success_rate": success_rate(rewards),
-        "unloaded": info["unloaded"],
-        "deadlocked": float(np.mean(deadlocked)),
-        "longest_deadlock": _longest_run(deadlocked),
-    }
+def _side_by_side(count: int, physics: str, **kwargs) -> gymnasium.vector.VectorEnv:
+    if physics == "table":
+        return ContainerVectorEnv(count, **kwargs)
+    return SyncVectorEnv(
+        [lambda: ContainerEnv(physics=physics, **kwargs)] * count,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+    )
 
 
-def _longest_run(flags: list[bool]) -> int:
-    longest = current = 0
-    for flag in flags:
-        current = current + 1 if flag else 0
-        longest = max(longest, current)
-    return longest
+def _play(
+    envs: gymnasium.vector.VectorEnv, policy: Policy, seeds: list[int], picks: int, mask: bool
+) -> pd.DataFrame:
+    """One episode of ``picks`` picks in each environment."""
+    rng = np.random.default_rng(seeds)
+    rows = np.arange(len(seeds))
+    rewards, deadlocked = np.empty((2, picks, len(seeds)))
+    observations, infos = envs.reset(seed=seeds)
+    for pick in range(picks):
+        allowed = infos["action_mask"] if mask else np.ones_like(infos["action_mask"])
+        actions = checks.integer_array(
+            "what policy returned", policy(observations, allowed, rng), rows.shape
+        )
+        for action in (int(actions.min()), int(actions.max())):
+            checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
+        deadlocked[pick] = infos["action_mask"][rows, actions] == 0
+        observations, rewards[pick], _, _, infos = envs.step(actions)
+    return pd.DataFrame(
+        {
+            "success_rate": [success_rate(each) for each in rewards.T],
+            "unloaded": (rewards > 0).sum(axis=0),
+            "deadlocked": deadlocked.mean(axis=0),
+            "longest_deadlock": [_longest_run(each) for each in deadlocked.T],
+        }
+    )
+
+
+def _longest_run(flags: np.ndarray) -> int:
+    """The most 1s in a row."""
+    ends = np.flatnonzero(np.diff(flags, prepend=0, append=0))
+    return int((ends[1::2] - ends[::2]).max(initial=0))
