@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test lab notebooks data bench clean
+.PHONY: help figures test lab notebooks paper bench clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
@@ -21,8 +21,9 @@ lab: $(VENV)/ready  ## open the notebooks in JupyterLab
 notebooks: $(VENV)/ready  ## run every notebook at its own counts and keep the outputs in it
 	$(BIN)/python notebooks/run.py --in-place
 
-data: $(VENV)/ready  ## compute data/ again (about 15 minutes; goes on where it was stopped)
-	$(BIN)/python -m unload.reproduce all
+paper: $(VENV)/ready  ## compute data/ at the paper's scale (hours; goes on where it was stopped), then notebooks
+	$(BIN)/python -m unload.reproduce paper
+	$(BIN)/python notebooks/run.py --in-place
 
 bench: $(VENV)/ready  ## measure speeds and print their ratios
 	$(BIN)/python benchmarks/run.py

@@ -138,6 +138,27 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
         assert torch.allclose(mine, theirs, atol=2e-5)
 
 
+def test_choosing_unchecked_is_acting(rng):
+    observations = rng.uniform(-1, 1, (50, 12, 3)).astype(np.float32)
+    masks = rng.integers(2, size=(50, 12)).astype(bool)
+    masks[:, 3] = True
+    agent = DQN(peq())
+    for epsilon in (0.0, 0.5, 1.0):
+        acted, chosen = (
+            method(observations, masks, epsilon, np.random.default_rng(1))
+            for method in (agent.act, agent.choose)
+        )
+        assert (acted == chosen).all()
+
+
+def test_choosing_from_nothing_is_refused(rng):
+    """By whoever chooses, the random numbers or the network."""
+    observations, allowed = np.zeros((2, 5, 3), np.float32), np.zeros((2, 5), bool)
+    for epsilon, error in ((1.0, ValueError), (0.0, FloatingPointError)):
+        with pytest.raises(error, match="expected"):
+            DQN(peq()).choose(observations, allowed, epsilon, rng)
+
+
 def test_with_gamma_zero_the_target_is_the_reward(rng):
     """One item, a value of 0.5 and a reward of -1: the loss is 1.5 - 0.5."""
     observations = np.full((1, 1, 3), 0.5, np.float32)

@@ -14,7 +14,7 @@ from unload.figures.mdp import fig01_mdp
 from unload.figures.network import fig07_network
 from unload.figures.style import save
 from unload.figures.substacks import fig03_substacks, rows
-from unload.sweep import set_name
+from unload.tuning import running_mean, set_name
 
 matplotlib.use("Agg")
 
@@ -54,10 +54,18 @@ def test_missing_data_names_the_command_that_makes_it(draw, tmp_path):
 
 
 def test_learning_rate_figure_draws_the_stored_curves():
-    axes = tuning.fig08_learning_rate().axes[0]
-    raw = [line.get_ydata() for line in axes.lines if line.get_alpha()]
+    drawn = [line.get_ydata() for line in tuning.fig08_learning_rate().axes[0].lines]
     stored = tuning.read_curve(files.DATA, "hitrate_curve_bz_1024_lr_0.001_agent_5")
-    assert any(np.array_equal(curve, stored) for curve in raw)
+    assert any(np.array_equal(curve, running_mean(stored)) for curve in drawn)
+
+
+def test_strong_lines_are_the_papers_runs():
+    figure, axes = plt.subplots()
+    runs = {run: np.full(30, run / 10) for run in (2, 5, 7)}
+    tuning.draw_curves(axes, {"a": (runs, 5), "b": (runs, 6)}, "MSR")
+    named = {line.get_label(): line.get_ydata()[0] for line in axes.lines if line.get_zorder() == 3}
+    assert named == {"a": 0.5, "b": 0.2}  # the first one where the paper's is missing
+    assert len(axes.lines) == 6
 
 
 @pytest.mark.parametrize(

@@ -1,84 +1,155 @@
-"""The hyperparameter grid, and running it."""
+"""Many runs side by side: what is kept, what is reported, and who does the work."""
 
-import dataclasses
+import os
+import signal
+import threading
+import time
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from unload import sweep
+from unload import files, sweep
 from unload.train import train
+from unload.tuning import tuning_config
 
 
 @pytest.fixture
 def configs():
     """Two tiny runs."""
-    return [sweep.tuning_config(8, 1e-3, run, steps=4, n_features=4) for run in range(2)]
+    return {f"set/run_{run}": tuning_config(8, 1e-3, run, steps=4, n_features=4) for run in (0, 1)}
 
 
-def test_grid_is_the_papers():
-    grid = sweep.tuning_grid()
-    assert len(grid) == len({sweep.run_folder(config, ".") for config in grid}) == 3 * 4 * 10 * 2
-    assert {config.learning_rate for config in grid} == {1e-1, 1e-2, 1e-3}
-    assert {config.batch_size for config in grid} == {64, 256, 1024, 2048}
-    assert {config.seed for config in grid} == set(range(10))
-    assert {config.picks for config in grid} == {3000 * 64}
-    assert {config.env for config in grid} == {"unload/HighestItem-v0"}
+def without_times(path):
+    return pd.read_csv(path).drop(columns="wall_time").to_csv()
 
 
-def test_runs_are_named_as_in_the_paper():
-    config = sweep.tuning_config(1024, 1e-1, 6)
-    assert sweep.run_name(config) == "bz_1024_lr_0.1_agent_6"
-    assert sweep.set_name(True) == "dummy_sim_with_hist_equal"
-    assert sweep.set_name(False) == "dummy_sim_without_hist_equal"
-
-
-@pytest.mark.slow
-def test_runs_side_by_side_equal_single_ones_and_are_kept(configs, tmp_path):
-    report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=2)
+def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
+    report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    assert list(report.index) == list(configs)
     assert (report["error"] == "").all()
-    for config, folder in zip(configs, report["folder"]):
-        alone = train(config, tmp_path / "alone" / str(config.seed), progress=False)
-        kept = pd.read_csv(f"{folder}/curve.csv")
-        assert kept["loss"].equals(alone.curve["loss"])
-    before = [(tmp_path / folder / "curve.csv").stat().st_mtime_ns for folder in report["folder"]]
-    sweep.run_sweep(configs, tmp_path / "many", n_jobs=1)
-    after = [(tmp_path / folder / "curve.csv").stat().st_mtime_ns for folder in report["folder"]]
-    assert before == after
+    assert report["seed"].tolist() == [0, 1]
+    assert capfd.readouterr() == ("", "")
+    for name, config in configs.items():
+        folder = tmp_path / "many" / name
+        assert report.loc[name, "folder"] == str(folder)
+        train(config, tmp_path / "alone" / name, progress=False)
+        assert without_times(folder / "curve.csv") == without_times(
+            tmp_path / "alone" / name / "curve.csv"
+        )
+        record = files.read_json(folder / "record.json")
+        assert not record["resumed"]
+        assert record["peak_memory_mib"] > 50
+        assert "256/256" in (folder / "log.txt").read_text()
+        assert not (folder / "attempts").exists()
+    written = sorted(tmp_path.glob("many/set/*/*[!t]"))  # all but log.txt
+    before = [path.stat().st_mtime_ns for path in written]
+    sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    assert [path.stat().st_mtime_ns for path in written] == before
+
+
+def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):
+    sweep.run_sweep(configs, tmp_path, n_jobs=1)
+    captured = capsys.readouterr()
+    assert "2/2" in captured.out
+    assert captured.err == ""
 
 
 def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
-    other = dataclasses.replace(configs[0], n_features=5)
-    folder = sweep.run_folder(configs[0], tmp_path)
-    train(other, folder, progress=False)  # another configuration sits where run 0 should go
-    report = sweep.run_sweep(configs, tmp_path, n_jobs=1)
-    assert "n_features (5, not 4)" in report["error"][0]
-    assert report["error"][1] == ""
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "run_0").write_text("a file where the run's folder should be")
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert "run_0" in report["error"].iloc[0]
+    assert report["error"].iloc[1] == ""
 
 
-def test_exported_curves_have_one_value_per_step(configs, tmp_path):
-    report = sweep.run_sweep(configs[:1], tmp_path, n_jobs=1)
-    sweep.export_curves(configs[0], report["folder"][0], tmp_path / "data")
-    folder = tmp_path / "data" / "dummy_sim_with_hist_equal"
-    hits = np.loadtxt(folder / "hitrate_curve_bz_8_lr_0.001_agent_0.csv")
-    assert hits.shape == (4,)
-    assert ((hits >= 0) & (hits <= 1)).all()
-    assert (folder / "loss_curve_bz_8_lr_0.001_agent_0.csv").read_text().count("\n") == 4
+def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
+    other = tuning_config(8, 1e-3, 0, steps=4, n_features=5)
+    train(other, tmp_path / "set" / "run_0", progress=False)
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert "n_features (5, not 4)" in report["error"].iloc[0]
+    assert report["error"].iloc[1] == ""
 
 
-def test_runs_that_would_share_a_folder_are_refused(configs, tmp_path):
-    twins = [configs[0], dataclasses.replace(configs[0], n_features=5)]
-    with pytest.raises(ValueError, match="2 runs for .*bz_8_lr_0.001_agent_0"):
-        sweep.run_sweep(twins, tmp_path)
+class Killer(threading.Thread):
+    """Kills the process of a run whenever it starts."""
+
+    def __init__(self, folder):
+        super().__init__(daemon=True)
+        self.path, self.done, self.killed = folder / "attempts", threading.Event(), []
+
+    def run(self):
+        while not self.done.wait(0.01):
+            try:
+                process = int(self.path.read_text().splitlines()[-1])
+            except (OSError, IndexError, ValueError):
+                continue
+            if process not in self.killed:
+                self.killed.append(process)
+                time.sleep(0.1)  # into the run
+                os.kill(process, signal.SIGKILL)
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_is_reported_and_stops_no_other(configs, tmp_path):
+    runs = {"doomed": tuning_config(8, 1e-3, 0, steps=10_000, n_features=4), **configs}
+    killer = Killer(tmp_path / "doomed")
+    killer.start()
+    report = sweep.run_sweep(runs, tmp_path, n_jobs=2, progress=False)
+    killer.done.set()
+    assert report["error"].tolist() == ["its process died, 2 times", "", ""]
+    assert len(killer.killed) == 2
+    assert not list(tmp_path.rglob("attempts"))
+
+
+@pytest.mark.slow
+def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
+    distributed = pytest.importorskip("distributed")
+    configs = {
+        f"run_{run}": tuning_config(8, 1e-3, run, steps=200, n_features=4) for run in range(4)
+    }
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    )
+    with cluster, distributed.Client(cluster) as client:
+        workers = set(client.run(os.getpid).values())
+        report = sweep.run_sweep(configs, tmp_path / "dask", backend="dask", progress=False)
+    assert capfd.readouterr().err == ""
+    assert (report["error"] == "").all()
+    sweep.run_sweep(configs, tmp_path / "loky", n_jobs=2, progress=False)
+    for name in configs:
+        curves = [
+            without_times(tmp_path / backend / name / "curve.csv") for backend in ("dask", "loky")
+        ]
+        assert curves[0] == curves[1]
+    used = {
+        files.read_json(tmp_path / "dask" / name / "record.json")["process"] for name in configs
+    }
+    assert used == workers
+    assert len(used) == 2
+
+
+def test_dask_without_a_client_is_refused(configs, tmp_path):
+    with pytest.raises(ValueError, match="first create a Dask Client"):
+        sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
+
+
+@pytest.mark.parametrize(
+    ("configs", "error", "message"),
+    [
+        ([1], TypeError, r"configs is \[1\]; expected a dict"),
+        ({"a": 1}, TypeError, r"configs\['a'\] is 1; expected an unload.TrainConfig"),
+        *(
+            ({name: tuning_config(8, 1e-3, 0)}, ValueError, "configs has the name .*relative path")
+            for name in ("", ".", "/a", "../a", "a/", "a//b", 3)
+        ),
+    ],
+)
+def test_bad_configurations_are_refused(configs, error, message, tmp_path):
+    with pytest.raises(error, match=message):
+        sweep.run_sweep(configs, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_only_configurations_are_run(tmp_path):
-    with pytest.raises(TypeError, match="configs holds 1"):
-        sweep.run_sweep([1], tmp_path)
-
-
-@pytest.mark.parametrize("steps", [0, -1, 2.5])
-def test_bad_steps(steps):
-    with pytest.raises((TypeError, ValueError), match="steps"):
-        sweep.tuning_config(8, 1e-3, 0, steps=steps)
+def test_unknown_backend_is_refused(configs, tmp_path):
+    with pytest.raises(ValueError, match="backend is 'spark'; expected one of 'loky', 'dask'"):
+        sweep.run_sweep(configs, tmp_path, backend="spark")

@@ -1,17 +1,23 @@
 import itertools
 import json
+import os
+import re
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
-from unload import TrainConfig, evaluate, load_policy, stack_load, train
+from unload import TrainConfig, evaluate, files, load_policy, stack_load, train
 from unload.train import CURVE_COLUMNS, ENVS
 
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
@@ -30,6 +36,9 @@ RUNS = {
 }
 
 
+KILLED_RUN = Path(__file__).with_name("killed_run.py")
+
+
 class Breakdown(Exception):
     """A crash at a moment of the test's choosing."""
 
@@ -39,20 +48,30 @@ def config(request) -> TrainConfig:
     return TrainConfig(**RUNS[request.param])
 
 
-@contextmanager
-def at_step(number: int, action: Callable[[], None]) -> Iterator[None]:
-    """Do something right after a training step; steps are counted from 1."""
-    run_class = import_module("unload.train")._Run  # unload.train itself is the function
-    step, count = run_class._step, itertools.count(1)
+def run_class() -> type:
+    """What ``train`` keeps of a run in progress."""
+    return import_module("unload.train")._Run  # unload.train itself is the function
 
-    def watched(run) -> None:
-        step(run)
+
+@contextmanager
+def at(method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Do something right after a call of a run's method; calls are counted from 1."""
+    call, count = getattr(run_class(), method), itertools.count(1)
+
+    def watched(*arguments):
+        result = call(*arguments)
         if next(count) == number:
             action()
+        return result
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_class, "_step", watched)
+        patch.setattr(run_class(), method, watched)
         yield
+
+
+def at_step(number: int, action: Callable[[], None]):
+    """Do something right after a training step."""
+    return at("_step", number, action)
 
 
 def crash() -> None:
@@ -68,6 +87,17 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
     message = f"stopped after {4 * steps} picks; call train again with run_dir='.*{folder.name}'"
     with at_step(steps, interrupt), pytest.raises(KeyboardInterrupt, match=message):
         train(config, folder, progress=False)
+
+
+@contextmanager
+def begun(config: TrainConfig, folder: Path) -> Iterator:
+    """A run in progress that has gone on from its checkpoint, if it has one."""
+    run = run_class()(config, folder, None, [])
+    try:
+        run.restore()
+        yield run
+    finally:
+        run.envs.close()
 
 
 def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
@@ -108,6 +138,7 @@ def test_what_a_run_leaves(tmp_path, config):
     assert curve["picks"].tolist() == list(range(interval, config.picks + 1, interval))
     assert curve["success_rate"].tolist() == ((curve["mean_reward"] + 1) / 2).tolist()
     assert curve["loss"].iloc[1:].between(0, 2).all()
+    assert curve["deadlocked"].between(0, 1).all()
     assert (curve["wall_time"].diff().dropna() >= 0).all()
     last_step = curve["picks"] - config.num_envs
     assert curve["epsilon"].tolist() == pytest.approx(
@@ -125,6 +156,29 @@ def test_a_finished_run_is_not_repeated(tmp_path):
     with at_step(1, crash):
         again = train(config, tmp_path, progress=False)
     pd.testing.assert_frame_equal(first.curve, again.curve)
+
+
+def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
+    """Row 5 again and again: it changes only when it is unloaded."""
+    config = TrainConfig(**CONTAINER | {"num_envs": 1, "picks": 11, "log_interval": 11})
+    with begun(config, tmp_path) as run:
+        run.agent.choose = lambda *arguments: np.array([5])
+        for _ in range(11):
+            run._step()
+    rewards = run.replay.arrays["rewards"]
+    point = dict(zip(CURVE_COLUMNS, run.curve[-1], strict=True))
+    assert 0 < (rewards[:-1] < 0).sum() < 10
+    assert point["deadlocked"] == pytest.approx((rewards[:-1] < 0).sum() / 11)
+    assert point["mean_reward"] == pytest.approx(rewards.mean())
+
+
+def test_the_number_of_threads_does_not_change_the_result(tmp_path):
+    config = TrainConfig(**CONTAINER | {"batch_size": 200, "n_features": 16})
+    for threads in (1, 2):
+        torch.set_num_threads(threads)
+        train(config, tmp_path / str(threads), progress=False)
+    torch.set_num_threads(1)
+    assert_same(tmp_path / "1", tmp_path / "2")
 
 
 @pytest.mark.slow
@@ -159,6 +213,100 @@ def test_a_crashed_run_goes_on_from_its_last_checkpoint(tmp_path):
     for number in (9, 14):  # twice
         with at_step(number, crash), pytest.raises(Breakdown):
             train(config, tmp_path / "broken", progress=False)
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_a_killed_run_ends_as_if_nothing_had_happened(tmp_path):
+    fields = CONTAINER | {"picks": 400, "checkpoint_interval": 0}
+    train(TrainConfig(**fields), tmp_path / "straight", progress=False)
+    done = subprocess.run(
+        [sys.executable, KILLED_RUN, tmp_path / "killed", json.dumps(fields)],
+        env=os.environ | {"PYTHONPATH": str(files.ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    kills, inside = map(int, re.search(r"(\d+) kills, (\d+) inside a save", done.stdout).groups())
+    assert kills >= 20 and inside >= 5
+    assert_same(tmp_path / "straight", tmp_path / "killed")
+    assert len(list((tmp_path / "killed").iterdir())) == 3  # nothing half written is left
+
+
+@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("changes", [{}, {"replay_size": 61}, {"replay_size": 5000}])
+def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):
+    """A memory smaller and larger than the run, and one of no whole number of steps."""
+    config = TrainConfig(**RUNS[name] | changes)
+    for steps in (1, 23, 24, 25, config.picks // config.num_envs):
+        with begun(config, tmp_path / str(steps)) as run:
+            for _ in range(steps):
+                run._step()
+            run._save()
+            with begun(config, tmp_path / str(steps)) as other:
+                assert other.steps == steps and other.replay.total == run.replay.total
+                filled = len(run.replay)
+                for name, array in run.replay.arrays.items():
+                    assert (array[:filled] == other.replay.arrays[name][:filled]).all(), name
+                assert (run.observations == other.observations).all()
+                assert (run.masks == other.masks).all()
+                assert (run.agent.state()["network.scorer.weight"]
+                        == other.agent.state()["network.scorer.weight"]).all()  # fmt: skip
+                assert [first for first, _ in run.starts] == [first for first, _ in other.starts]
+
+
+def test_a_checkpoint_is_small(tmp_path):
+    config = TrainConfig(num_envs=64, picks=6400, replay_size=6400, batch_size=8, n_features=4)
+    with begun(config, tmp_path) as run:
+        for _ in range(100):
+            run._step()
+        run._save()
+        assert run.checkpoint.stat().st_size < 0.01 * run.replay.arrays["observations"].nbytes
+
+
+def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "broken", 20)
+    before = (tmp_path / "broken" / "checkpoint.npz").read_bytes()
+    message = "stopped after 80 picks; call train again with run_dir="
+    with at("_pick", 3, interrupt), pytest.raises(KeyboardInterrupt, match=message):
+        train(config, tmp_path / "broken", progress=False)
+    assert (tmp_path / "broken" / "checkpoint.npz").read_bytes() == before
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_ctrl_c_while_the_environments_are_made(tmp_path, monkeypatch):
+    config, make_vec = TrainConfig(**CONTAINER), gymnasium.make_vec
+    train(config, tmp_path / "straight", progress=False)
+
+    def interrupted(*arguments, **keywords):
+        interrupt()
+        return make_vec(*arguments, **keywords)
+
+    monkeypatch.setattr(gymnasium, "make_vec", interrupted)
+    message = "stopped after 4 picks; call train again with run_dir="
+    with pytest.raises(KeyboardInterrupt, match=message):
+        train(config, tmp_path / "broken", progress=False)
+    monkeypatch.setattr(gymnasium, "make_vec", make_vec)
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_a_second_ctrl_c_stops_at_once(tmp_path):
+    config = TrainConfig(**CONTAINER, checkpoint_interval=0)
+    train(config, tmp_path / "straight", progress=False)
+
+    def twice() -> None:
+        interrupt()
+        interrupt()
+        pytest.fail("still running")
+
+    with at("_pick", 7, twice), pytest.raises(KeyboardInterrupt, match="^$"):
+        train(config, tmp_path / "broken", progress=False)
     train(config, tmp_path / "broken", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
@@ -207,6 +355,25 @@ def test_a_foreign_checkpoint_is_refused_by_name(tmp_path):
     np.savez(tmp_path / "checkpoint.npz", a=np.zeros(3))
     with pytest.raises(ValueError, match="checkpoint.npz"):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+def test_a_checkpoint_of_another_version_is_refused(tmp_path):
+    """The first version's configuration had a further field, and its checkpoints no format."""
+    old = json.dumps(asdict(TrainConfig(**CONTAINER)) | {"physics": "table"})
+    np.savez(tmp_path / "checkpoint.npz", config=np.array(old))
+    with pytest.raises(ValueError, match="checkpoint.npz was written by another version"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    (tmp_path / "checkpoint.npz").unlink()
+    (tmp_path / "config.json").write_text(old)
+    with pytest.raises(ValueError, match=r"another configuration: physics \('table', not None\)"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+def test_other_loads_than_at_the_start_are_refused(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 20)
+    with pytest.raises(ValueError, match="checkpoint.npz: its picks lead to other observations"):
+        train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
 
 
 # --- configuration ------------------------------------------------------------------
@@ -271,25 +438,29 @@ def test_a_configuration_is_needed(tmp_path):
 def test_the_bootstrap_maximum_obeys_the_mask(tmp_path, mask):
     """A failed item is out of the next state's maximum, whether training masks choices or not."""
     config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
-    run = import_module("unload.train")._Run(config, tmp_path, None)
-    for _ in range(12):
-        run._step()
-    run.envs.close()
+    with begun(config, tmp_path) as run:
+        for _ in range(12):
+            run._step()
     stored = run.replay.arrays
     failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
     assert len(failed) > 10
     assert not stored["next_masks"][failed, stored["actions"][failed]].any()
 
 
-def test_own_loads_are_trained_on(tmp_path):
+def test_own_loads_are_trained_on_and_gone_on_with(tmp_path):
     seen = []
 
     def stack(rng):
         seen.append(stack_load(rng, walls=10))
         return seen[-1]
 
-    train(TrainConfig(**CONTAINER), tmp_path, progress=False, stack=stack)
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path / "straight", progress=False, stack=stack)
     assert len(seen) >= 4
+    with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "broken", progress=False, stack=stack)
+    train(config, tmp_path / "broken", progress=False, stack=stack)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
 def test_loads_for_an_environment_without_loads_are_refused(tmp_path):

@@ -12,7 +12,7 @@ from torch.nn.functional import smooth_l1_loss
 from unload import checks, files, fused
 from unload.equalization import TIES, equalize
 from unload.network import PEQNetwork
-from unload.policies import check_batch, random
+from unload.policies import check_batch
 
 # Rows of a batch per backward pass: what one pass stores stays in the cache.
 CHUNK = 64
@@ -55,8 +55,9 @@ class DQN:
             )
         self.gamma = checks.real("gamma", gamma, 0, 1)
         self.beta = checks.real("beta", beta, 0)
+        learning_rate = checks.real("learning_rate", learning_rate, 0)
         self.optimizer = torch.optim.Adam(
-            network.parameters(), lr=checks.real("learning_rate", learning_rate, 0)
+            network.parameters(), learning_rate, fused=self.fused_update
         )
         self.target = {name: value.clone() for name, value in network.state_dict().items()}
 
@@ -82,13 +83,24 @@ class DQN:
             TypeError, ValueError: see ``unload.policies.check_batch``; ``epsilon`` is no
                 number in [0, 1], or ``rng`` no generator.
         """
-        observations, masks = check_batch(observations, masks)
-        checks.generator("rng", rng)
-        explore = rng.random(len(observations)) < checks.real("epsilon", epsilon, 0, 1)
-        actions = random(observations, masks, rng)
-        if not explore.all():
-            exploit = ~explore
-            actions[exploit] = _best_actions(self.network, observations[exploit], masks[exploit])
+        observations, allowed = check_batch(observations, masks)
+        checks.real("epsilon", epsilon, 0, 1)
+        return self.choose(observations, allowed, epsilon, checks.generator("rng", rng))
+
+    def choose(
+        self,
+        observations: np.ndarray,
+        allowed: np.ndarray,
+        epsilon: float,
+        rng: np.random.Generator,
+    ) -> np.ndarray:
+        """``act`` without its checks, for what an environment shows: float arrays, bool masks."""
+        explore = rng.random(len(observations)) < epsilon
+        exploit = ~explore
+        actions = np.empty(len(observations), np.int64)
+        actions[explore] = any_allowed(allowed[explore], rng)
+        if exploit.any():
+            actions[exploit] = _best_actions(self.network, observations[exploit], allowed[exploit])
         return actions
 
     def update(self, batch: dict[str, np.ndarray]) -> float:
@@ -195,6 +207,18 @@ def _best_actions(
         return fused.greedy_actions(network, observations.astype(np.float32, copy=False), allowed)
     values = network(torch.as_tensor(observations, dtype=torch.float32))
     return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
+
+
+def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """An allowed action, each with the same probability, (batch,) int64.
+
+    Raises:
+        ValueError: a row allows none.
+    """
+    draws = np.where(allowed, rng.random(allowed.shape), -1.0)
+    if (draws.max(axis=1) < 0).any():
+        raise ValueError("allowed is False in a whole row; expected at least one item to pick")
+    return draws.argmax(axis=1)
 
 
 class Greedy:

@@ -33,12 +33,10 @@ class TrainConfig:
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
     checkpoint_interval: float = 60.0  # * seconds
-    physics: str = "table"  # * of the container: "table" or "local"
 
     def __post_init__(self) -> None:
         checks.one_of("env", self.env, ENVS)
         checks.one_of("ties", self.ties, TIES)
-        checks.one_of("physics", self.physics, ("table", "local"))
         for name in ("equalize", "mask"):
             checks.boolean(name, getattr(self, name))
         for name in (

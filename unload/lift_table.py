@@ -48,9 +48,9 @@ class LiftTable:
         digest = np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
         slot = find(self.digests, digest)
         if self.digests[slot] == EMPTY:
-            distance = lift(self._world, situation)
-            self._insert(digest, round(distance * 1e6))
-            return distance
+            micrometres = round(lift(self._world, situation) * 1e6)
+            self._insert(digest, micrometres)
+            return micrometres / 1e6
         return int(self.micrometres[slot]) / 1e6
 
     def _insert(self, digest: np.uint64, micrometres: int) -> None:

@@ -8,6 +8,14 @@ from unload import checks
 CHECKS = {"f": checks.finite_array, "i": checks.integer_array, "b": checks.flag_array}
 
 
+def _checked(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    """``values``, if they may be written into an array of this ``dtype``."""
+    if isinstance(values, np.ndarray) and (values.dtype, values.shape) == (dtype, shape):
+        if dtype.kind != "f" or np.isfinite(values).all():
+            return values  # nothing to convert
+    return CHECKS[dtype.kind](name, values, shape)
+
+
 class ReplayBuffer:
     """The last ``size`` picks, in arrays.
 
@@ -60,7 +68,7 @@ class ReplayBuffer:
             raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
         count = len(checks.finite_array("rewards", batch["rewards"], (None,)))
         checked = {
-            name: CHECKS[array.dtype.kind](name, batch[name], (count, *array.shape[1:]))
+            name: _checked(name, batch[name], (count, *array.shape[1:]), array.dtype)
             for name, array in self.arrays.items()
         }
         slots = np.arange(self.total, self.total + count) % self.size
@@ -79,4 +87,5 @@ class ReplayBuffer:
         if not len(self):
             raise ValueError("the replay buffer is empty; add picks before sampling")
         slots = rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))
-        return {name: array[slots] for name, array in self.arrays.items()}
+        # Indexing by ``array[slots]`` would take half as long again.
+        return {name: array.take(slots, axis=0) for name, array in self.arrays.items()}

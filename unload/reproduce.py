@@ -4,44 +4,41 @@
     python -m unload.reproduce observation    Figs. 4–6
     python -m unload.reproduce tuning         Figs. 8–10
     python -m unload.reproduce training       Figs. 11 and 12
-    python -m unload.reproduce all
+    python -m unload.reproduce paper          all of them
 
-File names and columns are those that the paper's own plots read. Runs that were stopped
-go on where they were; finished ones are not repeated.
+File names and columns are those that the paper's own plots read. What has been computed is
+kept in ``runs/``: a command that was stopped goes on where it was, and what is finished is
+not repeated. Each training run writes its progress to ``log.txt`` in its folder there.
 """
 
 import argparse
+import sys
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 
 import gymnasium
+import numpy as np
 import pandas as pd
+from tqdm import tqdm
 
-from unload import checks, files, observation, policies, task
+from unload import checks, files, observation, policies, task, tuning
 from unload.agent import save_policy
 from unload.config import TrainConfig
 from unload.equalization import equalize
 from unload.evaluate import evaluate
-from unload.physics import shared_table
-from unload.provenance import write_provenance
-from unload.sweep import STEPS, export_curves, run_folder, run_sweep, tuning_config
-from unload.train import train
+from unload.lift_table import LiftTable
+from unload.provenance import joined, run_record, write_provenance
+from unload.sweep import run_sweep
+from unload.train import TrainResult, train
 
 COMMAND = "python -m unload.reproduce"
-# The runs that the paper's Figs. 8–10 show: batch size, learning rate, run, equalized.
-FIGURE_RUNS = (
-    (1024, 1e-1, 6, True),
-    (1024, 1e-2, 7, True),
-    (1024, 1e-3, 5, True),
-    (64, 1e-3, 9, True),
-    (256, 1e-3, 9, True),
-    (2048, 1e-3, 6, True),
-    (2048, 1e-3, 8, False),
-)
 PAPER_PICKS = TrainConfig().picks
-REDUCED_PICKS = 1_000_000
+SEEDS = (0, 1, 2)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
+EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
 
 
 def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
@@ -65,138 +62,316 @@ def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
     for name, points in tables.items():
         frame = pd.DataFrame(points[:, [0, 2]], columns=["x", "y"])
         files.write_text(folder / f"{name}.csv", frame.to_csv(index=False, float_format="%.6f"))
-    seconds = time.monotonic() - start
-    write_provenance(
-        folder, "observation", f"{COMMAND} observation", {"seed": seed}, seconds, reduced=False
-    )
+    record = run_record(time.monotonic() - start)
+    write_provenance(folder, "observation", f"{COMMAND} observation", {"seed": seed}, False, record)
 
 
-def lift_data(episodes: int = 60, seed: int = 0, folder: str | Path = files.DATA) -> None:
+def lift_data(
+    episodes: int = 8,
+    seed: int = 0,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    progress: bool = True,
+) -> None:
     """Lifts that a newcomer's containers will meet, ``lifts.npz``.
 
-    Plays episodes with each of the policies that need no learning and with a mixture of
-    the random and the highest-item policy, and adds what is new to the shared table.
+    Fills an empty table by playing with policies of very different tastes: the highest or the
+    nearest item, mixed with random ones to various degrees, or the item that is farthest in
+    some direction.
 
     Args:
-        episodes: per policy.
+        episodes: of 64 containers for each of the 21 policies.
         seed: of the episodes.
         folder: of the table.
+        runs_dir: where the table is kept with its record, not to be computed again.
+        progress: show a progress bar.
     """
-    start = time.monotonic()
+    settings = {
+        "episodes of 64 containers per policy": checks.integer("episodes", episodes, 1),
+        "seed": checks.integer("seed", seed, 0),
+    }
+    kept = Path(runs_dir) / f"lifts/{episodes}_episodes_seed_{seed}"
+    if not (kept / "record.json").exists():
+        start = time.monotonic()
+        rng = np.random.default_rng(seed)
+        envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS).unwrapped
+        envs.table = LiftTable()
+        jobs = list(product(range(episodes), _tastes(rng)))
+        for _, policy in tqdm(
+            jobs, unit="episode", disable=not progress, ncols=100, file=sys.stdout
+        ):
+            observations, infos = envs.reset(seed=int(rng.integers(2**31)))
+            for _ in range(task.MAX_PICKS):
+                actions = policy(observations, infos["action_mask"], rng)
+                observations, _, _, _, infos = envs.step(actions)
+        envs.close()
+        envs.table.save(kept / "lifts.npz")
+        files.write_json(kept / "record.json", run_record(time.monotonic() - start))
+    table = LiftTable.load(kept / "lifts.npz")
+    table.save(Path(folder) / "lifts.npz")
+    record = files.read_json(kept / "record.json")
+    settings["lifts"] = len(table)
+    write_provenance(folder, "lifts", f"{COMMAND} lifts", settings, False, record)
 
-    def mixed(observations, masks, rng):
-        return (policies.random if rng.random() < 0.3 else policies.highest)(
-            observations, masks, rng
+
+def _tastes(rng: np.random.Generator) -> list[Callable]:
+    """Policies that lead a container through very different states."""
+    return [
+        policies.random,
+        *(
+            _mixed(favourite, share)
+            for favourite in (policies.highest, policies.nearest)
+            for share in (0.0, 0.1, 0.3, 0.6)
+        ),
+        *(_mixed(_farthest(rng.normal(size=3)), 0.2) for _ in range(12)),
+    ]
+
+
+def _mixed(favourite: Callable, share: float) -> Callable:
+    """A policy that picks at random with probability ``share``."""
+
+    def policy(observations, masks, rng):
+        return np.where(
+            rng.random(len(masks)) < share,
+            policies.random(observations, masks, rng),
+            favourite(observations, masks, rng),
         )
 
-    for policy in (policies.random, policies.nearest, policies.highest, mixed):
-        evaluate(policy, episodes, seed)
-    table = shared_table()
-    table.save(Path(folder) / "lifts.npz")
-    settings = {"episodes": episodes, "seed": seed, "lifts": len(table)}
-    seconds = time.monotonic() - start
-    write_provenance(folder, "lifts", f"{COMMAND} lifts", settings, seconds, reduced=False)
+    return policy
+
+
+def _farthest(direction: np.ndarray) -> Callable:
+    """A policy that picks the item farthest in a direction, (3,) in scaled positions."""
+
+    def policy(observations, masks, rng):
+        return np.where(masks, observations @ direction, -np.inf).argmax(axis=1)
+
+    return policy
 
 
 def tuning_data(
-    runs: tuple[tuple[int, float, int, bool], ...] = FIGURE_RUNS,
-    steps: int = STEPS,
+    learning_rates: Sequence[float] = tuning.LEARNING_RATES,
+    batch_sizes: Sequence[int] = tuning.BATCH_SIZES,
+    runs: int = tuning.RUNS,
+    steps: int = tuning.STEPS,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
+    progress: bool = True,
 ) -> None:
     """Curves in the hyperparameter-tuning environment, for Figs. 8–10.
 
+    Every configuration is run with and without feature engineering. Writes the curves, see
+    ``unload.tuning.export_curves``, and ``tuning_summary.csv``, see
+    ``unload.tuning.tuning_summary``.
+
     Args:
-        runs: batch size, learning rate, number and equalization of each run.
+        learning_rates: μ.
+        batch_sizes: b.
+        runs: per configuration.
         steps: K.
-        folder: of the data, see ``unload.sweep.export_curves``.
-        runs_dir: where unfinished runs are kept.
-        n_jobs: processes.
+        folder: of the data.
+        runs_dir: where the runs are kept.
+        n_jobs: processes, see ``run_sweep``.
+        progress: show a progress bar.
 
     Raises:
         RuntimeError: a run failed; the message says which and why.
     """
-    start = time.monotonic()
-    configs = [
-        tuning_config(batch_size, learning_rate, run, equalized, steps)
-        for batch_size, learning_rate, run, equalized in runs
-    ]
-    report = run_sweep(configs, Path(runs_dir) / "tuning", n_jobs)
-    failed = report[report.error != ""]
-    if len(failed):
-        raise RuntimeError("runs failed:\n" + failed[["folder", "error"]].to_string(index=False))
-    for config in configs:
-        export_curves(config, run_folder(config, Path(runs_dir) / "tuning"), folder)
-    settings = {"steps": steps, "runs (batch size, learning rate, seed, equalized)": runs}
-    seconds = time.monotonic() - start
-    write_provenance(folder, "tuning", f"{COMMAND} tuning", settings, seconds, steps < STEPS)
+    folder, kept = Path(folder), Path(runs_dir) / f"tuning/{steps}_steps"
+    configs = tuning.tuning_grid(learning_rates, batch_sizes, runs, steps=steps)
+    records = _sweep(configs, kept, n_jobs, progress)
+    curves = {name: train(config, kept / name).curve for name, config in configs.items()}
+    for old in folder.glob("dummy_sim_*/*_curve_*.csv"):
+        old.unlink()  # it may be of a run that is not among these
+    for name, curve in curves.items():
+        tuning.export_curves(name, curve, folder)
+    summary = tuning.tuning_summary(configs, curves)
+    _write_table(folder / "tuning_summary.csv", summary)
+    settings = {
+        "learning_rates": list(learning_rates),
+        "batch_sizes": list(batch_sizes),
+        "runs": runs,
+        "steps": steps,
+        "equalize": [True, False],
+        "config": _shared(configs),
+    }
+    paper = {"learning_rates": tuning.LEARNING_RATES, "batch_sizes": tuning.BATCH_SIZES}
+    complete = all(set(values) <= set(settings[name]) for name, values in paper.items())
+    reduced = steps < tuning.STEPS or runs < tuning.RUNS or not complete
+    command = (
+        f"{COMMAND} tuning --learning-rates {_listed(learning_rates)} "
+        f"--batch-sizes {_listed(batch_sizes)} --runs {runs} --steps {steps}"
+    )
+    write_provenance(folder, "tuning", command, settings, reduced, joined(records))
 
 
 def training_data(
-    picks: int = REDUCED_PICKS,
+    picks: int = PAPER_PICKS,
+    seeds: Sequence[int] = SEEDS,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
     progress: bool = True,
 ) -> None:
     """The paper's training in the container (Sec. IV-B), for Figs. 11 and 12.
 
     Writes ``loss_function_agent.csv`` and ``total_rew_function_agent.csv`` with the columns
     ``Wall time,Step,Value`` of a TensorBoard export, the reward summed over an episode of
-    500 picks; and the trained policy, ``policies/paper.safetensors``.
+    500 picks; the same of the seeds after the first one, with ``_seed_<seed>`` after the
+    name; the trained policies, ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>``;
+    ``training_curves.csv``, means over each episode of all environments; and
+    ``training_summary.csv``, see ``training_summary``.
 
     Args:
         picks: K, at least one episode of all environments.
+        seeds: of the runs; the first one is the paper's line in the figures.
         folder: of the data.
-        runs_dir: where the unfinished run is kept.
+        runs_dir: where the runs are kept.
+        n_jobs: processes, see ``run_sweep``.
         progress: show a progress bar.
+
+    Raises:
+        RuntimeError: a run failed; the message says which and why.
     """
     checks.integer("picks", picks, task.NUM_ENVS * task.MAX_PICKS)
-    start = time.monotonic()
-    folder = Path(folder)
-    config = TrainConfig(picks=picks, log_interval=LOG_INTERVAL)
-    result = train(config, Path(runs_dir) / f"training_{picks}", progress)
-    curve = result.curve[["wall_time", "picks", "loss", "mean_reward"]]
-    # All environments start their episodes together, so that these are means over episodes.
+    folder, kept = Path(folder), Path(runs_dir) / f"training/{picks}_picks"
+    configs = {
+        f"seed_{seed}": TrainConfig(picks=picks, seed=seed, log_interval=LOG_INTERVAL)
+        for seed in seeds
+    }
+    records = _sweep(configs, kept, n_jobs, progress)
+    results = [train(config, kept / name) for name, config in configs.items()]
+    for old in (*folder.glob("*_agent_seed_*.csv"), *folder.glob("policies/paper_seed_*")):
+        old.unlink()  # it may be of a seed that is not among these
+    for number, (seed, result) in enumerate(zip(seeds, results)):
+        suffix = f"_seed_{seed}" if number else ""
+        for name, points in (
+            ("loss_function_agent", result.curve.rename(columns={"loss": "Value"})),
+            ("total_rew_function_agent", _rewards(result.curve)),
+        ):
+            points = points.rename(columns={"wall_time": "Wall time", "picks": "Step"})
+            points = points[["Wall time", "Step", "Value"]].dropna()
+            _write_table(folder / f"{name}{suffix}.csv", points, digits=12)
+        save_policy(result.policy, folder / "policies" / f"paper{suffix}.safetensors")
+    episodes = [_episodes(result.curve).assign(seed=seed) for seed, result in zip(seeds, results)]
+    columns = ["seed", "picks", "success_rate", "deadlocked", "loss", "epsilon"]
+    _write_table(folder / "training_curves.csv", pd.concat(episodes)[columns])
+    rows = [
+        {"seed": seed, **training_summary(result), **_cost(record)}
+        for seed, result, record in zip(seeds, results, records)
+    ]
+    _write_table(folder / "training_summary.csv", pd.DataFrame(rows))
+    settings = {
+        "picks": picks,
+        "seeds": list(seeds),
+        "evaluation": EVALUATION,
+        "config": _shared(configs),
+    }
+    command = f"{COMMAND} training --picks {picks} --seeds {_listed(seeds)}"
+    write_provenance(folder, "training", command, settings, picks < PAPER_PICKS, joined(records))
+
+
+def training_summary(result: TrainResult) -> dict[str, float]:
+    """What became of a training run.
+
+    Returns:
+        ``msr_start``, ``msr_end`` and ``msr_best``: the MSR while training over the first
+        episode of all environments, the last hundredth of the picks (at least one episode),
+        and the best episode. ``msr_mask``, ``msr_no_mask``: the MSR of the trained policy on
+        50 fresh containers, told which items have failed or not, each with its standard
+        deviation over the containers, and the share of picks in deadlocks without the mask.
+    """
+    msr = _episodes(result.curve)["success_rate"]
+    row = {
+        "msr_start": msr.iloc[0],
+        "msr_end": msr.iloc[-max(1, len(msr) // 100) :].mean(),
+        "msr_best": msr.max(),
+    }
+    for name, mask in (("mask", True), ("no_mask", False)):
+        table = evaluate(result.policy, **EVALUATION, mask=mask)
+        row[f"msr_{name}"] = table["success_rate"].mean()
+        row[f"msr_{name}_std"] = table["success_rate"].std()
+    return row | {"deadlocked_no_mask": table["deadlocked"].mean()}
+
+
+def _sweep(configs: dict[str, TrainConfig], folder: Path, n_jobs: int, progress: bool) -> list:
+    """Train; the records of the runs."""
+    report = run_sweep(configs, folder, n_jobs, progress=progress)
+    failed = report[report["error"] != ""]
+    if len(failed):
+        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+    return [files.read_json(folder / name / "record.json") for name in configs]
+
+
+def _shared(configs: dict[str, TrainConfig]) -> dict:
+    """The fields of the configuration in which all runs agree."""
+    fields = [asdict(config) for config in configs.values()]
+    return {
+        name: value
+        for name, value in fields[0].items()
+        if all(other[name] == value for other in fields)
+    }
+
+
+def _episodes(curve: pd.DataFrame) -> pd.DataFrame:
+    """Means of a curve over each episode; all environments start theirs together."""
     points = task.MAX_PICKS // LOG_INTERVAL
     complete = curve[: len(curve) // points * points]
-    episodes = complete.groupby(complete.index // points)
-    reward = episodes["mean_reward"].mean() * task.MAX_PICKS
-    for name, rows, values in (
-        ("loss_function_agent", curve, curve["loss"]),
-        ("total_rew_function_agent", episodes[["wall_time", "picks"]].last(), reward),
-    ):
-        frame = pd.DataFrame(
-            {"Wall time": rows["wall_time"], "Step": rows["picks"], "Value": values}
-        ).dropna()
-        files.write_text(folder / f"{name}.csv", frame.to_csv(index=False, float_format="%.12g"))
-    save_policy(result.policy, folder / "policies" / "paper.safetensors")
-    seconds = float(curve["wall_time"].iloc[-1] - curve["wall_time"].iloc[0])
-    write_provenance(
-        folder,
-        "training",
-        f"{COMMAND} training --picks {picks}",
-        asdict(config),
-        max(seconds, time.monotonic() - start),
-        reduced=picks < PAPER_PICKS,
-    )
+    groups = complete.groupby(complete.index // points)
+    return groups.mean().assign(**groups[["picks", "wall_time", "epsilon"]].last())
+
+
+def _rewards(curve: pd.DataFrame) -> pd.DataFrame:
+    """Mean over the environments of the reward summed over each episode, as ``Value``."""
+    episodes = _episodes(curve)
+    return episodes.assign(Value=episodes["mean_reward"] * task.MAX_PICKS)
+
+
+def _cost(record: dict) -> dict:
+    """What a run took: its wall time and its peak memory."""
+    return {name: record[name] for name in ("wall_time_s", "peak_memory_mib")}
+
+
+def _write_table(path: Path, table: pd.DataFrame, digits: int = 6) -> None:
+    files.write_text(path, table.to_csv(index=False, float_format=f"%.{digits}g"))
+
+
+def _listed(values: Sequence) -> str:
+    return " ".join(f"{value:g}" for value in values)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=["lifts", "observation", "tuning", "training", "all"])
-    parser.add_argument("--picks", type=int, default=REDUCED_PICKS, help="of the training")
+    add = parser.add_argument
+    add("what", choices=["lifts", "observation", "tuning", "training", "paper"])
+    add("--jobs", type=int, default=-1, help="processes; one per core by default")
+    add("--picks", type=int, default=PAPER_PICKS, help="of the training")
+    add("--seeds", type=int, nargs="+", default=SEEDS, help="of the training")
+    add("--learning-rates", type=float, nargs="+", default=tuning.LEARNING_RATES, help="tuned")
+    add("--batch-sizes", type=int, nargs="+", default=tuning.BATCH_SIZES, help="tuned")
+    add("--runs", type=int, default=tuning.RUNS, help="of each tuned configuration")
+    add("--steps", type=int, default=tuning.STEPS, help="of a tuning run")
     options = parser.parse_args()
-    if options.what in ("lifts", "all"):
+    chosen = {options.what}
+    if "paper" in chosen:
+        chosen = {"lifts", "observation", "tuning", "training"}
+    if "lifts" in chosen:
         lift_data()
-    if options.what in ("observation", "all"):
+    if "observation" in chosen:
         observation_data()
-    if options.what in ("tuning", "all"):
-        tuning_data()
-    if options.what in ("training", "all"):
-        training_data(options.picks)
+    if "tuning" in chosen:
+        tuning_data(
+            options.learning_rates,
+            options.batch_sizes,
+            options.runs,
+            options.steps,
+            n_jobs=options.jobs,
+        )
+    if "training" in chosen:
+        training_data(options.picks, options.seeds, n_jobs=options.jobs)
 
 
 if __name__ == "__main__":

@@ -1,148 +1,148 @@
-"""The hyperparameter grid of Sec. IV-A, and running many configurations at once."""
+"""Many training runs side by side, on the cores of one machine or of a cluster."""
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import redirect_stdout
 from dataclasses import asdict
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pandas as pd
 import torch
 from joblib import Parallel, delayed, parallel_config
+from tqdm import tqdm
 
-from unload import checks, files, task
+from unload import checks, files, provenance
 from unload.config import TrainConfig
 from unload.train import train
 
-LEARNING_RATES = (1e-1, 1e-2, 1e-3)
-BATCH_SIZES = (64, 256, 1024, 2048)
-RUNS = 10
-STEPS = 3000  # K, one pick in each of 64 environments and one update per step
-
-
-def tuning_config(
-    batch_size: int,
-    learning_rate: float,
-    run: int,
-    equalize: bool = True,
-    steps: int = STEPS,
-    **changes,
-) -> TrainConfig:
-    """One run in the hyperparameter-tuning environment (Sec. IV-A).
-
-    Args:
-        batch_size: b.
-        learning_rate: μ.
-        run: number of the run, its seed.
-        equalize: with the paper's feature engineering or without.
-        steps: K.
-        **changes: further fields of ``TrainConfig``.
-    """
-    checks.integer("steps", steps, 1)
-    return TrainConfig(
-        env="unload/HighestItem-v0",
-        picks=steps * task.NUM_ENVS,
-        batch_size=batch_size,
-        learning_rate=learning_rate,
-        seed=run,
-        equalize=equalize,
-        log_interval=1,
-        **changes,
-    )
-
-
-def tuning_grid(
-    learning_rates: Sequence[float] = LEARNING_RATES,
-    batch_sizes: Sequence[int] = BATCH_SIZES,
-    runs: int = RUNS,
-    equalize: Sequence[bool] = (True, False),
-    steps: int = STEPS,
-) -> list[TrainConfig]:
-    """All runs of the paper's grid, short ones first."""
-    return [
-        tuning_config(batch_size, learning_rate, run, equalized, steps)
-        for batch_size in sorted(batch_sizes)
-        for run in range(checks.integer("runs", runs, 1))
-        for equalized in equalize
-        for learning_rate in learning_rates
-    ]
-
-
-def run_name(config: TrainConfig) -> str:
-    """The paper's name of a tuning run, such as ``bz_64_lr_0.1_agent_3``."""
-    return f"bz_{config.batch_size}_lr_{config.learning_rate:g}_agent_{config.seed}"
-
-
-def set_name(equalize: bool) -> str:
-    """The paper's name for the tuning runs with or without feature engineering."""
-    return f"dummy_sim_{'with' if equalize else 'without'}_hist_equal"
+BACKENDS = ("loky", "dask")
+ATTEMPTS = 2  # a run whose process died so often is given up
 
 
 def run_sweep(
-    configs: Iterable[TrainConfig],
+    configs: Mapping[str, TrainConfig],
     folder: str | Path,
     n_jobs: int = -1,
     backend: str = "loky",
+    progress: bool = True,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
-    A run that fails is reported and does not stop the others.
+    A run that fails, or whose process dies, is reported and does not stop the others. Each
+    run uses one thread, shows its own progress in ``log.txt`` in its folder, and leaves
+    ``record.json`` there: what ``unload.provenance.run_record`` tells, ``process``, and
+    ``resumed``, whether all that is of the last part of a run that had been stopped.
 
     Args:
-        configs: the runs.
-        folder: each run has a folder of its own in it.
-        n_jobs: processes; -1 for one per core.
-        backend: joblib's; ``"loky"`` for processes on this machine.
+        configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
+            that in which they start.
+        folder: the run ``name`` is kept in ``folder/name``. Machines of a cluster must share it.
+        n_jobs: processes with ``"loky"``, -1 for one per core; 1 runs all in this process.
+            ``"dask"`` uses the whole cluster.
+        backend: joblib's: ``"loky"`` for processes on this machine, or ``"dask"`` for the
+            cluster of the ``distributed.Client`` that you have made before.
+        progress: show a progress bar over the runs.
 
     Returns:
-        One row per run, in the order given: ``folder`` of the run, ``error`` (what went
-        wrong, or empty), and the configuration's fields.
+        One row per run, in the order given, its name as index: ``error`` (what went wrong,
+        or empty), ``folder`` of the run, and the configuration's fields.
 
     Raises:
-        TypeError: one of ``configs`` is not a ``TrainConfig``.
-        ValueError: two of them would share a folder.
+        TypeError: ``configs`` is not a mapping of names to ``TrainConfig``.
+        ValueError: a name is not a plain relative path, the backend is unknown, or there is
+            no cluster.
     """
-    configs = list(configs)
-    for config in configs:
+    checks.entries("configs", configs, ())
+    for name, config in configs.items():
         if not isinstance(config, TrainConfig):
-            raise TypeError(f"configs holds {config!r}; expected only unload.TrainConfig")
-    folders = [run_folder(config, folder) for config in configs]
-    for place, count in Counter(folders).items():
-        if count > 1:
-            raise ValueError(
-                f"configs holds {count} runs for {str(place)!r}; expected runs that differ in "
-                "batch size, learning rate, seed or equalization, or a folder for each"
-            )
-    with parallel_config(backend=backend, n_jobs=n_jobs):
-        errors = Parallel()(delayed(_run)(*job) for job in zip(configs, folders))
+            raise TypeError(f"configs[{name!r}] is {config!r}; expected an unload.TrainConfig")
+        if not _is_plain(name):
+            raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
+    checks.one_of("backend", backend, BACKENDS)
+    folders = {name: Path(folder) / name for name in configs}
+    for place in folders.values():
+        if _mark(place).exists():  # of a sweep that was stopped
+            _mark(place).unlink()
+    errors = {}
+    bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
+    with bar, parallel_config(backend=backend, n_jobs=n_jobs):
+        for name, error in _outcomes(configs, folders):
+            errors[name] = error
+            bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
+            bar.update()
     rows = [
-        {"folder": str(place), "error": error, **asdict(config)}
-        for config, place, error in zip(configs, folders, errors)
+        {"error": errors[name], "folder": str(folders[name]), **asdict(config)}
+        for name, config in configs.items()
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
 
 
-def run_folder(config: TrainConfig, folder: str | Path) -> Path:
-    """Where ``run_sweep`` keeps a run."""
-    return Path(folder) / set_name(config.equalize) / run_name(config)
+def _is_plain(name: object) -> bool:
+    """Whether a run's name leads to a folder of its own inside the sweep's."""
+    if not isinstance(name, str):
+        return False
+    path = PurePosixPath(name)
+    return (
+        bool(path.parts)
+        and not path.is_absolute()
+        and ".." not in path.parts
+        and (str(path) == name)
+    )
 
 
-def _run(config: TrainConfig, folder: Path) -> str:
-    """Train one configuration; the error's text if it failed."""
-    torch.set_num_threads(1)  # the runs share the cores among themselves
-    try:
-        train(config, folder, progress=False)
-    except Exception as error:  # whatever it was, the other runs go on
-        return f"{type(error).__name__}: {error}"
-    return ""
+def _outcomes(
+    configs: Mapping[str, TrainConfig], folders: Mapping[str, Path]
+) -> Iterator[tuple[str, str]]:
+    """Name and error of each run, as they end.
 
-
-def export_curves(config: TrainConfig, run: str | Path, folder: str | Path) -> None:
-    """Write a finished tuning run's curves as the paper's plots read them.
-
-    ``folder/dummy_sim_{with,without}_hist_equal/{hitrate,loss}_curve_<name>.csv``: one value
-    per step and no header; the loss before the first update is left empty.
+    loky gives up all runs when one process dies. Those that were under way then go on alone,
+    one after the other, so that it shows whose process it was.
     """
-    curve = pd.read_csv(Path(run) / "curve.csv")
-    for name, column in (("hitrate", "success_rate"), ("loss", "loss")):
-        path = Path(folder) / set_name(config.equalize) / f"{name}_curve_{run_name(config)}.csv"
-        files.write_text(path, curve[column].to_csv(index=False, header=False, float_format="%.5g"))
+    left = dict(configs)
+    while left:
+        interrupted = [name for name in left if _mark(folders[name]).exists()]
+        jobs = [delayed(_run)(name, left[name], folders[name]) for name in interrupted[:1] or left]
+        try:
+            runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
+            for name, error in runs(jobs):
+                del left[name]
+                yield name, error
+        except BrokenProcessPool:
+            continue
+
+
+def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
+    """Train one configuration; its name, and the error's text if it failed."""
+    mark = _mark(folder)
+    attempts = mark.read_text() if mark.exists() else ""
+    if attempts.count("\n") == ATTEMPTS:
+        mark.unlink()
+        return name, f"its process died, {ATTEMPTS} times"
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # the runs share the cores among themselves
+    start = time.monotonic()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        mark.write_text(f"{attempts}{os.getpid()}\n")
+        resumed = (folder / "checkpoint.npz").exists()
+        with open(folder / "log.txt", "a") as log, redirect_stdout(log):
+            train(config, folder)
+        if not (folder / "record.json").exists():
+            record = {"resumed": resumed, "process": os.getpid()}
+            record |= provenance.run_record(time.monotonic() - start)
+            files.write_json(folder / "record.json", record)
+    except Exception as error:  # whatever it was, the other runs go on
+        return name, f"{type(error).__name__}: {error}"
+    finally:
+        if mark.exists():
+            mark.unlink()
+        torch.set_num_threads(threads)
+    return name, ""
+
+
+def _mark(folder: Path) -> Path:
+    """The file that is there while a run is under way: one line, a process, per attempt."""
+    return folder / "attempts"

@@ -1,13 +1,21 @@
-"""The training loop: vector environment, replay, updates, curves, checkpoints (Sec. IV-B)."""
+"""The training loop: vector environment, replay, updates, curves, checkpoints (Sec. IV-B).
+
+A checkpoint does not hold the replay memory, which is 1.6 GB in the paper's configuration.
+The environments are deterministic, so it holds their state at the start of the oldest
+episode that the memory reaches back to, and the picks since: repeating these fills the
+memory again, pick by pick as it was.
+"""
 
 import json
 import signal
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +23,6 @@ import gymnasium
 import numpy as np
 import pandas as pd
 import torch
-from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from unload import files, task
@@ -32,15 +39,19 @@ class TrainResult(NamedTuple):
     Attributes:
         policy: the trained network, as a greedy policy.
         curve: one row per ``log_interval`` steps, means over it: ``picks`` so far,
-            ``mean_reward``, ``success_rate`` (MSR of the exploring agent), ``loss`` (NaN
-            before the first update), ``epsilon``, and ``wall_time`` in s since the epoch.
+            ``mean_reward``, ``success_rate`` (MSR of the exploring agent), ``deadlocked``
+            (share of picks whose item had already failed since the last success), ``loss``
+            (NaN before the first update), ``epsilon``, and ``wall_time`` in s since the epoch.
     """
 
     policy: Greedy
     curve: pd.DataFrame
 
 
-CURVE_COLUMNS = ("picks", "mean_reward", "success_rate", "loss", "epsilon", "wall_time")
+CURVE_COLUMNS = (
+    "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
+)  # fmt: skip
+FORMAT = 2  # of the checkpoints
 
 
 def train(
@@ -52,8 +63,10 @@ def train(
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
-    for the wall times, as one that was not. Ctrl-C writes a checkpoint first. A finished
-    run is not repeated.
+    for the wall times, as one that was not, and so does one that was killed: it goes on
+    from its last checkpoint. Ctrl-C writes one first; pressed again, it stops at once. A
+    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads; the
+    result does not depend on their number.
 
     Args:
         config: what to train.
@@ -66,7 +79,8 @@ def train(
     Raises:
         TypeError: ``config`` is not a ``TrainConfig``.
         ValueError: ``run_dir`` is not a folder, or holds a run of another configuration
-            or damaged files; ``stack`` is given for an environment without loads.
+            or damaged files; ``stack`` is given for an environment without loads, or is
+            not the one that the run was started with.
         KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
     """
     if not isinstance(config, TrainConfig):
@@ -80,32 +94,35 @@ def train(
     if not (folder / "config.json").exists():
         _train(config, folder, progress, stack)
     _check_same(files.read_json(folder / "config.json"), config, folder)
+    for leftover in folder.glob("checkpoint.npz*"):
+        leftover.unlink()
     return TrainResult(
         load_policy(folder / "policy.safetensors"), pd.read_csv(folder / "curve.csv")
     )
 
 
 def _train(config: TrainConfig, folder: Path, progress: bool, stack: Callable | None) -> None:
-    run = _Run(config, folder, stack)
-    try:
-        run.go(progress)
-    finally:
-        run.envs.close()
-    save_policy(
-        Greedy(run.agent.network, config.equalize, config.ties), folder / "policy.safetensors"
-    )
-    curve = pd.DataFrame(run.curve, columns=CURVE_COLUMNS)
-    files.write_text(folder / "curve.csv", curve.to_csv(index=False))
-    files.write_json(folder / "config.json", asdict(config))  # last: it marks the run as finished
-    run.checkpoint.unlink(missing_ok=True)
+    with _interrupt_later() as interrupts:
+        run = _Run(config, folder, stack, interrupts)
+        try:
+            run.restore()
+            run.go(progress)
+        finally:
+            run.envs.close()
+        policy = Greedy(run.agent.network, config.equalize, config.ties)
+        save_policy(policy, folder / "policy.safetensors")
+        curve = pd.DataFrame(run.curve, columns=CURVE_COLUMNS)
+        files.write_text(folder / "curve.csv", curve.to_csv(index=False))
+        # Last: it marks the run as finished.
+        files.write_json(folder / "config.json", asdict(config))
 
 
 def _check_same(stored: dict, config: TrainConfig, folder: Path) -> None:
     """Raise unless a stored configuration is ``config``."""
     wanted = json.loads(json.dumps(asdict(config)))
-    differing = [name for name in wanted if stored.get(name) != wanted[name]]
+    differing = [name for name in wanted | stored if stored.get(name) != wanted.get(name)]
     if differing:
-        details = ", ".join(f"{n} ({stored.get(n)!r}, not {wanted[n]!r})" for n in differing)
+        details = ", ".join(f"{n} ({stored.get(n)!r}, not {wanted.get(n)!r})" for n in differing)
         raise ValueError(
             f"run_dir {str(folder)!r} holds a run of another configuration: {details}; "
             "expected the same one or an empty folder"
@@ -114,12 +131,18 @@ def _check_same(stored: dict, config: TrainConfig, folder: Path) -> None:
 
 @contextmanager
 def _interrupt_later() -> Iterator[list[int]]:
-    """Collect Ctrl-C in a list instead of raising, so that no step is left half done."""
+    """Collect the first Ctrl-C in a list instead of raising: no step is left half done."""
     received: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield received  # only the main thread receives signals
         return
-    previous = signal.signal(signal.SIGINT, lambda number, frame: received.append(number))
+
+    def receive(number: int, frame: object) -> None:
+        if received:
+            signal.default_int_handler(number, frame)
+        received.append(number)
+
+    previous = signal.signal(signal.SIGINT, receive)
     try:
         yield received
     finally:
@@ -127,10 +150,12 @@ def _interrupt_later() -> Iterator[list[int]]:
 
 
 class _Run:
-    """A training run in progress: everything a checkpoint must hold."""
+    """A training run in progress."""
 
-    def __init__(self, config: TrainConfig, folder: Path, stack: Callable | None) -> None:
-        self.config, self.folder = config, folder
+    def __init__(
+        self, config: TrainConfig, folder: Path, stack: Callable | None, interrupts: list[int]
+    ) -> None:
+        self.config, self.folder, self.interrupts = config, folder, interrupts
         self.checkpoint = folder / "checkpoint.npz"
         env_seed, rng_seed, torch_seed = np.random.SeedSequence(config.seed).generate_state(3)
         self.rng = np.random.default_rng(rng_seed)
@@ -143,28 +168,35 @@ class _Run:
         )
         size = min(config.replay_size, config.picks)
         self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
-        container = {"physics": config.physics} if config.env == ENVS[0] else {}
-        if stack is not None:
-            container["stack"] = stack
+        self.curve: list[tuple[float, ...]] = []
+        self.sums = self._no_sums()
+        # Every pick of the run, (steps, num_envs); a row of the observation fits a byte.
+        shape = (config.picks // config.num_envs, config.num_envs)
+        self.actions = np.empty(shape, np.uint8)
+        self.steps = 0  # made so far
         self.envs = gymnasium.make_vec(
             config.env,
             config.num_envs,
-            vectorization_mode="sync",
-            vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP},
             equalize=config.equalize,
             ties=config.ties,
             max_picks=config.max_picks,
-            **container,
+            **({} if stack is None else {"stack": stack}),
         )
-        self.picks = 0
-        self.curve: list[tuple[float, ...]] = []
-        self.rewards: list[float] = []  # since the last point of the curve
-        self.losses: list[float] = []
-        stored = self._read_checkpoint()
         self.observations, infos = self.envs.reset(seed=int(env_seed))
-        self.masks = self._usable(infos["action_mask"])
-        if stored is not None:
-            self._restore(stored)
+        self.masks = infos["action_mask"]
+        # The mask is part of training's choices only if asked for.
+        self.all_allowed = np.ones(self.masks.shape, dtype=bool)
+        # Of the episodes that the replay memory reaches back to: first step, state there.
+        self.starts = deque([(0, self.envs.get_state())])
+
+    @property
+    def picks(self) -> int:
+        return self.steps * self.config.num_envs
+
+    @staticmethod
+    def _no_sums() -> dict[str, float]:
+        """Sums since the last point of the curve."""
+        return dict.fromkeys(("picks", "rewards", "deadlocked", "updates", "losses"), 0.0)
 
     def go(self, progress: bool) -> None:
         """Train to the end, with a checkpoint now and then and on Ctrl-C."""
@@ -179,53 +211,68 @@ class _Run:
             ncols=100,
             file=sys.stdout,
         )
-        with bar, _interrupt_later() as interrupts:
-            while self.picks < self.config.picks:
+        with bar:
+            while self.steps < len(self.actions):
                 self._step()
                 bar.update(self.config.num_envs)
-                if not self.rewards:
-                    _, _, msr, loss, *_ = self.curve[-1]
+                if not self.sums["picks"]:
+                    _, _, msr, _, loss, *_ = self.curve[-1]
                     bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
-                if interrupts or time.monotonic() - saved > self.config.checkpoint_interval:
+                if self.interrupts or time.monotonic() - saved > self.config.checkpoint_interval:
                     self._save()
                     saved = time.monotonic()
-                if interrupts:
-                    raise KeyboardInterrupt(
-                        f"stopped after {self.picks} picks; call train again with "
-                        f"run_dir={str(self.folder)!r} to go on"
-                    )
+                self._check_interrupts(self.picks)
+
+    def _check_interrupts(self, picks: int) -> None:
+        if self.interrupts:
+            raise KeyboardInterrupt(
+                f"stopped after {picks} picks; call train again with "
+                f"run_dir={str(self.folder)!r} to go on"
+            )
 
     def _step(self) -> None:
         """One pick in every environment, and the updates that follow it."""
         config = self.config
         epsilon = config.epsilon(self.picks)
-        actions = self.agent.act(self.observations, self.masks, epsilon, self.rng)
-        following, rewards, terminations, truncations, infos = self.envs.step(actions)
-        batch = {"observations": self.observations, "actions": actions, "rewards": rewards}
-        if config.gamma > 0:
-            batch |= self._next_state(following, terminations, infos)
-        self.replay.add(**batch)
-        self.observations, self.masks = following, self._usable(infos["action_mask"])
-        before, self.picks = self.picks, self.picks + config.num_envs
-        self.rewards.append(float(np.mean(rewards)))
+        allowed = self.masks.astype(bool) if config.mask else self.all_allowed
+        actions = self.agent.choose(self.observations, allowed, epsilon, self.rng)
+        failed_before = self.masks[np.arange(config.num_envs), actions] == 0
+        rewards = self._pick(actions)
+        sums = self.sums
+        sums["picks"] += config.num_envs
+        sums["rewards"] += rewards.sum()
+        sums["deadlocked"] += failed_before.sum()
         if len(self.replay) >= min(config.batch_size, self.replay.size):
             for _ in range(config.gradient_steps):
-                batch = self.replay.sample(config.batch_size, self.rng)
-                self.losses.append(self.agent.update(batch))
+                sums["losses"] += self.agent.update(self.replay.sample(config.batch_size, self.rng))
+                sums["updates"] += 1
         interval = config.target_update_interval
-        if config.gamma > 0 and before // interval != self.picks // interval:
+        if config.gamma > 0 and self.picks % interval < config.num_envs:
             self.agent.update_target()
-        if len(self.rewards) == config.log_interval or self.picks == config.picks:
-            mean_reward = float(np.mean(self.rewards))
-            loss = float(np.mean(self.losses)) if self.losses else float("nan")
-            self.curve.append(
-                (self.picks, mean_reward, (mean_reward + 1) / 2, loss, epsilon, time.time())
-            )
-            self.rewards, self.losses = [], []
+        if self.steps % config.log_interval == 0 or self.steps == len(self.actions):
+            mean_reward = sums["rewards"] / sums["picks"]
+            loss = sums["losses"] / sums["updates"] if sums["updates"] else float("nan")
+            self.curve.append((
+                self.picks, mean_reward, (mean_reward + 1) / 2,
+                sums["deadlocked"] / sums["picks"], loss, epsilon, time.time(),
+            ))  # fmt: skip
+            self.sums = self._no_sums()
 
-    def _usable(self, masks: np.ndarray) -> np.ndarray:
-        """What the agent may choose from: the mask is part of training only if asked for."""
-        return masks.astype(bool) if self.config.mask else np.ones(masks.shape, dtype=bool)
+    def _pick(self, actions: np.ndarray) -> np.ndarray:
+        """Pick in every environment and remember it; the rewards."""
+        following, rewards, terminations, truncations, infos = self.envs.step(actions)
+        batch = {"observations": self.observations, "actions": actions, "rewards": rewards}
+        if self.config.gamma > 0:
+            batch |= self._next_state(following, terminations, infos)
+        self.replay.add(**batch)
+        self.actions[self.steps] = actions
+        self.steps += 1
+        self.observations, self.masks = following, infos["action_mask"]
+        if truncations.all():  # they all start together, and so end together
+            self.starts.append((self.steps, self.envs.get_state()))
+            while (self.steps - self.starts[1][0]) * self.config.num_envs >= self.replay.size:
+                self.starts.popleft()
+        return rewards
 
     def _next_state(self, observations, terminations, infos) -> dict[str, np.ndarray]:
         """What followed each pick; at an episode's end the last sight of it, not the reset's."""
@@ -240,46 +287,59 @@ class _Run:
         }
 
     def _save(self) -> None:
+        """Write a checkpoint."""
+        start, state = self.starts[0]
         arrays = {f"agent.{name}": array for name, array in self.agent.state().items()}
-        filled = len(self.replay)
-        arrays |= {f"replay.{name}": a[:filled] for name, a in self.replay.arrays.items()}
-        for number, env in enumerate(self.envs.envs):
-            for name, array in env.unwrapped.get_state().items():
-                arrays[f"env.{number}.{name}"] = array
+        arrays |= {f"start.{name}": array for name, array in state.items()}
+        arrays |= {f"sums.{name}": np.array(value) for name, value in self.sums.items()}
         arrays |= {
-            "observations": self.observations,
-            "masks": self.masks,
-            "curve": np.array(self.curve, dtype=np.float64).reshape(-1, len(CURVE_COLUMNS)),
-            "rewards": np.array(self.rewards),
-            "losses": np.array(self.losses),
-            "total": np.array(self.replay.total),
-            "picks": np.array(self.picks),
-            "rng": np.array(json.dumps(self.rng.bit_generator.state)),
+            "format": np.array(FORMAT),
             "config": np.array(json.dumps(asdict(self.config))),
+            "rng": np.array(json.dumps(self.rng.bit_generator.state)),
+            "curve": np.array(self.curve, dtype=np.float64).reshape(-1, len(CURVE_COLUMNS)),
+            "start": np.array(start),
+            "actions": self.actions[start : self.steps],
+            "digest": self._digest(),
         }
         files.write_arrays(self.checkpoint, arrays)
 
-    def _read_checkpoint(self) -> dict[str, np.ndarray] | None:
+    def _digest(self) -> np.ndarray:
+        """Tells apart what the environments show."""
+        content = self.observations.tobytes() + self.masks.tobytes()
+        return np.array(blake2b(content, digest_size=16).hexdigest())
+
+    def restore(self) -> None:
+        """Go on from the checkpoint, if there is one."""
         if not self.checkpoint.exists():
-            return None
+            return
         stored = files.read_arrays(self.checkpoint)
         if "config" not in stored:
             raise ValueError(f"{self.checkpoint} holds {sorted(stored)}; expected a checkpoint")
+        if stored.get("format") != FORMAT:
+            raise ValueError(
+                f"{self.checkpoint} was written by another version of unload; expected format "
+                f"{FORMAT}. Remove it to start anew, or go on with that version"
+            )
         _check_same(json.loads(str(stored["config"])), self.config, self.folder)
-        return stored
 
-    def _restore(self, stored: dict[str, np.ndarray]) -> None:
         def under(prefix: str) -> dict[str, np.ndarray]:
             return {k.removeprefix(prefix): v for k, v in stored.items() if k.startswith(prefix)}
 
         self.agent.load_state(under("agent."))
-        for name, array in under("replay.").items():
-            self.replay.arrays[name][: len(array)] = array
-        self.replay.total = int(stored["total"])
-        for number, env in enumerate(self.envs.envs):
-            env.unwrapped.set_state(under(f"env.{number}."))
-        self.observations, self.masks = stored["observations"], stored["masks"]
+        self.sums = {name: value.item() for name, value in under("sums.").items()}
         self.curve = [(int(picks), *means) for picks, *means in stored["curve"].tolist()]
-        self.rewards, self.losses = stored["rewards"].tolist(), stored["losses"].tolist()
-        self.picks = int(stored["picks"])
         self.rng.bit_generator.state = json.loads(str(stored["rng"]))
+        self.steps = int(stored["start"])
+        self.replay.total = self.picks
+        self.starts = deque([(self.steps, under("start."))])
+        self.observations, infos = self.envs.set_state(under("start."))
+        self.masks = infos["action_mask"]
+        picks = self.picks + stored["actions"].size
+        for actions in stored["actions"]:
+            self._pick(actions.astype(np.int64))
+            self._check_interrupts(picks)
+        if self._digest() != stored["digest"]:
+            raise ValueError(
+                f"{self.checkpoint}: its picks lead to other observations here; expected the "
+                "same stack and version of unload as when it was written"
+            )

@@ -229,7 +229,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         checks.one_of("physics", physics, ("table",))
         check_stack(stack)
         self.stack = stack
-        self._table = shared_table()
+        self.table = shared_table()
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     @property
@@ -277,7 +277,7 @@ class ContainerVectorEnv(PickingVectorEnv):
             after[tuple(slice(length) for length in before.shape)] = before
 
     def _pick(self, actions: np.ndarray) -> np.ndarray:
-        state, table = self._containers, self._table
+        state, table = self._containers, self.table
         items, distances = containers.look_up(state, actions, table.digests, table.micrometres)
         if distances.min() == containers.UNKNOWN:
             for env in np.flatnonzero(distances == containers.UNKNOWN):
@@ -293,7 +293,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         boxes = self._containers.geometry[env, : np.flatnonzero(present)[-1] + 1]
         labels = np.zeros(len(boxes), np.int64)
         load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
-        return self._table.lift(Surroundings(load, present[: len(boxes)]).situation(item))
+        return self.table.lift(Surroundings(load, present[: len(boxes)]).situation(item))
 
     def _look(self) -> np.ndarray:
         return self._containers.observations.copy()

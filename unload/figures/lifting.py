@@ -1,14 +1,15 @@
-"""A lift as a sequence of positions, seen from the entrance."""
+"""Lifts: as a sequence of positions, seen from the entrance, and by two ways of asking."""
 
 from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon
+from matplotlib.patches import Polygon, Rectangle
 
-from unload import checks
+from unload import checks, task
 from unload.figures.style import styled
 
 CHOSEN, ON_TOP, FIXED = "#2878b5", "#de5638", "#d9d9d6"
@@ -71,3 +72,43 @@ def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, dynamic: int) -
         turn = np.array([(np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))])
         colour = FIXED if box >= dynamic else CHOSEN if box == 0 else ON_TOP
         axes.add_patch(Polygon(corners * size @ turn + (y, z), fc=colour, ec="white", lw=0.8))
+
+
+@styled
+def agreement_scatter(frame: pd.DataFrame) -> Figure:
+    """How far the same boxes move in ``table`` and ``local``, and in ``full`` and ``local``.
+
+    Args:
+        frame: see ``unload.agreement.read_agreement``; the columns ``on_top``, ``table``,
+            ``local`` and ``full`` are used.
+
+    Raises:
+        ValueError: a column is missing.
+    """
+    for column in ("on_top", "table", "local", "full"):
+        if column not in frame:
+            raise ValueError(f"frame has no {column}; it has {', '.join(frame)}")
+    threshold, low, high = task.LIFT_THRESHOLD, -0.02, 0.5
+    figure, panels = plt.subplots(1, 2, figsize=(10, 5), sharex=True, sharey=True)
+    for axes, physics in zip(panels, ("table", "full")):
+        axes.axline((0, 0), slope=1, color="#bbbbbb", lw=1, zorder=0)
+        for corner in ((low, threshold), (threshold, low)):
+            width, height = (threshold - low, high - threshold)[:: 1 if corner[0] == low else -1]
+            axes.add_patch(Rectangle(corner, width, height, fc="#f1f0ec", ec="#8f8f8c", ls="--"))
+        axes.text(0.35, 0.09, "different decisions", color="0.4", fontsize=9, ha="center")
+        known = frame[frame[physics].notna()]
+        for count, (colour, label) in enumerate(
+            (("C2", "nothing"), ("C0", "one box"), ("C1", "two boxes"), ("C4", "three or more"))
+        ):
+            of = known[np.minimum(known["on_top"], 3) == count]
+            axes.scatter(of["local"], of[physics], s=14, alpha=0.6, color=colour, label=label)
+        axes.set(
+            xlim=(low, high),
+            ylim=(low, high),
+            xlabel="distance moved in local (m)",
+            ylabel=f"distance moved in {physics} (m)",
+            title=f"{len(known):,} lifts",
+            aspect="equal",
+        )
+    panels[0].legend(title="on top of the box", loc="upper left")
+    return figure

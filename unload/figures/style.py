@@ -42,6 +42,6 @@ def mark_reduced(figure: Figure, folder: str | Path, data: str) -> None:
     if provenance["reduced"]:
         settings = provenance["settings"]
         size = ", ".join(
-            f"{settings[name]:,} {name}" for name in ("picks", "steps") if name in settings
+            f"{settings[name]:,} {name}" for name in ("picks", "steps", "runs") if name in settings
         )
         figure.supxlabel(f"reduced run: {size}", fontsize=8, color="0.45")

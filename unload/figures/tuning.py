@@ -11,55 +11,80 @@ from matplotlib.figure import Figure
 
 from unload import files
 from unload.figures.style import mark_reduced, styled
-from unload.sweep import STEPS, set_name
+from unload.tuning import run_name, running_mean, set_name
 
-WINDOW = 25  # steps of the running mean drawn over the raw curve
+Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
 
 
 @styled
 def fig08_learning_rate(folder: str | Path = files.DATA) -> Figure:
     """MSR over training steps for three learning rates, batch size 1024 (Fig. 8).
 
+    The strong lines are the runs that the paper shows, or the first one there is; the thin
+    ones are all others.
+
     Args:
         folder: of the curves that ``python -m unload.reproduce tuning`` writes.
 
     Raises:
-        FileNotFoundError: a curve is missing.
+        FileNotFoundError: there is no run of a configuration.
     """
     curves = {
-        r"$\mu = 10^{-1}$": "hitrate_curve_bz_1024_lr_0.1_agent_6",
-        r"$\mu = 10^{-2}$": "hitrate_curve_bz_1024_lr_0.01_agent_7",
-        r"$\mu = 10^{-3}$": "hitrate_curve_bz_1024_lr_0.001_agent_5",
+        r"$\mu = 10^{-1}$": (read_curves(folder, "hitrate", 1024, 1e-1), 6),
+        r"$\mu = 10^{-2}$": (read_curves(folder, "hitrate", 1024, 1e-2), 7),
+        r"$\mu = 10^{-3}$": (read_curves(folder, "hitrate", 1024, 1e-3), 5),
     }
-    return _figure({name: read_curve(folder, file) for name, file in curves.items()}, "MSR", folder)
+    return _figure(curves, "MSR", folder)
 
 
 @styled
 def fig09_batch_size(folder: str | Path = files.DATA) -> Figure:
     """MSR over training steps for four batch sizes, learning rate 10⁻³ (Fig. 9).
 
-    Arguments and errors as in ``fig08_learning_rate``.
+    Arguments, lines and errors as in ``fig08_learning_rate``.
     """
     curves = {
-        "$b = 64$": "hitrate_curve_bz_64_lr_0.001_agent_9",
-        "$b = 256$": "hitrate_curve_bz_256_lr_0.001_agent_9",
-        "$b = 1024$": "hitrate_curve_bz_1024_lr_0.001_agent_5",
-        "$b = 2048$": "hitrate_curve_bz_2048_lr_0.001_agent_6",
+        f"$b = {batch_size}$": (read_curves(folder, "hitrate", batch_size, 1e-3), shown)
+        for batch_size, shown in ((64, 9), (256, 9), (1024, 5), (2048, 6))
     }
-    return _figure({name: read_curve(folder, file) for name, file in curves.items()}, "MSR", folder)
+    return _figure(curves, "MSR", folder)
 
 
 @styled
 def fig10_loss(folder: str | Path = files.DATA) -> Figure:
     """Loss over training steps with and without feature engineering, b = 2048 (Fig. 10).
 
-    Arguments and errors as in ``fig08_learning_rate``.
+    Arguments, lines and errors as in ``fig08_learning_rate``.
     """
     curves = {
-        "with FE": read_curve(folder, "loss_curve_bz_2048_lr_0.001_agent_6"),
-        "without FE": read_curve(folder, "loss_curve_bz_2048_lr_0.001_agent_8", equalize=False),
+        "with FE": (read_curves(folder, "loss", 2048, 1e-3), 6),
+        "without FE": (read_curves(folder, "loss", 2048, 1e-3, equalize=False), 8),
     }
     return _figure(curves, r"loss $\ell$", folder)
+
+
+def read_curves(
+    folder: str | Path, kind: str, batch_size: int, learning_rate: float, equalize: bool = True
+) -> Curves:
+    """The curves of all runs of a configuration, by the number of the run.
+
+    Args:
+        folder: of the data.
+        kind: ``"hitrate"`` or ``"loss"``.
+        batch_size: b.
+        learning_rate: μ.
+        equalize: with feature engineering or without.
+
+    Raises:
+        FileNotFoundError: there is none; the message says how to compute it.
+        ValueError: see ``read_curve``.
+    """
+    name = f"{kind}_curve_{run_name(batch_size, learning_rate, '*')}"
+    paths = (Path(folder) / set_name(equalize)).glob(f"{name}.csv")
+    runs = sorted(int(path.stem.rpartition("_")[2]) for path in paths)
+    if not runs:
+        read_curve(folder, name, equalize)  # says that it is missing
+    return {run: read_curve(folder, name.replace("*", str(run)), equalize) for run in runs}
 
 
 def read_curve(folder: str | Path, name: str, equalize: bool = True) -> np.ndarray:
@@ -82,20 +107,33 @@ def read_curve(folder: str | Path, name: str, equalize: bool = True) -> np.ndarr
 
 
 @styled
-def draw_curves(axes: Axes, curves: Mapping[str, np.ndarray], label: str) -> None:
-    """Draw curves over their steps: raw ones pale, running means of 25 steps on top."""
-    for number, (name, values) in enumerate(curves.items()):
-        steps = np.arange(len(values))
-        axes.plot(steps, values, color=f"C{number}", alpha=0.2, linewidth=0.6)
-        smooth = pd.Series(values).rolling(WINDOW, min_periods=1, center=True).mean()
-        axes.plot(steps, smooth, color=f"C{number}", label=name)
+def draw_curves(axes: Axes, curves: Mapping[str, tuple[Curves, int]], label: str) -> None:
+    """Draw running means of 25 steps of all runs, one of each configuration as a strong line.
+
+    Args:
+        axes: where.
+        curves: by name: the curves of all runs, and the number of the strong one; the first
+            one if that is missing.
+        label: of the vertical axis.
+    """
+    for number, (name, (runs, shown)) in enumerate(curves.items()):
+        strong = shown if shown in runs else min(runs)
+        for run, values in runs.items():
+            smooth = running_mean(values)
+            if run == strong:
+                axes.plot(smooth, color=f"C{number}", label=name, zorder=3)
+            else:
+                axes.plot(smooth, color=f"C{number}", linewidth=0.5, alpha=0.4)
     axes.set(xlabel="step $k$", ylabel=label)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
+    others = any(len(runs) > 1 for runs, _ in curves.values())
+    note = "thin: the other runs of the same configuration" if others else None
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, title=note, title_fontsize=8)
 
 
-def _figure(curves: Mapping[str, np.ndarray], label: str, folder: str | Path) -> Figure:
+def _figure(curves: Mapping[str, tuple[Curves, int]], label: str, folder: str | Path) -> Figure:
     figure, axes = plt.subplots()
     draw_curves(axes, curves, label)
-    axes.set(xlim=(0, STEPS), ylim=(0, 1.02) if label == "MSR" else (0, 0.6))
+    steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
+    axes.set(xlim=(0, steps), ylim=(0, 1.02) if label == "MSR" else (0, 0.6))
     mark_reduced(figure, folder, "tuning")
     return figure
