@@ -1,5 +1,7 @@
 """The fused update and choice against PyTorch."""
 
+import time
+
 import numpy as np
 import pytest
 import torch
@@ -7,6 +9,7 @@ from torch.nn.functional import smooth_l1_loss
 
 from unload import fused
 from unload.agent import DQN
+from unload.equalization import equalize
 from unload.network import PEQNetwork
 
 BATCH, ITEMS = 300, 128
@@ -25,7 +28,7 @@ def network(n_features, seed=0):
     return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
 
 
-def reference(net, batch, beta):
+def reference(net, batch, beta=1.0):
     """Loss and gradients by PyTorch in double precision."""
     double = PEQNetwork(net.n_features).double()
     double.load_state_dict({name: value.double() for name, value in net.state_dict().items()})
@@ -36,28 +39,138 @@ def reference(net, batch, beta):
     return loss.item(), [parameter.grad for parameter in double.parameters()]
 
 
-@pytest.mark.parametrize("n_features", [1, 16, 37, 64])
-@pytest.mark.parametrize("beta", [0.3, 1.0])
-def test_gradients_are_those_of_pytorch(batch, n_features, beta):
-    net = network(n_features)
+def check(net, batch, beta=1.0, tolerance=1e-5):
+    """Loss and gradients agree, the gradients relative to the largest of them."""
     loss = fused.loss_and_gradients(net, *batch.values(), beta)
     expected_loss, expected = reference(net, batch, beta)
     assert loss == pytest.approx(expected_loss, rel=1e-5)
+    largest = max(gradient.abs().max().item() for gradient in expected)
     for parameter, gradient in zip(net.parameters(), expected):
+        assert parameter.grad.shape == parameter.shape
         error = (parameter.grad - gradient).abs().max().item()
-        assert error < 1e-5 * max(gradient.abs().max().item(), 1e-2)
+        assert error < tolerance * min(largest, 1)
 
 
-@pytest.mark.parametrize("items", [1, 2, 5, 127])
-def test_any_number_of_items_will_do(batch, items):
-    batch["observations"] = np.ascontiguousarray(batch["observations"][:, :items])
-    batch["actions"] %= items
+def gradients(net, batch):
+    fused.loss_and_gradients(net, *batch.values())
+    return [parameter.grad.numpy().tobytes() for parameter in net.parameters()]
+
+
+@pytest.mark.parametrize("n_features", [1, 16, 37, 64, 65, 130])
+@pytest.mark.parametrize("beta", [0.3, 1.0])
+def test_gradients_are_those_of_pytorch(batch, n_features, beta):
+    check(network(n_features), batch, beta)
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+@pytest.mark.parametrize("seed", range(3))
+def test_gradients_on_equalized_observations(batch, ties, seed):
+    coarse = np.round(batch["observations"] * 8) / 8  # many items at the same height
+    batch["observations"] = equalize(coarse, ties)
+    check(network(64, seed), batch)
+
+
+@pytest.mark.parametrize("scale", [0.1, 3.0])
+def test_gradients_of_quiet_and_of_saturated_networks(batch, scale):
+    net = network(64)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter *= scale
+    check(net, batch)
+
+
+@pytest.mark.parametrize("items", [1, 2, 5, 127, 200])
+def test_any_number_of_items_will_do(rng, items):
+    batch = {
+        "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=BATCH),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
+    }
+    check(network(16), batch)
+
+
+@pytest.mark.parametrize("size", [1, 31, 32, 33, 100])
+def test_any_batch_size_will_do(batch, size):
+    check(network(16), {name: array[:size] for name, array in batch.items()})
+
+
+def test_arrays_that_are_not_contiguous_will_do(batch):
     net = network(16)
-    loss = fused.loss_and_gradients(net, *batch.values())
-    expected_loss, expected = reference(net, batch, beta=1.0)
-    assert loss == pytest.approx(expected_loss, rel=1e-5)
-    for parameter, gradient in zip(net.parameters(), expected):
-        assert torch.allclose(parameter.grad.double(), gradient, atol=1e-6)
+    expected = gradients(net, {name: array[::3].copy() for name, array in batch.items()})
+    assert gradients(net, {name: array[::3] for name, array in batch.items()}) == expected
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("first", [3, 70])
+def test_a_near_tie_is_decided_as_in_double_precision(sign, first):
+    """Two items' values differ by less than single precision resolves, or not at all.
+
+    They are the highest (sign 1) or the lowest (-1) and stand at x = 0.3 and x = 0.6, so the
+    gradient of the weight of x tells which one was taken.
+    """
+    net = network(1)
+    with torch.no_grad():
+        net.extractor.weight[:] = torch.tensor([1.0, 1.0, 0.0])
+        net.extractor.bias[:] = 5
+        net.scorer.weight[:] = torch.tensor([0.0, 0.05, 0.05, 0.0])
+        net.scorer.bias[:] = 0
+    a, b = np.float32([0.3, 0.6])
+    for step in range(-3, 4):
+        observations = np.zeros((1, ITEMS, 3), np.float32)
+        observations[0, first] = a, b - a + step * np.float32(2.0**-25), 0
+        observations[0, 100] = b, 0, 0
+        batch = {
+            "observations": sign * observations,
+            "actions": np.zeros(1, np.int64),
+            "rewards": np.ones(1, np.float32),
+        }
+        check(net, batch, tolerance=1e-6)
+
+
+def test_items_that_tie_share_the_gradient_evenly(batch):
+    net = network(8)
+    with torch.no_grad():
+        net.extractor.weight[:, :2] = 0  # only the height counts
+        net.extractor.bias[:] = 1
+    batch["observations"][:, :, 2] = np.sign(batch["observations"][:, :, 2])  # two heights
+    check(net, batch)
+
+
+def test_a_dead_network_has_no_gradients_but_the_last_bias(batch):
+    net = network(16)
+    with torch.no_grad():
+        net.extractor.weight[:] = 0
+        net.extractor.bias[:] = 0
+    check(net, batch)
+
+
+@pytest.fixture
+def two_threads():
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
+    size = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
+    batch = {
+        "observations": rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32),
+        "actions": rng.integers(ITEMS, size=size),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), size),
+    }
+    started = []
+    start = fused.threading.Thread.start
+    monkeypatch.setattr(
+        fused.threading.Thread, "start", lambda thread: (started.append(thread), start(thread))
+    )
+    net = network(64)
+    two = gradients(net, batch)
+    assert len(started) == 1 and not started[0].is_alive()
+    torch.set_num_threads(1)
+    assert gradients(net, batch) == two
+    assert gradients(net, batch) == two  # and again
+    assert len(started) == 1  # no thread where one is asked for
 
 
 def test_choice_is_that_of_the_network(batch, rng):
@@ -90,13 +203,26 @@ def test_two_updates_give_equal_bits(batch):
 
 
 @pytest.mark.parametrize("name", ["observations", "rewards"])
-@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_input_that_is_not_finite_is_refused(batch, name, value):
     net = network(16)
     batch[name].flat[7] = value
     with pytest.raises(FloatingPointError, match="expected finite"):
         fused.loss_and_gradients(net, *batch.values())
     assert all(parameter.grad is None for parameter in net.parameters())
+
+
+@pytest.mark.parametrize("parameter", range(4))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
+    net = network(16)
+    fused.loss_and_gradients(net, *batch.values())
+    before = [p.grad.numpy().copy() for p in net.parameters()]
+    with torch.no_grad():
+        list(net.parameters())[parameter].view(-1)[0] = value
+    with pytest.raises(FloatingPointError, match="expected finite"):
+        fused.loss_and_gradients(net, *batch.values())
+    assert all((p.grad.numpy() == kept).all() for p, kept in zip(net.parameters(), before))
 
 
 @pytest.mark.parametrize(
@@ -133,3 +259,29 @@ def test_rule_of_where_it_applies(other):
     assert not fused.applies(other)
     with pytest.raises(ValueError, match="fused_update is True"):
         DQN(other, fused_update=True)
+
+
+@pytest.mark.slow
+def test_fused_update_is_a_hundred_times_faster(rng):
+    """Than plain PyTorch, one thread each, at the paper's batch size."""
+    size = 2048
+    observations = rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32)
+    actions = rng.integers(ITEMS, size=size)
+    targets = rng.choice(np.array([-1, 1], np.float32), size)
+    net = network(64)
+
+    def plain():
+        values = net(torch.from_numpy(observations))
+        chosen = values.gather(1, torch.from_numpy(actions)[:, None]).squeeze(1)
+        smooth_l1_loss(chosen, torch.from_numpy(targets)).backward()
+
+    def seconds(function, repeats):
+        times = []
+        for _ in range(repeats + 1):
+            start = time.perf_counter()
+            function()
+            times.append(time.perf_counter() - start)
+        return min(times[1:])  # without the compilation
+
+    fast = seconds(lambda: fused.loss_and_gradients(net, observations, actions, targets), 100)
+    assert seconds(plain, 5) > 100 * fast

@@ -1,6 +1,6 @@
 """Do the three physics agree? The same lifts, asked of ``table``, ``local`` and ``full``.
 
-    python -m unload.agreement
+    python -m unload.reproduce agreement
 
 Containers are unloaded by several policies, from seeds that nothing else uses. At several
 stages some of the visible items are lifted, each from the same state; most of them are
@@ -9,7 +9,6 @@ those of a few states, drawn without looking at any answer, and all that are clo
 which ``local`` finds a distance near the threshold.
 """
 
-import argparse
 import sys
 import time
 from collections.abc import Iterator
@@ -50,17 +49,11 @@ DTYPES = {
 }
 
 
-def mixed(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The highest item or, in three of ten picks, a random one."""
-    policy = policies.random if rng.random() < 0.3 else policies.highest
-    return policy(observations, masks, rng)
-
-
 POLICIES = {
     "random": policies.random,
     "nearest": policies.nearest,
     "highest": policies.highest,
-    "mixed": mixed,
+    "mixed": policies.mixed(policies.highest, 0.3),
 }
 
 
@@ -139,7 +132,7 @@ def agreement_data(
         "stages (picks)": STAGES,
     }
     reduced = lifts < LIFTS or full < FULL
-    command = f"python -m unload.agreement --lifts {lifts} --full {full}"
+    command = "python -m unload.reproduce agreement"
     write_provenance(folder, NAME, command, settings, reduced, run_record(seconds))
     return read_agreement(folder)
 
@@ -266,23 +259,3 @@ def full_distance(state: State, item: int, folder: Path) -> tuple[float, float]:
     seconds = time.monotonic() - start
     files.write_json(path, {"question": question, "distance": distance, "seconds": seconds})
     return distance, seconds
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--lifts", type=int, default=LIFTS, help="compared with local")
-    parser.add_argument("--full", type=int, default=FULL, help="drawn for full")
-    parser.add_argument("--jobs", type=int, default=1, help="processes for full")
-    options = parser.parse_args()
-    frame = agreement_data(options.lifts, options.full, n_jobs=options.jobs)
-    for one, other in (("table", "local"), ("table", "full"), ("local", "full")):
-        compared, differing = frame[other].notna().sum(), disagreements(frame, one, other)
-        print(f"{one} and {other}: {len(differing)} of {compared} decisions differ")
-        if len(differing):
-            print(differing.to_string(index=False))
-
-
-if __name__ == "__main__":
-    main()

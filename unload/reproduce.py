@@ -1,6 +1,7 @@
 """The data behind the paper's figures, computed and kept in ``data/`` with its provenance.
 
     python -m unload.reproduce lifts          the lift table
+    python -m unload.reproduce agreement      the table against the physics it stands for
     python -m unload.reproduce observation    Figs. 4–6
     python -m unload.reproduce tuning         Figs. 8–10
     python -m unload.reproduce training       Figs. 11 and 12
@@ -26,6 +27,7 @@ from tqdm import tqdm
 
 from unload import checks, files, observation, policies, task, tuning
 from unload.agent import save_policy
+from unload.agreement import agreement_data
 from unload.config import TrainConfig
 from unload.equalization import equalize
 from unload.evaluate import evaluate
@@ -35,6 +37,7 @@ from unload.sweep import run_sweep
 from unload.train import TrainResult, train
 
 COMMAND = "python -m unload.reproduce"
+PARTS = ("lifts", "agreement", "observation", "tuning", "training")
 PAPER_PICKS = TrainConfig().picks
 SEEDS = (0, 1, 2)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
@@ -67,7 +70,7 @@ def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
 
 
 def lift_data(
-    episodes: int = 8,
+    episodes: int = 24,
     seed: int = 0,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
@@ -119,25 +122,12 @@ def _tastes(rng: np.random.Generator) -> list[Callable]:
     return [
         policies.random,
         *(
-            _mixed(favourite, share)
+            policies.mixed(favourite, share)
             for favourite in (policies.highest, policies.nearest)
             for share in (0.0, 0.1, 0.3, 0.6)
         ),
-        *(_mixed(_farthest(rng.normal(size=3)), 0.2) for _ in range(12)),
+        *(policies.mixed(_farthest(rng.normal(size=3)), 0.2) for _ in range(12)),
     ]
-
-
-def _mixed(favourite: Callable, share: float) -> Callable:
-    """A policy that picks at random with probability ``share``."""
-
-    def policy(observations, masks, rng):
-        return np.where(
-            rng.random(len(masks)) < share,
-            policies.random(observations, masks, rng),
-            favourite(observations, masks, rng),
-        )
-
-    return policy
 
 
 def _farthest(direction: np.ndarray) -> Callable:
@@ -346,7 +336,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("what", choices=["lifts", "observation", "tuning", "training", "paper"])
+    add("what", choices=[*PARTS, "paper"])
     add("--jobs", type=int, default=-1, help="processes; one per core by default")
     add("--picks", type=int, default=PAPER_PICKS, help="of the training")
     add("--seeds", type=int, nargs="+", default=SEEDS, help="of the training")
@@ -357,9 +347,11 @@ def main() -> None:
     options = parser.parse_args()
     chosen = {options.what}
     if "paper" in chosen:
-        chosen = {"lifts", "observation", "tuning", "training"}
+        chosen = set(PARTS)
     if "lifts" in chosen:
         lift_data()
+    if "agreement" in chosen:
+        agreement_data(n_jobs=options.jobs)
     if "observation" in chosen:
         observation_data()
     if "tuning" in chosen:

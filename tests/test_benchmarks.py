@@ -1,0 +1,187 @@
+"""The benchmarks: what they measure is what they say, and their figures are drawn from it."""
+
+import subprocess
+import sys
+
+import gymnasium
+import matplotlib
+import numpy as np
+import pandas as pd
+import pytest
+import stable_baselines3
+import torch
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+import unload
+from benchmarks.environments import container_costs, pick_rates
+from benchmarks.floors import bytes_per_second, operations_per_second
+from benchmarks.lifts import fill_rates, lift_rates
+from benchmarks.profile_step import step_profile
+from benchmarks.run import show
+from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
+from benchmarks.timing import best_times
+from benchmarks.updates import update_times
+from unload import files
+from unload.figures import speed
+from unload.figures.style import save
+from unload.provenance import read_provenance
+
+matplotlib.use("Agg")
+FIGURES = (speed.speed_ratios, speed.speed_containers, speed.speed_profile)
+
+
+@pytest.fixture
+def make_adapter():
+    """``make_adapter(num_envs, max_picks)``: array environments for Stable-Baselines3."""
+    made = []
+
+    def make(num_envs, max_picks=3):
+        envs = gymnasium.make_vec("unload/Container-v0", num_envs, max_picks=max_picks)
+        made.append(VectorEnvAdapter(envs))
+        return made[-1]
+
+    yield make
+    for envs in made:
+        envs.close()
+
+
+def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
+    clock = iter([0.0, 3.0, 10.0, 12.0, 20.0, 25.0])
+    monkeypatch.setattr("time.perf_counter", lambda: next(clock))
+    calls = []
+    assert best_times({"call": lambda: calls.append(1)}, 3) == {"call": 2.0}
+    assert len(calls) == 4
+
+
+def test_adapter_gives_stable_baselines_what_gymnasium_shows(make_adapter):
+    adapter = make_adapter(2)
+
+    def single():
+        return gymnasium.make("unload/Container-v0", physics="table", max_picks=3)
+
+    loop = SyncVectorEnv([single] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
+    adapter.seed(7)
+    observations, _ = loop.reset(seed=7)
+    assert np.array_equal(adapter.reset(), observations)
+    for step in range(7):
+        actions = np.array([step, 2 * step])
+        observations, rewards, _, truncations, infos = loop.step(actions)
+        seen, earned, dones, each = adapter.step(actions)
+        assert np.array_equal(seen, observations)
+        assert np.array_equal(earned, rewards)
+        assert earned.dtype == np.float32
+        assert np.array_equal(dones, truncations)
+        for env in range(2):
+            if dones[env]:
+                assert np.array_equal(each[env]["terminal_observation"], infos["final_obs"][env])
+                assert each[env]["TimeLimit.truncated"]
+            else:
+                assert each[env] == {}
+    loop.close()
+
+
+def test_adapter_refuses_another_way_of_resetting():
+    envs = gymnasium.make_vec("CartPole-v1", 2, vectorization_mode="sync")
+    with pytest.raises(ValueError, match="envs resets with .*expected AutoresetMode.SAME_STEP"):
+        VectorEnvAdapter(envs)
+    envs.close()
+
+
+def test_stable_baselines_trains_the_papers_network(make_adapter):
+    model = stable_baselines3.DQN(
+        PEQPolicy, make_adapter(4), buffer_size=64, learning_starts=8, batch_size=8, train_freq=1,
+        policy_kwargs={"net_arch": [6]}, seed=0, device="cpu",
+    )  # fmt: skip
+    network = model.q_net.q_net
+    assert type(network) is unload.PEQNetwork
+    assert network.n_features == 6
+    assert len(list(model.q_net.parameters())) == 4  # nothing beside the network
+    before = [parameter.detach().clone() for parameter in network.parameters()]
+    model.learn(32)
+    assert not any(torch.equal(old, new) for old, new in zip(before, network.parameters()))
+    observations = model.env.reset()
+    values = network(torch.from_numpy(observations))
+    chosen, _ = model.predict(observations, deterministic=True)
+    assert np.array_equal(chosen, values.argmax(dim=1))
+
+
+def test_rates_are_positive(small_load):
+    rates = lift_rates(small_load, full=1, others=2, rounds=1)
+    assert list(rates) == ["full", "local", "table"]
+    rates |= fill_rates(small_load, rounds=1) | pick_rates(num_envs=2, picks=3, rounds=1)
+    rates |= update_times(batch_size=8, n_features=4, rounds=1)
+    assert len(rates) == 14
+    assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
+    assert operations_per_second(rounds=1) > 1e8
+    assert bytes_per_second(rounds=1) > 1e8
+
+
+def test_container_costs_add_up():
+    table = container_costs(counts=(1, 3), picks=4, rounds=1)
+    assert list(table.columns) == speed.COLUMNS["containers"]
+    assert table["containers"].tolist() == [1, 3]
+    assert np.allclose(table["picks_per_s"] * (table["step_ns"] + table["reset_ns"]), 1e9)
+    assert table["memory_mb"].is_monotonic_increasing
+
+
+def test_profile_is_of_the_whole_step():
+    table = step_profile(picks=8_000)
+    assert list(table.columns) == speed.COLUMNS["profile"]
+    assert (table["us"] > 0).all()
+    assert (table["floor_us"] >= 0).all()
+
+
+@pytest.mark.parametrize("draw", FIGURES)
+def test_figures_are_saved_as_the_same_bytes_and_committed(draw, tmp_path):
+    for folder in ("a", "b"):
+        save(draw(), draw.__name__, tmp_path / folder)
+    for suffix in ("png", "pdf"):
+        name = f"{draw.__name__}.{suffix}"
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+        assert (files.FIGURES / name).exists()
+
+
+def test_kept_results_name_the_machine():
+    provenance = read_provenance(speed.FOLDER, "benchmarks")
+    assert provenance["command"] == "python benchmarks/run.py"
+    assert {"date", "stable-baselines3"} <= set(provenance["settings"])
+    assert {"revision", "versions", "machine", "wall_time_s"} <= set(provenance)
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "message"),
+    [
+        (None, FileNotFoundError, "is missing; python benchmarks/run.py measures it"),
+        ("a,b\n1,2\n", ValueError, r"has columns \['a', 'b'\]; expected \['what', "),
+        ("what,how,value,unit,ratio\n", ValueError, "has no rows; expected at least one"),
+        ("what,how,value,unit,ratio\na,b,1,c,\n", ValueError, "holds nan"),
+    ],
+)
+def test_bad_tables_are_refused(tmp_path, content, error, message):
+    if content is not None:
+        (tmp_path / "speeds.csv").write_text(content)
+    with pytest.raises(error, match=message):
+        speed.speed_ratios(tmp_path)
+
+
+def test_unknown_table_is_refused():
+    with pytest.raises(ValueError, match="name is 'lifts'; expected one of 'speeds', "):
+        speed.read_table("lifts")
+
+
+def test_tables_are_printed_with_their_units(capsys):
+    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
+    show({"speeds": pd.DataFrame([row])})
+    printed = capsys.readouterr().out
+    assert "12,300 lifts/s 0.988 ×" in printed
+
+
+@pytest.mark.slow
+def test_the_command_measures_everything_and_keeps_nothing_when_quick():
+    path = speed.FOLDER / "speeds.csv"
+    before = path.read_bytes()
+    command = [sys.executable, str(files.ROOT / "benchmarks" / "run.py"), "--quick"]
+    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    for part in ("lifts", "random picks", "update", "training", "containers", "profile"):
+        assert part in printed
+    assert path.read_bytes() == before
