@@ -1,116 +1,106 @@
-"""How fast the parts are: one table, in about two minutes.
+"""How fast the parts are: measured, printed and kept in data/benchmarks.
 
-    python benchmarks/run.py
+    python benchmarks/run.py            all, in about five minutes
+    python benchmarks/run.py --quick    in small, within a minute; nothing is kept
 
-Absolute times depend on the machine and on what else it does; the ratios say more. Each
-figure is the median of a few runs in this process, on one thread.
+Absolute times depend on the machine and on what else it does; the ratios, each to the
+first row of its kind and all of one run, say more. All is on one thread unless said.
 """
 
+import argparse
+import sys
 import time
-from collections.abc import Callable
+from datetime import date
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import torch
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # where benchmarks/ is found
+
 import unload
-from unload.agent import DQN
-from unload.lift_table import LiftTable
-from unload.physics import FullPhysics, LocalPhysics, Physics, TablePhysics
+from benchmarks.environments import container_costs, pick_rates
+from benchmarks.lifts import fill_rates, lift_rates
+from benchmarks.profile_step import step_profile
+from benchmarks.training import training_rates
+from benchmarks.updates import update_times
+from unload import files
+from unload.figures.speed import FOLDER, three_digits
+from unload.provenance import run_record, write_provenance
 
-BATCH, ITEMS, FEATURES = 2048, 128, 64
-
-
-def seconds(call: Callable[..., object], *arguments: object, repeats: int = 5) -> float:
-    """Median wall time of a call, after one that is not counted."""
-    call(*arguments)
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call(*arguments)
-        times.append(time.perf_counter() - start)
-    return float(np.median(times))
+COMMAND = "python benchmarks/run.py"
 
 
-def lift_all(physics: Physics, items: list[int]) -> None:
-    for item in items:
-        physics.lift(item)
+def speeds(quick: bool = False) -> pd.DataFrame:
+    """The speeds of all parts.
+
+    Args:
+        quick: measure less, to see that all works.
+
+    Returns:
+        One row per way of doing a thing: ``what``, ``how``, ``value``, ``unit``, and
+        ``ratio``, how many times as fast as the first way.
+    """
+    load = unload.stack_load(np.random.default_rng(0), *([1] if quick else []))
+    batch_size = 128 if quick else 2048
+    update = f"update, b = {batch_size}, n = 64"
+    parts = (  # what, unit, how it is measured, and what changes in small
+        ("lifts", "lifts/s", partial(lift_rates, load), {"full": 1, "others": 5, "rounds": 1}),
+        ("fill the full simulation", "containers/s", partial(fill_rates, load), {"rounds": 1}),
+        ("random picks", "picks/s", pick_rates, {"num_envs": 2, "picks": 20, "rounds": 1}),
+        (update, "ms", partial(update_times, batch_size), {"rounds": 1}),
+        ("training", "picks/s", training_rates, {"ours": 6400, "plain": 640, "theirs": 64}),
+    )
+    rows = []
+    for what, unit, measure, small in parts:
+        print(f"measuring: {what} …", file=sys.stderr, flush=True)
+        values = measure(**(small if quick else {}))
+        first = next(iter(values.values()))
+        for how, value in values.items():
+            ratio = first / value if unit == "ms" else value / first
+            rows.append({"what": what, "how": how, "value": value, "unit": unit, "ratio": ratio})
+    return pd.DataFrame(rows)
 
 
-def lifts(load: unload.Load, items: list[int]) -> dict[str, float]:
-    """Lifts per second of each physics, on the same items of the same full container."""
-    rates = {}
-    table = TablePhysics(LiftTable())
-    for name, physics, count in (
-        ("full", FullPhysics(), 3),
-        ("local", LocalPhysics(), len(items)),
-        ("table", table, len(items)),
-    ):
-        physics.reset(load)
-        chosen = items[:count]
-        rates[name] = count / seconds(lift_all, physics, chosen, repeats=3)
-        physics.close()
-    return rates
+def measure(quick: bool = False) -> dict[str, pd.DataFrame]:
+    """All tables by name: ``speeds``, ``containers`` and ``profile``."""
+    tables = {"speeds": speeds(quick)}
+    print("measuring: 1 to 4096 containers …", file=sys.stderr, flush=True)
+    small = {"counts": (1, 4), "picks": 20, "rounds": 1} if quick else {}
+    tables["containers"] = container_costs(**small)
+    print("measuring: the parts of a training step …", file=sys.stderr, flush=True)
+    tables["profile"] = step_profile(**({"picks": 12_800} if quick else {}))
+    return tables
 
 
-def updates(rng: np.random.Generator) -> dict[str, float]:
-    """Updates per second of a batch of 2048, plain and fused."""
-    batch = {
-        "observations": rng.uniform(-1, 1, (BATCH, ITEMS, 3)).astype(np.float32),
-        "actions": rng.integers(ITEMS, size=BATCH),
-        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
-    }
-    rates = {}
-    for name, fused in (("plain", False), ("fused", True)):
-        network = unload.PEQNetwork(FEATURES, torch.Generator().manual_seed(0))
-        agent = DQN(network, fused_update=fused)
-        rates[name] = 1 / seconds(agent.update, batch)
-    return rates
-
-
-def resets(load: unload.Load) -> dict[str, float]:
-    """Full containers per second: all boxes created anew, and moved."""
-
-    def build() -> None:
-        physics = FullPhysics()
-        physics.reset(load)
-        physics.close()
-
-    physics = FullPhysics()
-    physics.reset(load)
-    rates = {
-        "created anew": 1 / seconds(build),
-        "moved at reset": 1 / seconds(physics.reset, load),
-    }
-    physics.close()
-    return rates
-
-
-def picks() -> dict[str, float]:
-    """Picks per second of random episodes, the lifts known or not."""
-
-    def play(physics: str) -> None:
-        unload.evaluate(unload.policies.random, 1, physics=physics, max_picks=100)
-
-    return {physics: 100 / seconds(play, physics, repeats=3) for physics in ("local", "table")}
+def show(tables: dict[str, pd.DataFrame]) -> None:
+    """Print the tables."""
+    numbers = {"value": three_digits, "ratio": lambda ratio: f"{three_digits(ratio)} ×"}
+    for name, table in tables.items():
+        text = table.to_string(index=False, formatters=numbers, float_format="{:,.1f}".format)
+        print(f"\n{name}\n{text}")
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="measure less and keep nothing")
+    options = parser.parse_args()
     torch.set_num_threads(1)
-    rng = np.random.default_rng(0)
-    load = unload.stack_load(rng)
-    items = rng.permutation(len(load))[:60].tolist()
-    rows = []
-    for what, unit, rates in (
-        ("lifts", "1/s", lifts(load, items)),
-        ("fill a full container", "1/s", resets(load)),
-        ("picks of an environment", "1/s", picks()),
-        ("updates, batch 2048, n = 64", "1/s", updates(rng)),
-    ):
-        slowest = min(rates.values())
-        for name, rate in rates.items():
-            rows.append((what, name, f"{rate:,.4g} {unit}", f"{rate / slowest:,.3g} ×"))
-    print(pd.DataFrame(rows, columns=["what", "how", "rate", "ratio"]).to_string(index=False))
+    start = time.monotonic()
+    tables = measure(options.quick)
+    show(tables)
+    if options.quick:
+        return
+    for name, table in tables.items():
+        files.write_text(FOLDER / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
+    settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
+    record = run_record(time.monotonic() - start)
+    write_provenance(FOLDER, "benchmarks", COMMAND, settings, False, record)
 
 
 if __name__ == "__main__":

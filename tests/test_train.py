@@ -173,7 +173,7 @@ def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
 
 
 def test_the_number_of_threads_does_not_change_the_result(tmp_path):
-    config = TrainConfig(**CONTAINER | {"batch_size": 200, "n_features": 16})
+    config = TrainConfig(**CONTAINER | {"batch_size": 512, "n_features": 16})
     for threads in (1, 2):
         torch.set_num_threads(threads)
         train(config, tmp_path / str(threads), progress=False)

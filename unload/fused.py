@@ -168,7 +168,7 @@ def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
 def _on_threads(*arguments) -> None:
     """``_add_chunks`` on as many threads as PyTorch would use, where it pays.
 
-    Threads are started anew each time: that takes some 50 µs, and there is nothing to keep
+    Threads are started anew each time: that takes well below 0.1 ms, and there is nothing to keep
     across a fork or to stop at exit.
     """
     threads = min(torch.get_num_threads(), len(arguments[-1]) // CHUNKS_PER_THREAD)

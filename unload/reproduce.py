@@ -70,7 +70,7 @@ def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
 
 
 def lift_data(
-    episodes: int = 24,
+    episodes: int = 12,
     seed: int = 0,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,

@@ -1,0 +1,1 @@
+"""How fast the parts are. ``python benchmarks/run.py`` measures and prints it all."""

@@ -1,0 +1,97 @@
+"""Picks per second of whole trainings, ours and Stable-Baselines3's."""
+
+import tempfile
+import time
+from unittest import mock
+
+import gymnasium
+import numpy as np
+import stable_baselines3
+import torch
+from stable_baselines3.common.callbacks import BaseCallback
+
+import unload
+from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
+from unload import fused
+
+
+def training_rates(ours: int = 320_000, plain: int = 3_200, theirs: int = 960) -> dict[str, float]:
+    """Picks per second in the paper's configuration, from end to end.
+
+    Both train the same network on the same 64 containers, with one update per 64 picks on
+    a batch of 2048, as soon as there are 2048 picks to learn from; the picks before that
+    do not count. Exploration falls over the picks made here as it does in the paper.
+
+    Args:
+        ours: picks of our training with the fused update.
+        plain: with plain PyTorch's.
+        theirs: of Stable-Baselines3's DQN.
+
+    Returns:
+        By who trains and how.
+    """
+    rates = {}
+    for threads in (1, 2):
+        name = f"{threads} thread{'s' * (threads > 1)}"
+        rates[f"Stable-Baselines3, {name}"] = _their_rate(theirs, threads)
+    with mock.patch.object(fused, "applies", return_value=False):
+        rates["here, PyTorch's update, 1 thread"] = _our_rate(plain, 1)
+    for threads in (1, 2):
+        name = f"{threads} thread{'s' * (threads > 1)}"
+        rates[f"here, fused update, {name}"] = _our_rate(ours, threads)
+    torch.set_num_threads(1)
+    return rates
+
+
+def _our_rate(picks: int, threads: int) -> float:
+    torch.set_num_threads(threads)
+    config = unload.TrainConfig(picks=picks + 3200, log_interval=10)
+    with tempfile.TemporaryDirectory() as folder:
+        curve = unload.train(config, folder, progress=False).curve
+    counted = curve[curve["picks"] >= 3200]  # the updates began at 2048
+    picked, seconds = (
+        counted[name].iloc[-1] - counted[name].iloc[0] for name in ("picks", "wall_time")
+    )
+    return picked / seconds
+
+
+class _Clock(BaseCallback):
+    """Notes the time of each step."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.times: list[float] = []
+
+    def _on_step(self) -> bool:
+        self.times.append(time.perf_counter())
+        return True
+
+
+def _their_rate(picks: int, threads: int) -> float:
+    torch.set_num_threads(threads)
+    config = unload.TrainConfig()
+    envs = gymnasium.make_vec(config.env, config.num_envs, equalize=config.equalize)
+    model = stable_baselines3.DQN(
+        PEQPolicy,
+        VectorEnvAdapter(envs),
+        learning_rate=config.learning_rate,
+        buffer_size=config.replay_size,
+        learning_starts=config.batch_size,
+        batch_size=config.batch_size,
+        gamma=config.gamma,
+        train_freq=1,  # of all environments
+        gradient_steps=config.gradient_steps,
+        target_update_interval=config.target_update_interval,
+        exploration_fraction=config.epsilon_fraction,
+        exploration_initial_eps=config.epsilon_init,
+        exploration_final_eps=config.epsilon_final,
+        policy_kwargs={"net_arch": [config.n_features]},
+        device="cpu",
+        seed=config.seed,
+    )
+    clock = _Clock()
+    warm = config.batch_size + 2 * config.num_envs  # two updates do not count
+    model.learn(warm + picks, clock)
+    envs.close()
+    steps = np.diff(clock.times)[-(picks // config.num_envs) :]
+    return config.num_envs / float(np.mean(steps))
