@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 import torch
@@ -6,6 +8,7 @@ from torch.nn.functional import smooth_l1_loss
 
 from unload import DQN, Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
 from unload.agent import greedy_actions
+from unload.architectures import NETWORKS
 
 
 class HeightNetwork(torch.nn.Module):
@@ -38,6 +41,12 @@ def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> di
         "next_masks": masks,
         "terminations": rng.random(size) < 0.2,
     }
+
+
+def of_network(name: object) -> dict[str, str]:
+    """The metadata of a policy's file."""
+    settings = {"network": name, "n_features": 8, "equalize": True, "ties": "noise"}
+    return {"policy": json.dumps(settings)}
 
 
 def without_next(batch: dict) -> dict:
@@ -136,6 +145,17 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
         assert agent.update(given) == pytest.approx(loss.item(), rel=1e-5)
     for mine, theirs in zip(weights(agent.network), weights(reference)):
         assert torch.allclose(mine, theirs, atol=2e-5)
+
+
+@pytest.mark.parametrize("gamma", [0.0, 0.9])
+@pytest.mark.parametrize("fused", [True, False])
+def test_learning_from_some_rows_is_learning_from_a_copy_of_them(rng, gamma, fused):
+    batch, rows = make_batch(rng), rng.integers(150, size=200)
+    agents = [DQN(peq(), gamma=gamma, fused_update=fused) for _ in range(2)]
+    loss = agents[0].update({name: array[rows] for name, array in batch.items()})
+    assert agents[1].update(batch, rows) == loss
+    for one, other in zip(*(weights(agent.network) for agent in agents)):
+        assert torch.equal(one, other)
 
 
 def test_choosing_unchecked_is_acting(rng):
@@ -275,8 +295,12 @@ def test_what_is_no_network_or_no_batch_is_refused():
 
 
 def test_only_learned_policies_are_saved(tmp_path):
-    for policy in (policies.highest, Greedy(HeightNetwork(), equalize=False)):
-        with pytest.raises(TypeError, match="policy is .*; expected a Greedy of a PEQNetwork"):
+    class Subclass(PEQNetwork):
+        """Its file would be read as another network."""
+
+    others = (Greedy(network, equalize=False) for network in (HeightNetwork(), Subclass()))
+    for policy in (policies.highest, *others):
+        with pytest.raises(TypeError, match="policy is .*; expected a Greedy of one of PEQNetwork"):
             save_policy(policy, tmp_path / "policy.safetensors")
     assert not list(tmp_path.iterdir())
 
@@ -311,12 +335,15 @@ def test_greedy_equalizes_what_its_network_expects(observations, rng):
     assert (raw != expected).any()
 
 
+@pytest.mark.parametrize("kind", NETWORKS.values())
 @pytest.mark.parametrize(("equalized", "ties"), [(True, "average"), (False, "noise")])
-def test_a_saved_policy_comes_back(tmp_path, observations, rng, equalized, ties):
-    policy, path = Greedy(peq(n_features=7), equalized, ties), tmp_path / "policy.safetensors"
+def test_a_saved_policy_comes_back(tmp_path, observations, rng, equalized, ties, kind):
+    network = kind(6, torch.Generator().manual_seed(0))
+    policy, path = Greedy(network, equalized, ties), tmp_path / "policy.safetensors"
     save_policy(policy, path)
     loaded = load_policy(path)
-    assert (loaded.equalize, loaded.ties, loaded.network.n_features) == (equalized, ties, 7)
+    assert type(loaded.network) is kind
+    assert (loaded.equalize, loaded.ties, loaded.network.n_features) == (equalized, ties, 6)
     for mine, theirs in zip(weights(loaded.network), weights(policy.network)):
         assert torch.equal(mine, theirs)
     masks = np.ones(observations.shape[:2])
@@ -345,7 +372,10 @@ def test_a_damaged_file_is_refused(tmp_path, content):
         load_policy(path)
 
 
-@pytest.mark.parametrize("metadata", [None, {"format": "pt"}])
+@pytest.mark.parametrize(
+    "metadata",
+    [None, {"format": "pt"}, *map(of_network, ("Unknown", "EquivariantStack", [], None))],
+)
 def test_weights_of_others_are_refused(tmp_path, metadata):
     path = tmp_path / "foreign.safetensors"
     save_file(peq().state_dict(), path, metadata=metadata)

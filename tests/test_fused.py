@@ -1,5 +1,8 @@
 """The fused update and choice against PyTorch."""
 
+import os
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -7,7 +10,7 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from unload import fused
+from unload import files, fused
 from unload.agent import DQN
 from unload.equalization import equalize
 from unload.network import PEQNetwork
@@ -285,3 +288,39 @@ def test_fused_update_is_a_hundred_times_faster(rng):
 
     fast = seconds(lambda: fused.loss_and_gradients(net, observations, actions, targets), 100)
     assert seconds(plain, 5) > 100 * fast
+
+
+def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bits(tmp_path):
+    program = """
+import numpy as np, torch
+from unload import PEQNetwork, fused
+rng = np.random.default_rng(0)
+network = PEQNetwork(20, torch.Generator().manual_seed(0))
+observations = rng.uniform(-1, 1, (70, 9, 3)).astype(np.float32)
+targets = rng.choice([-1, 1], 70).astype(np.float32)
+fused.loss_and_gradients(network, observations, rng.integers(9, size=70), targets)
+print(*(p.grad.numpy().tobytes().hex() for p in network.parameters()))
+"""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(files.ROOT)}
+    first, second = (
+        subprocess.check_output([sys.executable, "-c", program], env=environment) for _ in range(2)
+    )
+    assert any(tmp_path.rglob("fused._add_chunks*"))
+    assert first == second
+
+
+def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
+    net, rows = network(16), rng.integers(BATCH, size=100)
+    expected = gradients(net, {name: array[rows] for name, array in batch.items()})
+    actions, rewards = batch["actions"][rows], batch["rewards"][rows]
+    fused.loss_and_gradients(net, batch["observations"], actions, rewards, rows=rows)
+    assert [parameter.grad.numpy().tobytes() for parameter in net.parameters()] == expected
+
+
+@pytest.mark.parametrize(
+    "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.array([0, 1, 2])]
+)
+def test_bad_rows_are_refused_by_name(batch, rows):
+    actions, rewards = batch["actions"][:2], batch["rewards"][:2]
+    with pytest.raises(ValueError, match="rows|actions"):
+        fused.loss_and_gradients(network(4), batch["observations"], actions, rewards, rows=rows)

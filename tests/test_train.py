@@ -18,6 +18,7 @@ import pytest
 import torch
 
 from unload import TrainConfig, evaluate, files, load_policy, stack_load, train
+from unload.architectures import NETWORKS
 from unload.train import CURVE_COLUMNS, ENVS
 
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
@@ -32,6 +33,7 @@ RUNS = {
     "container": CONTAINER,
     "container, masked": CONTAINER | {"mask": True, "equalize": False, "gradient_steps": 2},
     "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
+    "container, height reward": CONTAINER | {"height_reward": 0.5},
     "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100, "gradient_steps": 1},
 }
 
@@ -150,6 +152,17 @@ def test_what_a_run_leaves(tmp_path, config):
     assert TrainConfig(**stored) == config
 
 
+def test_policies_are_kept_along_the_way(tmp_path):
+    config = TrainConfig(**CONTAINER, snapshots=3)
+    train(config, tmp_path, progress=False)
+    kept = sorted((tmp_path / "snapshots").iterdir())
+    steps = config.picks // config.num_envs
+    ends = [-(-steps * number // 3) * config.num_envs for number in (1, 2, 3)]
+    assert [int(path.stem) for path in kept] == ends
+    assert kept[-1].read_bytes() == (tmp_path / "policy.safetensors").read_bytes()
+    assert len({path.read_bytes() for path in kept}) == 3
+
+
 def test_a_finished_run_is_not_repeated(tmp_path):
     config = TrainConfig(**CONTAINER)
     first = train(config, tmp_path, progress=False)
@@ -179,6 +192,41 @@ def test_the_number_of_threads_does_not_change_the_result(tmp_path):
         train(config, tmp_path / str(threads), progress=False)
     torch.set_num_threads(1)
     assert_same(tmp_path / "1", tmp_path / "2")
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+def test_every_network_is_trained_and_gone_on_with(tmp_path, network):
+    config = TrainConfig(**CONTAINER | {"network": network})
+    result = train(config, tmp_path / "straight", progress=False)
+    assert type(result.policy.network) is NETWORKS[network]
+    interrupt_run(config, tmp_path / "broken", 17)
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+@pytest.mark.parametrize("equalize", [True, False])
+def test_a_failed_pick_is_the_less_bad_the_higher_its_item(tmp_path, equalize):
+    """The same picks with and without the reward for height, learned from or not."""
+    plain = CONTAINER | {"equalize": equalize, "epsilon_final": 1.0, "log_interval": 25}
+    memories, curves = [], []
+    for height_reward in (0, 0.5):
+        config = TrainConfig(**plain | {"height_reward": height_reward})
+        with begun(config, tmp_path / str(height_reward)) as run:
+            for _ in range(25):
+                run._step()
+        memories.append(run.replay.arrays)
+        curves.append(dict(zip(CURVE_COLUMNS, run.curve[-1], strict=True)))
+    true, shaped = memories
+    assert (true["actions"] == shaped["actions"]).all()
+    heights = shaped["observations"][np.arange(100), shaped["actions"], 2]
+    failed = true["rewards"] == -1
+    assert 20 < failed.sum() < 100 and np.ptp(heights[failed]) > 0.5
+    assert shaped["rewards"][failed] == pytest.approx(-1 + 0.5 * (heights[failed] + 1) / 2)
+    assert (shaped["rewards"][~failed] == 1).all() and (true["rewards"][~failed] == 1).all()
+    for name in ("mean_reward", "success_rate", "deadlocked"):
+        assert curves[0][name] == curves[1][name]
+    assert curves[0]["mean_reward"] == pytest.approx(true["rewards"].mean())
+    assert curves[0]["loss"] != curves[1]["loss"]
 
 
 @pytest.mark.slow
@@ -384,6 +432,7 @@ def test_the_papers_configuration_is_the_default():
     assert (config.picks, config.num_envs, config.learning_rate) == (20_000_000, 64, 1e-3)
     assert (config.batch_size, config.replay_size) == (2048, 2**20)
     assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
+    assert (config.network, config.height_reward) == ("peq", 0)
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 
 
@@ -415,6 +464,9 @@ def test_epsilon_falls_linearly_and_stays():
         ("gamma", float("nan"), ValueError),
         ("gamma", True, TypeError),
         ("beta", float("inf"), ValueError),
+        ("height_reward", 1.1, ValueError),
+        ("height_reward", "high", TypeError),
+        ("network", "mlp", ValueError),
         ("n_features", 0, ValueError),
         ("equalize", "no", TypeError),
         ("mask", None, TypeError),

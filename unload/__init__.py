@@ -4,6 +4,7 @@ import gymnasium
 
 from unload import policies
 from unload.agent import DQN, Greedy, load_policy, save_policy
+from unload.architectures import AttentionNetwork, EquivariantStack, TwoLayerScorer
 from unload.config import TrainConfig
 from unload.env import ContainerEnv
 from unload.equalization import equalize
@@ -17,12 +18,15 @@ from unload.view import view
 __version__ = "0.1.0"
 __all__ = [
     "DQN",
+    "AttentionNetwork",
     "ContainerEnv",
+    "EquivariantStack",
     "Greedy",
     "HighestItemEnv",
     "Load",
     "PEQNetwork",
     "TrainConfig",
+    "TwoLayerScorer",
     "build_load",
     "equalize",
     "evaluate",

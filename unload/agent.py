@@ -10,8 +10,8 @@ from safetensors.torch import save
 from torch.nn.functional import smooth_l1_loss
 
 from unload import checks, files, fused
+from unload.architectures import NETWORKS
 from unload.equalization import TIES, equalize
-from unload.network import PEQNetwork
 from unload.policies import check_batch
 
 # Rows of a batch per backward pass: what one pass stores stays in the cache.
@@ -103,8 +103,13 @@ class DQN:
             actions[exploit] = _best_actions(self.network, observations[exploit], allowed[exploit])
         return actions
 
-    def update(self, batch: dict[str, np.ndarray]) -> float:
-        """One step of Adam on a batch from ``ReplayBuffer.sample``.
+    def update(self, batch: dict[str, np.ndarray], rows: np.ndarray | None = None) -> float:
+        """One step of Adam.
+
+        Args:
+            batch: arrays as ``ReplayBuffer.sample`` returns them, or all that it holds.
+            rows: (batch,) int64, which rows of the arrays to learn from; None for all. The
+                fused update reads them where they are, which saves copying them.
 
         Returns:
             The loss before the step.
@@ -114,14 +119,16 @@ class DQN:
             FloatingPointError: the loss is not finite; the weights are left as they were.
         """
         names = ("next_observations", "next_masks", "terminations") if self.gamma else ()
-        checks.entries("batch", batch, ("observations", "actions", "rewards", *names))
+        names = ("observations", "actions", "rewards", *names)
+        checks.entries("batch", batch, names)
+        observations = batch["observations"]
+        if rows is not None:
+            copied = names[1:] if self.fused_update else names
+            batch = {name: batch[name].take(rows, axis=0) for name in copied}
         if self.fused_update:
+            targets = self._targets(batch).numpy()
             loss = fused.loss_and_gradients(
-                self.network,
-                batch["observations"],
-                batch["actions"],
-                self._targets(batch).numpy(),
-                self.beta,
+                self.network, observations, batch["actions"], targets, self.beta, rows
             )
         else:
             loss = self._loss_and_gradients(batch)
@@ -233,7 +240,7 @@ class Greedy:
         ties: see ``unload.equalize``.
     """
 
-    def __init__(self, network: PEQNetwork, equalize: bool, ties: str = "noise") -> None:
+    def __init__(self, network: torch.nn.Module, equalize: bool, ties: str = "noise") -> None:
         self.network = _check_network(network).eval()
         self.equalize = checks.boolean("equalize", equalize)
         checks.one_of("ties", ties, TIES)
@@ -251,10 +258,11 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     """Write a policy's weights and how to use them, as safetensors, in one atomic step.
 
     Raises:
-        TypeError: ``policy`` is no ``Greedy`` of a ``PEQNetwork``.
+        TypeError: ``policy`` is no ``Greedy`` of one of ``unload.architectures.NETWORKS``.
     """
-    if not (isinstance(policy, Greedy) and isinstance(policy.network, PEQNetwork)):
-        raise TypeError(f"policy is {policy!r}; expected a Greedy of a PEQNetwork")
+    if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
+        known = ", ".join(kind.__name__ for kind in NETWORKS.values())
+        raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
     settings = {
         "network": type(policy.network).__name__,
         "n_features": policy.network.n_features,
@@ -284,7 +292,8 @@ def load_policy(path: str | Path) -> Greedy:
         raise ValueError(f"{path} is not a safetensors file: {error}") from error
     try:
         settings = json.loads(metadata["policy"])
-        network = PEQNetwork(settings["n_features"])
+        kinds = {kind.__name__: kind for kind in NETWORKS.values()}
+        network = kinds[settings["network"]](settings["n_features"])
         network.load_state_dict(tensors)
         if not all(tensor.isfinite().all() for tensor in tensors.values()):
             raise ValueError("a weight is not finite")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from unload import checks
+from unload.architectures import NETWORKS
 from unload.equalization import TIES
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
@@ -25,6 +26,9 @@ class TrainConfig:
     epsilon_fraction: float = 0.5  # K_ε / K
     gamma: float = 0.0  # Sec. III-E
     beta: float = 1.0  # Sec. III-G
+    # h of Sec. V-A: a failed pick is learned from as -1 + h (z + 1) / 2, z as observed.
+    height_reward: float = 0.0
+    network: str = "peq"  # Sec. III-G; the others: unload.architectures
     n_features: int = 64  # * n
     equalize: bool = True  # Sec. III-F
     ties: str = "noise"  # * see unload.equalize
@@ -32,11 +36,13 @@ class TrainConfig:
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
+    snapshots: int = 0  # * policies kept along the way, evenly spaced
     checkpoint_interval: float = 60.0  # * seconds
 
     def __post_init__(self) -> None:
         checks.one_of("env", self.env, ENVS)
         checks.one_of("ties", self.ties, TIES)
+        checks.one_of("network", self.network, NETWORKS)
         for name in ("equalize", "mask"):
             checks.boolean(name, getattr(self, name))
         for name in (
@@ -44,9 +50,11 @@ class TrainConfig:
             "target_update_interval", "log_interval",
         ):  # fmt: skip
             self._set(name, checks.integer(name, getattr(self, name), 1))
-        for name in ("seed", "gradient_steps"):
+        for name in ("seed", "gradient_steps", "snapshots"):
             self._set(name, checks.integer(name, getattr(self, name), 0))
-        for name in ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"):
+        for name in (
+            "epsilon_init", "epsilon_final", "epsilon_fraction", "gamma", "height_reward"
+        ):  # fmt: skip
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
             self._set(name, checks.real(name, getattr(self, name), 0))

@@ -23,6 +23,7 @@ import threading
 import numba
 import numpy as np
 import torch
+from numba.extending import intrinsic
 
 from unload.network import PEQNetwork
 
@@ -31,7 +32,7 @@ CHUNKS_PER_THREAD = 8  # at least; below, starting a thread takes longer than it
 WIDTH = 64  # features handled together: loops of constant length become vector instructions
 
 # What is kept of WIDTH features: rows of WIDTH numbers in one flat array, and where they start.
-ROWS = 41
+ROWS = 42
 STARTS = range(0, ROWS * WIDTH, WIDTH)
 WX, WY, WZ, BIAS = STARTS[:4]  # of the extractor
 LOW, LOW2, HIGH, HIGH2 = STARTS[4:8]  # keys of the two lowest and the two highest values
@@ -39,17 +40,30 @@ MEAN, OWN, LOWEST, HIGHEST = STARTS[8:24:4]  # the four inputs each
 SLACK = STARTS[24]  # values closer than this may be in the wrong order
 SCORE = STARTS[25]  # 4 rows: the scorer's weights of the own, minimum, maximum, mean feature
 FEATURE = STARTS[29]  # 4 rows: these features
-GRADIENT = STARTS[33]  # 8 rows: of the extractor's weights and bias, of the scorer's weights
+PARTS = STARTS[33]  # of the value before tanh
+GRADIENT = STARTS[34]  # 8 rows: of the extractor's weights and bias, of the scorer's weights
 
-FLAGS = {"contract", "nsz"}  # fused multiply-add; no reordering, so that bits are stable
 ZERO, ONE = np.float32(0), np.float32(1)
-NOTHING = np.float32(-0.0)  # x + -0.0 is x for every x, so the compiler can leave it out
+
+
+@intrinsic
+def fma(typing_context, a, b, c):
+    """a·b + c, rounded once.
+
+    Left to itself, the compiler decides anew in each program where to round once and where
+    twice. Said explicitly, the bits are the same wherever it runs.
+    """
+
+    def build(context, builder, signature, arguments):
+        return builder.fma(*arguments)
+
+    return a(a, a, a), build
 
 
 def applies(network: torch.nn.Module) -> bool:
     """The rule: a ``PEQNetwork`` itself (no subclass), in float32 on the CPU."""
     return type(network) is PEQNetwork and all(
-        p.device.type == "cpu" and p.dtype == torch.float32 for p in network.parameters()
+        p.device.type == "cpu" and p.dtype == torch.float32 for p in _parameters(network)
     )
 
 
@@ -59,6 +73,7 @@ def loss_and_gradients(
     actions: np.ndarray,
     targets: np.ndarray,
     beta: float = 1.0,
+    rows: np.ndarray | None = None,
 ) -> float:
     """Mean smooth-L1 loss of the chosen actions' values, its gradients left in ``.grad``.
 
@@ -66,30 +81,38 @@ def loss_and_gradients(
 
     Args:
         network: whose parameters' ``.grad`` are set.
-        observations: (batch, items, 3) float32.
+        observations: (batch, items, 3) float32; with ``rows`` any number of them.
         actions: (batch,) int64, in 0 … items-1.
         targets: (batch,) float32.
         beta: of the smooth-L1 loss, > 0.
+        rows: (batch,) int64, which of the observations to use, so that they need not be
+            copied out of a large memory; None for all.
 
     Returns:
         The loss.
 
     Raises:
-        ValueError: an array's shape or dtype is another, or an action is out of range.
+        ValueError: an array's shape or dtype is another, or an action or row is out of range.
         FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
     """
-    size, items = _check(observations)
-    for name, array, dtype in (("actions", actions, np.int64), ("targets", targets, np.float32)):
-        if array.shape != (size,) or array.dtype != dtype:
+    count, items = _check(observations)
+    if rows is None:
+        rows = np.arange(count)
+    size = rows.size
+    for name, array, dtype in (
+        ("rows", rows, np.int64), ("actions", actions, np.int64), ("targets", targets, np.float32)
+    ):  # fmt: skip
+        if array.shape != (size,) or array.dtype != dtype or not size:
             raise ValueError(
                 f"{name} has shape {array.shape} and dtype {array.dtype}; "
-                f"expected ({size},) {np.dtype(dtype)}"
+                f"expected ({size or 'batch'},) {np.dtype(dtype)}"
             )
-    if actions.min() < 0 or actions.max() >= items:
-        raise ValueError(
-            f"actions holds {actions.min()} to {actions.max()}; expected 0 to {items - 1}"
-        )
-    batch = [np.ascontiguousarray(array) for array in (observations, actions, targets)]
+    for name, array, end in (("rows", rows, count), ("actions", actions, items)):
+        if array.min() < 0 or array.max() >= end:
+            raise ValueError(
+                f"{name} holds {array.min()} to {array.max()}; expected 0 to {end - 1}"
+            )
+    batch = [np.ascontiguousarray(array) for array in (observations, rows, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.full((-(-size // CHUNK), 8 * network.n_features + 2), np.nan, np.float32)
     _on_threads(*batch, np.float32(beta), *_weights(network), partial)
@@ -100,7 +123,7 @@ def loss_and_gradients(
             "expected finite observations, targets and weights"
         )
     gradients = torch.from_numpy(total[:-1].astype(np.float32))
-    parameters = list(network.parameters())
+    parameters = _parameters(network)
     parts = gradients.split([parameter.numel() for parameter in parameters])
     for parameter, part in zip(parameters, parts):
         parameter.grad = part.view(parameter.shape)
@@ -135,7 +158,7 @@ def greedy_actions(
         )
     weight, bias, score, _ = _weights(network)
     actions = np.full(size, -1)
-    _best(observations, allowed, np.ascontiguousarray(weight.T), bias, score[0], actions)
+    _best(observations, allowed, weight, bias, score[0], actions)
     if (actions < 0).any():
         raise FloatingPointError(
             f"row {int(np.argmin(actions))} has no allowed action of a finite value; "
@@ -159,9 +182,15 @@ def _check(observations: np.ndarray) -> tuple[int, int]:
     return observations.shape[:2]
 
 
+def _parameters(network: PEQNetwork) -> tuple[torch.nn.Parameter, ...]:
+    """In their order; ``network.parameters()`` would take ten times as long to find them."""
+    extractor, scorer = network.extractor, network.scorer
+    return extractor.weight, extractor.bias, scorer.weight, scorer.bias
+
+
 def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
     """Extractor weights (n, 3) and biases (n,), scorer weights (4, n) and bias."""
-    weight, bias, score, score_bias = (p.detach().numpy() for p in network.parameters())
+    weight, bias, score, score_bias = (p.detach().numpy() for p in _parameters(network))
     return weight, bias, score.reshape(4, -1), score_bias[0]
 
 
@@ -186,8 +215,9 @@ def _on_threads(*arguments) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _add_chunks(
-    first, step, observations, actions, targets, beta, weight, bias, score, score_bias, partial
-):
+    first, step, observations, rows, actions, targets, beta, weight, bias, score, score_bias,
+    partial,
+):  # fmt: skip
     """Sum the gradients and losses of every ``step``-th chunk into its row of ``partial``."""
     n, items = len(bias), observations.shape[1]
     x = np.empty((-(-items // 4) * 4, 3), np.float32)  # one sample's items, filled up to fours
@@ -199,12 +229,12 @@ def _add_chunks(
     blocks = _blocks(weight, bias, score)
     for chunk in range(first, len(partial), step):
         begin, end = chunk * CHUNK, min((chunk + 1) * CHUNK, len(actions))
-        largest = _largest(observations[begin:end].reshape(-1))
+        largest = _largest(observations, rows[begin:end])
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
         sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias  # NaN if not finite
         for sample in range(begin, end):
-            _copy(observations[sample].reshape(-1), x.reshape(-1))
+            _copy(observations[rows[sample]].reshape(-1), x.reshape(-1))
             logit = np.float64(score_bias)  # double: 1 - tanh² loses its digits near 1
             for b in range(len(blocks)):
                 _reduce_items(x, items, np.int32((1 << bits) - 1), blocks[b])
@@ -248,16 +278,18 @@ def _blocks(weight, bias, score):
 
 
 @numba.njit(cache=True)
-def _largest(inputs):
+def _largest(observations, rows):
     """The largest magnitude; not finite if one of the inputs is not.
 
     Read as integers, the bits of positive numbers are in the order of the numbers; those of
     infinity and NaN come last.
     """
-    bits, largest = inputs.view(np.int32), np.int32(0)
-    for i in range(len(bits)):
-        magnitude = np.int32(bits[i] & 0x7FFFFFFF)
-        largest = magnitude if magnitude > largest else largest
+    largest = np.int32(0)
+    for row in rows:
+        bits = observations[row].reshape(-1).view(np.int32)
+        for i in range(len(bits)):
+            magnitude = np.int32(bits[i] & 0x7FFFFFFF)
+            largest = magnitude if magnitude > largest else largest
     return np.int32(largest).view(np.float32)
 
 
@@ -279,7 +311,7 @@ def _copy(inputs, x):
         x[i] = x[i - 3]
 
 
-@numba.njit(fastmath=FLAGS, cache=True)
+@numba.njit(cache=True)
 def _reduce_items(x, items, mask, block):
     """Read all items: sums of the active ones, keys of the two lowest and the two highest.
 
@@ -297,12 +329,13 @@ def _reduce_items(x, items, mask, block):
         i0, i1, i2, i3 = np.int32(i), np.int32(i + 1), np.int32(i + 2), np.int32(i + 3)
         for f in range(WIDTH):
             a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
-            v0, v1 = a * x0 + (b * y0 + (c * z0 + d)), a * x1 + (b * y1 + (c * z1 + d))
-            v2, v3 = a * x2 + (b * y2 + (c * z2 + d)), a * x3 + (b * y3 + (c * z3 + d))
-            _add_active(block, MEAN + f, v0, v1, v2, v3, x0, x1, x2, x3)
-            _add_active(block, MEAN + WIDTH + f, v0, v1, v2, v3, y0, y1, y2, y3)
-            _add_active(block, MEAN + 2 * WIDTH + f, v0, v1, v2, v3, z0, z1, z2, z3)
-            _add_active(block, MEAN + 3 * WIDTH + f, v0, v1, v2, v3, ONE, ONE, ONE, ONE)
+            v0, v1 = _value(a, b, c, d, x0, y0, z0), _value(a, b, c, d, x1, y1, z1)
+            v2, v3 = _value(a, b, c, d, x2, y2, z2), _value(a, b, c, d, x3, y3, z3)
+            a0, a1, a2, a3 = _active(v0), _active(v1), _active(v2), _active(v3)
+            _add(block, MEAN + f, a0, a1, a2, a3, x0, x1, x2, x3)
+            _add(block, MEAN + WIDTH + f, a0, a1, a2, a3, y0, y1, y2, y3)
+            _add(block, MEAN + 2 * WIDTH + f, a0, a1, a2, a3, z0, z1, z2, z3)
+            block[MEAN + 3 * WIDTH + f] += (a0 + a1) + (a2 + a3)
             k0, k1 = _key(v0, i0, mask), _key(v1, i1, mask)
             k2, k3 = _key(v2, i2, mask), _key(v3, i3, mask)
             # Sort the four keys: low ≤ low2, high2 ≤ high. Then merge them with those so far.
@@ -317,21 +350,28 @@ def _reduce_items(x, items, mask, block):
     for i in range(items, len(x)):  # repeated items do not count
         for f in range(WIDTH):
             a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
-            active = ONE if a * x[i, 0] + (b * x[i, 1] + (c * x[i, 2] + d)) > ZERO else ZERO
+            active = _active(_value(a, b, c, d, x[i, 0], x[i, 1], x[i, 2]))
             block[MEAN + f] -= active * x[i, 0]
             block[MEAN + WIDTH + f] -= active * x[i, 1]
             block[MEAN + 2 * WIDTH + f] -= active * x[i, 2]
             block[MEAN + 3 * WIDTH + f] -= active
 
 
-@numba.njit(fastmath=FLAGS, cache=True, forceinline=True)
-def _add_active(block, place, v0, v1, v2, v3, x0, x1, x2, x3):
-    total = block[place]
-    total += x0 if v0 > ZERO else NOTHING
-    total += x1 if v1 > ZERO else NOTHING
-    total += x2 if v2 > ZERO else NOTHING
-    total += x3 if v3 > ZERO else NOTHING
-    block[place] = total
+@numba.njit(cache=True, forceinline=True)
+def _value(a, b, c, d, x, y, z):
+    """A feature before the ReLU."""
+    return fma(a, x, fma(b, y, fma(c, z, d)))
+
+
+@numba.njit(cache=True, forceinline=True)
+def _active(value):
+    return ONE if value > ZERO else ZERO
+
+
+@numba.njit(cache=True, forceinline=True)
+def _add(block, place, a0, a1, a2, a3, x0, x1, x2, x3):
+    """Add the inputs of the active ones of four items."""
+    block[place] = fma(a3, x3, fma(a2, x2, fma(a1, x1, fma(a0, x0, block[place]))))
 
 
 @numba.njit(cache=True, forceinline=True)
@@ -388,7 +428,7 @@ def _decide(x, items, sign, f, place, block):
     _put(mean, sign * best > 0, place, block)
 
 
-@numba.njit(fastmath=FLAGS | {"reassoc"}, cache=True)
+@numba.njit(cache=True)
 def _forward(chosen, items, block):
     """Set the inputs of the chosen item, and all features; their part of the value before tanh."""
     x, y, z, share = chosen[0], chosen[1], chosen[2], ONE / np.float32(items)
@@ -400,24 +440,30 @@ def _forward(chosen, items, block):
         block[MEAN + WIDTH + f] *= share
         block[MEAN + 2 * WIDTH + f] *= share
         block[MEAN + 3 * WIDTH + f] *= share
-    logit = ZERO
     for f in range(WIDTH):
-        logit += _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
-        logit += _feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block)
-    return logit
+        part = _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
+        block[PARTS + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
+    half = WIDTH // 2
+    while half:  # in an order that needs few steps one after the other
+        for f in range(half):
+            block[PARTS + f] += block[PARTS + half + f]
+        half //= 2
+    return block[PARTS]
 
 
-@numba.njit(fastmath=FLAGS, cache=True, forceinline=True)
+@numba.njit(cache=True, forceinline=True)
 def _feature(inputs, kind, f, block):
     """Set one feature, weights · inputs; its part of the value before tanh."""
     place = inputs + f
-    feature = block[WX + f] * block[place] + block[WY + f] * block[place + WIDTH]
-    feature += block[WZ + f] * block[place + 2 * WIDTH] + block[BIAS + f] * block[place + 3 * WIDTH]
+    feature = block[BIAS + f] * block[place + 3 * WIDTH]
+    feature = fma(block[WZ + f], block[place + 2 * WIDTH], feature)
+    feature = fma(block[WY + f], block[place + WIDTH], feature)
+    feature = fma(block[WX + f], block[place], feature)
     block[FEATURE + kind * WIDTH + f] = feature
     return block[SCORE + kind * WIDTH + f] * feature
 
 
-@numba.njit(fastmath=FLAGS, cache=True)
+@numba.njit(cache=True)
 def _backward(slope, block):
     """Add one sample's gradients; ``slope`` is the loss's by the value before tanh."""
     for f in range(WIDTH):
@@ -425,27 +471,31 @@ def _backward(slope, block):
         high, mean = slope * block[SCORE + 2 * WIDTH + f], slope * block[SCORE + 3 * WIDTH + f]
         for axis in range(4):
             row = axis * WIDTH + f
-            block[GRADIENT + row] += (
-                own * block[OWN + row]
-                + low * block[LOWEST + row]
-                + high * block[HIGHEST + row]
-                + mean * block[MEAN + row]
-            )
+            gradient = fma(own, block[OWN + row], block[GRADIENT + row])
+            gradient = fma(low, block[LOWEST + row], gradient)
+            gradient = fma(high, block[HIGHEST + row], gradient)
+            block[GRADIENT + row] = fma(mean, block[MEAN + row], gradient)
         for kind in range(4):
-            block[GRADIENT + (4 + kind) * WIDTH + f] += slope * block[FEATURE + kind * WIDTH + f]
+            row = GRADIENT + (4 + kind) * WIDTH + f
+            block[row] = fma(slope, block[FEATURE + kind * WIDTH + f], block[row])
 
 
-@numba.njit(fastmath=FLAGS | {"reassoc"}, cache=True)
+@numba.njit(cache=True)
 def _best(observations, allowed, weight, bias, score, actions):
     """The item of the highest own score; the first one if several have it."""
+    x = np.empty((3, observations.shape[1]), np.float32)
+    scores = np.empty(observations.shape[1], np.float32)
     for sample in range(len(actions)):
+        for i in range(len(scores)):
+            for axis in range(3):
+                x[axis, i] = observations[sample, i, axis]
+        scores[:] = 0
+        for f in range(len(bias)):
+            a, b, c, d, s = weight[f, 0], weight[f, 1], weight[f, 2], bias[f], score[f]
+            for i in range(len(scores)):
+                value = _value(a, b, c, d, x[0, i], x[1, i], x[2, i])
+                scores[i] = fma(s, ZERO if value < ZERO else value, scores[i])
         best = -np.inf
-        for i in range(observations.shape[1]):
-            if allowed[sample, i]:
-                x, y, z = observations[sample, i]
-                logit = ZERO
-                for f in range(len(bias)):
-                    value = weight[0, f] * x + weight[1, f] * y + weight[2, f] * z + bias[f]
-                    logit += score[f] * max(value, ZERO)
-                if logit > best:
-                    best, actions[sample] = logit, i
+        for i in range(len(scores)):
+            if allowed[sample, i] and scores[i] > best:
+                best, actions[sample] = scores[i], i

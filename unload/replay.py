@@ -76,8 +76,8 @@ class ReplayBuffer:
             self.arrays[name][slots] = values
         self.total += count
 
-    def sample(self, batch_size: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
-        """Draw picks uniformly, with replacement.
+    def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
+        """Draw slots uniformly, with replacement, (batch_size,) int64.
 
         Raises:
             TypeError: ``rng`` is not a ``numpy.random.Generator``.
@@ -86,6 +86,10 @@ class ReplayBuffer:
         checks.generator("rng", rng)
         if not len(self):
             raise ValueError("the replay buffer is empty; add picks before sampling")
-        slots = rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))
-        # Indexing by ``array[slots]`` would take half as long again.
-        return {name: array.take(slots, axis=0) for name, array in self.arrays.items()}
+        return rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))
+
+    def sample(self, batch_size: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Copies of picks that ``sample_rows`` draws; raises as it does."""
+        rows = self.sample_rows(batch_size, rng)
+        # Indexing by ``array[rows]`` would take half as long again.
+        return {name: array.take(rows, axis=0) for name, array in self.arrays.items()}

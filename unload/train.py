@@ -14,6 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import asdict
 from hashlib import blake2b
 from pathlib import Path
@@ -27,8 +28,8 @@ from tqdm import tqdm
 
 from unload import files, task
 from unload.agent import DQN, Greedy, load_policy, save_policy
+from unload.architectures import NETWORKS
 from unload.config import ENVS, TrainConfig
-from unload.network import PEQNetwork
 from unload.replay import ReplayBuffer
 from unload.substacks import Load
 
@@ -65,13 +66,14 @@ def train(
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
     for the wall times, as one that was not, and so does one that was killed: it goes on
     from its last checkpoint. Ctrl-C writes one first; pressed again, it stops at once. A
-    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads; the
-    result does not depend on their number.
+    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads; with
+    the paper's network the result does not depend on their number.
 
     Args:
         config: what to train.
         run_dir: folder of the run: ``checkpoint.npz`` while it lasts, and at its end
-            ``policy.safetensors``, ``curve.csv`` and ``config.json``.
+            ``policy.safetensors``, ``curve.csv`` and ``config.json``. ``config.snapshots``
+            policies are kept there as ``snapshots/<picks>.safetensors``.
         progress: show picks/s, MSR, loss and the time left.
         stack: makes the loads, see ``ContainerEnv``; the paper's if None. It is not part
             of the configuration: pass the same one to go on.
@@ -109,8 +111,7 @@ def _train(config: TrainConfig, folder: Path, progress: bool, stack: Callable | 
             run.go(progress)
         finally:
             run.envs.close()
-        policy = Greedy(run.agent.network, config.equalize, config.ties)
-        save_policy(policy, folder / "policy.safetensors")
+        save_policy(run.policy(), folder / "policy.safetensors")
         curve = pd.DataFrame(run.curve, columns=CURVE_COLUMNS)
         files.write_text(folder / "curve.csv", curve.to_csv(index=False))
         # Last: it marks the run as finished.
@@ -161,7 +162,7 @@ class _Run:
         self.rng = np.random.default_rng(rng_seed)
         weights = torch.Generator().manual_seed(int(torch_seed))
         self.agent = DQN(
-            PEQNetwork(config.n_features, weights),
+            NETWORKS[config.network](config.n_features, weights),
             config.learning_rate,
             config.gamma,
             config.beta,
@@ -192,6 +193,10 @@ class _Run:
     @property
     def picks(self) -> int:
         return self.steps * self.config.num_envs
+
+    def policy(self) -> Greedy:
+        """What has been learned so far, a copy."""
+        return Greedy(deepcopy(self.agent.network), self.config.equalize, self.config.ties)
 
     @staticmethod
     def _no_sums() -> dict[str, float]:
@@ -244,7 +249,8 @@ class _Run:
         sums["deadlocked"] += failed_before.sum()
         if len(self.replay) >= min(config.batch_size, self.replay.size):
             for _ in range(config.gradient_steps):
-                sums["losses"] += self.agent.update(self.replay.sample(config.batch_size, self.rng))
+                rows = self.replay.sample_rows(config.batch_size, self.rng)
+                sums["losses"] += self.agent.update(self.replay.arrays, rows)
                 sums["updates"] += 1
         interval = config.target_update_interval
         if config.gamma > 0 and self.picks % interval < config.num_envs:
@@ -257,11 +263,18 @@ class _Run:
                 sums["deadlocked"] / sums["picks"], loss, epsilon, time.time(),
             ))  # fmt: skip
             self.sums = self._no_sums()
+        steps, snapshots = len(self.actions), config.snapshots
+        if self.steps * snapshots // steps > (self.steps - 1) * snapshots // steps:
+            save_policy(self.policy(), self.folder / f"snapshots/{self.picks:09d}.safetensors")
 
     def _pick(self, actions: np.ndarray) -> np.ndarray:
         """Pick in every environment and remember it; the rewards."""
         following, rewards, terminations, truncations, infos = self.envs.step(actions)
-        batch = {"observations": self.observations, "actions": actions, "rewards": rewards}
+        batch = {
+            "observations": self.observations,
+            "actions": actions,
+            "rewards": self._shaped(rewards, actions),
+        }
         if self.config.gamma > 0:
             batch |= self._next_state(following, terminations, infos)
         self.replay.add(**batch)
@@ -273,6 +286,11 @@ class _Run:
             while (self.steps - self.starts[1][0]) * self.config.num_envs >= self.replay.size:
                 self.starts.popleft()
         return rewards
+
+    def _shaped(self, rewards: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """What is learned from: a failed pick is the less bad, the higher its item is seen."""
+        heights = (self.observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
+        return np.where(rewards < 0, rewards + self.config.height_reward * heights, rewards)
 
     def _next_state(self, observations, terminations, infos) -> dict[str, np.ndarray]:
         """What followed each pick; at an episode's end the last sight of it, not the reset's."""
