@@ -29,6 +29,20 @@ def small_load() -> unload.Load:
     return unload.stack_load(np.random.default_rng(0), walls=1)
 
 
+@pytest.fixture(scope="session")
+def few_items() -> Callable[[np.random.Generator, int], unload.Load]:
+    """``few_items(rng, count)``: the items of a random load that are farthest from the entrance."""
+
+    def build(rng: np.random.Generator, count: int) -> unload.Load:
+        load = unload.stack_load(rng)
+        last = np.sort(unload.observation.nearest(load.positions, len(load))[-count:])
+        return unload.Load(
+            load.positions[last], load.sizes[last], load.packages[last], load.walls[last]
+        )
+
+    return build
+
+
 @pytest.fixture
 def boxes() -> Callable[..., unload.Load]:
     """``boxes((y, z), ...)``: a load of cubes of 0.4 m in the plane x = 3.5 m."""

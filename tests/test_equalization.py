@@ -98,8 +98,36 @@ def test_the_input_stays_as_it_was(rng):
         ([["a"], ["b"]], {}, TypeError, "positions has dtype"),
         (np.zeros((2, 1)), {"ties": "coin"}, ValueError, "ties is 'coin'; expected one of"),
         (np.zeros((2, 1)), {"tolerance": -1}, ValueError, "tolerance is -1"),
+        (np.zeros((2, 1)), {"present": np.ones(3)}, ValueError, r"present has shape \(3,\)"),
+        (np.zeros((2, 1)), {"present": [0, 2]}, ValueError, "present holds 2; expected bool"),
+        (np.zeros((2, 1)), {"present": ["a", "b"]}, TypeError, "present has dtype"),
     ],
 )
 def test_bad_input_is_refused(positions, kwargs, error, message):
     with pytest.raises(error, match=message):
         equalize(positions, **kwargs)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("ties", ["noise", "average"])
+@pytest.mark.parametrize("kind", [np.float32, np.float64, int])
+def test_only_items_that_are_present_count(rng, ties, kind):
+    positions = (rng.uniform(-1, 1, (4, 5, 9, 3)).round(1) * 10).astype(kind)
+    present = rng.random((4, 5, 9)) < 0.6
+    present[0, 0], present[0, 1] = False, True
+    present[0, 2] = np.arange(9) == 7
+    result = equalize(positions, ties, present=present)
+    assert result.dtype == np.float32 and (result[~present] == -1).all()
+    for index in np.ndindex(4, 5):
+        there = present[index]
+        if there.sum() > 1:
+            alone = equalize(positions[index][there], ties)
+            assert result[index][there].tobytes() == alone.tobytes()
+    assert (result[0, 2, 7] == 0).all()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_all_present_is_the_same_as_no_word_of_it(rng, ties):
+    positions = rng.uniform(-1, 1, (3, 128, 3)).round(2).astype(np.float32)
+    everywhere = equalize(positions, ties, present=np.ones((3, 128)))
+    assert everywhere.tobytes() == equalize(positions, ties).tobytes()

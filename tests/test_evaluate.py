@@ -97,6 +97,59 @@ def test_local_and_table_agree():
     pd.testing.assert_frame_equal(*frames)
 
 
+# --- complete unloading --------------------------------------------------------------
+
+
+def test_whole_containers_are_unloaded_by_picking_the_highest_item():
+    frame = evaluate(policies.highest, episodes=3, max_picks=None)
+    assert list(frame.columns) == [*COLUMNS, "picks", "emptied"]
+    assert frame["emptied"].dtype == bool and frame["emptied"].all()
+    assert frame["picks"].dtype == np.int64 and (frame["picks"] == frame["unloaded"]).all()
+    assert (frame["success_rate"] == 1).all() and frame["unloaded"].between(800, 1000).all()
+
+
+@pytest.mark.parametrize("policy", [policies.random, policies.nearest])
+@pytest.mark.parametrize("mask", [False, True])
+def test_each_episode_counts_to_its_own_end(few_items, policy, mask):
+    counts = iter([3, 60, 20] + [5] * 99)  # the first three loads, and those that follow
+
+    frame = evaluate(
+        policy, 3, max_picks=None, mask=mask, stack=lambda rng: few_items(rng, next(counts))
+    )
+    assert frame["unloaded"].tolist() == [3, 60, 20] and frame["emptied"].all()
+    shares = frame["unloaded"] / frame["picks"]
+    assert frame["success_rate"].tolist() == pytest.approx(shares.tolist())
+    assert (frame["picks"] >= frame["unloaded"]).all() and frame["picks"].nunique() == 3
+    assert not mask or (frame["deadlocked"] == 0).all()
+
+
+def test_an_episode_ends_with_the_last_item_whatever_the_limit(few_items):
+    def play(**kwargs):
+        return evaluate(policies.nearest, 3, stack=lambda rng: few_items(rng, 12), **kwargs)
+
+    limited, whole = play(max_picks=400), play(max_picks=None)
+    pd.testing.assert_frame_equal(limited, whole[COLUMNS])
+    assert (play(max_picks=7)["unloaded"] <= 7).all()
+
+
+def test_local_and_table_agree_to_the_last_item(few_items):
+    frames = [
+        evaluate(policies.random, 1, physics=p, max_picks=None, stack=lambda rng: few_items(rng, 9))
+        for p in ("local", "table")
+    ]
+    pd.testing.assert_frame_equal(*frames)
+    assert frames[0]["emptied"].all()
+
+
+def test_an_episode_that_is_stuck_is_given_up(few_items):
+    frame = evaluate(lowest, 2, mask=False, max_picks=None, stack=lambda rng: few_items(rng, 40))
+    assert not frame["emptied"].any() and (frame["unloaded"] < 40).all()
+    assert (frame["longest_deadlock"] == 1279).all()
+    assert (frame["picks"] >= 1280).all()
+    shares = frame["unloaded"] / frame["picks"]
+    assert frame["success_rate"].tolist() == pytest.approx(shares.tolist())
+
+
 @pytest.mark.parametrize(
     ("kwargs", "error", "message"),
     [

@@ -87,3 +87,60 @@ def test_other_types_are_refused(observations, message):
 def test_bad_numbers_of_features_are_refused(n, error):
     with pytest.raises(error, match="n_features is"):
         PEQNetwork(n)
+
+
+@pytest.mark.parametrize("n", [5, 64])
+def test_rows_that_are_not_present_are_left_out(rng, n):
+    peq = network(n)
+    batch = torch.from_numpy(rng.uniform(-1, 1, (6, 128, 3)).astype(np.float32))
+    counts = torch.tensor([1, 2, 5, 64, 127, 128])
+    present = torch.arange(128) < counts[:, None]
+    batch[~present] = -1
+    values = peq(batch, present)
+    assert values.isfinite().all()
+    for row, count in enumerate(counts):
+        alone = peq(batch[row : row + 1, :count])[0]
+        assert torch.allclose(values[row, :count], alone, atol=1e-6)
+    assert torch.equal(peq(batch, torch.ones_like(present))[5], values[5])
+    scattered = torch.from_numpy(rng.permutation(128))
+    shuffled = peq(batch[:, scattered], present[:, scattered])
+    assert torch.allclose(shuffled, values[:, scattered], atol=1e-6)
+
+
+def test_gradients_ignore_rows_that_are_not_present(rng):
+    peq = network(8)
+    batch = torch.from_numpy(rng.uniform(-1, 1, (2, 9, 3)).astype(np.float32))
+    present = torch.arange(9) < torch.tensor([[4], [0]])
+
+    def gradients(observations, there):
+        peq.zero_grad()
+        peq(observations, there)[0, :4].sum().backward()
+        return [parameter.grad.clone() for parameter in peq.parameters()]
+
+    for padded, alone in zip(gradients(batch, present), gradients(batch[:1, :4], None)):
+        assert torch.allclose(padded, alone, atol=1e-6)
+
+
+def test_an_observation_without_items_has_finite_values():
+    peq = network()
+    values = peq(torch.full((2, 7, 3), -1.0), torch.zeros((2, 7), dtype=torch.bool))
+    values.sum().backward()
+    assert values.isfinite().all()
+    assert all(parameter.grad.isfinite().all() for parameter in peq.parameters())
+
+
+@pytest.mark.parametrize(
+    ("present", "error", "message"),
+    [
+        (np.ones((1, 4), bool), TypeError, "present is a ndarray; expected a tensor"),
+        (torch.ones((1, 4)), TypeError, "present has dtype torch.float32; expected torch.bool"),
+        (
+            torch.ones((1, 5), dtype=torch.bool),
+            ValueError,
+            r"present has shape \(1, 5\); .*\(1, 4\)",
+        ),
+    ],
+)
+def test_other_flags_are_refused(present, error, message):
+    with pytest.raises(error, match=message):
+        network()(torch.zeros((1, 4, 3)), present)

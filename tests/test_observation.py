@@ -55,8 +55,20 @@ def test_bad_positions_are_refused(function, positions, error):
         function(positions)
 
 
-def test_too_few_items_are_refused():
-    with pytest.raises(ValueError, match="positions holds 127 items; expected at least 128"):
-        observation.nearest(np.zeros((127, 3)))
+def test_all_items_are_observed_if_there_are_fewer(rng):
+    positions = rng.uniform(0, task.CONTAINER, (127, 3))
+    rows = observation.nearest(positions)
+    assert (rows == np.argsort(observation.distance(positions))).all()
+    assert observation.nearest(np.zeros((0, 3))).shape == (0,)
     with pytest.raises(ValueError, match="count is 0"):
         observation.nearest(np.zeros((3, 3)), 0)
+
+
+def test_rows_that_hold_an_item(rng):
+    seen = rng.uniform(-1, 1, (2, 3, 6, 3)).astype(np.float32)
+    seen[0, 1, 4:] = observation.PADDING
+    seen[1, 2, :, :2] = -1  # in the corner in two of three columns
+    expected = np.ones((2, 3, 6), bool)
+    expected[0, 1, 4:] = False
+    held = observation.holds_item(seen)
+    assert held.dtype == bool and (held == expected).all()

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from unload import policies
+from unload.observation import PADDING
 
 POLICIES = [policies.random, policies.nearest, policies.highest]
 
@@ -93,3 +94,13 @@ def test_a_mixed_policy_picks_at_random_now_and_then(rng):
         assert abs((actions != best).mean() - share * 127 / 128) < 0.03
     with pytest.raises(ValueError, match="share is 2"):
         policies.mixed(policies.highest, 2)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_rows_without_an_item_are_never_picked(policy, rng):
+    observations = rng.uniform(-1, 1, (300, 8, 3)).astype(np.float32)
+    counts = rng.integers(1, 9, 300)
+    masks = np.arange(8) < counts[:, None]
+    observations[~masks] = PADDING
+    observations[:100, :, 2] = -1  # as low as padding
+    assert (policy(observations, masks, rng) < counts).all()

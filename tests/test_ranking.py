@@ -5,7 +5,7 @@ import pytest
 
 from unload import equalize
 from unload.equalization import TOLERANCE
-from unload.ranking import features, nearest_first, rank, replace
+from unload.ranking import features, nearest_first, rank, remove, replace
 
 WIDTH = np.float32(TOLERANCE)
 
@@ -60,3 +60,27 @@ def test_nearest_first_sorts_by_distance(items, rng, ties):
         order = np.argsort(distances[env], kind="stable")
         assert observations[env].tobytes() == equalize(seen[env, order], ties).tobytes()
         assert (rows[env] == flags[env, order]).all()
+
+
+def test_removed_items_leave_the_ranks_of_a_stable_sort(items, rng):
+    values = items[0].copy()
+    ranks = ranks_of(values).astype(np.int32)
+    for count in range(128, 0, -1):
+        row = int(rng.integers(count))
+        wanted = np.delete(values[:count], row)
+        remove(values[:count], ranks[:count], row)
+        assert (values[: count - 1] == wanted).all()
+        assert (ranks[: count - 1] == ranks_of(wanted)).all()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 64, 127, 128])
+def test_features_of_fewer_items_are_those_of_equalize(items, ties, count):
+    ranks = np.full((3, 128), 99, np.int32)
+    ranks[:, :count] = ranks_of(items[:, :count])
+    observation = np.empty((128, 3), np.float32)
+    present = np.arange(128) < count
+    features(items, ranks, True, ties == "average", WIDTH, observation, count)
+    assert observation.tobytes() == equalize(items.T, ties, present=present).tobytes()
+    features(items, ranks, False, ties == "average", WIDTH, observation, count)
+    assert (observation == np.where(present[:, None], items.T, -1)).all()

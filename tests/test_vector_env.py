@@ -44,20 +44,27 @@ def assert_same(one, other) -> None:
         assert one == other
 
 
-def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -> None:
-    """Step both environments with the same actions, some random and some sensible."""
+def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -> np.ndarray:
+    """Step both environments with the same actions, some random and some sensible.
+
+    Returns:
+        (steps, 2, num_envs) bool, where episodes were terminated, and where truncated.
+    """
     array, side_by_side = make_pair(env_id, num_envs, **kwargs)
     rng = np.random.default_rng(seed)
     results = array.reset(seed=seed)
     assert_same(results, side_by_side.reset(seed=seed))
+    ends = []
     for _ in range(steps):
         actions = rng.integers(128, size=num_envs)
         sensible = rng.random(num_envs) < 0.4
         actions[sensible] = results[0][sensible, :, 2].argmax(axis=1)
         results = array.step(actions)
         assert_same(results, side_by_side.step(actions))
+        ends.append(results[2:4])
     array.close()
     side_by_side.close()
+    return np.array(ends)
 
 
 def test_64_containers_for_whole_episodes_and_beyond():
@@ -84,6 +91,48 @@ def test_loads_of_several_sizes_and_kinds():
         return unload.stack_load(rng, walls=int(rng.integers(3, 16)))
 
     play_both(CONTAINER, 4, 45, max_picks=15, stack=stack)
+
+
+@pytest.fixture
+def mixed_stack(few_items):
+    """Loads of 1 to 150 items."""
+    return lambda rng: few_items(rng, int(rng.choice([1, 2, 5, 40, 127, 128, 129, 150])))
+
+
+@pytest.mark.parametrize(
+    "kwargs",
+    [{}, {"equalize": True}, {"equalize": True, "ties": "average"}],
+    ids=str,
+)
+def test_episodes_that_end_at_different_steps(mixed_stack, kwargs):
+    ends = play_both(CONTAINER, 5, 600, seed=2, max_picks=150, stack=mixed_stack, **kwargs)
+    terminated, truncated = ends.transpose(1, 0, 2)
+    assert terminated.any() and truncated.any()
+    together = (terminated | truncated).sum(axis=1)
+    assert {0, 1} < set(together.tolist())
+
+
+def test_episodes_that_end_at_once(few_items):
+    ends = play_both(CONTAINER, 3, 20, max_picks=2, stack=lambda rng: few_items(rng, 1))
+    assert ends[:, 0].any() and ends[:, 1].any()
+    together = ends.any(axis=1).sum(axis=1)
+    assert 3 in together and {1, 2} & set(together.tolist())
+
+
+def test_a_whole_load_to_the_last_item():
+    envs, side_by_side = make_pair(CONTAINER, 2, equalize=True, max_picks=2000)
+    results = envs.reset(seed=0)
+    side_by_side.reset(seed=0)
+    ended = np.zeros(2, bool)
+    while not ended.all():
+        heights = np.where(results[-1]["item_mask"], results[0][..., 2], -2)
+        results = envs.step(heights.argmax(axis=1))
+        assert_same(results, side_by_side.step(heights.argmax(axis=1)))
+        ended |= results[2]
+        for number in np.flatnonzero(results[2]):
+            final = results[4]["final_info"]
+            assert final["unloaded"][number] >= 800 and not final["item_mask"][number].any()
+            assert (results[4]["final_obs"][number] == -1).all()
 
 
 def test_spaces_and_metadata():
@@ -179,6 +228,50 @@ def test_a_state_may_hold_the_picks_of_several_episodes(rng):
     assert_same(other.get_state(), envs.get_state())
 
 
+@pytest.mark.parametrize("picks", [0, 1, 30, 100, 333])
+@pytest.mark.parametrize("max_picks", [40, 500])
+def test_a_state_in_different_stages_goes_on_identically(mixed_stack, picks, max_picks, rng):
+    def make():
+        return gymnasium.make_vec(CONTAINER, 4, max_picks=max_picks, stack=mixed_stack).unwrapped
+
+    def act():
+        actions = rng.integers(128, size=4)
+        return np.where(rng.random(4) < 0.5, 0, actions)
+
+    envs, other = make(), make()
+    results = envs.reset(seed=1)
+    for _ in range(picks):
+        results = envs.step(act())
+    state = envs.get_state()
+    assert state["actions"].shape[0] <= min(picks, max_picks)
+    if picks >= 100:
+        assert (state["actions"][0] == -1).any() and (state["actions"][0] >= 0).any()
+    observations, infos = other.set_state(state)
+    assert_same(observations, results[0])
+    for name in ("action_mask", "item_mask", "unloaded"):
+        assert_same(infos[name], results[-1][name])
+    assert_same(other.get_state(), state)
+    for _ in range(200):
+        actions = act()
+        assert_same(other.step(actions), envs.step(actions))
+    assert_same(other.get_state(), envs.get_state())
+
+
+@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
+def test_an_environment_waits_for_the_pick_that_begins_its_episode(env_id, rng):
+    actions = rng.integers(128, size=(12, 2))
+    envs, other = (gymnasium.make_vec(env_id, 2, max_picks=10).unwrapped for _ in range(2))
+    envs.reset(seed=1)
+    start = envs.get_state()
+    late = actions.copy()
+    late[:4, 1] = -1
+    observations, _ = other.set_state(start | {"actions": late})
+    alone = gymnasium.make_vec(env_id, 1, max_picks=10).unwrapped
+    for env, first in ((0, 0), (1, 4)):
+        one = {"rng": start["rng"][env : env + 1], "actions": late[first:, env : env + 1]}
+        assert_same(alone.set_state(one)[0][0], observations[env])
+
+
 @pytest.mark.parametrize(
     ("actions", "error", "message"),
     [
@@ -243,6 +336,8 @@ def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
         ({"rng": np.array(["{}", "{}"])}, ValueError, r"state\['rng'\] is .*generator's state"),
         ({"rng": np.array(["{}"])}, ValueError, r"state\['rng'\] has shape \(1,\)"),
         ({"actions": np.full((3, 2), 128)}, ValueError, r"state\['actions'\] holds 128 to 128"),
+        ({"actions": np.full((3, 2), -2)}, ValueError, r"state\['actions'\] holds -2 to -2"),
+        ({"actions": np.array([[0, 1], [1, -1]])}, ValueError, "holds -1 after a pick"),
         ({"actions": np.zeros((3, 4), int)}, ValueError, r"state\['actions'\] has shape \(3, 4\)"),
     ],
 )
@@ -271,7 +366,7 @@ def test_nothing_works_before_reset_or_after_close(call):
         envs.reset()
 
 
-def test_a_load_that_is_too_small_is_refused():
-    envs = gymnasium.make_vec(CONTAINER, 2, stack=lambda rng: unload.stack_load(rng, walls=2))
-    with pytest.raises(ValueError, match="expected at least 628"):
+def test_a_stack_of_something_else_is_refused():
+    envs = gymnasium.make_vec(CONTAINER, 2, stack=lambda rng: "boxes")
+    with pytest.raises(TypeError, match="load is 'boxes'; expected an unload.Load"):
         envs.reset(seed=0)

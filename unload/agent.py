@@ -12,6 +12,7 @@ from torch.nn.functional import smooth_l1_loss
 from unload import checks, files, fused
 from unload.architectures import NETWORKS
 from unload.equalization import TIES, equalize
+from unload.observation import holds_item
 from unload.policies import check_batch
 
 # Rows of a batch per backward pass: what one pass stores stays in the cache.
@@ -199,20 +200,32 @@ def _check_network(network: torch.nn.Module) -> torch.nn.Module:
 
 
 def greedy_actions(
-    network: torch.nn.Module, observations: np.ndarray, masks: np.ndarray
+    network: torch.nn.Module,
+    observations: np.ndarray,
+    masks: np.ndarray,
+    present: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The allowed action of the highest value, (batch,) int64."""
-    return _best_actions(network, *check_batch(observations, masks))
+    """The allowed action of the highest value, (batch,) int64.
+
+    ``present``: (batch, items) bool, the rows that hold an item; all if None.
+    """
+    return _best_actions(network, *check_batch(observations, masks), present)
 
 
 @torch.no_grad()
 def _best_actions(
-    network: torch.nn.Module, observations: np.ndarray, allowed: np.ndarray
+    network: torch.nn.Module,
+    observations: np.ndarray,
+    allowed: np.ndarray,
+    present: np.ndarray | None = None,
 ) -> np.ndarray:
     """``greedy_actions`` on what ``check_batch`` has returned."""
-    if fused.applies(network):
+    if fused.applies(network):  # the item's own features decide, whatever else there is
         return fused.greedy_actions(network, observations.astype(np.float32, copy=False), allowed)
-    values = network(torch.as_tensor(observations, dtype=torch.float32))
+    arguments = [torch.as_tensor(observations, dtype=torch.float32)]
+    if present is not None and not present.all():  # other modules need not know of padding
+        arguments.append(torch.from_numpy(present))
+    values = network(*arguments)
     return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
 
 
@@ -249,9 +262,10 @@ class Greedy:
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        present = holds_item(observations)
         if self.equalize:
-            observations = equalize(observations, self.ties)
-        return greedy_actions(self.network, observations, masks)
+            observations = equalize(observations, self.ties, present=present)
+        return greedy_actions(self.network, observations, masks, present)
 
 
 def save_policy(policy: Greedy, path: str | Path) -> None:

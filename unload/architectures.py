@@ -9,7 +9,7 @@ from torch import nn
 from torch.nn.functional import linear
 
 from unload import checks
-from unload.network import PEQNetwork
+from unload.network import PEQNetwork, check_observations, check_present, pooled
 
 HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 features
 
@@ -93,13 +93,7 @@ class TwoLayerScorer(ScoringNetwork):
 
     def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
         own = torch.relu(self.extractor(observations))
-        if present is None:
-            lowest, mean = own.amin(dim=1), own.mean(dim=1)
-        else:
-            padding = ~present.unsqueeze(2)
-            lowest = own.masked_fill(padding, torch.inf).amin(dim=1)
-            mean = own.masked_fill(padding, 0).sum(dim=1) / present.sum(dim=1, keepdim=True)
-        context = torch.cat([lowest, highest(own, present), mean], dim=1)
+        context = torch.cat(pooled(own, present), dim=1)
         return torch.relu(linear_beside(self.hidden, own, context))
 
 
@@ -176,28 +170,3 @@ def linear_beside(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) ->
     """
     for_own, for_context = layer.weight.split([own.shape[2], context.shape[1]], dim=1)
     return linear(own, for_own, layer.bias) + linear(context, for_context).unsqueeze(1)
-
-
-def check_observations(observations: torch.Tensor, dtype: torch.dtype) -> None:
-    """Raise unless ``observations`` is (batch, items, 3) of this ``dtype``, of some items."""
-    if not isinstance(observations, torch.Tensor):
-        raise TypeError(f"observations is a {type(observations).__name__}; expected a tensor")
-    if observations.dtype != dtype:
-        raise TypeError(f"observations has dtype {observations.dtype}; expected {dtype}")
-    if observations.ndim != 3 or observations.shape[1] == 0 or observations.shape[2] != 3:
-        raise ValueError(
-            f"observations has shape {tuple(observations.shape)}; "
-            "expected (batch, items, 3) with at least one item"
-        )
-
-
-def check_present(present: torch.Tensor, observations: torch.Tensor) -> None:
-    """Raise unless ``present`` is bool, one per row of ``observations``."""
-    if not isinstance(present, torch.Tensor):
-        raise TypeError(f"present is a {type(present).__name__}; expected a tensor")
-    if present.dtype != torch.bool:
-        raise TypeError(f"present has dtype {present.dtype}; expected torch.bool")
-    if present.shape != observations.shape[:2]:
-        raise ValueError(
-            f"present has shape {tuple(present.shape)}; expected {tuple(observations.shape[:2])}"
-        )

@@ -3,7 +3,7 @@
 A container of ``unload.env`` looks at all its boxes at each pick. But in a neat load no
 box moves, so the order of the boxes by distance is settled when the load is: the 128
 nearest are the first 128 that are left, and a box that is unloaded makes room for the next
-one in that order. Here a pick touches these 128 at most.
+one in that order, as long as there is one. Here a pick touches these 128 at most.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 from unload import task
 from unload.boxes import ABOVE, BELOW, BESIDE, TOLERANCE
 from unload.lift_table import EMPTY, HELD_DOWN, absorb, find
-from unload.ranking import features, rank, replace
+from unload.ranking import features, rank, remove, replace
 from unload.situation import RESOLUTION
 
 WIDTH = float(task.CONTAINER[1])
@@ -29,13 +29,15 @@ class Containers(NamedTuple):
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
+        left, unloaded: (E,) int64, how many items there are, and how many there were besides.
         seen: (E, capacity, 3) float32, the scaled positions as observed.
         by_distance: (E, capacity) int32, the items, nearest first.
-        coming: (E,) int32, place in ``by_distance`` of the next item that becomes visible.
-        visible: (E, 128) int32, the item in each row of the observation.
-        values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows.
+        visible: (E, 128) int32, the item in each row of the observation, -1 in padded rows.
+        values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows
+            that hold an item.
         observations: (E, 128, 3) float32.
-        masks: (E, 128) int8, 0 for rows that failed since the last successful pick.
+        masks: (E, 128) int8, 0 for rows that failed since the last successful pick, and for
+            padded ones.
         failed: (E, 128) float64, how far such a row moved, in m.
     """
 
@@ -43,9 +45,10 @@ class Containers(NamedTuple):
     starts: np.ndarray
     links: np.ndarray
     present: np.ndarray
+    left: np.ndarray
+    unloaded: np.ndarray
     seen: np.ndarray
     by_distance: np.ndarray
-    coming: np.ndarray
     visible: np.ndarray
     values: np.ndarray
     ranks: np.ndarray
@@ -61,9 +64,10 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
         present=np.zeros((num_envs, capacity), bool),
+        left=np.zeros(num_envs, np.int64),
+        unloaded=np.zeros(num_envs, np.int64),
         seen=np.zeros((num_envs, capacity, 3), np.float32),
         by_distance=np.zeros((num_envs, capacity), np.int32),
-        coming=np.zeros(num_envs, np.int32),
         visible=np.zeros((num_envs, N_VISIBLE), np.int32),
         values=np.zeros((num_envs, 3, N_VISIBLE), np.float32),
         ranks=np.zeros((num_envs, 3, N_VISIBLE), np.int32),
@@ -76,29 +80,45 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
 @numba.njit(cache=True)
 def start(containers, env, equalize, average, tolerance):
     """Set up all that depends on the geometry, contacts and order of a fresh load."""
-    for row in range(N_VISIBLE):
+    rows = min(containers.left[env], N_VISIBLE)
+    for row in range(rows):
         item = containers.by_distance[env, row]
         containers.visible[env, row] = item
         for axis in range(3):
             containers.values[env, axis, row] = containers.seen[env, item, axis]
-    containers.coming[env] = N_VISIBLE
-    containers.masks[env] = 1
+    containers.visible[env, rows:] = -1
+    containers.unloaded[env] = 0
     for axis in range(3):
-        rank(containers.values[env, axis], containers.ranks[env, axis])
+        rank(containers.values[env, axis, :rows], containers.ranks[env, axis, :rows])
+    show(containers, env, rows, equalize, average, tolerance)
+
+
+@numba.njit(cache=True)
+def show(containers, env, rows, equalize, average, tolerance):
+    """Write the observation and the mask of a container that has changed."""
+    containers.masks[env] = 1
+    if rows < N_VISIBLE:
+        containers.masks[env, rows:] = 0
     features(
         containers.values[env], containers.ranks[env], equalize, average, tolerance,
-        containers.observations[env],
+        containers.observations[env], rows,
     )  # fmt: skip
 
 
 @numba.njit(cache=True)
 def look_up(containers, actions, digests, micrometres):
-    """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64."""
+    """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
+
+    Where the row is padded, or the action is -1, the item is -1 and moves by 0.
+    """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     members = np.empty(containers.present.shape[1], np.int32)
     for env in range(len(actions)):
         row = actions[env]
-        items[env] = containers.visible[env, row]
+        items[env] = containers.visible[env, row] if row >= 0 else -1
+        if items[env] < 0:
+            distances[env] = 0
+            continue
         if containers.masks[env, row] == 0:
             distances[env] = containers.failed[env, row]
             continue
@@ -114,10 +134,16 @@ def look_up(containers, actions, digests, micrometres):
 
 @numba.njit(cache=True)
 def pick(containers, actions, distances, equalize, average, tolerance):
-    """Unload the items that moved far enough; the rewards, (E,) float64."""
+    """Unload the items that moved far enough; the rewards, (E,) float64.
+
+    Where the action is -1 nothing happens, and the reward is 0.
+    """
     rewards = np.empty(len(actions))
     for env in range(len(actions)):
         row = actions[env]
+        if row < 0:
+            rewards[env] = 0
+            continue
         if distances[env] < task.LIFT_THRESHOLD:
             rewards[env] = -1
             containers.masks[env, row] = 0
@@ -126,21 +152,25 @@ def pick(containers, actions, distances, equalize, average, tolerance):
         rewards[env] = 1
         visible = containers.visible[env]
         containers.present[env, visible[row]] = False
-        item = containers.by_distance[env, containers.coming[env]]
-        containers.coming[env] += 1
+        containers.left[env] -= 1
+        containers.unloaded[env] += 1
+        rows = min(containers.left[env], N_VISIBLE)
         for i in range(row, N_VISIBLE - 1):
             visible[i] = visible[i + 1]
-        visible[N_VISIBLE - 1] = item
-        for axis in range(3):
-            replace(
-                containers.values[env, axis], containers.ranks[env, axis], row,
-                containers.seen[env, item, axis],
-            )  # fmt: skip
-        containers.masks[env] = 1
-        features(
-            containers.values[env], containers.ranks[env], equalize, average, tolerance,
-            containers.observations[env],
-        )  # fmt: skip
+        if rows == N_VISIBLE:
+            item = containers.by_distance[env, containers.unloaded[env] + N_VISIBLE - 1]
+            visible[N_VISIBLE - 1] = item
+            for axis in range(3):
+                replace(
+                    containers.values[env, axis], containers.ranks[env, axis], row,
+                    containers.seen[env, item, axis],
+                )  # fmt: skip
+        else:
+            visible[rows] = -1
+            for axis in range(3):
+                values, ranks = containers.values[env, axis], containers.ranks[env, axis]
+                remove(values[: rows + 1], ranks[: rows + 1], row)
+        show(containers, env, rows, equalize, average, tolerance)
     return rewards
 
 

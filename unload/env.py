@@ -19,16 +19,10 @@ def check_stack(stack: object) -> None:
         raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
 
 
-def check_load(load: object, max_picks: int) -> None:
-    """Raise unless ``load`` is a ``Load`` with enough items for an episode."""
+def check_load(load: object) -> None:
+    """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
     if not isinstance(load, Load):
         raise TypeError(f"load is {load!r}; expected an unload.Load")
-    least = task.N_VISIBLE + max_picks
-    if len(load) < least:
-        raise ValueError(
-            f"load holds {len(load)} items; expected at least {least}, "
-            f"{task.N_VISIBLE} visible ones after max_picks={max_picks} picks"
-        )
 
 
 class ContainerEnv(PickingEnv):
@@ -38,11 +32,12 @@ class ContainerEnv(PickingEnv):
     A container of 7.0 × 2.5 × 2.5 m holds 800–1000 boxes, stacked in walls. At each step
     the agent chooses one of the 128 boxes nearest to the entrance. It is pulled upwards
     with 20 N for 0.3 s; if it moved at least 0.2 m it is unloaded, else the container
-    stays as it was.
+    stays as it was. With ``max_picks`` large enough, it is unloaded to the last box.
 
     ## Action space
     ``Discrete(128)``: the row of the observation to pick. A row that failed before may be
-    picked again, and fails again.
+    picked again, and fails again. So does a row without a box: it is a failed pick of
+    item -1, which moves by 0 m, and changes nothing.
 
     ## Observation space
     ``Box(-1, 1, (128, 3), float32)``: centres of the 128 nearest boxes, nearest first,
@@ -54,6 +49,11 @@ class ContainerEnv(PickingEnv):
     | 1 | y | left side wall | right side wall |
     | 2 | z | floor | ceiling |
 
+    Once fewer than 128 boxes are left, they come first, and each row after them holds -1 in
+    all columns, equalized or not. ``info["item_mask"]`` tells these rows; so does
+    ``unload.observation.holds_item``, if the observation is not equalized. Ranks are those
+    among the boxes that are there.
+
     ## Rewards
     +1 if the item was unloaded, -1 if not.
 
@@ -62,17 +62,22 @@ class ContainerEnv(PickingEnv):
     simulation shows (0.5 mm, and 1 mm down).
 
     ## Episode end
-    Truncation after ``max_picks`` picks; there is no termination.
+    Termination when the last box has been unloaded; nothing is left to pick then, and every
+    row is padded. Truncation after ``max_picks`` picks. The paper's loads of 800 boxes or
+    more are never emptied by its 500 picks.
 
     ## Information
     ``reset`` and ``step`` return a dict with
 
-    - ``action_mask``: (128,) int8, 0 for rows that failed since the last successful pick;
+    - ``action_mask``: (128,) int8, 0 for rows that failed since the last successful pick,
+      and for rows without a box;
+    - ``item_mask``: (128,) int8, 0 for rows without a box only: for learners that are not
+      told which rows failed;
     - ``unloaded``: int, items unloaded in this episode;
 
     and ``step`` also
 
-    - ``item``: int, the picked item's number in the load;
+    - ``item``: int, the picked item's number in the load, -1 if the row held none;
     - ``distance``: float, how far it moved in m.
 
     Args:
@@ -82,17 +87,16 @@ class ContainerEnv(PickingEnv):
         after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
-        max_picks: length of an episode.
+        max_picks: greatest length of an episode.
         position_noise: standard deviation of the blur in m; 0 also switches off the
             1 mm down. It applies where the boxes stay where they were put; ``"full"``
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
-        stack: makes a ``Load`` from a ``numpy.random.Generator``; it must hold at least
-            128 items more than can be unloaded in an episode.
+        stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``.
         render_mode: ``"rgb_array"`` for pictures by PyBullet's TinyRenderer, or None.
 
     Attributes:
-        visible: (128,) int64, the item in each row of the observation.
+        visible: (128,) int64, the item in each row of the observation, -1 in rows without.
 
     Raises:
         TypeError, ValueError: an argument, an action or a load is not as described.
@@ -128,7 +132,7 @@ class ContainerEnv(PickingEnv):
         for name in options:
             checks.one_of("options", name, ("load",))
         if "load" in options:  # before the generator is seeded
-            check_load(options["load"], self.max_picks)
+            check_load(options["load"])
         super().reset(seed=seed)
         self._fill(options["load"] if "load" in options else self.stack(self.np_random))
         self._look()
@@ -138,27 +142,27 @@ class ContainerEnv(PickingEnv):
         """Pick the item in row ``action`` of the observation."""
         self._check_running()
         item = int(self.visible[self._row(action)])
-        distance = self.physics.lift(item)
+        distance = self.physics.lift(item) if item >= 0 else 0.0
         success = distance >= task.LIFT_THRESHOLD
         self._picks += 1
         if success:
             self.physics.remove(item)
             self._unloaded += 1
             self._failed[:] = False
-        else:
+        elif item >= 0:
             self._failed[item] = True
         if success or not self.physics.exact:
             self._look()
-        truncated = self._picks == self.max_picks
-        if truncated:
+        terminated, truncated = self._ends()
+        if terminated or truncated:
             self._state = "finished"
         info = self._info() | {"item": item, "distance": distance}
-        return self._observation.copy(), 1.0 if success else -1.0, False, truncated, info
+        return self._observation.copy(), 1.0 if success else -1.0, terminated, truncated, info
 
     def action_masks(self) -> np.ndarray:
-        """(128,) bool, False for rows that failed since the last successful pick."""
+        """(128,) bool, False for rows without a box or failed since the last successful pick."""
         self._check_started()
-        return ~self._failed[self.visible]
+        return (self.visible >= 0) & ~self._failed[self.visible]
 
     def liftable(self) -> np.ndarray:
         """(128,) bool, which rows of the observation can be unloaded now.
@@ -170,7 +174,7 @@ class ContainerEnv(PickingEnv):
         self._check_started()
         if not self.physics.exact:
             raise ValueError("after_pick lets lifts move other boxes; expected 'restore'")
-        lifts = [self.physics.lift(item) for item in self.visible.tolist()]
+        lifts = [self.physics.lift(item) if item >= 0 else 0.0 for item in self.visible.tolist()]
         return np.array(lifts) >= task.LIFT_THRESHOLD
 
     def get_state(self) -> dict[str, np.ndarray]:
@@ -206,7 +210,6 @@ class ContainerEnv(PickingEnv):
         self._check_open()
         checks.entries("state", state, (*LOAD, "present", "blur", "failed", "counts", "rng"))
         load = Load(**{name: state[name] for name in LOAD})
-        check_load(load, self.max_picks)
         count = len(load)
         present = checks.flag_array("state['present']", state["present"], (count,))
         failed = checks.flag_array("state['failed']", state["failed"], (count,))
@@ -222,7 +225,7 @@ class ContainerEnv(PickingEnv):
         self._blur, self._failed = blur, failed
         self._picks, self._unloaded = picks, unloaded
         generators.set_state_text(state["rng"], self.np_random)
-        if self._picks == self.max_picks:
+        if any(self._ends()):
             self._state = "finished"
         self._look()
 
@@ -243,7 +246,7 @@ class ContainerEnv(PickingEnv):
         super().close()
 
     def _fill(self, load: Load) -> None:
-        check_load(load, self.max_picks)
+        check_load(load)
         self.physics.reset(load)
         self._blur = self._drift(len(load))
         self._failed = np.zeros(len(load), dtype=bool)
@@ -261,9 +264,17 @@ class ContainerEnv(PickingEnv):
         present = np.flatnonzero(self.physics.present)
         positions = self.observed_positions()[present]
         rows = observation.nearest(positions)
-        self.visible = present[rows]
+        self.visible = np.full(task.N_VISIBLE, -1)
+        self.visible[: len(rows)] = present[rows]
         self._observation = self._features(positions[rows])
 
+    def _ends(self) -> tuple[bool, bool]:
+        """Whether the episode is terminated, and whether it is truncated."""
+        return self._unloaded == len(self.physics.load), self._picks == self.max_picks
+
     def _info(self) -> dict:
-        mask = (~self._failed[self.visible]).astype(np.int8)
-        return {"action_mask": mask, "unloaded": self._unloaded}
+        return {
+            "action_mask": self.action_masks().astype(np.int8),
+            "item_mask": (self.visible >= 0).astype(np.int8),
+            "unloaded": self._unloaded,
+        }

@@ -1,5 +1,6 @@
 """How well a policy picks."""
 
+import sys
 from collections.abc import Callable
 
 import gymnasium
@@ -12,6 +13,9 @@ from unload.env import ContainerEnv
 from unload.vector_env import ContainerVectorEnv
 
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
+# Failed picks in a row after which an episode without a limit is given up. A policy that
+# obeys the mask has tried every item after 128.
+GIVE_UP = 10 * task.N_VISIBLE
 
 
 def success_rate(rewards: np.ndarray) -> float:
@@ -39,7 +43,7 @@ def evaluate(
     seed: int = 0,
     physics: str = "table",
     mask: bool = True,
-    max_picks: int = task.MAX_PICKS,
+    max_picks: int | None = task.MAX_PICKS,
     **env_kwargs,
 ) -> pd.DataFrame:
     """Let a policy unload fresh containers.
@@ -54,13 +58,17 @@ def evaluate(
             the number of episodes.
         physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
             one after the other.
-        mask: whether the policy is told which items failed since the last success.
-        max_picks: picks per episode.
-        **env_kwargs: further arguments of ``ContainerEnv``.
+        mask: whether the policy is told which items failed since the last success. Which
+            rows hold an item it is told in any case.
+        max_picks: most picks per episode; fewer if the container is empty before. With None
+            it is unloaded completely, however many picks that takes; only an episode in
+            which 1280 picks in a row fail is given up.
+        **env_kwargs: further arguments of ``ContainerEnv``, such as ``stack``.
 
     Returns:
         One row per episode: ``success_rate``, ``unloaded`` (items), ``deadlocked``
-        (share of picks) and ``longest_deadlock`` (deadlocked picks in a row).
+        (share of picks) and ``longest_deadlock`` (deadlocked picks in a row); with
+        ``max_picks=None`` also ``picks`` (int) and ``emptied`` (bool, False if given up).
 
     Raises:
         TypeError, ValueError: an argument is not as described, or ``policy`` returns
@@ -69,7 +77,8 @@ def evaluate(
     checks.integer("episodes", episodes, 1)
     checks.integer("seed", seed, 0)
     checks.boolean("mask", mask)
-    checks.integer("max_picks", max_picks, 1)
+    if max_picks is not None:
+        checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
     at_once = task.NUM_ENVS if physics == "table" else 1
@@ -77,12 +86,14 @@ def evaluate(
     frames = []
     for first in range(0, episodes, at_once):
         seeds = load_seeds[first : first + at_once]
-        envs = _side_by_side(len(seeds), physics, max_picks=max_picks, **env_kwargs)
+        limit = sys.maxsize if max_picks is None else max_picks
+        envs = _side_by_side(len(seeds), physics, max_picks=limit, **env_kwargs)
         try:
-            frames.append(_play(envs, policy, seeds, max_picks, mask))
+            frames.append(_play(envs, policy, seeds, mask, give_up=max_picks is None))
         finally:
             envs.close()
-    return pd.concat(frames, ignore_index=True)
+    table = pd.concat(frames, ignore_index=True)
+    return table if max_picks is None else table.drop(columns=["picks", "emptied"])
 
 
 def _side_by_side(count: int, physics: str, **kwargs) -> gymnasium.vector.VectorEnv:
@@ -95,28 +106,43 @@ def _side_by_side(count: int, physics: str, **kwargs) -> gymnasium.vector.Vector
 
 
 def _play(
-    envs: gymnasium.vector.VectorEnv, policy: Policy, seeds: list[int], picks: int, mask: bool
+    envs: gymnasium.vector.VectorEnv, policy: Policy, seeds: list[int], mask: bool, give_up: bool
 ) -> pd.DataFrame:
-    """One episode of ``picks`` picks in each environment."""
+    """One episode in each environment; what follows after its end does not count."""
     rng = np.random.default_rng(seeds)
     rows = np.arange(len(seeds))
-    rewards, deadlocked = np.empty((2, picks, len(seeds)))
+    rewards, deadlocked = [], []  # of each step, (num_envs,)
+    running, emptied = np.ones(len(seeds), bool), np.zeros(len(seeds), bool)
+    picks, failures = np.zeros((2, len(seeds)), np.int64)  # so far, and failed ones in a row
     observations, infos = envs.reset(seed=seeds)
-    for pick in range(picks):
-        allowed = infos["action_mask"] if mask else np.ones_like(infos["action_mask"])
+    while running.any():
+        allowed = infos["action_mask" if mask else "item_mask"]
         actions = checks.integer_array(
             "what policy returned", policy(observations, allowed, rng), rows.shape
         )
         for action in (int(actions.min()), int(actions.max())):
             checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
-        deadlocked[pick] = infos["action_mask"][rows, actions] == 0
-        observations, rewards[pick], _, _, infos = envs.step(actions)
+        deadlocked.append(infos["action_mask"][rows, actions] == 0)
+        observations, reward, terminations, truncations, infos = envs.step(actions)
+        rewards.append(reward)
+        picks += running
+        failures = np.where(reward > 0, 0, failures + 1)
+        emptied |= running & terminations
+        running &= ~(terminations | truncations)
+        if give_up:
+            running &= failures < GIVE_UP
+    rewards, deadlocked = (
+        [each[:count] for count, each in zip(picks, np.transpose(steps))]
+        for steps in (rewards, deadlocked)
+    )
     return pd.DataFrame(
         {
-            "success_rate": [success_rate(each) for each in rewards.T],
-            "unloaded": (rewards > 0).sum(axis=0),
-            "deadlocked": deadlocked.mean(axis=0),
-            "longest_deadlock": [_longest_run(each) for each in deadlocked.T],
+            "success_rate": [success_rate(each) for each in rewards],
+            "unloaded": [(each > 0).sum() for each in rewards],
+            "deadlocked": [each.mean() for each in deadlocked],
+            "longest_deadlock": [_longest_run(each) for each in deadlocked],
+            "picks": picks,
+            "emptied": emptied,
         }
     )
 

@@ -51,7 +51,7 @@ def with_intervals(table: pd.DataFrame, by: Sequence[str], measures: Sequence[st
     Raises:
         TypeError, ValueError: a column is missing, or a measure is not finite.
     """
-    checks.entries("table", table, (*by, *measures))
+    checks.entries("table", dict(table), (*by, *measures))
     rows = []
     for key, group in table.groupby(list(by), sort=False):
         row = dict(zip(by, key)) | {"runs": len(group)}

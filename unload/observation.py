@@ -1,8 +1,15 @@
-"""What the agent sees: the items nearest to the entrance, scaled (Sec. III-B)."""
+"""What the agent sees: the items nearest to the entrance, scaled (Sec. III-B).
+
+The last items of a container fill the first rows of the observation only. The rows after
+them hold ``PADDING`` on all three axes: the corner of the container, where no item's centre
+can lie.
+"""
 
 import numpy as np
 
 from unload import checks, task
+
+PADDING = -1.0
 
 
 def distance(positions: np.ndarray) -> np.ndarray:
@@ -24,19 +31,14 @@ def nearest(positions: np.ndarray, count: int = task.N_VISIBLE) -> np.ndarray:
 
     Args:
         positions: (n, 3) float, centres in m.
-        count: how many to observe.
+        count: how many to observe, if there are as many.
 
     Returns:
-        (count,) int64, indices of the nearest items, nearest first. Of items at the same
-        distance the one with the smaller index comes first.
-
-    Raises:
-        ValueError: there are fewer than ``count`` positions.
+        (min(count, n),) int64, indices of the nearest items, nearest first. Of items at the
+        same distance the one with the smaller index comes first.
     """
-    distances = distance(positions)
-    if len(distances) < checks.integer("count", count, 1):
-        raise ValueError(f"positions holds {len(distances)} items; expected at least {count}")
-    return np.argsort(distances, kind="stable")[:count]
+    checks.integer("count", count, 1)
+    return np.argsort(distance(positions), kind="stable")[:count]
 
 
 def scale(positions: np.ndarray) -> np.ndarray:
@@ -50,3 +52,16 @@ def scale(positions: np.ndarray) -> np.ndarray:
     """
     positions = checks.finite_array("positions", positions, (None, 3))
     return (2 / task.CONTAINER * positions - 1).astype(np.float32)
+
+
+def holds_item(observations: np.ndarray) -> np.ndarray:
+    """Which rows hold an item and not padding.
+
+    Args:
+        observations: (..., items, 3) float, scaled positions. Equalized ones do not tell:
+            an item that is last on every axis has the ranks of padding.
+
+    Returns:
+        (..., items) bool.
+    """
+    return (np.asarray(observations) != PADDING).any(axis=-1)

@@ -60,9 +60,16 @@ class PickingEnv(gymnasium.Env):
         self._state = "closed"
 
     def _features(self, positions: np.ndarray) -> np.ndarray:
-        """The observation of items at ``positions`` (128, 3) in m, equalized if asked for."""
-        seen = scaled(positions)
-        return equalize(seen, self.ties) if self.equalize else seen
+        """The observation of up to 128 items at ``positions`` (n, 3) in m, nearest first.
+
+        Equalized if asked for, and padded.
+        """
+        seen = np.full((task.N_VISIBLE, 3), observation.PADDING, np.float32)
+        seen[: len(positions)] = scaled(positions)
+        if not self.equalize:
+            return seen
+        present = np.arange(task.N_VISIBLE) < len(positions)
+        return equalize(seen, self.ties, present=present)
 
     def _drift(self, count: int) -> np.ndarray:
         return drift(count, self.position_noise, self.np_random)

@@ -2,8 +2,9 @@
 
 A policy is a function ``policy(observations, masks, rng) -> actions`` on a batch:
 observations (batch, 128, 3) float as ``unload/Container-v0`` gives them, nearest item
-first and not equalized; masks (batch, 128), bool or 0 and 1, where a row may be picked; ``rng`` a
-``numpy.random.Generator``; actions (batch,) int64. ``unload.Greedy`` is a learned one.
+first and not equalized; masks (batch, 128), bool or 0 and 1, where a row may be picked, 0 at
+least in rows that hold no item; ``rng`` a ``numpy.random.Generator``; actions (batch,) int64.
+``unload.Greedy`` is a learned one.
 """
 
 from collections.abc import Callable

@@ -3,18 +3,22 @@
 ``unload.equalize`` sorts; here an item's rank is the number of smaller items, which needs
 no sorting, and when one item leaves and another comes, no recounting either. Arrays are
 (axes, items), so that the items of one axis lie side by side. Of equal items the first
-has the smaller rank, as in a stable sort.
+has the smaller rank, as in a stable sort. Where fewer than 128 items are left, they are the
+first ones of the arrays.
 """
 
 import numba
 import numpy as np
 
 from unload import task
+from unload.observation import PADDING
 
-# The equalized coordinate (2 r - (N-1)) / (N-1) by twice the rank, which ties make odd.
-LEVELS = ((np.arange(2 * task.N_VISIBLE - 1) - (task.N_VISIBLE - 1)) / (task.N_VISIBLE - 1)).astype(
-    np.float32
-)
+# The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
+# odd. An item that is alone gets 0.
+LEVELS = np.zeros((task.N_VISIBLE + 1, 2 * task.N_VISIBLE - 1), np.float32)
+for _items in range(2, task.N_VISIBLE + 1):
+    _last = _items - 1
+    LEVELS[_items, : 2 * _last + 1] = (np.arange(2 * _last + 1) - _last) / _last
 
 
 @numba.njit(cache=True)
@@ -48,6 +52,16 @@ def replace(values, ranks, row, value):
 
 
 @numba.njit(cache=True)
+def remove(values, ranks, row):
+    """Take the item in ``row`` out and move the later ones up; the last place is void then."""
+    left, last = ranks[row], len(values) - 1
+    for i in range(row, last):
+        values[i], ranks[i] = values[i + 1], ranks[i + 1]
+    for i in range(last):
+        ranks[i] -= np.int32(ranks[i] > left)
+
+
+@numba.njit(cache=True)
 def twice_shared_ranks(values, ranks, tolerance, twice):
     """Twice the mean rank of each run of sorted values at most ``tolerance`` apart.
 
@@ -68,30 +82,33 @@ def twice_shared_ranks(values, ranks, tolerance, twice):
 
 
 @numba.njit(cache=True)
-def features(values, ranks, equalize, average, tolerance, observation):
-    """Write an observation: the values themselves, or equalized.
+def features(values, ranks, equalize, average, tolerance, observation, items=task.N_VISIBLE):
+    """Write an observation: the values themselves, or equalized; then padding.
 
     Args:
-        values, ranks: (axes, items) float32 and int32.
+        values, ranks: (axes, rows) float32 and int32.
         equalize: whether to equalize, and, if so,
         average: whether items in a tie share their mean rank.
         tolerance: float32, see ``unload.equalize``.
-        observation: (items, axes) float32, filled.
+        observation: (rows, axes) float32, filled.
+        items: how many of the rows, the first ones, hold an item.
     """
-    axes, items = values.shape
-    twice = np.empty(items, np.int32)
+    axes, rows = values.shape
+    twice, levels = np.empty(items, np.int32), LEVELS[items]
+    if items < rows:
+        observation[items:] = PADDING
     for axis in range(axes):
         if not equalize:
             for i in range(items):
                 observation[i, axis] = values[axis, i]
             continue
         if average:
-            twice_shared_ranks(values[axis], ranks[axis], tolerance, twice)
+            twice_shared_ranks(values[axis, :items], ranks[axis, :items], tolerance, twice)
         else:
             for i in range(items):
                 twice[i] = 2 * ranks[axis, i]
         for i in range(items):
-            observation[i, axis] = LEVELS[twice[i]]
+            observation[i, axis] = levels[twice[i]]
 
 
 @numba.njit(cache=True)
@@ -117,4 +134,4 @@ def nearest_first(distances, seen, flags, equalize, average, tolerance, observat
         if equalize:
             for axis in range(axes):
                 rank(values[axis], ranks[axis])
-        features(values, ranks, equalize, average, tolerance, observations[env])
+        features(values, ranks, equalize, average, tolerance, observations[env], items)

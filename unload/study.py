@@ -6,17 +6,10 @@ times cheaper, and the search shows what it changes.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
-import numpy as np
-import pandas as pd
-
-from unload import files
-from unload.agent import Greedy, load_policy
 from unload.config import TrainConfig
-from unload.evaluate import evaluate
 
 # What the network sees of an item's position.
 FEATURES = {
@@ -26,10 +19,6 @@ FEATURES = {
 }
 FLOORS = (0.0, 0.05)  # of the exploration rate
 BASE = TrainConfig(batch_size=256, snapshots=20)
-LOADS = 200  # fresh containers that judge a trained policy
-SNAPSHOT_LOADS = 64  # that judge what it had learned on the way
-LOADS_SEED = 1000
-GOAL = 0.99  # MSR
 
 
 def factorial(picks: int = 2_000_000, seeds: int = 5) -> dict[str, TrainConfig]:
@@ -107,73 +96,3 @@ def features_of(config: TrainConfig) -> str:
     if not config.equalize:
         return "positions"
     return {"noise": "noisy ranks", "average": "tied ranks"}[config.ties]
-
-
-def judge(config: TrainConfig, folder: str | Path) -> tuple[dict, pd.DataFrame]:
-    """What a finished run in ``folder`` has learned, and when.
-
-    Returns:
-        A row: ``features``, the configuration's fields, and ``msr_mask`` and ``msr_no_mask``,
-        the MSR of the trained policy on 200 fresh loads, told which items failed since the
-        last success or not; ``deadlocked`` and ``longest_deadlock``, the share of picks in
-        deadlocks and the longest one in any load, without the mask; ``msr_training`` and
-        ``deadlocked_training`` over the last tenth of the training, ``deadlocked_overall`` over
-        all of it; ``picks_to_goal_mask`` and ``picks_to_goal_no_mask``, the first snapshot with an
-        MSR of 99 % and more on 64 loads, NaN if there is none.
-
-        The curve, one row per snapshot: ``picks``; ``success_rate``, ``deadlocked``, ``loss``
-        of the training since the last one; ``msr_mask`` and ``msr_no_mask``.
-    """
-    folder = Path(folder)
-    training = pd.read_csv(folder / "curve.csv")
-    snapshots = sorted((folder / "snapshots").glob("*.safetensors"))
-    points = []
-    start = 0
-    for path in snapshots:
-        picks, policy = int(path.stem), load_policy(path)
-        since = training[(training["picks"] > start) & (training["picks"] <= picks)]
-        means = since[["success_rate", "deadlocked", "loss"]].mean()
-        played = {
-            f"msr_{name}": _play(policy, SNAPSHOT_LOADS, mask)["success_rate"].mean()
-            for name, mask in (("mask", True), ("no_mask", False))
-        }
-        points.append({"picks": picks, **means, **played})
-        start = picks
-    curve = pd.DataFrame(points)
-    policy = load_policy(folder / "policy.safetensors")
-    masked, unmasked = (_play(policy, LOADS, mask) for mask in (True, False))
-    end = training[training["picks"] > 0.9 * config.picks]
-    row = {
-        "features": features_of(config),
-        **asdict(config),
-        "msr_mask": masked["success_rate"].mean(),
-        "msr_no_mask": unmasked["success_rate"].mean(),
-        "deadlocked": unmasked["deadlocked"].mean(),
-        "longest_deadlock": int(unmasked["longest_deadlock"].max()),
-        "msr_training": end["success_rate"].mean(),
-        "deadlocked_training": end["deadlocked"].mean(),
-        "deadlocked_overall": training["deadlocked"].mean(),
-    }
-    for name in ("mask", "no_mask"):
-        reached = curve.loc[curve[f"msr_{name}"] >= GOAL, "picks"]
-        row[f"picks_to_goal_{name}"] = reached.iloc[0] if len(reached) else np.nan
-    return row, curve
-
-
-def _play(policy: Greedy, loads: int, mask: bool) -> pd.DataFrame:
-    """Fresh containers; the environment equalizes, faster than the policy would."""
-    ready = Greedy(policy.network, equalize=False)
-    seen = {"equalize": policy.equalize, "ties": policy.ties}
-    return evaluate(ready, loads, LOADS_SEED, mask=mask, **seen)
-
-
-def read(experiment: str, folder: str | Path = files.DATA) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """An experiment's rows and curves, as ``judge`` gives them, with each run's name in ``run``.
-
-    Raises:
-        FileNotFoundError: the experiment has not been made.
-    """
-    folder = Path(folder) / "study"
-    rows = pd.read_csv(folder / f"{experiment}.csv")
-    curves = pd.read_csv(folder / f"{experiment}_curves.csv")
-    return rows, curves.merge(rows, on="run", suffixes=("", "_end"))

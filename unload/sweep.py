@@ -80,6 +80,21 @@ def run_sweep(
     return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
 
 
+def run_all(
+    configs: Mapping[str, TrainConfig], folder: str | Path, n_jobs: int, progress: bool
+) -> list[dict]:
+    """``run_sweep``, insisting on every run; their records.
+
+    Raises:
+        RuntimeError: a run failed; the message says which and why.
+    """
+    report = run_sweep(configs, folder, n_jobs, progress=progress)
+    failed = report[report["error"] != ""]
+    if len(failed):
+        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+    return [files.read_json(Path(folder) / name / "record.json") for name in configs]
+
+
 def _is_plain(name: object) -> bool:
     """Whether a run's name leads to a folder of its own inside the sweep's."""
     if not isinstance(name, str):

@@ -269,7 +269,7 @@ class _Run:
 
     def _pick(self, actions: np.ndarray) -> np.ndarray:
         """Pick in every environment and remember it; the rewards."""
-        following, rewards, terminations, truncations, infos = self.envs.step(actions)
+        following, rewards, terminations, _, infos = self.envs.step(actions)
         batch = {
             "observations": self.observations,
             "actions": actions,
@@ -281,7 +281,7 @@ class _Run:
         self.actions[self.steps] = actions
         self.steps += 1
         self.observations, self.masks = following, infos["action_mask"]
-        if truncations.all():  # they all start together, and so end together
+        if self.steps % self.config.max_picks == 0:  # whole episodes, unless a container is empty
             self.starts.append((self.steps, self.envs.get_state()))
             while (self.steps - self.starts[1][0]) * self.config.num_envs >= self.replay.size:
                 self.starts.popleft()

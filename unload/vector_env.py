@@ -2,11 +2,12 @@
 
 ``gymnasium.make_vec(id, num_envs)`` makes them. Each behaves, bit for bit, as Gymnasium's
 ``SyncVectorEnv`` of the single environments with autoreset in the same step: same seeds,
-same actions, same observations, rewards, masks and infos. Since no episode ends before its
-last pick, all end together.
+same actions, same observations, rewards, masks and infos. Each environment begins its next
+episode when its own has ended.
 """
 
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import gymnasium
@@ -66,9 +67,11 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._features = (self.equalize, ties == "average", np.float32(TOLERANCE))
         self._rngs: list[np.random.Generator] = []
-        self._starts = np.zeros(0, str)  # the generators' states before the episode's reset
-        self._actions = np.zeros((0, self.num_envs), np.int64)  # of the episode so far
-        self._picks = 0
+        self._starts: list[str] = []  # the generators' states before each episode's reset
+        # Of each episode so far. An environment that waits for others counts up to 0.
+        self._picks = np.zeros(self.num_envs, np.int64)
+        # The last actions, (num_envs,) each: no episode is longer.
+        self._actions: deque[np.ndarray] = deque(maxlen=self.max_picks)
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options=None):
         """Start an episode in every environment. There are no options.
@@ -93,10 +96,14 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             rng if one is None and rng is not None else seeding.np_random(one)[0]
             for one, rng in zip(seeds, old)
         ]
-        return self._start_episode()
+        return self._restart()
 
     def step(self, actions: np.ndarray):
-        """Pick row ``actions[i]``, (num_envs,) int, in environment i."""
+        """Pick row ``actions[i]``, (num_envs,) int, in environment i.
+
+        Where an episode ends, the next one begins: the observation and infos are the
+        reset's, and ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones.
+        """
         self._check_started()
         actions = checks.integer_array("actions", actions, (self.num_envs,))
         if actions.min() < 0 or actions.max() >= task.N_VISIBLE:
@@ -104,32 +111,63 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
                 f"actions holds {actions.min()} to {actions.max()}; "
                 f"expected 0 to {task.N_VISIBLE - 1}"
             )
-        self._actions[self._picks] = actions
+        return self._advance(actions)
+
+    def _advance(self, actions: np.ndarray):
+        """``step`` by checked actions; where one is -1, the environment waits."""
+        self._actions.append(actions)
         rewards = self._pick(actions)
-        observations, infos = self._look(), self._infos() | self._pick_infos()
         self._picks += 1
-        terminations = np.zeros(self.num_envs, bool)
-        truncations = np.full(self.num_envs, self._picks == self.max_picks)
-        if truncations[0]:
-            final = {"final_obs": np.fromiter(observations, object), "final_info": infos}
-            observations, infos = self._start_episode()
-            infos |= _in_all(final)
+        terminations = self._emptied()
+        truncations = self._picks == self.max_picks
+        observations, infos = self._look(), self._infos() | self._pick_infos()
+        ended = terminations | truncations
+        if ended.any():
+            observations, infos = self._begin_next(ended, observations, infos)
+        else:
+            infos = _flagged(infos, ~ended)
         return observations, rewards, terminations, truncations, infos
+
+    def _begin_next(self, ended: np.ndarray, last: np.ndarray, last_infos: dict[str, np.ndarray]):
+        """Begin the next episode where one has ended; what ``step`` shows and tells then.
+
+        Args:
+            ended: (num_envs,) bool.
+            last, last_infos: what was seen and told after the pick in every environment.
+        """
+        self._begin(ended)
+        infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
+        if not ended.all():  # a reset does not tell of a pick
+            picks = {name: each for name, each in last_infos.items() if name not in infos}
+            infos |= _flagged(_masked(picks, ~ended), ~ended)
+        final = np.full(self.num_envs, None)
+        for env in np.flatnonzero(ended):
+            final[env] = last[env]
+        infos |= {"final_obs": final, "_final_obs": ended}
+        final_infos = _flagged(_masked(last_infos, ended), ended)
+        infos |= {"final_info": final_infos, "_final_info": ended}
+        return self._look(), infos
 
     def get_state(self) -> dict[str, np.ndarray]:
         """All that ``set_state`` needs to go on from here.
 
         Returns:
-            ``rng``: (num_envs,) str, the generators' states before the episode's reset, and
-            ``actions``: (picks, num_envs) int64, the picks made since.
+            ``rng``: (num_envs,) str, the generators' states before each episode's reset, and
+            ``actions``: (picks, num_envs) int64, the picks made since, the latest in the last
+            row. -1 stands for picks before the environment's episode began.
         """
         self._check_started()
-        return {"rng": self._starts.copy(), "actions": self._actions[: self._picks].copy()}
+        steps = int(self._picks.max())
+        latest = list(self._actions)[len(self._actions) - steps :]
+        actions = np.array(latest, np.int64).reshape(steps, self.num_envs)
+        actions[np.arange(steps)[:, np.newaxis] < steps - self._picks] = -1
+        return {"rng": np.array(self._starts), "actions": actions}
 
     def set_state(self, state: dict[str, np.ndarray]):
         """Go on from what ``get_state`` returned, here or in another environment.
 
-        The picks are repeated; they may be those of several episodes.
+        The picks are repeated; they may be those of several episodes. An environment whose
+        first actions are -1 waits for the others meanwhile.
 
         Returns:
             Observations and infos after the last of them.
@@ -145,28 +183,40 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         for text in texts:
             generators.check_state_text("state['rng']", text)
         actions = checks.integer_array("state['actions']", state["actions"], (None, self.num_envs))
-        if actions.size and not (0 <= actions.min() and actions.max() < task.N_VISIBLE):
+        if actions.size and not (-1 <= actions.min() and actions.max() < task.N_VISIBLE):
             raise ValueError(
                 f"state['actions'] holds {actions.min()} to {actions.max()}; "
-                f"expected 0 to {task.N_VISIBLE - 1}"
+                f"expected 0 to {task.N_VISIBLE - 1}, or -1"
             )
+        if (actions[1:] < 0)[actions[:-1] >= 0].any():
+            raise ValueError("state['actions'] holds -1 after a pick; expected -1 before all picks")
         self._rngs = [np.random.default_rng() for _ in range(self.num_envs)]
         for rng, text in zip(self._rngs, texts):
             generators.set_state_text(text, rng)
-        observations, infos = self._start_episode()
+        observations, infos = self._restart()
+        self._picks -= (actions < 0).sum(axis=0)
         for row in actions:
-            observations, _, _, _, infos = self.step(row)
+            observations, _, _, _, infos = self._advance(row)
         return observations, infos
 
     def close_extras(self, **kwargs) -> None:
         """Nothing to free."""
 
-    def _start_episode(self):
-        self._starts = np.array([generators.state_text(rng) for rng in self._rngs])
-        self._actions = np.zeros((self.max_picks, self.num_envs), np.int64)
-        self._picks = 0
-        self._fill()
-        return self._look(), self._infos()
+    def _restart(self):
+        """Begin an episode in every environment; what ``reset`` shows and tells."""
+        everywhere = np.ones(self.num_envs, bool)
+        self._starts = [""] * self.num_envs
+        self._actions.clear()
+        self._begin(everywhere)
+        return self._look(), _flagged(self._infos(), everywhere)
+
+    def _begin(self, where: np.ndarray) -> None:
+        """Begin an episode in some environments, (num_envs,) bool."""
+        envs = np.flatnonzero(where)
+        for env in envs:
+            self._starts[env] = generators.state_text(self._rngs[env])
+        self._picks[envs] = 0
+        self._fill(envs)
 
     def _check_open(self) -> None:
         if self.closed:
@@ -178,12 +228,16 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             raise ResetNeeded("the episodes are not started; call reset first")
 
     @abstractmethod
-    def _fill(self) -> None:
-        """Begin an episode in every environment."""
+    def _fill(self, envs: np.ndarray) -> None:
+        """Put fresh items into the environments of these numbers, (k,) int64."""
 
     @abstractmethod
     def _pick(self, actions: np.ndarray) -> np.ndarray:
-        """Carry out checked actions; the rewards, (num_envs,) float64."""
+        """Carry out checked actions where they are not -1; the rewards, (num_envs,) float64."""
+
+    @abstractmethod
+    def _emptied(self) -> np.ndarray:
+        """Where the last item has been unloaded, (num_envs,) bool."""
 
     @abstractmethod
     def _look(self) -> np.ndarray:
@@ -191,17 +245,24 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
 
     @abstractmethod
     def _infos(self) -> dict[str, np.ndarray]:
-        """What ``reset`` and ``step`` tell."""
+        """What ``reset`` and ``step`` tell, without Gymnasium's flags."""
 
     def _pick_infos(self) -> dict[str, np.ndarray]:
         """What only ``step`` tells."""
         return {}
 
 
-def _in_all(infos: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Add Gymnasium's flags that say in which environments there is such an info: in all."""
-    everywhere = np.ones(len(next(iter(infos.values()))), bool)
-    return infos | {f"_{name}": everywhere for name in infos}
+def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
+    """Add Gymnasium's flags that say in which environments there are such infos."""
+    return infos | {f"_{name}": where for name in infos}
+
+
+def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
+    """The infos of some environments, and 0 elsewhere."""
+    infos = {name: values.copy() for name, values in infos.items()}
+    for values in infos.values():
+        values[~where] = 0
+    return infos
 
 
 class ContainerVectorEnv(PickingVectorEnv):
@@ -215,7 +276,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         stack: makes a ``Load`` from a ``numpy.random.Generator``.
 
     Attributes:
-        visible: (num_envs, 128) int32, the item in each row of the observations.
+        visible: (num_envs, 128) int32, the item in each row of the observations, -1 in rows
+            without.
     """
 
     def __init__(
@@ -237,15 +299,15 @@ class ContainerVectorEnv(PickingVectorEnv):
         return self._containers.visible.copy()
 
     def action_masks(self) -> np.ndarray:
-        """(num_envs, 128) bool, False for rows that failed since the last successful pick."""
+        """(num_envs, 128) bool, False for rows without a box or failed since the last success."""
         self._check_started()
         return self._containers.masks.astype(bool)
 
-    def _fill(self) -> None:
-        self._unloaded = np.zeros(self.num_envs, np.int64)
-        for env, rng in enumerate(self._rngs):
+    def _fill(self, envs: np.ndarray) -> None:
+        for env in envs:
+            rng = self._rngs[env]
             load = self.stack(rng)
-            check_load(load, self.max_picks)
+            check_load(load)
             self._put(env, load, drift(len(load), self.position_noise, rng))
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
@@ -260,6 +322,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.links[env, : len(links)] = links
         state.present[env, :count] = True
         state.present[env, count:] = False
+        state.left[env] = count
         state.seen[env, :count] = scaled(positions)
         state.by_distance[env, :count] = observation.nearest(positions, count)
         containers.start(state, env, *self._features)
@@ -283,9 +346,7 @@ class ContainerVectorEnv(PickingVectorEnv):
             for env in np.flatnonzero(distances == containers.UNKNOWN):
                 distances[env] = self._lift(env, items[env])
         self._items, self._distances = items, distances
-        rewards = containers.pick(state, actions, distances, *self._features)
-        self._unloaded += rewards > 0
-        return rewards
+        return containers.pick(state, actions, distances, *self._features)
 
     def _lift(self, env: int, item: int) -> float:
         """Ask PyBullet for a lift that the table does not know, and let it remember."""
@@ -295,50 +356,62 @@ class ContainerVectorEnv(PickingVectorEnv):
         load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
         return self.table.lift(Surroundings(load, present[: len(boxes)]).situation(item))
 
+    def _emptied(self) -> np.ndarray:
+        return self._containers.left == 0
+
     def _look(self) -> np.ndarray:
         return self._containers.observations.copy()
 
     def _infos(self) -> dict[str, np.ndarray]:
-        return _in_all(
-            {"action_mask": self._containers.masks.copy(), "unloaded": self._unloaded.copy()}
-        )
+        return {
+            "action_mask": self._containers.masks.copy(),
+            "item_mask": (self._containers.visible >= 0).view(np.int8),
+            "unloaded": self._containers.unloaded.copy(),
+        }
 
     def _pick_infos(self) -> dict[str, np.ndarray]:
-        return _in_all({"item": self._items, "distance": self._distances})
+        return {"item": self._items, "distance": self._distances}
 
 
 class HighestItemVectorEnv(PickingVectorEnv):
     """``unload/HighestItem-v0``, many at once. See ``HighestItemEnv``."""
 
-    def _fill(self) -> None:
-        self._draw()
+    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
+        super().__init__(num_envs, **settings)
+        self._observations = np.zeros(self.observation_space.shape, np.float32)
+        self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
 
-    def _pick(self, actions: np.ndarray) -> np.ndarray:
-        rewards = np.where(self._highest[np.arange(self.num_envs), actions], 1.0, -1.0)
-        self._draw()
-        return rewards
-
-    def _draw(self) -> None:
-        """New items in every environment."""
-        shape = self.num_envs, task.N_VISIBLE
+    def _fill(self, envs: np.ndarray) -> None:
+        shape = len(envs), task.N_VISIBLE
         places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
-        for env, rng in enumerate(self._rngs):
-            places[env] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
-            offsets[env] = drift(task.N_VISIBLE, self.position_noise, rng)
+        for number, env in enumerate(envs):
+            rng = self._rngs[env]
+            places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
+            offsets[number] = drift(task.N_VISIBLE, self.position_noise, rng)
         positions = (places + offsets).reshape(-1, 3)
-        self._observations = np.empty((*shape, 3), np.float32)
-        self._highest = np.empty(shape, bool)
+        observations, highest = np.empty((*shape, 3), np.float32), np.empty(shape, bool)
         nearest_first(
             observation.distance(positions).reshape(shape),
             scaled(positions).reshape(*shape, 3),
             highest_places(places),
             *self._features,
-            self._observations,
-            self._highest,
+            observations,
+            highest,
         )
+        self._observations[envs], self._highest[envs] = observations, highest
+
+    def _pick(self, actions: np.ndarray) -> np.ndarray:
+        rewards = np.where(self._highest[np.arange(self.num_envs), actions], 1.0, -1.0)
+        waiting = actions < 0
+        rewards[waiting] = 0
+        self._fill(np.flatnonzero(~waiting))
+        return rewards
+
+    def _emptied(self) -> np.ndarray:
+        return np.zeros(self.num_envs, bool)  # there are always 128 items
 
     def _look(self) -> np.ndarray:
-        return self._observations
+        return self._observations.copy()
 
     def _infos(self) -> dict[str, np.ndarray]:
-        return _in_all({"action_mask": np.ones((self.num_envs, task.N_VISIBLE), np.int8)})
+        return {"action_mask": np.ones((self.num_envs, task.N_VISIBLE), np.int8)}
