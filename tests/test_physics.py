@@ -101,6 +101,17 @@ def test_boxes_of_a_full_world_at_rest_for_long_still_lift(make, small_load):
     assert physics.lift(top) == pytest.approx(ONE_BOX, rel=0.02)
 
 
+@pytest.mark.parametrize("scale", [0.8, 1.2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_boxes_of_another_scale_lift_alike(make, rng, kind, scale):
+    load = stack_load(rng, walls=1, scale=scale)
+    physics = make(kind, load)
+    around = Surroundings(load, physics.present)
+    on_top = np.array([len(around.on_top(item)) for item in range(len(load))])
+    assert lifts(physics, np.flatnonzero(on_top == 0)[:3]) == pytest.approx([ONE_BOX] * 3, rel=0.05)
+    assert max(lifts(physics, np.flatnonzero(on_top > 2)[:3])) < 0.02
+
+
 # --- one physics against another ----------------------------------------------------
 
 
@@ -237,26 +248,37 @@ def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(make, small_load)
     assert (physics.positions() == settled).all()
 
 
+def test_the_ways_to_simulate_a_full_world_lift_alike(make, rng):
+    """Rigid bodies, which only ``"keep"`` uses, and multibodies."""
+    load = stack_load(rng, walls=1)
+    around = Surroundings(load, np.ones(len(load), dtype=bool))
+    for item in np.argsort([len(around.on_top(item)) for item in range(len(load))])[::20]:
+        kept, restored = (make("full", load, after_pick=how) for how in ("keep", "restore"))
+        assert kept.lift(item) == pytest.approx(restored.lift(item), abs=0.005)
+
+
 # --- reset --------------------------------------------------------------------------
 
 
-def test_reused_bodies_lift_as_fresh_ones(make, rng):
+@pytest.mark.parametrize("after_pick", ["restore", "keep"])
+def test_reused_bodies_lift_as_fresh_ones(make, rng, after_pick):
     first, second = (stack_load(rng, walls=1) for _ in range(2))
-    reused = make("full", first)
+    reused = make("full", first, after_pick=after_pick)
     items = range(0, min(len(first), len(second)), 12)
     lifts(reused, items)
     top = int(np.argmax(first.positions[:, 2]))
     reused.remove(top)
     reused.reset(second)
-    fresh = make("full", second)
+    fresh = make("full", second, after_pick=after_pick)
     assert reused.present.all()
     assert (reused.positions() == second.positions).all()
     assert lifts(reused, items) == pytest.approx(lifts(fresh, items), abs=0.003)
 
 
-def test_boxes_stay_in_place_after_a_reset(make, rng):
+@pytest.mark.parametrize("after_pick", ["restore", "keep"])
+def test_boxes_stay_in_place_after_a_reset(make, rng, after_pick):
     """Contacts of the old load, if Bullet kept them, would fling boxes about."""
-    physics = make("full", stack_load(rng, walls=1))
+    physics = make("full", stack_load(rng, walls=1), after_pick=after_pick)
     for _ in range(10):
         load = stack_load(rng, walls=1)
         physics.reset(load)

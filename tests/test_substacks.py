@@ -3,19 +3,24 @@ import itertools
 import numpy as np
 import pytest
 
-from unload import task
+from unload import observation, task
+from unload.boxes import ABOVE, BELOW, BESIDE
+from unload.env import ContainerEnv
 from unload.substacks import (
     CELL,
     CELLS_WIDE,
     COLUMNS,
     DEPTH,
+    FRONT_WALLS,
     PACKAGES,
     ROWS,
     ROWS_HIGH,
     WALLS,
     Load,
     build_load,
+    front_walls,
     stack_load,
+    substacks_that_fit,
     wall_cells,
 )
 
@@ -105,6 +110,94 @@ def test_build_load_places_the_walls_from_the_rear():
     assert load.positions[:, 2].max() < 3 * ROWS_HIGH * CELL
 
 
+# --- other scales -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scale", "fit"),
+    [
+        (1, (12, 3, 4)),
+        (0.8, (15, 4, 4)),
+        (1.2, (10, 3, 3)),
+        (0.5, (24, 7, 7)),
+        (1.5, (8, 2, 2)),
+    ],
+)
+def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
+    walls, rows, columns = fit
+    assert substacks_that_fit(scale) == fit
+    load = stack_load(rng, scale=scale)
+    reach = (load.positions + load.sizes / 2).max(axis=0)
+    width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale
+    height = rows * ROWS_HIGH * CELL * scale
+    assert reach == pytest.approx([7.0, width, height])
+    # Boxes do not overlap, or there were no load: so they leave no hole.
+    assert load.sizes.prod(axis=1).sum() == pytest.approx(7.0 * width * height)
+    assert len(np.unique(load.walls)) == walls
+    # No further substack would fit.
+    assert width + 10 * CELL * scale > 2.5 and height + ROWS_HIGH * CELL * scale > 2.5
+    expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
+    assert load.sizes == pytest.approx(scale * expected)
+
+
+def test_boxes_of_another_scale_touch_as_before(rng):
+    variants = rng.integers(3, size=(12, 3, 4))
+    load, small = build_load(variants), build_load(variants, 0.8)
+    assert (load.contacts.starts == small.contacts.starts).all()
+    for kind, box in itertools.product((ABOVE, BELOW, BESIDE), range(len(load))):
+        touching = (each.contacts.of(kind, box).tolist() for each in (load, small))
+        assert len({frozenset(boxes) for boxes in touching}) == 1
+
+
+@pytest.mark.parametrize("scale", [0.8, 1.2])
+def test_every_box_of_another_scale_is_supported(rng, scale):
+    load = stack_load(rng, scale=scale)
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    for box in np.flatnonzero(low[:, 2] > 1e-9):
+        below = load.contacts.of(BELOW, box)
+        shared = np.minimum(high[below, 1], high[box, 1]) - np.maximum(low[below, 1], low[box, 1])
+        assert shared.sum() == pytest.approx(load.sizes[box, 1])  # along its whole width
+
+
+def test_scale_1_is_the_papers_load():
+    default, named = (stack_load(np.random.default_rng(3), **kw) for kw in ({}, {"scale": 1.0}))
+    assert default.positions.tobytes() == named.positions.tobytes()
+    assert len(stack_load(np.random.default_rng(3), walls=2, scale=0.8)) < 300
+
+
+# --- the front ----------------------------------------------------------------------
+
+
+def test_front_walls_keep_their_place(full_load):
+    front = front_walls(full_load, 3)
+    kept = full_load.walls >= WALLS - 3
+    for name in FIELDS:
+        assert (getattr(front, name) == getattr(full_load, name)[kept]).all()
+    assert (front_walls(full_load, WALLS).positions == full_load.positions).all()
+    assert (front_walls(front, 2).positions == front_walls(full_load, 2).positions).all()
+
+
+def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
+    for _ in range(50):
+        load = stack_load(rng)
+        seen = observation.nearest(load.positions, task.N_VISIBLE + 100)
+        assert load.walls[seen].min() > WALLS - FRONT_WALLS
+
+
+def test_the_front_is_picked_as_the_whole_load(full_load):
+    envs = [ContainerEnv("table", max_picks=100, position_noise=0) for _ in range(2)]
+    for env, load in zip(envs, (full_load, front_walls(full_load))):
+        env.reset(options={"load": load})
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        action = int(rng.integers(40))
+        (seen, reward, *_), (also_seen, same_reward, *_) = (env.step(action) for env in envs)
+        assert (seen == also_seen).all() and reward == same_reward
+
+
+# --- a load -------------------------------------------------------------------------
+
+
 def test_a_load_cannot_be_changed(full_load):
     for name in FIELDS:
         with pytest.raises(ValueError, match="read-only"):
@@ -188,3 +281,17 @@ def test_bad_arguments_of_stack_load_are_refused(rng):
         stack_load(0)
     with pytest.raises(ValueError, match="walls is 0"):
         stack_load(rng, walls=0)
+    with pytest.raises(ValueError, match=r"scale is 0.1; expected .*\[0.5, 1.5\]"):
+        stack_load(rng, scale=0.1)
+    with pytest.raises(TypeError, match="scale is '1'"):
+        stack_load(rng, scale="1")
+    with pytest.raises(ValueError, match=r"variants has shape .* expected \(any, any, 3\)"):
+        build_load(np.zeros((1, 3, 4), dtype=int), scale=1.2)
+    with pytest.raises(ValueError, match="inside the container"):
+        build_load(np.zeros((1, 4, 4), dtype=int))
+
+
+@pytest.mark.parametrize(("count", "error"), [(0, ValueError), (13, ValueError), (2.0, TypeError)])
+def test_bad_numbers_of_front_walls_are_refused(full_load, count, error):
+    with pytest.raises(error, match=f"count is {count}"):
+        front_walls(full_load, count)

@@ -33,7 +33,7 @@ def assert_same(one, other) -> None:
         assert one.keys() == other.keys()
         for name in one:
             assert_same(one[name], other[name])
-    elif isinstance(one, (tuple, list)) or getattr(one, "dtype", None) == object:
+    elif isinstance(one, (tuple, list)) or getattr(one, "dtype", None) == np.dtype(object):
         assert len(one) == len(other)
         for a, b in zip(one, other):
             assert_same(a, b)

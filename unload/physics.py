@@ -181,7 +181,8 @@ class FullPhysics(Physics):
     Args:
         after_pick: what becomes of the other boxes after a pick. ``"restore"`` puts all
             back, ``"restore_failure"`` only after a failed lift, ``"keep"`` leaves
-            whatever the simulation made of them: they drift.
+            whatever the simulation made of them: they drift. ``"keep"`` simulates them
+            as plain rigid bodies, the others as multibodies, see ``unload.bullet.World``.
     """
 
     def __init__(self, after_pick: str = "restore") -> None:
@@ -189,9 +190,10 @@ class FullPhysics(Physics):
         super().__init__()
         self.after_pick = after_pick
         self.exact = after_pick == "restore"
-        # Moving a multibody is cheap; plain rigid bodies would be faster to lift, but each
-        # move rebuilds a part of Bullet's search tree: slower than creating them anew.
-        self._world = World(maximal_coordinates=False)
+        # Rigid bodies are twice as fast to lift, but moving them far rebuilds a part of
+        # Bullet's search tree: a reset takes longer than creating them anew. Where nothing
+        # is put back, resets are rare beside lifts.
+        self._world = World(maximal_coordinates=after_pick == "keep")
         self._bodies_of_size: dict[tuple[int, ...], list[int]] = {}  # by edges in micrometres
         self._bodies: list[int] = []  # of the load's items
         length, width, height = task.CONTAINER

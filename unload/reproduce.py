@@ -5,6 +5,10 @@
     python -m unload.reproduce observation    Figs. 4–6
     python -m unload.reproduce tuning         Figs. 8–10
     python -m unload.reproduce training       Figs. 11 and 12
+    python -m unload.reproduce study          why 60 %: the controlled experiments
+    python -m unload.reproduce offline        what random picks alone teach
+    python -m unload.reproduce comparison     policies under other conditions
+    python -m unload.reproduce robustness     policies with every box simulated
     python -m unload.reproduce paper          all of them
 
 File names and columns are those that the paper's own plots read. What has been computed is
@@ -28,16 +32,25 @@ from tqdm import tqdm
 from unload import checks, files, observation, policies, task, tuning
 from unload.agent import save_policy
 from unload.agreement import agreement_data
+from unload.comparison import comparison_data
 from unload.config import TrainConfig
 from unload.equalization import equalize
 from unload.evaluate import evaluate
+from unload.judge import study_data
 from unload.lift_table import LiftTable
+from unload.offline import offline_data
+from unload.players import POLICIES
 from unload.provenance import joined, run_record, write_provenance
-from unload.sweep import run_sweep
+from unload.robustness import robustness_data
+from unload.study import EXPERIMENTS
+from unload.sweep import run_all
 from unload.train import TrainResult, train
 
 COMMAND = "python -m unload.reproduce"
-PARTS = ("lifts", "agreement", "observation", "tuning", "training")
+PARTS = (
+    "lifts", "agreement", "observation", "tuning", "training", "study", "offline", "comparison",
+    "robustness",
+)  # fmt: skip
 PAPER_PICKS = TrainConfig().picks
 SEEDS = (0, 1, 2)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
@@ -170,7 +183,7 @@ def tuning_data(
     """
     folder, kept = Path(folder), Path(runs_dir) / f"tuning/{steps}_steps"
     configs = tuning.tuning_grid(learning_rates, batch_sizes, runs, steps=steps)
-    records = _sweep(configs, kept, n_jobs, progress)
+    records = run_all(configs, kept, n_jobs, progress)
     curves = {name: train(config, kept / name).curve for name, config in configs.items()}
     for old in folder.glob("dummy_sim_*/*_curve_*.csv"):
         old.unlink()  # it may be of a run that is not among these
@@ -230,7 +243,7 @@ def training_data(
         f"seed_{seed}": TrainConfig(picks=picks, seed=seed, log_interval=LOG_INTERVAL)
         for seed in seeds
     }
-    records = _sweep(configs, kept, n_jobs, progress)
+    records = run_all(configs, kept, n_jobs, progress)
     results = [train(config, kept / name) for name, config in configs.items()]
     for old in (*folder.glob("*_agent_seed_*.csv"), *folder.glob("policies/paper_seed_*")):
         old.unlink()  # it may be of a seed that is not among these
@@ -285,15 +298,6 @@ def training_summary(result: TrainResult) -> dict[str, float]:
     return row | {"deadlocked_no_mask": table["deadlocked"].mean()}
 
 
-def _sweep(configs: dict[str, TrainConfig], folder: Path, n_jobs: int, progress: bool) -> list:
-    """Train; the records of the runs."""
-    report = run_sweep(configs, folder, n_jobs, progress=progress)
-    failed = report[report["error"] != ""]
-    if len(failed):
-        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
-    return [files.read_json(folder / name / "record.json") for name in configs]
-
-
 def _shared(configs: dict[str, TrainConfig]) -> dict:
     """The fields of the configuration in which all runs agree."""
     fields = [asdict(config) for config in configs.values()]
@@ -344,6 +348,8 @@ def main() -> None:
     add("--batch-sizes", type=int, nargs="+", default=tuning.BATCH_SIZES, help="tuned")
     add("--runs", type=int, default=tuning.RUNS, help="of each tuned configuration")
     add("--steps", type=int, default=tuning.STEPS, help="of a tuning run")
+    add("--experiments", nargs="+", choices=EXPERIMENTS, default=EXPERIMENTS, help="of the study")
+    add("--policies", nargs="+", choices=POLICIES, default=POLICIES, help="of the robustness")
     options = parser.parse_args()
     chosen = {options.what}
     if "paper" in chosen:
@@ -364,6 +370,15 @@ def main() -> None:
         )
     if "training" in chosen:
         training_data(options.picks, options.seeds, n_jobs=options.jobs)
+    if "study" in chosen:
+        for experiment in options.experiments:
+            study_data(experiment, n_jobs=options.jobs)
+    if "offline" in chosen:
+        offline_data(n_jobs=options.jobs)
+    if "comparison" in chosen:
+        comparison_data(n_jobs=options.jobs)
+    if "robustness" in chosen:
+        robustness_data(options.policies, n_jobs=options.jobs)
 
 
 if __name__ == "__main__":
