@@ -137,6 +137,6 @@ def test_absent_and_unknown_policies_are_named(quick, monkeypatch, tmp_path):
     monkeypatch.setattr(files, "DATA", tmp_path)
     with pytest.raises(FileNotFoundError, match="policies/paper.safetensors is absent"):
         quick("highest", "paper")
-    with pytest.raises(ValueError, match="policy is 'lowest'; expected one of 'highest'"):
+    with pytest.raises(ValueError, match="policy is 'lowest'; expected one of 'random'"):
         quick("lowest")
     assert not (tmp_path / "runs").exists()

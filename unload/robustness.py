@@ -190,7 +190,8 @@ def _kept(question: dict, folder: Path) -> tuple[dict[str, float], float]:
     if kept.get("question") == question:
         return kept["row"], kept["seconds"]
     start = time.monotonic()
-    row = play(find_policy(name, files.DATA), after_pick, question["seed"], question["picks"], stack=front_load)
+    policy = find_policy(name, files.DATA)
+    row = play(policy, after_pick, question["seed"], question["picks"], stack=front_load)
     seconds = time.monotonic() - start
     files.write_json(path, {"question": question, "row": row, "seconds": seconds})
     return row, seconds
