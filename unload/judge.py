@@ -17,7 +17,7 @@ from unload.sweep import run_all
 
 COMMAND = "python -m unload.reproduce study"
 LOADS = 200  # fresh containers that judge a trained policy
-SNAPSHOT_LOADS = 64  # that judge what it had learned on the way
+SNAPSHOT_LOADS = 32  # that judge what it had learned on the way
 LOADS_SEED = 1000
 GOAL = 0.99  # MSR
 
@@ -83,7 +83,7 @@ def judge(config: TrainConfig, folder: str | Path) -> tuple[dict, pd.DataFrame]:
         deadlocks and the longest one in any load, without the mask; ``msr_training`` and
         ``deadlocked_training`` over the last tenth of the training, ``deadlocked_overall``
         over all of it; ``picks_to_goal_mask`` and ``picks_to_goal_no_mask``, the first
-        snapshot with an MSR of 99 % and more on 64 loads, NaN if there is none.
+        snapshot with an MSR of 99 % and more on 32 loads, NaN if there is none.
 
         The curve, one row per snapshot: ``picks``; ``success_rate``, ``deadlocked`` and
         ``loss`` of the training since the last one; ``msr_mask`` and ``msr_no_mask``.
