@@ -27,7 +27,7 @@ PARTS = {
     "choose": (unload.DQN, "choose"),
     "step": (ContainerVectorEnv, "step"),
     "add": (ReplayBuffer, "add"),
-    "sample": (ReplayBuffer, "sample"),
+    "sample": (ReplayBuffer, "sample_rows"),
     "update": (unload.DQN, "update"),
     "gradients": (fused, "loss_and_gradients"),
 }
@@ -110,7 +110,7 @@ def _floors(config: unload.TrainConfig) -> dict[str, tuple[float, str]]:
         "choose": (CHOOSE * greedy * features * operation, f"{CHOOSE} operations per feature"),
         "environments": (2 * written * byte, "write the observations"),
         "remember": (2 * written * byte, "copy the observations"),
-        "sample": (2 * config.batch_size * OBSERVATION * byte, "copy the batch"),
+        "sample": (8 * config.batch_size * byte, "write the rows' numbers"),
         "gradients": (
             LEARN * config.batch_size * features * operation,
             f"{LEARN} operations per feature",

@@ -1,6 +1,8 @@
 """The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -133,7 +135,8 @@ class DQN:
             )
         else:
             loss = self._loss_and_gradients(batch)
-        self.optimizer.step()
+        with _one_thread():
+            self.optimizer.step()
         return loss
 
     def _loss_and_gradients(self, batch: dict[str, np.ndarray]) -> float:
@@ -191,6 +194,20 @@ class DQN:
             moments.setdefault(int(number), {})[key] = tensor
         optimizer = self.optimizer.state_dict()
         self.optimizer.load_state_dict({**optimizer, "state": moments})
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Keep PyTorch from starting a second thread for so few weights.
+
+    It would wait for more work, busily, on the core that the fused update needs next.
+    """
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _check_network(network: torch.nn.Module) -> torch.nn.Module:

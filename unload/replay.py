@@ -71,7 +71,10 @@ class ReplayBuffer:
             name: _checked(name, batch[name], (count, *array.shape[1:]), array.dtype)
             for name, array in self.arrays.items()
         }
-        slots = np.arange(self.total, self.total + count) % self.size
+        start = self.total % self.size
+        slots = slice(start, start + count)
+        if start + count > self.size:  # round the end
+            slots = np.arange(start, start + count) % self.size
         for name, values in checked.items():
             self.arrays[name][slots] = values
         self.total += count
