@@ -11,7 +11,7 @@ def test_example_prints_what_it_says(capsys):
     (example,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     promised = re.findall(r"print\(.*\) +# (.*)", example)
     exec(example, {})
-    assert capsys.readouterr().out.splitlines() == promised == ["1.0 128", "1.0"]
+    assert capsys.readouterr().out.splitlines() == promised == ["1.0 128", "1.0 True"]
 
 
 def test_links_lead_to_files():

@@ -60,8 +60,8 @@ class World:
 
     Args:
         time_step: s per ``stepSimulation``.
-        maximal_coordinates: plain rigid bodies instead of Featherstone multibodies;
-            1.6 times as fast, with the same answers.
+        maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
+            2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
 
     Raises:
         TypeError, ValueError: ``time_step`` is no number from 1e-6 to 1.
