@@ -31,6 +31,7 @@ def lowest(observations, masks, rng):
 def quick(monkeypatch, tmp_path):
     """``quick(names)``: two episodes of two picks in small loads, kept in ``tmp_path``."""
     monkeypatch.setattr(robustness, "front_load", lambda rng: front_walls(stack_load(rng), 1))
+    monkeypatch.setattr(robustness, "RESTORED", ("highest",))
 
     def run(*names: str) -> pd.DataFrame:
         return robustness.robustness_data(
@@ -98,9 +99,8 @@ def test_bad_settings_are_refused():
 
 def test_data_and_its_provenance(quick, tmp_path, monkeypatch):
     frame = quick("highest", "paper")
-    assert len(frame) == 2 * 2 * 2
-    assert set(frame["policy"]) == {"highest", "paper"}
-    assert frame["after_pick"].tolist() == ["keep"] * 4 + ["restore"] * 4
+    assert frame["policy"].tolist() == ["highest"] * 2 + ["paper"] * 2 + ["highest"] * 2
+    assert frame["after_pick"].tolist() == ["keep"] * 4 + ["restore"] * 2
     moved = frame.groupby("after_pick")["median_displacement"]
     assert (moved.max()["restore"] == 0) and (moved.min()["keep"] > 0)
     written = tmp_path / "data/robustness.csv"
@@ -129,7 +129,7 @@ def test_all_policies_meet_the_same_loads(quick, monkeypatch):
 
     monkeypatch.setattr(robustness, "play", play)
     quick("highest", "random", "nearest")
-    assert len(seeds) == 12 and len(set(seeds)) == 4
+    assert len(seeds) == 8 and len(set(seeds)) == 4
     assert seeds[:2] == seeds[2:4] == seeds[4:6]
 
 

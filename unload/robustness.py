@@ -23,7 +23,7 @@ from unload.bullet import SETTINGS
 from unload.env import ContainerEnv
 from unload.evaluate import Policy, success_rate
 from unload.players import LEARNED, POLICIES, find_policy, policy_file
-from unload.provenance import run_record, write_provenance
+from unload.provenance import joined, run_record, write_provenance
 from unload.situation import Surroundings
 from unload.substacks import FRONT_WALLS, Load, front_walls, stack_load
 
@@ -31,6 +31,7 @@ NAME = "robustness"
 EPISODES, PICKS = 10, 100
 SEED = 2000  # of the loads; no other data uses it
 AFTER_PICK = ("keep", "restore")
+RESTORED = ("recommended",)  # others only drift: restored, all lifts are those of the table
 
 
 def robustness_data(
@@ -44,8 +45,9 @@ def robustness_data(
 ) -> pd.DataFrame:
     """Let policies unload the same containers; write ``robustness.csv`` and its provenance.
 
-    An episode takes minutes. Each one that is finished is kept, so that a run that was
-    stopped goes on.
+    Boxes are kept where they are for every policy, and restored for the recommended one. An
+    episode takes minutes. Each one that is finished is kept, so that a run that was stopped
+    goes on.
 
     Args:
         names: of the policies.
@@ -72,6 +74,7 @@ def robustness_data(
         {"policy": name, "after_pick": after_pick, "episode": episode}
         for after_pick in AFTER_PICK
         for name in weights
+        if after_pick == "keep" or name in RESTORED
         for episode in range(episodes)
     ]
     results = Parallel(n_jobs, return_as="generator")(
@@ -89,10 +92,10 @@ def robustness_data(
         for job in jobs
     )
     bar = tqdm(jobs, unit="episode", disable=not progress, ncols=100, file=sys.stdout)
-    rows, seconds = [], 0.0
-    for job, (row, took) in zip(bar, results):
+    rows, records = [], []
+    for job, (row, record) in zip(bar, results):
         rows.append(job | row)
-        seconds += took
+        records.append(record)
     frame = pd.DataFrame(rows)
     text = frame.to_csv(index=False, float_format="%.6g")
     files.write_text(Path(folder) / f"{NAME}.csv", text)
@@ -106,7 +109,7 @@ def robustness_data(
     }
     reduced = episodes < EPISODES or picks < PICKS or set(weights) < set(POLICIES)
     command = f"python -m unload.reproduce {NAME} --policies {' '.join(weights)}"
-    write_provenance(folder, NAME, command, settings, reduced, run_record(seconds))
+    write_provenance(folder, NAME, command, settings, reduced, joined(records))
     return frame
 
 
@@ -182,19 +185,19 @@ def front_load(rng: np.random.Generator) -> Load:
     return front_walls(stack_load(rng))
 
 
-def _kept(question: dict, folder: Path) -> tuple[dict[str, float], float]:
-    """What ``play`` returns and the seconds it took; kept in ``folder``."""
+def _kept(question: dict, folder: Path) -> tuple[dict[str, float], dict]:
+    """What ``play`` returns and its ``run_record``; kept in ``folder``."""
     name, after_pick = question["policy"], question["after_pick"]
     path = folder / f"{name}_{after_pick}_{question['episode']}.json"
     kept = files.read_json(path) if path.exists() else {}
     if kept.get("question") == question:
-        return kept["row"], kept["seconds"]
+        return kept["row"], kept["record"]
     start = time.monotonic()
     policy = find_policy(name, files.DATA)
     row = play(policy, after_pick, question["seed"], question["picks"], stack=front_load)
-    seconds = time.monotonic() - start
-    files.write_json(path, {"question": question, "row": row, "seconds": seconds})
-    return row, seconds
+    record = run_record(time.monotonic() - start)
+    files.write_json(path, {"question": question, "row": row, "record": record})
+    return row, record
 
 
 def _digest(name: str) -> str | None:
