@@ -11,14 +11,86 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 
 from unload import checks, files
-from unload.figures.style import styled
+from unload.figures.style import mark_reduced, styled
 from unload.intervals import bootstrap_interval, with_intervals
 from unload.judge import read_study
+from unload.provenance import read_provenance
 from unload.study import FEATURES
 
 CELL = ["features", "mask", "epsilon_final"]
-APPLIED = {"msr_mask": ("C0", "o", "told what failed"), "msr_no_mask": ("C3", "s", "not told")}
-PAPER_MSR = 0.6
+APPLIED = {"msr_mask": ("C0", "o", "told what failed"), "msr_no_mask": ("C1", "s", "not told")}
+PAPER_MSR = 0.6  # at the end of its Fig. 12
+OFFLINE = ["features", "seed", "loss", "msr_mask", "msr_no_mask", "deadlocked"]
+# Why 60 %: what is changed, in which cell of the factorial study, and the bar's colour.
+CHANGES = {
+    "nothing": (("noisy ranks", False), "C1"),
+    "told which items have failed": (("noisy ranks", True), "C3"),
+    "equal coordinates share one rank": (("tied ranks", False), "C2"),
+    "positions instead of ranks": (("positions", False), "C0"),
+}
+
+
+@styled
+def why_60(folder: str | Path = files.DATA) -> Figure:
+    """MSR at the end of training: as reported, of the same configuration, and one change away.
+
+    The measure is the paper's (Fig. 12): all containers of the training, over its last part.
+    Bars are means over the seeds, the dots; lines are 95 % intervals.
+
+    Args:
+        folder: of ``training_summary.csv`` and ``study/factorial.csv``.
+
+    Raises:
+        FileNotFoundError: a table is missing; the message says how to compute it.
+    """
+    training = _read(Path(folder) / "training_summary.csv", "training", ["msr_start", "msr_end"])
+    rows, _ = read_study("factorial", folder)
+    cells = rows[rows["epsilon_final"] == 0].groupby(["features", "mask"])["msr_training"]
+    count = EngFormatter(sep=" ")
+    long, short = read_provenance(folder, "training")["settings"]["picks"], rows["picks"].max()
+    bars = {
+        "the paper reports": ([PAPER_MSR], "0.6"),
+        f"its training here, {count(long)} picks": (training["msr_end"], "C1"),
+        **{name: (cells.get_group(cell), colour) for name, (cell, colour) in CHANGES.items()},
+    }
+    places = [0, 1, 2.8, 3.8, 4.8, 5.8]  # room for a heading above the changes
+    figure, axes = plt.subplots(figsize=(6.4, 3.2))
+    for place, (values, colour) in zip(places, bars.values()):
+        mean = np.mean(values)
+        axes.barh(place, mean, color=colour, height=0.72)
+        if len(values) > 1:
+            axes.plot(bootstrap_interval(values), [place, place], color="black", linewidth=1)
+            axes.plot(values, [place] * len(values), "o", color="black", markersize=2.5, alpha=0.6)
+        axes.text(max(values) + 0.02, place, f"{mean:.0%}", va="center", weight="bold")
+    start = training["msr_start"].mean()
+    axes.axvline(start, color="0.4", linestyle=":", linewidth=1)
+    axes.text(start, -0.55, "random picks", ha="center", va="bottom", color="0.4", fontsize=8)
+    axes.text(-0.02, 2.05, f"{count(short)} picks, one thing changed:", ha="right", va="center",
+              color="0.4", transform=axes.get_yaxis_transform())  # fmt: skip
+    axes.set_yticks(places, bars)
+    axes.set(ylim=(6.4, -0.6), xlim=(0, 1.1), xticks=np.linspace(0, 1, 6))
+    axes.set_xlabel("mean success rate (MSR) at the end of training")
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+    axes.grid(False, axis="y")
+    axes.tick_params(axis="y", length=0)
+    mark_reduced(figure, folder, "training")
+    return figure
+
+
+@styled
+def offline_msr(folder: str | Path = files.DATA) -> Figure:
+    """MSR of networks fitted to the same random picks, by what they see of the positions.
+
+    Args:
+        folder: of ``study/offline.csv``.
+
+    Raises:
+        FileNotFoundError: it is missing; the message says how to compute it.
+        ValueError: it has other columns.
+    """
+    rows = _read(Path(folder) / "study" / "offline.csv", "offline", OFFLINE)
+    cells = dict(list(rows.groupby("features", sort=False)))
+    return _one_panel(list(cells), list(cells.values()))
 
 
 def factorial_table(folder: str | Path = files.DATA) -> pd.DataFrame:
@@ -55,9 +127,7 @@ def factorial_msr(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: see ``read_study``.
     """
     rows, _ = read_study("factorial", folder)
-    figure, panels = plt.subplots(
-        len(FEATURES), 1, figsize=(6.4, 5.2), sharex=True, sharey=True, layout="constrained"
-    )
+    figure, panels = plt.subplots(len(FEATURES), 1, figsize=(6.4, 5.2), sharex=True, sharey=True)
     for axes, features in zip(panels, FEATURES):
         group = rows[rows["features"] == features]
         cells = list(group.groupby(["mask", "epsilon_final"], sort=False))
@@ -78,12 +148,12 @@ def factorial_msr(folder: str | Path = files.DATA) -> Figure:
 
 @styled
 def varied_msr(
-    experiment: str, field: str | Sequence[str], folder: str | Path = files.DATA
+    experiment: str | Sequence[str], field: str | Sequence[str], folder: str | Path = files.DATA
 ) -> Figure:
     """MSR of the policies of an experiment that varies one setting at a time.
 
     Args:
-        experiment: a name in ``unload.study.EXPERIMENTS``.
+        experiment: a name in ``unload.study.EXPERIMENTS``, or several to be shown as one.
         field: the settings that are varied; a row is named by those that differ from the
             first row's.
         folder: of the data.
@@ -92,25 +162,21 @@ def varied_msr(
         ValueError: a field is not a column.
         FileNotFoundError: see ``read_study``.
     """
-    rows, _ = read_study(experiment, folder)
+    experiments = [experiment] if isinstance(experiment, str) else experiment
+    rows = pd.concat([read_study(name, folder)[0] for name in experiments])
     fields = [field] if isinstance(field, str) else list(field)
     checks.entries("the experiment", dict(rows), fields)
     cells = list(rows.groupby(fields, sort=False))
     first = cells[0][0]
     names = []
-    for number, (key, _) in enumerate(cells):
+    for key, _ in cells:
         changed = [
             f"{name} {value}"
             for name, value, base in zip(fields, key, first)
             if value != base or len(fields) == 1
         ]
-        names.append(", ".join(changed).replace("_", " ") if changed or number else "as it was")
-    figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)), layout="constrained")
-    _dots(axes, names, [cell for _, cell in cells])
-    axes.set(xlabel="MSR of the trained policy on fresh loads", xlim=(0, 1.02))
-    axes.xaxis.set_major_formatter(PercentFormatter(1))
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
-    return figure
+        names.append(", ".join(changed).replace("_", " ") or "unchanged")
+    return _one_panel(names, [cell for _, cell in cells])
 
 
 @styled
@@ -138,6 +204,24 @@ def factorial_curves(folder: str | Path = files.DATA) -> Figure:
     panels[0].yaxis.set_major_formatter(PercentFormatter(1))
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    return figure
+
+
+def _read(path: Path, part: str, columns: Sequence[str]) -> pd.DataFrame:
+    """A table that a part of ``unload.reproduce`` makes; it must have some columns."""
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce {part} computes it")
+    table = pd.read_csv(path)
+    checks.entries(f"{path}", dict(table), columns)
+    return table
+
+
+def _one_panel(names: Sequence[str], cells: Sequence[pd.DataFrame]) -> Figure:
+    figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
+    _dots(axes, names, cells)
+    axes.set(xlabel="MSR of the trained policy on fresh loads", xlim=(0, 1.02))
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
     return figure
 
 
