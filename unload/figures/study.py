@@ -61,7 +61,7 @@ def why_60(folder: str | Path = files.DATA) -> Figure:
         if len(values) > 1:
             axes.plot(bootstrap_interval(values), [place, place], color="black", linewidth=1)
             axes.plot(values, [place] * len(values), "o", color="black", markersize=2.5, alpha=0.6)
-        axes.text(max(values) + 0.02, place, f"{mean:.0%}", va="center", weight="bold")
+        axes.text(max(values) + 0.02, place, f"{mean:.0%}", va="center", fontsize=11)
     start = training["msr_start"].mean()
     axes.axvline(start, color="0.4", linestyle=":", linewidth=1)
     axes.text(start, -0.55, "random picks", ha="center", va="bottom", color="0.4", fontsize=8)
