@@ -1,9 +1,11 @@
 """The fused update and choice against PyTorch."""
 
+import multiprocessing
 import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -16,15 +18,20 @@ from unload.equalization import equalize
 from unload.network import PEQNetwork
 
 BATCH, ITEMS = 300, 128
+FOR_TWO_THREADS = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
+
+
+def random_batch(rng, size):
+    return {
+        "observations": rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32),
+        "actions": rng.integers(ITEMS, size=size),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), size),
+    }
 
 
 @pytest.fixture
 def batch(rng):
-    return {
-        "observations": rng.uniform(-1, 1, (BATCH, ITEMS, 3)).astype(np.float32),
-        "actions": rng.integers(ITEMS, size=BATCH),
-        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
-    }
+    return random_batch(rng, BATCH)
 
 
 def network(n_features, seed=0):
@@ -156,24 +163,47 @@ def two_threads():
 
 
 def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
-    size = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
-    batch = {
-        "observations": rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32),
-        "actions": rng.integers(ITEMS, size=size),
-        "rewards": rng.choice(np.array([-1, 1], np.float32), size),
-    }
-    started = []
-    start = fused.threading.Thread.start
+    submitted = []
+    submit = ThreadPoolExecutor.submit
     monkeypatch.setattr(
-        fused.threading.Thread, "start", lambda thread: (started.append(thread), start(thread))
+        ThreadPoolExecutor,
+        "submit",
+        lambda pool, *work: submitted.append(submit(pool, *work)) or submitted[-1],
     )
-    net = network(64)
+    net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
     two = gradients(net, batch)
-    assert len(started) == 1 and not started[0].is_alive()
+    assert len(submitted) == 1 and submitted[0].done()
     torch.set_num_threads(1)
     assert gradients(net, batch) == two
     assert gradients(net, batch) == two  # and again
-    assert len(started) == 1  # no thread where one is asked for
+    assert len(submitted) == 1  # no thread where one is asked for
+
+
+def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
+    net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
+    finish = fused.start(net, *batch.values())
+    assert net.scorer.weight.grad is None
+    fused.greedy_actions(net, batch["observations"], np.ones(batch["observations"].shape[:2], bool))
+    loss = finish()
+    begun = [parameter.grad.numpy().tobytes() for parameter in net.parameters()]
+    assert gradients(net, batch) == begun
+    assert fused.loss_and_gradients(net, *batch.values()) == loss
+
+
+def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
+    net, batch = network(8), random_batch(rng, FOR_TWO_THREADS)
+    here = fused.loss_and_gradients(net, *batch.values())
+    fork = multiprocessing.get_context("fork")
+    answers = fork.SimpleQueue()
+    process = fork.Process(
+        target=lambda: answers.put(fused.loss_and_gradients(net, *batch.values()))
+    )
+    process.start()
+    process.join(60)
+    try:
+        assert not process.is_alive() and answers.get() == here
+    finally:
+        process.kill()
 
 
 def test_choice_is_that_of_the_network(batch, rng):

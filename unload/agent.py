@@ -1,8 +1,9 @@
 """The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -121,6 +122,17 @@ class DQN:
             TypeError, ValueError: ``batch`` is no dict, or an array is missing.
             FloatingPointError: the loss is not finite; the weights are left as they were.
         """
+        return self.start_update(batch, rows)()
+
+    def start_update(
+        self, batch: dict[str, np.ndarray], rows: np.ndarray | None = None
+    ) -> Callable[[], float]:
+        """Begin ``update``; the fused one goes on in other threads while this one acts.
+
+        Returns:
+            A function that completes the update and returns the loss. The weights stay as
+            they are until it is called, and so must the arrays.
+        """
         names = ("next_observations", "next_masks", "terminations") if self.gamma else ()
         names = ("observations", "actions", "rewards", *names)
         checks.entries("batch", batch, names)
@@ -130,14 +142,19 @@ class DQN:
             batch = {name: batch[name].take(rows, axis=0) for name in copied}
         if self.fused_update:
             targets = self._targets(batch).numpy()
-            loss = fused.loss_and_gradients(
+            gradients = fused.start(
                 self.network, observations, batch["actions"], targets, self.beta, rows
             )
         else:
-            loss = self._loss_and_gradients(batch)
-        with _one_thread():
-            self.optimizer.step()
-        return loss
+            gradients = partial(self._loss_and_gradients, batch)
+
+        def finish() -> float:
+            loss = gradients()
+            with _one_thread():
+                self.optimizer.step()
+            return loss
+
+        return finish
 
     def _loss_and_gradients(self, batch: dict[str, np.ndarray]) -> float:
         """The smooth-L1 loss, its gradients left in ``.grad``: plain PyTorch."""

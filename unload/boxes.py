@@ -73,19 +73,23 @@ def _find(low, high, order, ends):
         low, high: corners.
         order, ends: the boxes, slab by slab, from left to right in each; where the slabs end.
     """
-    found, count = np.empty((8 * len(order) + 4, 3), np.int32), 0
-    low, high = low[order], high[order]
-    start = 0
+    count, start = 0, 0
+    found = np.empty((8 * len(order) + 4, 3), np.int32)
+    # One array each: what is read next is near what was read last.
+    x0, y0, z0 = _columns(low, order)
+    x1, y1, z1 = _columns(high, order)
     for end in ends:
         for i in range(start, end):
             for j in range(i + 1, end):
-                across = _shared(low, high, i, j, 1)
-                if across < -TOLERANCE:
+                if y0[j] - y1[i] > TOLERANCE:
                     break  # j begins to the right of i, and so do all further ones
-                along, upwards = _shared(low, high, i, j, 0), _shared(low, high, i, j, 2)
-                # One branch in place of many, whose outcome the processor could not foretell.
-                contact = (min(across, upwards) >= -TOLERANCE) & (max(across, upwards) > TOLERANCE)
-                if not contact & (along > OVERLAP):
+                # Lengths of the stretches that both share; below 0 the gap between them.
+                upwards = min(z1[i], z1[j]) - max(z0[i], z0[j])
+                if upwards < -TOLERANCE:
+                    continue
+                across = min(y1[i], y1[j]) - y0[j]
+                along = min(x1[i], x1[j]) - max(x0[i], x0[j])
+                if max(across, upwards) <= TOLERANCE or along <= OVERLAP:
                     continue
                 if min(across, upwards) > OVERLAP:
                     return found[:count], order[i], order[j]
@@ -95,7 +99,7 @@ def _find(low, high, order, ends):
                     found = np.concatenate((found, np.empty_like(found)))
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
                 if across > TOLERANCE:
-                    one, other = (ABOVE, BELOW) if low[j, 2] > low[i, 2] else (BELOW, ABOVE)
+                    one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
                 found[count, 0], found[count, 1], found[count, 2] = one, order[i], order[j]
                 count += 1
                 found[count, 0], found[count, 1], found[count, 2] = other, order[j], order[i]
@@ -105,9 +109,12 @@ def _find(low, high, order, ends):
 
 
 @numba.njit(cache=True)
-def _shared(low, high, i, j, axis):
-    """Length of the stretch of the axis that two boxes share; below 0 the gap between them."""
-    return min(high[i, axis], high[j, axis]) - max(low[i, axis], low[j, axis])
+def _columns(corners, order):
+    """x, y and z of corners in this order."""
+    x, y, z = np.empty(len(order)), np.empty(len(order)), np.empty(len(order))
+    for i, box in enumerate(order):
+        x[i], y[i], z[i] = corners[box]
+    return x, y, z
 
 
 @numba.njit(cache=True)

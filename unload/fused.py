@@ -18,17 +18,21 @@ runner-up is kept to notice that, and double precision decides. Items that tie e
 the gradient evenly, as in PyTorch.
 """
 
-import threading
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import numba
 import numpy as np
 import torch
+from numba import types
 from numba.extending import intrinsic
 
 from unload.network import PEQNetwork
 
 CHUNK = 32  # samples whose gradients are summed in single precision
-CHUNKS_PER_THREAD = 8  # at least; below, starting a thread takes longer than it saves
+CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
 WIDTH = 64  # features handled together: loops of constant length become vector instructions
 
 # What is kept of WIDTH features: rows of WIDTH numbers in one flat array, and where they start.
@@ -60,6 +64,17 @@ def fma(typing_context, a, b, c):
     return a(a, a, a), build
 
 
+@intrinsic
+def next_number(typing_context, counter):
+    """What ``counter``, (1,) int64, holds; then one more, which no other thread sees before."""
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.atomic_rmw("add", data, context.get_constant(types.int64, 1), "monotonic")
+
+    return types.int64(counter), build
+
+
 def applies(network: torch.nn.Module) -> bool:
     """The rule: a ``PEQNetwork`` itself (no subclass), in float32 on the CPU."""
     return type(network) is PEQNetwork and all(
@@ -77,7 +92,8 @@ def loss_and_gradients(
 ) -> float:
     """Mean smooth-L1 loss of the chosen actions' values, its gradients left in ``.grad``.
 
-    Runs on up to ``torch.get_num_threads()`` threads; the result does not depend on it.
+    Runs on up to ``torch.get_num_threads()`` threads; the result does not depend on their
+    number.
 
     Args:
         network: whose parameters' ``.grad`` are set.
@@ -94,6 +110,23 @@ def loss_and_gradients(
     Raises:
         ValueError: an array's shape or dtype is another, or an action or row is out of range.
         FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
+    """
+    return start(network, observations, actions, targets, beta, rows)()
+
+
+def start(
+    network: PEQNetwork,
+    observations: np.ndarray,
+    actions: np.ndarray,
+    targets: np.ndarray,
+    beta: float = 1.0,
+    rows: np.ndarray | None = None,
+) -> Callable[[], float]:
+    """Begin ``loss_and_gradients`` on all threads but this one, which may do something else.
+
+    Returns:
+        A function that does what is left to do, sets ``.grad`` and returns the loss. Until
+        then, the weights and arrays must stay as they are.
     """
     count, items = _check(observations)
     if rows is None:
@@ -115,19 +148,34 @@ def loss_and_gradients(
     batch = [np.ascontiguousarray(array) for array in (observations, rows, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.full((-(-size // CHUNK), 8 * network.n_features + 2), np.nan, np.float32)
-    _on_threads(*batch, np.float32(beta), *_weights(network), partial)
-    total = partial.sum(axis=0, dtype=np.float64) / size
-    if not np.isfinite(total).all():
-        raise FloatingPointError(
-            f"the loss is {total[-1]} and its gradients are not all finite; "
-            "expected finite observations, targets and weights"
-        )
-    gradients = torch.from_numpy(total[:-1].astype(np.float32))
-    parameters = _parameters(network)
-    parts = gradients.split([parameter.numel() for parameter in parameters])
-    for parameter, part in zip(parameters, parts):
-        parameter.grad = part.view(parameter.shape)
-    return float(total[-1])
+    work = (np.zeros(1, np.int64), *batch, np.float32(beta), *_weights(network), partial)
+    threads = min(torch.get_num_threads(), len(partial) // CHUNKS_PER_THREAD)
+    others = [_helpers(os.getpid()).submit(_add_chunks, *work) for _ in range(1, threads)]
+
+    def finish() -> float:
+        _add_chunks(*work)
+        for other in others:
+            other.result()
+        total = partial.sum(axis=0, dtype=np.float64) / size
+        if not np.isfinite(total).all():
+            raise FloatingPointError(
+                f"the loss is {total[-1]} and its gradients are not all finite; "
+                "expected finite observations, targets and weights"
+            )
+        gradients = torch.from_numpy(total[:-1].astype(np.float32))
+        parameters = _parameters(network)
+        parts = gradients.split([parameter.numel() for parameter in parameters])
+        for parameter, part in zip(parameters, parts):
+            parameter.grad = part.view(parameter.shape)
+        return float(total[-1])
+
+    return finish
+
+
+@cache
+def _helpers(process: int) -> ThreadPoolExecutor:
+    """Threads that wait for work; a process that was forked needs its own."""
+    return ThreadPoolExecutor()
 
 
 def greedy_actions(
@@ -194,31 +242,14 @@ def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, n
     return weight, bias, score.reshape(4, -1), score_bias[0]
 
 
-def _on_threads(*arguments) -> None:
-    """``_add_chunks`` on as many threads as PyTorch would use, where it pays.
-
-    Threads are started anew each time: that takes well below 0.1 ms, and there is nothing to keep
-    across a fork or to stop at exit.
-    """
-    threads = min(torch.get_num_threads(), len(arguments[-1]) // CHUNKS_PER_THREAD)
-    threads = max(1, threads)
-    others = [
-        threading.Thread(target=_add_chunks, args=(k, threads, *arguments))
-        for k in range(1, threads)
-    ]
-    for thread in others:
-        thread.start()
-    _add_chunks(0, threads, *arguments)
-    for thread in others:
-        thread.join()
-
-
 @numba.njit(cache=True, nogil=True)
 def _add_chunks(
-    first, step, observations, rows, actions, targets, beta, weight, bias, score, score_bias,
-    partial,
-):  # fmt: skip
-    """Sum the gradients and losses of every ``step``-th chunk into its row of ``partial``."""
+    counter, observations, rows, actions, targets, beta, weight, bias, score, score_bias, partial
+):
+    """Sum the gradients and losses of each chunk into its row of ``partial``.
+
+    Several threads may call this with the same ``counter``, and share the chunks.
+    """
     n, items = len(bias), observations.shape[1]
     x = np.empty((-(-items // 4) * 4, 3), np.float32)  # one sample's items, filled up to fours
     bits = 0  # of an item's number
@@ -227,7 +258,8 @@ def _add_chunks(
     # The relative error of a key: three roundings of the value, and the bits that it lacks.
     precision = np.float32(2.0**-21 + 2.0 ** (bits - 23))
     blocks = _blocks(weight, bias, score)
-    for chunk in range(first, len(partial), step):
+    chunk = next_number(counter)
+    while chunk < len(partial):
         begin, end = chunk * CHUNK, min((chunk + 1) * CHUNK, len(actions))
         largest = _largest(observations, rows[begin:end])
         for b in range(len(blocks)):
@@ -258,6 +290,7 @@ def _add_chunks(
             for row in range(3, 8):
                 partial[chunk, row * n + f] = block[GRADIENT + row * WIDTH + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
+        chunk = next_number(counter)
 
 
 @numba.njit(cache=True)

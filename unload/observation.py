@@ -38,7 +38,12 @@ def nearest(positions: np.ndarray, count: int = task.N_VISIBLE) -> np.ndarray:
         same distance the one with the smaller index comes first.
     """
     checks.integer("count", count, 1)
-    return np.argsort(distance(positions), kind="stable")[:count]
+    distances = distance(positions)
+    order = np.argsort(distances)
+    ranked = distances[order]
+    if (ranked[1:] == ranked[:-1]).any():  # a stable order takes three times as long to find
+        order = np.argsort(distances, kind="stable")
+    return order[:count]
 
 
 def scale(positions: np.ndarray) -> np.ndarray:

@@ -112,7 +112,7 @@ class Load:
 
 
 def _check_inside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> None:
-    if low.min() >= -tolerance and (high.max(axis=0) <= task.CONTAINER + tolerance).all():
+    if (low >= -tolerance).all() and (high <= task.CONTAINER + tolerance).all():
         return
     outside = ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
     item = int(np.argmax(outside))
@@ -228,15 +228,30 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     if not len(variants):
         raise ValueError("variants has no walls; expected at least one")
     check_variants("variants", variants.reshape(-1, columns), columns)
-    walls, packages, left, lower = _cells(variants, *_row(columns)).T
-    width, height = PACKAGES[packages].T
-    depth = task.CONTAINER[0] / len(variants)
-    cell = CELL * scale
-    positions = np.column_stack(
-        [(walls + 0.5) * depth, (left + width / 2) * cell, (lower + height / 2) * cell]
-    )
-    sizes = np.column_stack([np.full(len(walls), depth), width * cell, height * cell])
-    return Load(positions, sizes, packages, walls)
+    cells = _cells(variants, *_row(columns))
+    positions, sizes = _boxes(cells, PACKAGES, task.CONTAINER[0] / len(variants), CELL * scale)
+    return Load(positions, sizes, cells[:, 1], cells[:, 0])
+
+
+@numba.njit(cache=True)
+def _boxes(cells, packages, depth, cell):
+    """Centres and edge lengths of items in m, both (n, 3) float64.
+
+    Args:
+        cells: what ``_cells`` returned.
+        packages: ``PACKAGES``.
+        depth, cell: of a wall and of a cell, in m.
+    """
+    positions, sizes = np.empty((len(cells), 3)), np.empty((len(cells), 3))
+    for item, (wall, package, left, lower) in enumerate(cells):
+        width, height = packages[package]
+        positions[item] = (
+            (wall + 0.5) * depth,
+            (left + width / 2) * cell,
+            (lower + height / 2) * cell,
+        )
+        sizes[item] = depth, width * cell, height * cell
+    return positions, sizes
 
 
 def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float = 1.0) -> Load:

@@ -52,7 +52,7 @@ class TrainResult(NamedTuple):
 CURVE_COLUMNS = (
     "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
 )  # fmt: skip
-FORMAT = 2  # of the checkpoints
+FORMAT = 3  # of the checkpoints
 
 
 def train(
@@ -236,22 +236,25 @@ class _Run:
             )
 
     def _step(self) -> None:
-        """One pick in every environment, and the updates that follow it."""
+        """One pick in every environment; meanwhile the agent learns from those before."""
         config = self.config
+        learns = len(self.replay) >= min(config.batch_size, self.replay.size)
+        complete = self._start_update() if learns else None
         epsilon = config.epsilon(self.picks)
         allowed = self.masks.astype(bool) if config.mask else self.all_allowed
         actions = self.agent.choose(self.observations, allowed, epsilon, self.rng)
         failed_before = self.masks[np.arange(config.num_envs), actions] == 0
-        rewards = self._pick(actions)
+        rewards, picks = self._pick(actions)
         sums = self.sums
         sums["picks"] += config.num_envs
         sums["rewards"] += rewards.sum()
         sums["deadlocked"] += failed_before.sum()
-        if len(self.replay) >= min(config.batch_size, self.replay.size):
-            for _ in range(config.gradient_steps):
-                rows = self.replay.sample_rows(config.batch_size, self.rng)
-                sums["losses"] += self.agent.update(self.replay.arrays, rows)
-                sums["updates"] += 1
+        if learns:
+            sums["losses"] += complete()
+            for _ in range(config.gradient_steps - 1):
+                sums["losses"] += self._start_update()()
+            sums["updates"] += config.gradient_steps
+        self.replay.add(**picks)
         interval = config.target_update_interval
         if config.gamma > 0 and self.picks % interval < config.num_envs:
             self.agent.update_target()
@@ -267,17 +270,21 @@ class _Run:
         if self.steps * snapshots // steps > (self.steps - 1) * snapshots // steps:
             save_policy(self.policy(), self.folder / f"snapshots/{self.picks:09d}.safetensors")
 
-    def _pick(self, actions: np.ndarray) -> np.ndarray:
-        """Pick in every environment and remember it; the rewards."""
+    def _start_update(self) -> Callable[[], float]:
+        """Begin an update; what completes it returns the loss."""
+        rows = self.replay.sample_rows(self.config.batch_size, self.rng)
+        return self.agent.start_update(self.replay.arrays, rows)
+
+    def _pick(self, actions: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Pick in every environment; the rewards, and what to remember."""
         following, rewards, terminations, _, infos = self.envs.step(actions)
-        batch = {
+        picks = {
             "observations": self.observations,
             "actions": actions,
             "rewards": self._shaped(rewards, actions),
         }
         if self.config.gamma > 0:
-            batch |= self._next_state(following, terminations, infos)
-        self.replay.add(**batch)
+            picks |= self._next_state(following, terminations, infos)
         self.actions[self.steps] = actions
         self.steps += 1
         self.observations, self.masks = following, infos["action_mask"]
@@ -285,10 +292,12 @@ class _Run:
             self.starts.append((self.steps, self.envs.get_state()))
             while (self.steps - self.starts[1][0]) * self.config.num_envs >= self.replay.size:
                 self.starts.popleft()
-        return rewards
+        return rewards, picks
 
     def _shaped(self, rewards: np.ndarray, actions: np.ndarray) -> np.ndarray:
         """What is learned from: a failed pick is the less bad, the higher its item is seen."""
+        if not self.config.height_reward:
+            return rewards
         heights = (self.observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
         return np.where(rewards < 0, rewards + self.config.height_reward * heights, rewards)
 
@@ -354,7 +363,8 @@ class _Run:
         self.masks = infos["action_mask"]
         picks = self.picks + stored["actions"].size
         for actions in stored["actions"]:
-            self._pick(actions.astype(np.int64))
+            _, remembered = self._pick(actions.astype(np.int64))
+            self.replay.add(**remembered)
             self._check_interrupts(picks)
         if self._digest() != stored["digest"]:
             raise ValueError(
