@@ -20,6 +20,7 @@ import torch
 from unload import TrainConfig, evaluate, files, load_policy, stack_load, train
 from unload.architectures import NETWORKS
 from unload.train import CURVE_COLUMNS, ENVS
+from unload.vector_env import ContainerVectorEnv
 
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
 # with gamma > 0, updates of the target network.
@@ -540,3 +541,17 @@ def test_numpy_numbers_make_the_same_configuration():
     assert json.dumps(asdict(config)) == json.dumps(
         asdict(TrainConfig(picks=6400, learning_rate=0.5))
     )
+
+
+def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
+    fewest, pick = [], ContainerVectorEnv._pick
+
+    def watched(envs, actions):
+        fewest.append((envs.visible >= 0).sum(axis=1).min())
+        assert (envs.visible[np.arange(len(actions)), actions] >= 0).all()
+        return pick(envs, actions)
+
+    monkeypatch.setattr(ContainerVectorEnv, "_pick", watched)
+    config = TrainConfig(picks=800, num_envs=4, batch_size=32, n_features=4, mask=False)
+    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=1))
+    assert min(fewest) < 70  # of 128 rows

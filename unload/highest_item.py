@@ -46,7 +46,7 @@ class HighestItemEnv(PickingEnv):
     Truncation after ``max_picks`` picks; there is no termination.
 
     ## Information
-    ``action_mask``: (128,) int8, all 1, since no row fails twice.
+    ``action_mask`` and ``item_mask``: (128,) int8, all 1, since no row fails twice or is empty.
 
     Args:
         equalize: give equalized observations (Alg. 1).
@@ -137,4 +137,4 @@ class HighestItemEnv(PickingEnv):
         return self._features(positions[rows])
 
     def _info(self) -> dict:
-        return {"action_mask": np.ones(task.N_VISIBLE, dtype=np.int8)}
+        return {name: np.ones(task.N_VISIBLE, np.int8) for name in ("action_mask", "item_mask")}

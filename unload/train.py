@@ -183,12 +183,15 @@ class _Run:
             max_picks=config.max_picks,
             **({} if stack is None else {"stack": stack}),
         )
-        self.observations, infos = self.envs.reset(seed=int(env_seed))
-        self.masks = infos["action_mask"]
-        # The mask is part of training's choices only if asked for.
-        self.all_allowed = np.ones(self.masks.shape, dtype=bool)
+        self._see(*self.envs.reset(seed=int(env_seed)))
         # Of the episodes that the replay memory reaches back to: first step, state there.
         self.starts = deque([(0, self.envs.get_state())])
+
+    def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
+        """Take what ``reset`` or ``step`` of the environments shows and tells."""
+        self.observations, self.masks = observations, infos["action_mask"]
+        # Which items have failed is part of training's choices only if asked for.
+        self.allowed = infos["action_mask" if self.config.mask else "item_mask"].astype(bool)
 
     @property
     def picks(self) -> int:
@@ -241,8 +244,7 @@ class _Run:
         learns = len(self.replay) >= min(config.batch_size, self.replay.size)
         complete = self._start_update() if learns else None
         epsilon = config.epsilon(self.picks)
-        allowed = self.masks.astype(bool) if config.mask else self.all_allowed
-        actions = self.agent.choose(self.observations, allowed, epsilon, self.rng)
+        actions = self.agent.choose(self.observations, self.allowed, epsilon, self.rng)
         failed_before = self.masks[np.arange(config.num_envs), actions] == 0
         rewards, picks = self._pick(actions)
         sums = self.sums
@@ -287,7 +289,7 @@ class _Run:
             picks |= self._next_state(following, terminations, infos)
         self.actions[self.steps] = actions
         self.steps += 1
-        self.observations, self.masks = following, infos["action_mask"]
+        self._see(following, infos)
         if self.steps % self.config.max_picks == 0:  # whole episodes, unless a container is empty
             self.starts.append((self.steps, self.envs.get_state()))
             while (self.steps - self.starts[1][0]) * self.config.num_envs >= self.replay.size:
@@ -359,8 +361,7 @@ class _Run:
         self.steps = int(stored["start"])
         self.replay.total = self.picks
         self.starts = deque([(self.steps, under("start."))])
-        self.observations, infos = self.envs.set_state(under("start."))
-        self.masks = infos["action_mask"]
+        self._see(*self.envs.set_state(under("start.")))
         picks = self.picks + stored["actions"].size
         for actions in stored["actions"]:
             _, remembered = self._pick(actions.astype(np.int64))

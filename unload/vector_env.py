@@ -414,4 +414,5 @@ class HighestItemVectorEnv(PickingVectorEnv):
         return self._observations.copy()
 
     def _infos(self) -> dict[str, np.ndarray]:
-        return {"action_mask": np.ones((self.num_envs, task.N_VISIBLE), np.int8)}
+        shape = (self.num_envs, task.N_VISIBLE)
+        return {name: np.ones(shape, np.int8) for name in ("action_mask", "item_mask")}
