@@ -48,7 +48,7 @@ def test_conditions_are_those_of_the_data():
     played = {*comparison.CONDITIONS, *figures.FULL.values()}
     assert len(figures.CONDITIONS) == len(played)
     assert set(figures.CONDITIONS) == played
-    assert set(figures.FULL) == set(robustness.AFTER_PICK)
+    assert set(figures.FULL) < set(robustness.AFTER_PICK)
     assert len(figures.CONDITIONS) % figures.COLUMNS == 0
 
 

@@ -83,6 +83,14 @@ def test_deadlocks_are_counted_without_a_mask(monkeypatch):
     assert row["deadlocked"] == 0.9 and row["longest_deadlock"] == 9
 
 
+def test_the_table_lifts_as_the_full_physics_that_restores():
+    rows = [
+        robustness.play(policies.highest, how, 3, 3, stack=two_walls)
+        for how in ("table", "restore")
+    ]
+    assert rows[0] == rows[1]
+
+
 def test_bad_settings_are_refused():
     with pytest.raises(ValueError, match="after_pick is 'forget'"):
         robustness.play(policies.random, "forget", 0)
@@ -99,10 +107,11 @@ def test_bad_settings_are_refused():
 
 def test_data_and_its_provenance(quick, tmp_path, monkeypatch):
     frame = quick("highest", "paper")
-    assert frame["policy"].tolist() == ["highest"] * 2 + ["paper"] * 2 + ["highest"] * 2
-    assert frame["after_pick"].tolist() == ["keep"] * 4 + ["restore"] * 2
+    both = ["highest"] * 2 + ["paper"] * 2
+    assert frame["policy"].tolist() == both + both + ["highest"] * 2
+    assert frame["after_pick"].tolist() == ["table"] * 4 + ["keep"] * 4 + ["restore"] * 2
     moved = frame.groupby("after_pick")["median_displacement"]
-    assert (moved.max()["restore"] == 0) and (moved.min()["keep"] > 0)
+    assert (moved.max()[["table", "restore"]] == 0).all() and (moved.min()["keep"] > 0)
     written = tmp_path / "data/robustness.csv"
     pd.testing.assert_frame_equal(pd.read_csv(written), frame, check_dtype=False, rtol=1e-5)
     provenance = read_provenance(tmp_path / "data", "robustness")
@@ -129,7 +138,7 @@ def test_all_policies_meet_the_same_loads(quick, monkeypatch):
 
     monkeypatch.setattr(robustness, "play", play)
     quick("highest", "random", "nearest")
-    assert len(seeds) == 8 and len(set(seeds)) == 4
+    assert len(seeds) == 14 and len(set(seeds)) == 6
     assert seeds[:2] == seeds[2:4] == seeds[4:6]
 
 

@@ -4,7 +4,8 @@
 
 In ``full`` physics all boxes are free to move. With ``after_pick="restore"`` they are put
 back after every pick; with ``"keep"`` they stay where the pick has left them. They drift,
-and a box on which nothing lies may be jammed between its neighbours.
+and a box on which nothing lies may be jammed between its neighbours. ``"table"`` stands for
+the lift table, in whose loads only the picked box moves: what drift costs is seen beside it.
 """
 
 import sys
@@ -30,8 +31,8 @@ from unload.substacks import FRONT_WALLS, Load, front_walls, stack_load
 NAME = "robustness"
 EPISODES, PICKS = 10, 100
 SEED = 2000  # of the loads; no other data uses it
-AFTER_PICK = ("keep", "restore")
-RESTORED = ("recommended",)  # others only drift: restored, all lifts are those of the table
+AFTER_PICK = ("table", "keep", "restore")
+RESTORED = ("recommended",)  # of others too, restored, all lifts would be those of the table
 
 
 def robustness_data(
@@ -45,9 +46,9 @@ def robustness_data(
 ) -> pd.DataFrame:
     """Let policies unload the same containers; write ``robustness.csv`` and its provenance.
 
-    Boxes are kept where they are for every policy, and restored for the recommended one. An
-    episode takes minutes. Each one that is finished is kept, so that a run that was stopped
-    goes on.
+    By the lift table and with boxes kept where they are for every policy, and with boxes
+    restored for the recommended one. A simulated episode takes minutes. Each one that is
+    finished is kept, so that a run that was stopped goes on.
 
     Args:
         names: of the policies.
@@ -74,7 +75,7 @@ def robustness_data(
         {"policy": name, "after_pick": after_pick, "episode": episode}
         for after_pick in AFTER_PICK
         for name in weights
-        if after_pick == "keep" or name in RESTORED
+        if after_pick != "restore" or name in RESTORED
         for episode in range(episodes)
     ]
     results = Parallel(n_jobs, return_as="generator")(
@@ -121,11 +122,12 @@ def play(
     mask: bool = True,
     stack: Callable[[np.random.Generator], Load] = stack_load,
 ) -> dict[str, float]:
-    """Let a policy unload one container in ``full`` physics.
+    """Let a policy unload one container.
 
     Args:
         policy: see ``unload.policies``.
-        after_pick: see ``FullPhysics``.
+        after_pick: ``"keep"`` or ``"restore"`` in ``full`` physics, see ``FullPhysics``;
+            ``"table"`` for the lift table.
         seed: of the load and of the policy's random numbers.
         picks: how many.
         mask: whether the policy is told which items failed since the last success.
@@ -142,11 +144,13 @@ def play(
         TypeError, ValueError: an argument is not as described, or the load does not hold
             more items than ``picks``.
     """
+    checks.one_of("after_pick", after_pick, AFTER_PICK)
     checks.boolean("mask", mask)
     rng = np.random.default_rng([checks.integer("seed", seed, 0)])
     rewards, deadlocked, free = [], [], []
     longest = stuck = 0
-    env = ContainerEnv("full", after_pick, max_picks=picks, stack=stack)
+    physics = ("table",) if after_pick == "table" else ("full", after_pick)
+    env = ContainerEnv(*physics, max_picks=picks, stack=stack)
     try:
         observation, info = env.reset(seed=seed)
         physics = env.physics

@@ -54,6 +54,7 @@ def read_comparison(folder: str | Path = files.DATA) -> pd.DataFrame:
     robustness = Path(folder) / "robustness.csv"
     if robustness.is_file():
         full = _read(robustness, ["policy", "after_pick"])
+        full = full[full["after_pick"].isin(FULL)]
         full = full.assign(mask=True, condition=full["after_pick"].map(FULL))
         table = pd.concat([table, full], ignore_index=True)
     return table[[*KEY, "success_rate"]]
