@@ -14,6 +14,7 @@ import torch
 import unload
 from benchmarks.floors import bytes_per_second, operations_per_second
 from unload import fused, task
+from unload.adam import Adam
 from unload.replay import ReplayBuffer
 from unload.vector_env import ContainerVectorEnv
 
@@ -29,7 +30,7 @@ PARTS = {
     "add": (ReplayBuffer, "add"),
     "sample": (ReplayBuffer, "sample_rows"),
     "gradients": (fused, "_add_chunks"),
-    "Adam": (torch.optim.Adam, "step"),
+    "Adam": (Adam, "step"),
 }
 
 

@@ -182,12 +182,11 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
 def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
     net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
     finish = fused.start(net, *batch.values())
-    assert net.scorer.weight.grad is None
     fused.greedy_actions(net, batch["observations"], np.ones(batch["observations"].shape[:2], bool))
-    loss = finish()
-    begun = [parameter.grad.numpy().tobytes() for parameter in net.parameters()]
-    assert gradients(net, batch) == begun
-    assert fused.loss_and_gradients(net, *batch.values()) == loss
+    total = finish()
+    assert fused.loss_and_gradients(net, *batch.values()) == total[-1]
+    flat = np.concatenate([parameter.grad.numpy().ravel() for parameter in net.parameters()])
+    assert np.array_equal(flat, total[:-1].astype(np.float32))
 
 
 def test_a_forked_process_has_threads_of_its_own(rng, two_threads):

@@ -1,8 +1,7 @@
 """The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from safetensors.torch import save
 from torch.nn.functional import smooth_l1_loss
 
 from unload import checks, files, fused
+from unload.adam import Adam
 from unload.architectures import NETWORKS
 from unload.equalization import TIES, equalize
 from unload.observation import holds_item
@@ -34,7 +34,8 @@ class DQN:
         gamma: discount factor; 0 in the paper (Sec. III-E), where the target is the
             reward alone and the target network is not asked.
         beta: threshold of the smooth-L1 loss (Sec. III-G); 1 in the paper.
-        fused_update: update by ``unload.fused`` instead of PyTorch; wherever it applies if None.
+        fused_update: update by ``unload.fused`` and ``unload.adam`` instead of PyTorch; wherever
+            it applies if None.
 
     Raises:
         TypeError, ValueError: an argument is not as described, or ``fused_update`` is asked
@@ -60,9 +61,10 @@ class DQN:
         self.gamma = checks.real("gamma", gamma, 0, 1)
         self.beta = checks.real("beta", beta, 0)
         learning_rate = checks.real("learning_rate", learning_rate, 0)
-        self.optimizer = torch.optim.Adam(
-            network.parameters(), learning_rate, fused=self.fused_update
-        )
+        if self.fused_update:
+            self.optimizer = Adam(fused.flat_weights(network), learning_rate)
+        else:
+            self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
         self.target = {name: value.clone() for name, value in network.state_dict().items()}
 
     def act(
@@ -140,21 +142,24 @@ class DQN:
         if rows is not None:
             copied = names[1:] if self.fused_update else names
             batch = {name: batch[name].take(rows, axis=0) for name in copied}
-        if self.fused_update:
-            targets = self._targets(batch).numpy()
-            gradients = fused.start(
-                self.network, observations, batch["actions"], targets, self.beta, rows
-            )
-        else:
-            gradients = partial(self._loss_and_gradients, batch)
+        if not self.fused_update:
+            return partial(self._plain_update, batch)
+        targets = self._targets(batch).numpy()
+        gradients = fused.start(
+            self.network, observations, batch["actions"], targets, self.beta, rows
+        )
 
         def finish() -> float:
-            loss = gradients()
-            with _one_thread():
-                self.optimizer.step()
-            return loss
+            total = gradients()
+            self.optimizer.step(total[:-1])
+            return float(total[-1])
 
         return finish
+
+    def _plain_update(self, batch: dict[str, np.ndarray]) -> float:
+        loss = self._loss_and_gradients(batch)
+        self.optimizer.step()
+        return loss
 
     def _loss_and_gradients(self, batch: dict[str, np.ndarray]) -> float:
         """The smooth-L1 loss, its gradients left in ``.grad``: plain PyTorch."""
@@ -193,38 +198,37 @@ class DQN:
         """Weights, target weights and optimizer state as arrays, to go on from later."""
         arrays = {f"network.{k}": v.numpy().copy() for k, v in self.network.state_dict().items()}
         arrays |= {f"target.{k}": v.numpy().copy() for k, v in self.target.items()}
-        for number, moments in self.optimizer.state_dict()["state"].items():
-            arrays |= {f"adam.{number}.{k}": v.numpy().copy() for k, v in moments.items()}
-        return arrays
+        if self.fused_update:
+            optimizer = self.optimizer.state()
+        else:
+            optimizer = {
+                f"{number}.{key}": value.numpy().copy()
+                for number, moments in self.optimizer.state_dict()["state"].items()
+                for key, value in moments.items()
+            }
+        return arrays | {f"adam.{name}": array for name, array in optimizer.items()}
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what ``state`` returned."""
-        groups: dict[str, dict] = {"network": {}, "target": {}, "adam": {}}
+        groups: dict[str, dict[str, np.ndarray]] = {"network": {}, "target": {}, "adam": {}}
         for name, array in arrays.items():
             group, _, rest = name.partition(".")
-            groups[group][rest] = torch.from_numpy(np.array(array))
-        self.network.load_state_dict(groups["network"])
-        self.target = groups["target"]
+            groups[group][rest] = array
+        self.network.load_state_dict(_tensors(groups["network"]))
+        self.target = _tensors(groups["target"])
+        if self.fused_update:
+            self.optimizer.load_state(groups["adam"])
+            return
         moments: dict[int, dict[str, torch.Tensor]] = {}
-        for name, tensor in groups["adam"].items():
+        for name, tensor in _tensors(groups["adam"]).items():
             number, _, key = name.partition(".")
             moments.setdefault(int(number), {})[key] = tensor
         optimizer = self.optimizer.state_dict()
         self.optimizer.load_state_dict({**optimizer, "state": moments})
 
 
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Keep PyTorch from starting a second thread for so few weights.
-
-    It would wait for more work, busily, on the core that the fused update needs next.
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
+def _tensors(arrays: dict[str, np.ndarray]) -> dict[str, torch.Tensor]:
+    return {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
 
 
 def _check_network(network: torch.nn.Module) -> torch.nn.Module:

@@ -111,7 +111,13 @@ def loss_and_gradients(
         ValueError: an array's shape or dtype is another, or an action or row is out of range.
         FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
     """
-    return start(network, observations, actions, targets, beta, rows)()
+    total = start(network, observations, actions, targets, beta, rows)()
+    gradients = torch.from_numpy(total[:-1].astype(np.float32))
+    parameters = _parameters(network)
+    parts = gradients.split([parameter.numel() for parameter in parameters])
+    for parameter, part in zip(parameters, parts):
+        parameter.grad = part.view(parameter.shape)
+    return float(total[-1])
 
 
 def start(
@@ -121,12 +127,12 @@ def start(
     targets: np.ndarray,
     beta: float = 1.0,
     rows: np.ndarray | None = None,
-) -> Callable[[], float]:
+) -> Callable[[], np.ndarray]:
     """Begin ``loss_and_gradients`` on all threads but this one, which may do something else.
 
     Returns:
-        A function that does what is left to do, sets ``.grad`` and returns the loss. Until
-        then, the weights and arrays must stay as they are.
+        A function that does what is left to do and returns (8n + 2,) float64: the gradients of
+        ``flat_weights``, and the loss. Until then, weights and arrays must stay as they are.
     """
     count, items = _check(observations)
     if rows is None:
@@ -152,7 +158,7 @@ def start(
     threads = min(torch.get_num_threads(), len(partial) // CHUNKS_PER_THREAD)
     others = [_helpers(os.getpid()).submit(_add_chunks, *work) for _ in range(1, threads)]
 
-    def finish() -> float:
+    def finish() -> np.ndarray:
         _add_chunks(*work)
         for other in others:
             other.result()
@@ -162,12 +168,7 @@ def start(
                 f"the loss is {total[-1]} and its gradients are not all finite; "
                 "expected finite observations, targets and weights"
             )
-        gradients = torch.from_numpy(total[:-1].astype(np.float32))
-        parameters = _parameters(network)
-        parts = gradients.split([parameter.numel() for parameter in parameters])
-        for parameter, part in zip(parameters, parts):
-            parameter.grad = part.view(parameter.shape)
-        return float(total[-1])
+        return total
 
     return finish
 
@@ -234,6 +235,11 @@ def _parameters(network: PEQNetwork) -> tuple[torch.nn.Parameter, ...]:
     """In their order; ``network.parameters()`` would take ten times as long to find them."""
     extractor, scorer = network.extractor, network.scorer
     return extractor.weight, extractor.bias, scorer.weight, scorer.bias
+
+
+def flat_weights(network: PEQNetwork) -> list[np.ndarray]:
+    """The weights themselves, float32 in one axis: of extractor and scorer, weights and biases."""
+    return [parameter.detach().numpy().reshape(-1) for parameter in _parameters(network)]
 
 
 def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
