@@ -144,7 +144,7 @@ class DQN:
             batch = {name: batch[name].take(rows, axis=0) for name in copied}
         if not self.fused_update:
             return partial(self._plain_update, batch)
-        targets = self._targets(batch).numpy()
+        targets = self._targets(batch).numpy() if self.gamma else batch["rewards"]
         gradients = fused.start(
             self.network, observations, batch["actions"], targets, self.beta, rows
         )
