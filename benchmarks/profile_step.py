@@ -29,7 +29,7 @@ PARTS = {
     "step": (ContainerVectorEnv, "step"),
     "add": (ReplayBuffer, "add"),
     "sample": (ReplayBuffer, "sample_rows"),
-    "gradients": (fused, "_add_chunks"),
+    "gradients": (fused, "add_chunks"),
     "Adam": (Adam, "step"),
 }
 

@@ -1,0 +1,344 @@
+"""The compiled loops of ``unload.fused``.
+
+Features are handled in blocks of ``WIDTH``, whose numbers lie in one flat array. Loops over
+items leave nothing behind but sums and keys; what needs the batch is done chunk by chunk.
+"""
+
+import numba
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+CHUNK = 32  # samples whose gradients are summed in single precision
+WIDTH = 64  # features handled together: loops of constant length become vector instructions
+
+# What is kept of WIDTH features: rows of WIDTH numbers in one flat array, and where they start.
+ROWS = 42
+STARTS = range(0, ROWS * WIDTH, WIDTH)
+WX, WY, WZ, BIAS = STARTS[:4]  # of the extractor
+LOW, LOW2, HIGH, HIGH2 = STARTS[4:8]  # keys of the two lowest and the two highest values
+MEAN, OWN, LOWEST, HIGHEST = STARTS[8:24:4]  # the four inputs each
+SLACK = STARTS[24]  # values closer than this may be in the wrong order
+SCORE = STARTS[25]  # 4 rows: the scorer's weights of the own, minimum, maximum, mean feature
+FEATURE = STARTS[29]  # 4 rows: these features
+PARTS = STARTS[33]  # of the value before tanh
+GRADIENT = STARTS[34]  # 8 rows: of the extractor's weights and bias, of the scorer's weights
+
+ZERO, ONE = np.float32(0), np.float32(1)
+
+
+@intrinsic
+def fma(typing_context, a, b, c):
+    """a·b + c, rounded once.
+
+    Left to itself, the compiler decides anew in each program where to round once and where
+    twice. Said explicitly, the bits are the same wherever it runs.
+    """
+
+    def build(context, builder, signature, arguments):
+        return builder.fma(*arguments)
+
+    return a(a, a, a), build
+
+
+@intrinsic
+def next_number(typing_context, counter):
+    """What ``counter``, (1,) int64, holds; then one more, which no other thread sees before."""
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.atomic_rmw("add", data, context.get_constant(types.int64, 1), "monotonic")
+
+    return types.int64(counter), build
+
+
+@numba.njit(cache=True, nogil=True)
+def add_chunks(
+    counter, observations, rows, actions, targets, beta, weight, bias, score, score_bias, partial
+):
+    """Sum the gradients and losses of each chunk into its row of ``partial``.
+
+    Several threads may call this with the same ``counter``, and share the chunks.
+    """
+    n, items = len(bias), observations.shape[1]
+    x = np.empty((-(-items // 4) * 4, 3), np.float32)  # one sample's items, filled up to fours
+    bits = 0  # of an item's number
+    while len(x) > 1 << bits:
+        bits += 1
+    # The relative error of a key: three roundings of the value, and the bits that it lacks.
+    precision = np.float32(2.0**-21 + 2.0 ** (bits - 23))
+    blocks = _blocks(weight, bias, score)
+    chunk = next_number(counter)
+    while chunk < len(partial):
+        begin, end = chunk * CHUNK, min((chunk + 1) * CHUNK, len(actions))
+        largest = _largest(observations, rows[begin:end])
+        for b in range(len(blocks)):
+            _start_chunk(largest, precision, blocks[b])
+        sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias  # NaN if not finite
+        for sample in range(begin, end):
+            _copy(observations[rows[sample]].reshape(-1), x.reshape(-1))
+            logit = np.float64(score_bias)  # double: 1 - tanh² loses its digits near 1
+            for b in range(len(blocks)):
+                _reduce_items(x, items, np.int32((1 << bits) - 1), blocks[b])
+                _find_extremes(x, items, (1 << bits) - 1, min(WIDTH, n - b * WIDTH), blocks[b])
+                logit += _forward(x[actions[sample]], items, blocks[b])
+            value = np.tanh(logit)
+            error = value - targets[sample]
+            if abs(error) < beta:
+                loss, slope = error * error / (2 * beta), error / beta
+            else:
+                loss, slope = abs(error) - beta / 2, np.sign(error)
+            slope *= 1 - value * value
+            sum_slopes += slope
+            sum_losses += loss
+            for b in range(len(blocks)):
+                _backward(np.float32(slope), blocks[b])
+        for f in range(n):
+            block, place = blocks[f // WIDTH], f % WIDTH
+            for axis in range(3):
+                partial[chunk, 3 * f + axis] = block[GRADIENT + axis * WIDTH + place]
+            for row in range(3, 8):
+                partial[chunk, row * n + f] = block[GRADIENT + row * WIDTH + place]
+        partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
+        chunk = next_number(counter)
+
+
+@numba.njit(cache=True)
+def _blocks(weight, bias, score):
+    """The weights in blocks of ``WIDTH`` features; zeros where there are no more features."""
+    count = -(-len(bias) // WIDTH)
+    memory = np.zeros(count * ROWS * WIDTH + 16, np.float32)
+    start = (-memory.ctypes.data // 4) % 16  # of a cache line, which a vector fills
+    blocks = memory[start : start + count * ROWS * WIDTH].reshape(count, ROWS * WIDTH)
+    for f in range(len(bias)):
+        block, place = blocks[f // WIDTH], f % WIDTH
+        for axis in range(3):
+            block[WX + axis * WIDTH + place] = weight[f, axis]
+        block[BIAS + place] = bias[f]
+        for kind in range(4):
+            block[SCORE + kind * WIDTH + place] = score[kind, f]
+    return blocks
+
+
+@numba.njit(cache=True)
+def _largest(observations, rows):
+    """The largest magnitude; not finite if one of the inputs is not.
+
+    Read as integers, the bits of positive numbers are in the order of the numbers; those of
+    infinity and NaN come last.
+    """
+    largest = np.int32(0)
+    for row in rows:
+        bits = observations[row].reshape(-1).view(np.int32)
+        for i in range(len(bits)):
+            magnitude = np.int32(bits[i] & 0x7FFFFFFF)
+            largest = magnitude if magnitude > largest else largest
+    return np.int32(largest).view(np.float32)
+
+
+@numba.njit(cache=True)
+def _start_chunk(largest, precision, block):
+    block[GRADIENT:] = 0
+    for f in range(WIDTH):
+        scale = abs(block[WX + f]) + abs(block[WY + f]) + abs(block[WZ + f])
+        scale = scale * largest + abs(block[BIAS + f])  # no value is larger
+        block[SLACK + f] = scale * precision + np.float32(1e-30)
+
+
+@numba.njit(cache=True)
+def _copy(inputs, x):
+    """Copy one sample and repeat its last item until ``x`` is full."""
+    for i in range(len(inputs)):
+        x[i] = inputs[i]
+    for i in range(len(inputs), len(x)):
+        x[i] = x[i - 3]
+
+
+@numba.njit(cache=True)
+def _reduce_items(x, items, mask, block):
+    """Read all items: sums of the active ones, keys of the two lowest and the two highest.
+
+    Nearly all of the time is spent here. Four items at a time, so that the sums need not be
+    fetched and put back for each; no branches, so that ``WIDTH`` features go side by side.
+    """
+    keys = block.view(np.int32)
+    keys[LOW:HIGH] = 0x7FFFFFFF
+    keys[HIGH:MEAN] = -0x80000000
+    block[MEAN:OWN] = 0
+    for i in range(0, len(x), 4):
+        x0, x1, x2, x3 = x[i, 0], x[i + 1, 0], x[i + 2, 0], x[i + 3, 0]
+        y0, y1, y2, y3 = x[i, 1], x[i + 1, 1], x[i + 2, 1], x[i + 3, 1]
+        z0, z1, z2, z3 = x[i, 2], x[i + 1, 2], x[i + 2, 2], x[i + 3, 2]
+        i0, i1, i2, i3 = np.int32(i), np.int32(i + 1), np.int32(i + 2), np.int32(i + 3)
+        for f in range(WIDTH):
+            a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
+            v0, v1 = _value(a, b, c, d, x0, y0, z0), _value(a, b, c, d, x1, y1, z1)
+            v2, v3 = _value(a, b, c, d, x2, y2, z2), _value(a, b, c, d, x3, y3, z3)
+            a0, a1, a2, a3 = _active(v0), _active(v1), _active(v2), _active(v3)
+            _add(block, MEAN + f, a0, a1, a2, a3, x0, x1, x2, x3)
+            _add(block, MEAN + WIDTH + f, a0, a1, a2, a3, y0, y1, y2, y3)
+            _add(block, MEAN + 2 * WIDTH + f, a0, a1, a2, a3, z0, z1, z2, z3)
+            block[MEAN + 3 * WIDTH + f] += (a0 + a1) + (a2 + a3)
+            k0, k1 = _key(v0, i0, mask), _key(v1, i1, mask)
+            k2, k3 = _key(v2, i2, mask), _key(v3, i3, mask)
+            # Sort the four keys: low ≤ low2, high2 ≤ high. Then merge them with those so far.
+            k0, k1, k2, k3 = min(k0, k1), max(k0, k1), min(k2, k3), max(k2, k3)
+            low, high = min(k0, k2), max(k1, k3)
+            k0, k1 = max(k0, k2), min(k1, k3)
+            low2, high2 = min(k0, k1), max(k0, k1)
+            keys[LOW2 + f] = min(min(keys[LOW2 + f], low2), max(keys[LOW + f], low))
+            keys[LOW + f] = min(keys[LOW + f], low)
+            keys[HIGH2 + f] = max(max(keys[HIGH2 + f], high2), min(keys[HIGH + f], high))
+            keys[HIGH + f] = max(keys[HIGH + f], high)
+    for i in range(items, len(x)):  # repeated items do not count
+        for f in range(WIDTH):
+            a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
+            active = _active(_value(a, b, c, d, x[i, 0], x[i, 1], x[i, 2]))
+            block[MEAN + f] -= active * x[i, 0]
+            block[MEAN + WIDTH + f] -= active * x[i, 1]
+            block[MEAN + 2 * WIDTH + f] -= active * x[i, 2]
+            block[MEAN + 3 * WIDTH + f] -= active
+
+
+@numba.njit(cache=True, forceinline=True)
+def _value(a, b, c, d, x, y, z):
+    """A feature before the ReLU."""
+    return fma(a, x, fma(b, y, fma(c, z, d)))
+
+
+@numba.njit(cache=True, forceinline=True)
+def _active(value):
+    return ONE if value > ZERO else ZERO
+
+
+@numba.njit(cache=True, forceinline=True)
+def _add(block, place, a0, a1, a2, a3, x0, x1, x2, x3):
+    """Add the inputs of the active ones of four items."""
+    block[place] = fma(a3, x3, fma(a2, x2, fma(a1, x1, fma(a0, x0, block[place]))))
+
+
+@numba.njit(cache=True, forceinline=True)
+def _key(value, item, mask):
+    """The value's bits, the lowest of them replaced by the item's number: an int32.
+
+    Keys of positive values are in the order of the values, and all below them are the keys of
+    negative values, in reverse order. So the lowest of all keys tells what the ReLU needs: the
+    lowest value if all are positive, else the negative value nearest to zero.
+    """
+    return np.int32(np.int32(np.float32(value).view(np.int32) & ~mask) | item)
+
+
+@numba.njit(cache=True)
+def _find_extremes(x, items, mask, n, block):
+    """The inputs of the lowest and of the highest item for the block's ``n`` features."""
+    keys = block.view(np.int32)
+    for f in range(n):
+        low, high, slack = block[LOW + f], block[HIGH + f], block[SLACK + f]
+        _put(x[keys[LOW + f] & mask], low > 0, LOWEST + f, block)
+        _put(x[keys[HIGH + f] & mask], high > 0, HIGHEST + f, block)
+        some_negative, all_negative = low < -slack, high < 0 and low < -slack
+        if not (some_negative or (low > slack and block[LOW2 + f] - low > slack)):
+            _decide(x, items, -1.0, f, LOWEST + f, block)
+        if not (all_negative or (high > slack and high - block[HIGH2 + f] > slack)):
+            _decide(x, items, 1.0, f, HIGHEST + f, block)
+
+
+@numba.njit(cache=True, forceinline=True)
+def _put(inputs, active, place, block):
+    """Set four inputs; zeros if the ReLU is closed."""
+    block[place] = inputs[0] if active else ZERO
+    block[place + WIDTH] = inputs[1] if active else ZERO
+    block[place + 2 * WIDTH] = inputs[2] if active else ZERO
+    block[place + 3 * WIDTH] = ONE if active else ZERO
+
+
+@numba.njit(cache=True)
+def _decide(x, items, sign, f, place, block):
+    """Set the inputs of one feature's highest (sign 1) or lowest (-1) item by double precision.
+
+    The mean of those that tie.
+    """
+    a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
+    best, count, px, py, pz = -np.inf, 1, 0.0, 0.0, 0.0
+    for i in range(items):
+        value = sign * (np.float64(a) * x[i, 0] + np.float64(b) * x[i, 1])
+        value += sign * (np.float64(c) * x[i, 2] + d)
+        if value > best:
+            best, count, px, py, pz = value, 1, x[i, 0], x[i, 1], x[i, 2]
+        elif value == best:
+            count, px, py, pz = count + 1, px + x[i, 0], py + x[i, 1], pz + x[i, 2]
+    mean = np.float32(px / count), np.float32(py / count), np.float32(pz / count)
+    _put(mean, sign * best > 0, place, block)
+
+
+@numba.njit(cache=True)
+def _forward(chosen, items, block):
+    """Set the inputs of the chosen item, and all features; their part of the value before tanh."""
+    x, y, z, share = chosen[0], chosen[1], chosen[2], ONE / np.float32(items)
+    for f in range(WIDTH):
+        own = np.float64(block[WX + f]) * x + np.float64(block[WY + f]) * y
+        own += np.float64(block[WZ + f]) * z + block[BIAS + f]
+        _put((x, y, z), own > 0, OWN + f, block)
+        block[MEAN + f] *= share
+        block[MEAN + WIDTH + f] *= share
+        block[MEAN + 2 * WIDTH + f] *= share
+        block[MEAN + 3 * WIDTH + f] *= share
+    for f in range(WIDTH):
+        part = _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
+        block[PARTS + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
+    half = WIDTH // 2
+    while half:  # in an order that needs few steps one after the other
+        for f in range(half):
+            block[PARTS + f] += block[PARTS + half + f]
+        half //= 2
+    return block[PARTS]
+
+
+@numba.njit(cache=True, forceinline=True)
+def _feature(inputs, kind, f, block):
+    """Set one feature, weights · inputs; its part of the value before tanh."""
+    place = inputs + f
+    feature = block[BIAS + f] * block[place + 3 * WIDTH]
+    feature = fma(block[WZ + f], block[place + 2 * WIDTH], feature)
+    feature = fma(block[WY + f], block[place + WIDTH], feature)
+    feature = fma(block[WX + f], block[place], feature)
+    block[FEATURE + kind * WIDTH + f] = feature
+    return block[SCORE + kind * WIDTH + f] * feature
+
+
+@numba.njit(cache=True)
+def _backward(slope, block):
+    """Add one sample's gradients; ``slope`` is the loss's by the value before tanh."""
+    for f in range(WIDTH):
+        own, low = slope * block[SCORE + f], slope * block[SCORE + WIDTH + f]
+        high, mean = slope * block[SCORE + 2 * WIDTH + f], slope * block[SCORE + 3 * WIDTH + f]
+        for axis in range(4):
+            row = axis * WIDTH + f
+            gradient = fma(own, block[OWN + row], block[GRADIENT + row])
+            gradient = fma(low, block[LOWEST + row], gradient)
+            gradient = fma(high, block[HIGHEST + row], gradient)
+            block[GRADIENT + row] = fma(mean, block[MEAN + row], gradient)
+        for kind in range(4):
+            row = GRADIENT + (4 + kind) * WIDTH + f
+            block[row] = fma(slope, block[FEATURE + kind * WIDTH + f], block[row])
+
+
+@numba.njit(cache=True)
+def best_items(observations, allowed, weight, bias, score, actions):
+    """The item of the highest own score; the first one if several have it."""
+    x = np.empty((3, observations.shape[1]), np.float32)
+    scores = np.empty(observations.shape[1], np.float32)
+    for sample in range(len(actions)):
+        for i in range(len(scores)):
+            for axis in range(3):
+                x[axis, i] = observations[sample, i, axis]
+        scores[:] = 0
+        for f in range(len(bias)):
+            a, b, c, d, s = weight[f, 0], weight[f, 1], weight[f, 2], bias[f], score[f]
+            for i in range(len(scores)):
+                value = _value(a, b, c, d, x[0, i], x[1, i], x[2, i])
+                scores[i] = fma(s, ZERO if value < ZERO else value, scores[i])
+        best = -np.inf
+        for i in range(len(scores)):
+            if allowed[sample, i] and scores[i] > best:
+                best, actions[sample] = scores[i], i
