@@ -66,8 +66,9 @@ def train(
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
     for the wall times, as one that was not, and so does one that was killed: it goes on
     from its last checkpoint. Ctrl-C writes one first; pressed again, it stops at once. A
-    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads; with
-    the paper's network the result does not depend on their number.
+    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads, and
+    with the paper's network they go on while the environments step; the result does not
+    depend on the number of threads.
 
     Args:
         config: what to train.
