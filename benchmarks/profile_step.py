@@ -116,6 +116,6 @@ def _floors(config: unload.TrainConfig) -> dict[str, tuple[float, str]]:
             LEARN * config.batch_size * features * operation,
             f"{LEARN} operations per feature",
         ),
-        "Adam": (7 * 4 * weights * byte, "read and write the weights and moments"),
+        "Adam": (48 * weights * byte, "read and write the weights and moments"),
         "rest": (0.0, "nothing"),
     }

@@ -85,9 +85,10 @@ def test_nearly_perfect_is_not_called_perfect(tmp_path):
 def test_only_what_should_be_there_is_missed(tmp_path):
     write(tmp_path, missing=("nearest", True, "σ 5 cm"))
     write_full(tmp_path, [policy for policy in figures.POLICIES if policy != "paper"])
-    assert figures.not_played(tmp_path) == [
-        "paper: full, restored", "paper: full, kept", "nearest: σ 5 cm"
-    ]  # fmt: skip
+    assert figures.not_played(tmp_path) == ["paper: full, kept", "nearest: σ 5 cm"]
+    write_full(tmp_path, ["paper"])  # restored, only the recommended agent plays
+    assert "recommended: full, restored" in figures.not_played(tmp_path)
+    assert "random: full, restored" not in figures.not_played(tmp_path)
     write(tmp_path)
     write_full(tmp_path, figures.POLICIES)
     assert figures.not_played(tmp_path) == []

@@ -555,3 +555,22 @@ def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
     config = TrainConfig(picks=800, num_envs=4, batch_size=32, n_features=4, mask=False)
     train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=1))
     assert min(fewest) < 70  # of 128 rows
+
+
+def test_training_meets_other_loads_than_evaluate_does_with_its_seed(tmp_path):
+    with begun(TrainConfig(**CONTAINER), tmp_path) as run:
+        met = {observation.tobytes() for observation in run.observations}
+    envs = ContainerVectorEnv(8, equalize=True)
+    shown, _ = envs.reset(seed=np.random.SeedSequence(0).generate_state(8).tolist())
+    envs.close()
+    assert not met & {observation.tobytes() for observation in shown}
+
+
+def test_without_updates_the_weights_stay(tmp_path):
+    config = TrainConfig(**CONTAINER | {"gradient_steps": 0})
+    with begun(config, tmp_path) as run:
+        before = run.agent.state()
+        for _ in range(20):
+            run._step()
+        after = run.agent.state()
+    assert all(np.array_equal(before[name], after[name]) for name in before)

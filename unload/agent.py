@@ -132,8 +132,11 @@ class DQN:
         """Begin ``update``; the fused one goes on in other threads while this one acts.
 
         Returns:
-            A function that completes the update and returns the loss. The weights stay as
-            they are until it is called, and so must the arrays.
+            A function that completes the update, returns the loss and may raise as ``update``
+            does. The weights stay as they are until it is called, and so must the arrays.
+
+        Raises:
+            TypeError, ValueError: as ``update`` does.
         """
         names = ("next_observations", "next_masks", "terminations") if self.gamma else ()
         names = ("observations", "actions", "rewards", *names)
@@ -145,12 +148,12 @@ class DQN:
         if not self.fused_update:
             return partial(self._plain_update, batch)
         targets = self._targets(batch).numpy() if self.gamma else batch["rewards"]
-        gradients = fused.start(
+        finish_gradients = fused.start(
             self.network, observations, batch["actions"], targets, self.beta, rows
         )
 
         def finish() -> float:
-            total = gradients()
+            total = finish_gradients()
             self.optimizer.step(total[:-1])
             return float(total[-1])
 

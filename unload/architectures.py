@@ -21,7 +21,9 @@ class ScoringNetwork(nn.Module):
 
     Args:
         n_features: n.
-        generator: source of the initial weights, PyTorch's default one if None.
+
+    Subclasses also take ``generator``, the source of the initial weights: PyTorch's default
+    one if None.
 
     Raises:
         TypeError, ValueError: ``n_features`` is no number of features.

@@ -1,7 +1,7 @@
 """The compiled loops of ``unload.fused``.
 
-Features are handled in blocks of ``WIDTH``, whose numbers lie in one flat array. Loops over
-items leave nothing behind but sums and keys; what needs the batch is done chunk by chunk.
+Features are handled in blocks of ``WIDTH``, whose numbers lie in one flat array; samples in
+chunks of ``CHUNK``, which several threads share.
 """
 
 import numba
@@ -43,7 +43,7 @@ def fma(typing_context, a, b, c):
 
 @intrinsic
 def next_number(typing_context, counter):
-    """What ``counter``, (1,) int64, holds; then one more, which no other thread sees before."""
+    """Return ``counter``, (1,) int64, and raise it by one, in a single step for all threads."""
 
     def build(context, builder, signature, arguments):
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data

@@ -1,4 +1,4 @@
-"""How sure a mean over seeds is."""
+"""How sure a mean over seeds or containers is."""
 
 from collections.abc import Sequence
 
@@ -15,8 +15,11 @@ def bootstrap_interval(
 ) -> tuple[float, float]:
     """Percentile bootstrap interval of the mean.
 
+    Few values make it too narrow: of normally distributed ones, an interval of level 0.95
+    holds the true mean in 75 % of all cases with three values, 84 % with five, 89 % with ten.
+
     Args:
-        values: (n,) one number per seed, n ≥ 1.
+        values: (n,) one number per seed or container, n ≥ 1.
         level: share of the resampled means inside.
         seed: of the resampling.
 
@@ -40,7 +43,7 @@ def with_intervals(table: pd.DataFrame, by: Sequence[str], measures: Sequence[st
     """Mean and 95 % bootstrap interval of each measure over the rows of a group.
 
     Args:
-        table: one row per seed.
+        table: one row per seed or container.
         by: columns that make a group; the groups keep their order.
         measures: columns of numbers.
 

@@ -86,7 +86,8 @@ def judge(config: TrainConfig, folder: str | Path) -> tuple[dict, pd.DataFrame]:
         snapshot with an MSR of 99 % and more on 32 loads, NaN if there is none.
 
         The curve, one row per snapshot: ``picks``; ``success_rate``, ``deadlocked`` and
-        ``loss`` of the training since the last one; ``msr_mask`` and ``msr_no_mask``.
+        ``loss`` of the training since the last one, means over the points of the run's curve
+        that lie between, NaN if none does; ``msr_mask`` and ``msr_no_mask``.
     """
     folder = Path(folder)
     training = pd.read_csv(folder / "curve.csv")

@@ -157,7 +157,8 @@ def offline_data(
         seeds: how many.
         **size: ``steps``, ``updates`` and ``loads`` of ``fit``, if not its own.
     """
-    size = {"steps": STEPS, "updates": UPDATES, "loads": LOADS} | size
+    full = {"steps": STEPS, "updates": UPDATES, "loads": LOADS}
+    size = full | size
     kept = Path(runs_dir) / "offline" / "_".join(f"{value}_{name}" for name, value in size.items())
     jobs = [
         delayed(_kept)(features, seed, kept, size)
@@ -168,7 +169,7 @@ def offline_data(
     folder = Path(folder) / "study"
     files.write_text(folder / "offline.csv", table.to_csv(index=False, float_format="%.6g"))
     settings = {"seeds": seeds, "batch_size": BATCH_SIZE, "loads_seed": LOADS_SEED, **size}
-    reduced = seeds < SEEDS or size["updates"] < UPDATES or size["loads"] < LOADS
+    reduced = seeds < SEEDS or any(size[name] < full[name] for name in full)
     record = joined(result["record"] for result in results)
     write_provenance(
         folder, "offline", "python -m unload.reproduce offline", settings, reduced, record

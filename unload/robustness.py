@@ -32,7 +32,7 @@ NAME = "robustness"
 EPISODES, PICKS = 10, 100
 SEED = 2000  # of the loads; no other data uses it
 AFTER_PICK = ("table", "keep", "restore")
-RESTORED = ("recommended",)  # of others too, restored, all lifts would be those of the table
+RESTORED = ("recommended",)  # for the others every lift would be the table's
 
 
 def robustness_data(

@@ -159,7 +159,9 @@ class _Run:
     ) -> None:
         self.config, self.folder, self.interrupts = config, folder, interrupts
         self.checkpoint = folder / "checkpoint.npz"
-        env_seed, rng_seed, torch_seed = np.random.SeedSequence(config.seed).generate_state(3)
+        # The key keeps the loads apart from those that ``evaluate`` draws with the same seed.
+        seeds = np.random.SeedSequence(config.seed, spawn_key=(1,))
+        env_seed, rng_seed, torch_seed = seeds.generate_state(3)
         self.rng = np.random.default_rng(rng_seed)
         weights = torch.Generator().manual_seed(int(torch_seed))
         self.agent = DQN(
@@ -242,7 +244,8 @@ class _Run:
     def _step(self) -> None:
         """One pick in every environment; meanwhile the agent learns from those before."""
         config = self.config
-        learns = len(self.replay) >= min(config.batch_size, self.replay.size)
+        enough = len(self.replay) >= min(config.batch_size, self.replay.size)
+        learns = enough and config.gradient_steps > 0
         complete = self._start_update() if learns else None
         epsilon = config.epsilon(self.picks)
         actions = self.agent.choose(self.observations, self.allowed, epsilon, self.rng)

@@ -12,6 +12,7 @@ from unload import checks, files
 from unload.figures.style import styled
 from unload.intervals import with_intervals
 from unload.players import LEARNED, POLICIES
+from unload.robustness import RESTORED
 
 KEY = ["policy", "mask", "condition"]
 # Conditions from left to right and top to bottom; those of ``unload.comparison`` and, with
@@ -23,7 +24,7 @@ CONDITIONS = (
     "complete", "boxes × 0.8", "boxes × 1.2",
 )  # fmt: skip
 COLUMNS = 3
-# Who plays, by policy and mask: only to a learned policy does the mask make a difference.
+# Who plays, by policy and mask: the rules with it only.
 ROWS = {
     (policy, mask): policy if mask else f"{policy}, no mask"
     for policy in POLICIES
@@ -94,9 +95,15 @@ def not_played(folder: str | Path = files.DATA) -> list[str]:
         f"{name}: {condition}"
         for condition in CONDITIONS
         for (policy, mask), name in ROWS.items()
-        if (policy, mask, condition) not in played
-        and (mask or condition not in FULL.values())  # never played without the mask
+        if (policy, mask, condition) not in played and _meant(policy, mask, condition)
     ]
+
+
+def _meant(policy: str, mask: bool, condition: str) -> bool:
+    """Whether it is ever played: in full physics with the mask, and restored by few policies."""
+    if condition not in FULL.values():
+        return True
+    return mask and (condition != FULL["restore"] or policy in RESTORED)
 
 
 def comparison_table(folder: str | Path = files.DATA) -> pd.DataFrame:
@@ -161,7 +168,8 @@ def _panel(axes: Axes, means: pd.DataFrame, condition: str) -> None:
     for row, (policy, mask) in enumerate(ROWS):
         key = (policy, mask, condition)
         if key not in means.index:
-            axes.text(0.03, row, "not played", va="center", fontsize=7, color="0.45")
+            text = "not played" if _meant(*key) else ABSENT
+            axes.text(0.03, row, text, va="center", fontsize=7, color="0.45")
             continue
         _, mean, low, high = means.loc[key]
         colour = COLOURS[policy]
