@@ -14,6 +14,7 @@ least ``task.LIFT_THRESHOLD``.
 
 from abc import ABC, abstractmethod
 from collections import Counter
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -207,11 +208,7 @@ class FullPhysics(Physics):
             self._world.add_box(position, size, 0)
 
     def _reset(self) -> None:
-        # A time step with an empty container makes Bullet forget the contacts of the old
-        # load. Without it boxes are flung by up to a metre.
-        for body in self._bodies:
-            self._park(body)
-        self._world.step(TIME_STEP)
+        self._clear(self._bodies)
         sizes = np.rint(self.load.sizes / RESOLUTION).astype(int).tolist()
         self._poses = [(tuple(position), UPRIGHT) for position in self.load.positions.tolist()]
         self._bodies = []
@@ -231,6 +228,16 @@ class FullPhysics(Physics):
         self._world.place(bodies[number], position)
         return bodies[number]
 
+    def _clear(self, bodies: Sequence[int]) -> None:
+        """Empty the container, so that Bullet forgets the contacts in it.
+
+        A box that is only moved keeps its old contacts: it may be flung by up to a metre, or
+        held though nothing touches it any more.
+        """
+        for body in bodies:
+            self._park(body)
+        self._world.step(TIME_STEP)
+
     def _park(self, body: int) -> None:
         """Keep a body for a later load, on a place of its own in the depot."""
         row, column = divmod(body, 100)
@@ -246,7 +253,9 @@ class FullPhysics(Physics):
         distance = self._world.pull(self._bodies[item])
         failed = distance < task.LIFT_THRESHOLD
         if self.after_pick == "restore" or (self.after_pick == "restore_failure" and failed):
-            for index in np.flatnonzero(self.present):
+            present = np.flatnonzero(self.present)
+            self._clear([self._bodies[index] for index in present])
+            for index in present:
                 self._world.place(self._bodies[index], *self._poses[index])
         else:
             self._keep()
