@@ -80,8 +80,11 @@ def _find(low, high, order, ends):
     x1, y1, z1 = _columns(high, order)
     for end in ends:
         for i in range(start, end):
+            if count + 2 * (end - i) > len(found):
+                found = np.concatenate((found, np.empty_like(found)))
+            limit = y1[i] + TOLERANCE
             for j in range(i + 1, end):
-                if y0[j] - y1[i] > TOLERANCE:
+                if y0[j] > limit:
                     break  # j begins to the right of i, and so do all further ones
                 # Lengths of the stretches that both share; below 0 the gap between them.
                 upwards = min(z1[i], z1[j]) - max(z0[i], z0[j])
@@ -95,8 +98,6 @@ def _find(low, high, order, ends):
                     return found[:count], order[i], order[j]
                 if along <= TOLERANCE:
                     continue
-                if count + 2 > len(found):
-                    found = np.concatenate((found, np.empty_like(found)))
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
                 if across > TOLERANCE:
                     one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
