@@ -1,6 +1,6 @@
 """How fast the parts are: measured, printed and kept in data/benchmarks.
 
-    python benchmarks/run.py            all, in about five minutes
+    python benchmarks/run.py            all, in about seven minutes
     python benchmarks/run.py --quick    in small, within a minute; nothing is kept
 
 Absolute times depend on the machine and on what else it does; the ratios, each to the
@@ -52,7 +52,7 @@ def speeds(quick: bool = False) -> pd.DataFrame:
         ("fill the full simulation", "containers/s", partial(fill_rates, load), {"rounds": 1}),
         ("random picks", "picks/s", pick_rates, {"num_envs": 2, "picks": 20, "rounds": 1}),
         (update, "ms", partial(update_times, batch_size), {"rounds": 1}),
-        ("training", "picks/s", training_rates, {"ours": 6400, "plain": 640, "theirs": 64}),
+        ("training", "picks/s", training_rates, {"ours": 6400, "memory": 3200, "plain": 640, "theirs": 64}),
     )
     rows = []
     for what, unit, measure, small in parts:
