@@ -47,12 +47,13 @@ def speeds(quick: bool = False) -> pd.DataFrame:
     load = unload.stack_load(np.random.default_rng(0), *([1] if quick else []))
     batch_size = 128 if quick else 2048
     update = f"update, b = {batch_size}, n = 64"
+    few = {"ours": 6400, "memory": 3200, "plain": 640, "theirs": 64}
     parts = (  # what, unit, how it is measured, and what changes in small
         ("lifts", "lifts/s", partial(lift_rates, load), {"full": 1, "others": 5, "rounds": 1}),
         ("fill the full simulation", "containers/s", partial(fill_rates, load), {"rounds": 1}),
         ("random picks", "picks/s", pick_rates, {"num_envs": 2, "picks": 20, "rounds": 1}),
         (update, "ms", partial(update_times, batch_size), {"rounds": 1}),
-        ("training", "picks/s", training_rates, {"ours": 6400, "memory": 3200, "plain": 640, "theirs": 64}),
+        ("training", "picks/s", training_rates, few),
     )
     rows = []
     for what, unit, measure, small in parts:
