@@ -84,3 +84,9 @@ def test_summary_has_a_row_per_configuration():
     assert table["final_msr"].tolist() == [0.5, 0.5]
     assert table["final_msr_std"].tolist() == pytest.approx([0.5**0.5] * 2)
     assert table["solved"].tolist() == [1, 1]
+
+
+def test_a_run_without_an_update_has_no_losses():
+    summary = tuning.run_summary(np.full(3, 0.5), np.full(3, np.nan))
+    assert summary["final_msr"] == 0.5
+    assert all(np.isnan(summary[name]) for name in tuning.LOSSES)

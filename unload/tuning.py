@@ -17,6 +17,7 @@ STEPS = 3000  # K, one pick in each of 64 environments and one update per step
 WINDOW = 25  # steps of the running means
 FINAL = 100  # steps at the end of a run that its final values are means of
 SOLVED = 0.99  # MSR
+LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
 
 
 def tuning_config(
@@ -121,21 +122,26 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
         on the running mean of the MSR stays at 99 % or above, NaN if it does not end there.
         ``loss_start``: the first loss; ``loss_dip`` and ``loss_peak``: where the running mean of
         the loss begins and ends its largest rise; ``loss_end``: mean over the last 100 steps.
+        These are NaN if the run was too short for an update.
     """
     below = np.flatnonzero(running_mean(success_rate) < SOLVED)
     solved_at = below[-1] + 1 if below.size else 0
-    known = np.isfinite(loss)
-    smooth = running_mean(loss)[known]
-    lowest = np.minimum.accumulate(smooth)
-    peak = np.argmax(smooth - lowest)
     return {
         "final_msr": success_rate[-FINAL:].mean(),
         "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
-        "loss_start": loss[known][0],
-        "loss_dip": lowest[peak],
-        "loss_peak": smooth[peak],
-        "loss_end": loss[known][-FINAL:].mean(),
+        **_loss_summary(loss),
     }
+
+
+def _loss_summary(loss: np.ndarray) -> dict[str, float]:
+    known = np.isfinite(loss)
+    if not known.any():
+        return dict.fromkeys(LOSSES, np.nan)
+    smooth = running_mean(loss)[known]
+    lowest = np.minimum.accumulate(smooth)
+    peak = np.argmax(smooth - lowest)
+    ends = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
+    return dict(zip(LOSSES, ends))
 
 
 def tuning_summary(
@@ -167,10 +173,7 @@ def tuning_summary(
             final_msr_max=("final_msr", "max"),
             solved=("solved_at", "count"),
             solved_at=("solved_at", "mean"),
-            loss_start=("loss_start", "mean"),
-            loss_dip=("loss_dip", "mean"),
-            loss_peak=("loss_peak", "mean"),
-            loss_end=("loss_end", "mean"),
+            **{name: (name, "mean") for name in LOSSES},
         )
         .reset_index()
     )
