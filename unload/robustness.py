@@ -149,8 +149,8 @@ def play(
     rng = np.random.default_rng([checks.integer("seed", seed, 0)])
     rewards, deadlocked, free = [], [], []
     longest = stuck = 0
-    physics = ("table",) if after_pick == "table" else ("full", after_pick)
-    env = ContainerEnv(*physics, max_picks=picks, stack=stack)
+    lifts = ("table",) if after_pick == "table" else ("full", after_pick)
+    env = ContainerEnv(*lifts, max_picks=picks, stack=stack)
     try:
         observation, info = env.reset(seed=seed)
         physics = env.physics
