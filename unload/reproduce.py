@@ -52,7 +52,7 @@ PARTS = (
     "robustness",
 )  # fmt: skip
 PAPER_PICKS = TrainConfig().picks
-SEEDS = (0, 1, 2)
+SEEDS = (0, 1, 2, 3, 4)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
 EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
 
