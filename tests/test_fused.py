@@ -181,8 +181,9 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
 
 def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
     net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
-    finish = fused.start(net, *batch.values())
-    fused.greedy_actions(net, batch["observations"], np.ones(batch["observations"].shape[:2], bool))
+    finish = fused.start(fused.weights_of(net), *batch.values())
+    everything = np.ones(batch["observations"].shape[:2], bool)
+    fused.greedy_actions(fused.weights_of(net), batch["observations"], everything)
     total = finish()
     assert fused.loss_and_gradients(net, *batch.values()) == total[-1]
     flat = np.concatenate([parameter.grad.numpy().ravel() for parameter in net.parameters()])
@@ -210,7 +211,7 @@ def test_choice_is_that_of_the_network(batch, rng):
     allowed = rng.random((BATCH, ITEMS)) < 0.3
     values = net(torch.from_numpy(batch["observations"]))
     expected = values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
-    actions = fused.greedy_actions(net, batch["observations"], allowed)
+    actions = fused.greedy_actions(fused.weights_of(net), batch["observations"], allowed)
     assert np.mean(actions == expected) > 0.99  # tanh may round two scores to one value
     rows = np.arange(BATCH)
     best = values.detach().numpy()
@@ -260,7 +261,7 @@ def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("actions", np.full(BATCH, ITEMS), "actions holds 128 to 128"),
+        ("actions", np.full(BATCH, ITEMS), "actions holds 128; expected 0 to 127"),
         ("actions", np.full(BATCH, -1), "actions holds -1"),
         ("actions", np.zeros(BATCH), "actions has shape .* dtype float64"),
         ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
@@ -276,7 +277,8 @@ def test_bad_batches_are_refused(batch, name, value, message):
 def test_choice_among_nothing_finite_is_refused():
     observations = np.full((2, ITEMS, 3), np.nan, np.float32)
     with pytest.raises(FloatingPointError, match="no allowed action of a finite value"):
-        fused.greedy_actions(network(4), observations, np.ones((2, ITEMS), bool))
+        weights = fused.weights_of(network(4))
+        fused.greedy_actions(weights, observations, np.ones((2, ITEMS), bool))
 
 
 class Subclass(PEQNetwork):
@@ -341,15 +343,13 @@ print(*(p.grad.numpy().tobytes().hex() for p in network.parameters()))
 def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
     net, rows = network(16), rng.integers(BATCH, size=100)
     expected = gradients(net, {name: array[rows] for name, array in batch.items()})
-    actions, rewards = batch["actions"][rows], batch["rewards"][rows]
-    fused.loss_and_gradients(net, batch["observations"], actions, rewards, rows=rows)
+    fused.loss_and_gradients(net, *batch.values(), rows=rows)
     assert [parameter.grad.numpy().tobytes() for parameter in net.parameters()] == expected
 
 
 @pytest.mark.parametrize(
-    "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.array([0, 1, 2])]
+    "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.zeros((2, 2), int)]
 )
 def test_bad_rows_are_refused_by_name(batch, rows):
-    actions, rewards = batch["actions"][:2], batch["rewards"][:2]
-    with pytest.raises(ValueError, match="rows|actions"):
-        fused.loss_and_gradients(network(4), batch["observations"], actions, rewards, rows=rows)
+    with pytest.raises(ValueError, match="rows"):
+        fused.loss_and_gradients(network(4), *batch.values(), rows=rows)

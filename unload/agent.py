@@ -62,7 +62,8 @@ class DQN:
         self.beta = checks.real("beta", beta, 0)
         learning_rate = checks.real("learning_rate", learning_rate, 0)
         if self.fused_update:
-            self.optimizer = Adam(fused.flat_weights(network), learning_rate)
+            self.weights = fused.weights_of(network)
+            self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
         else:
             self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
         self.target = {name: value.clone() for name, value in network.state_dict().items()}
@@ -106,7 +107,11 @@ class DQN:
         actions = np.empty(len(observations), np.int64)
         actions[explore] = any_allowed(allowed[explore], rng)
         if exploit.any():
-            actions[exploit] = _best_actions(self.network, observations[exploit], allowed[exploit])
+            seen = observations[exploit].astype(np.float32, copy=False), allowed[exploit]
+            if self.fused_update:
+                actions[exploit] = fused.greedy_actions(self.weights, *seen)
+            else:
+                actions[exploit] = _best_actions(self.network, *seen)
         return actions
 
     def update(self, batch: dict[str, np.ndarray], rows: np.ndarray | None = None) -> float:
@@ -141,15 +146,13 @@ class DQN:
         names = ("next_observations", "next_masks", "terminations") if self.gamma else ()
         names = ("observations", "actions", "rewards", *names)
         checks.entries("batch", batch, names)
-        observations = batch["observations"]
-        if rows is not None:
-            copied = names[1:] if self.fused_update else names
-            batch = {name: batch[name].take(rows, axis=0) for name in copied}
+        if rows is not None and (self.gamma or not self.fused_update):
+            batch, rows = {name: batch[name].take(rows, axis=0) for name in names}, None
         if not self.fused_update:
             return partial(self._plain_update, batch)
         targets = self._targets(batch).numpy() if self.gamma else batch["rewards"]
         finish_gradients = fused.start(
-            self.network, observations, batch["actions"], targets, self.beta, rows
+            self.weights, batch["observations"], batch["actions"], targets, self.beta, rows
         )
 
         def finish() -> float:
@@ -262,7 +265,8 @@ def _best_actions(
 ) -> np.ndarray:
     """``greedy_actions`` on what ``check_batch`` has returned."""
     if fused.applies(network):  # the item's own features decide, whatever else there is
-        return fused.greedy_actions(network, observations.astype(np.float32, copy=False), allowed)
+        observations = observations.astype(np.float32, copy=False)
+        return fused.greedy_actions(fused.weights_of(network), observations, allowed)
     arguments = [torch.as_tensor(observations, dtype=torch.float32)]
     if present is not None and not present.all():  # other modules need not know of padding
         arguments.append(torch.from_numpy(present))

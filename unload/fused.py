@@ -22,14 +22,29 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import torch
 
-from unload.fused_kernel import CHUNK, add_chunks, best_items
+from unload.fused_kernel import CHUNK, add_chunks, best_items, sum_chunks
 from unload.network import PEQNetwork
 
 CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
+
+
+class Weights(NamedTuple):
+    """The weights of a ``PEQNetwork``, float32, in its own memory: who changes one changes both.
+
+    Attributes:
+        weight, bias: of the extractor, (n, 3) and (n,).
+        score, score_bias: of the scorer, (4, n) and (1,).
+    """
+
+    weight: np.ndarray
+    bias: np.ndarray
+    score: np.ndarray
+    score_bias: np.ndarray
 
 
 def applies(network: torch.nn.Module) -> bool:
@@ -37,6 +52,12 @@ def applies(network: torch.nn.Module) -> bool:
     return type(network) is PEQNetwork and all(
         p.device.type == "cpu" and p.dtype == torch.float32 for p in _parameters(network)
     )
+
+
+def weights_of(network: PEQNetwork) -> Weights:
+    """The weights of a network for which ``applies`` holds."""
+    weight, bias, score, score_bias = (p.detach().numpy() for p in _parameters(network))
+    return Weights(weight, bias, score.reshape(4, -1), score_bias)
 
 
 def loss_and_gradients(
@@ -54,12 +75,12 @@ def loss_and_gradients(
 
     Args:
         network: whose parameters' ``.grad`` are set.
-        observations: (batch, items, 3) float32; with ``rows`` any number of them.
+        observations: (batch, items, 3) float32.
         actions: (batch,) int64, in 0 … items-1.
         targets: (batch,) float32.
         beta: of the smooth-L1 loss, > 0.
-        rows: (batch,) int64, which of the observations to use, so that they need not be
-            copied out of a large memory; None for all.
+        rows: int64, which rows of these arrays are the batch, so that they need not be copied
+            out of a large memory; None for all.
 
     Returns:
         The loss.
@@ -68,7 +89,7 @@ def loss_and_gradients(
         ValueError: an array's shape or dtype is another, or an action or row is out of range.
         FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
     """
-    total = start(network, observations, actions, targets, beta, rows)()
+    total = start(weights_of(network), observations, actions, targets, beta, rows)()
     gradients = torch.from_numpy(total[:-1].astype(np.float32))
     parameters = _parameters(network)
     parts = gradients.split([parameter.numel() for parameter in parameters])
@@ -78,7 +99,7 @@ def loss_and_gradients(
 
 
 def start(
-    network: PEQNetwork,
+    weights: Weights,
     observations: np.ndarray,
     actions: np.ndarray,
     targets: np.ndarray,
@@ -89,29 +110,25 @@ def start(
 
     Returns:
         A function that does what is left to do and returns (8n + 2,) float64: the gradients of
-        ``flat_weights``, and the loss. Until then, weights and arrays must stay as they are.
+        ``weights``, and the loss. Until then, weights and arrays must stay as they are.
     """
-    count, items = _check(observations)
+    count, _ = _check(observations)
     if rows is None:
         rows = np.arange(count)
-    size = rows.size
-    for name, array, dtype in (
-        ("rows", rows, np.int64), ("actions", actions, np.int64), ("targets", targets, np.float32)
-    ):  # fmt: skip
-        if array.shape != (size,) or array.dtype != dtype or not size:
+    for name, array, shape, dtype in (
+        ("rows", rows, (rows.size,), np.int64),
+        ("actions", actions, (count,), np.int64),
+        ("targets", targets, (count,), np.float32),
+    ):
+        if array.shape != shape or array.dtype != dtype or not array.size:
             raise ValueError(
                 f"{name} has shape {array.shape} and dtype {array.dtype}; "
-                f"expected ({size or 'batch'},) {np.dtype(dtype)}"
+                f"expected {shape if array.size else '(batch,)'} {np.dtype(dtype)}"
             )
-    for name, array, end in (("rows", rows, count), ("actions", actions, items)):
-        if array.min() < 0 or array.max() >= end:
-            raise ValueError(
-                f"{name} holds {array.min()} to {array.max()}; expected 0 to {end - 1}"
-            )
-    batch = [np.ascontiguousarray(array) for array in (observations, rows, actions, targets)]
+    batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
-    partial = np.full((-(-size // CHUNK), 8 * network.n_features + 2), np.nan, np.float32)
-    work = (np.zeros(1, np.int64), *batch, np.float32(beta), *_weights(network), partial)
+    partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
+    work = (np.zeros(1, np.int64), *batch, np.float32(beta), *weights, partial)
     threads = min(torch.get_num_threads(), len(partial) // CHUNKS_PER_THREAD)
     others = [_helpers(os.getpid()).submit(add_chunks, *work) for _ in range(1, threads)]
 
@@ -119,7 +136,7 @@ def start(
         add_chunks(*work)
         for other in others:
             other.result()
-        total = partial.sum(axis=0, dtype=np.float64) / size
+        total = sum_chunks(partial) / rows.size
         if not np.isfinite(total).all():
             raise FloatingPointError(
                 f"the loss is {total[-1]} and its gradients are not all finite; "
@@ -136,16 +153,14 @@ def _helpers(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor()
 
 
-def greedy_actions(
-    network: PEQNetwork, observations: np.ndarray, allowed: np.ndarray
-) -> np.ndarray:
+def greedy_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """The allowed action of the highest value.
 
     The global features add the same to every item's score and tanh keeps the order, so
     the item's own features decide.
 
     Args:
-        network: the network.
+        weights: of the network.
         observations: (batch, items, 3) float32.
         allowed: (batch, items) bool, at least one per row.
 
@@ -162,9 +177,8 @@ def greedy_actions(
             f"allowed has shape {allowed.shape} and dtype {allowed.dtype}; "
             f"expected ({size}, {items}) bool"
         )
-    weight, bias, score, _ = _weights(network)
     actions = np.full(size, -1)
-    best_items(observations, allowed, weight, bias, score[0], actions)
+    best_items(observations, allowed, weights.weight, weights.bias, weights.score[0], actions)
     if (actions < 0).any():
         raise FloatingPointError(
             f"row {int(np.argmin(actions))} has no allowed action of a finite value; "
@@ -192,14 +206,3 @@ def _parameters(network: PEQNetwork) -> tuple[torch.nn.Parameter, ...]:
     """In their order; ``network.parameters()`` would take ten times as long to find them."""
     extractor, scorer = network.extractor, network.scorer
     return extractor.weight, extractor.bias, scorer.weight, scorer.bias
-
-
-def flat_weights(network: PEQNetwork) -> list[np.ndarray]:
-    """The weights themselves, float32 in one axis: of extractor and scorer, weights and biases."""
-    return [parameter.detach().numpy().reshape(-1) for parameter in _parameters(network)]
-
-
-def _weights(network: PEQNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.float32]:
-    """Extractor weights (n, 3) and biases (n,), scorer weights (4, n) and bias."""
-    weight, bias, score, score_bias = (p.detach().numpy() for p in _parameters(network))
-    return weight, bias, score.reshape(4, -1), score_bias[0]

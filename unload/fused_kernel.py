@@ -6,6 +6,7 @@ chunks of ``CHUNK``, which several threads share.
 
 import numba
 import numpy as np
+from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
@@ -52,9 +53,28 @@ def next_number(typing_context, counter):
     return types.int64(counter), build
 
 
+@intrinsic
+def prefetch(typing_context, numbers, place):
+    """Have ``numbers[place]``, float32 in one axis, fetched from memory without waiting for it.
+
+    There need not be such a place.
+    """
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        pointer = builder.gep(data, [arguments[1]])
+        how = [ir.Constant(ir.IntType(32), option) for option in (0, 3, 1)]  # read, keep, data
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type, *(option.type for option in how)])
+        function = builder.module.declare_intrinsic("llvm.prefetch", [pointer.type], kind)
+        builder.call(function, [pointer, *how])
+        return context.get_dummy_value()
+
+    return types.void(numbers, types.int64), build
+
+
 @numba.njit(cache=True, nogil=True)
 def add_chunks(
-    counter, observations, rows, actions, targets, beta, weight, bias, score, score_bias, partial
+    counter, rows, observations, actions, targets, beta, weight, bias, score, score_bias, partial
 ):
     """Sum the gradients and losses of each chunk into its row of ``partial``.
 
@@ -68,22 +88,27 @@ def add_chunks(
     # The relative error of a key: three roundings of the value, and the bits that it lacks.
     precision = np.float32(2.0**-21 + 2.0 ** (bits - 23))
     blocks = _blocks(weight, bias, score)
+    picked, wanted = np.empty(CHUNK, np.int64), np.empty(CHUNK, np.float32)
     chunk = next_number(counter)
     while chunk < len(partial):
-        begin, end = chunk * CHUNK, min((chunk + 1) * CHUNK, len(actions))
-        largest = _largest(observations, rows[begin:end])
+        following = next_number(counter)
+        chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
+        coming = rows[following * CHUNK : (following + 1) * CHUNK]
+        _look_up(chosen, observations.shape[:2], actions, targets, picked, wanted)
+        largest = _largest(observations, chosen)
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
-        sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias  # NaN if not finite
-        for sample in range(begin, end):
-            _copy(observations[rows[sample]].reshape(-1), x.reshape(-1))
-            logit = np.float64(score_bias)  # double: 1 - tanh² loses its digits near 1
+        sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias[0]  # NaN if not finite
+        for number, row in enumerate(chosen):
+            later = observations[coming[number] if number < len(coming) else row].reshape(-1)
+            _copy(observations[row].reshape(-1), x.reshape(-1))
+            logit = np.float64(score_bias[0])  # double: 1 - tanh² loses its digits near 1
             for b in range(len(blocks)):
-                _reduce_items(x, items, np.int32((1 << bits) - 1), blocks[b])
+                _reduce_items(x, items, np.int32((1 << bits) - 1), later, blocks[b])
                 _find_extremes(x, items, (1 << bits) - 1, min(WIDTH, n - b * WIDTH), blocks[b])
-                logit += _forward(x[actions[sample]], items, blocks[b])
+                logit += _forward(x[picked[number]], items, blocks[b])
             value = np.tanh(logit)
-            error = value - targets[sample]
+            error = value - wanted[number]
             if abs(error) < beta:
                 loss, slope = error * error / (2 * beta), error / beta
             else:
@@ -100,7 +125,28 @@ def add_chunks(
             for row in range(3, 8):
                 partial[chunk, row * n + f] = block[GRADIENT + row * WIDTH + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
-        chunk = next_number(counter)
+        chunk = following
+
+
+@numba.njit(cache=True)
+def _look_up(rows, shape, actions, targets, picked, wanted):
+    """Copy the actions and targets of a chunk, so that the memory is asked for all at once."""
+    count, items = shape
+    for number, row in enumerate(rows):
+        if not 0 <= row < count:
+            raise ValueError(f"rows holds {row}; expected 0 to {count - 1}")
+        if not 0 <= actions[row] < items:
+            raise ValueError(f"actions holds {actions[row]}; expected 0 to {items - 1}")
+        picked[number], wanted[number] = actions[row], targets[row]
+
+
+@numba.njit(cache=True)
+def sum_chunks(partial):
+    """The sum of the rows, in double precision."""
+    total = np.zeros(partial.shape[1])
+    for row in partial:
+        total += row
+    return total
 
 
 @numba.njit(cache=True)
@@ -155,17 +201,19 @@ def _copy(inputs, x):
 
 
 @numba.njit(cache=True)
-def _reduce_items(x, items, mask, block):
+def _reduce_items(x, items, mask, later, block):
     """Read all items: sums of the active ones, keys of the two lowest and the two highest.
 
     Nearly all of the time is spent here. Four items at a time, so that the sums need not be
     fetched and put back for each; no branches, so that ``WIDTH`` features go side by side.
+    Meanwhile the memory may send the inputs of a sample to come.
     """
     keys = block.view(np.int32)
     keys[LOW:HIGH] = 0x7FFFFFFF
     keys[HIGH:MEAN] = -0x80000000
     block[MEAN:OWN] = 0
     for i in range(0, len(x), 4):
+        prefetch(later, 3 * i)
         x0, x1, x2, x3 = x[i, 0], x[i + 1, 0], x[i + 2, 0], x[i + 3, 0]
         y0, y1, y2, y3 = x[i, 1], x[i + 1, 1], x[i + 2, 1], x[i + 3, 1]
         z0, z1, z2, z3 = x[i, 2], x[i + 1, 2], x[i + 2, 2], x[i + 3, 2]
