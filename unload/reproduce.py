@@ -54,6 +54,7 @@ PARTS = (
 PAPER_PICKS = TrainConfig().picks
 SEEDS = (0, 1, 2, 3, 4)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
+RANDOM_SHARE = 40  # episodes of random picks per episode of each other taste, to fill the table
 EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
 
 
@@ -93,17 +94,19 @@ def lift_data(
 
     Fills an empty table by playing with policies of very different tastes: the highest or the
     nearest item, mixed with random ones to various degrees, or the item that is farthest in
-    some direction.
+    some direction; and with random picks far longer, since these leave the most situations
+    behind.
 
     Args:
-        episodes: of 64 containers for each of the 21 policies.
+        episodes: of 64 containers for each of the 20 tastes, and ``RANDOM_SHARE`` times as many of random picks.
         seed: of the episodes.
         folder: of the table.
         runs_dir: where the table is kept with its record, not to be computed again.
         progress: show a progress bar.
     """
     settings = {
-        "episodes of 64 containers per policy": checks.integer("episodes", episodes, 1),
+        "episodes of 64 containers per taste": checks.integer("episodes", episodes, 1),
+        "of random picks": RANDOM_SHARE * episodes,
         "seed": checks.integer("seed", seed, 0),
     }
     kept = Path(runs_dir) / f"lifts/{episodes}_episodes_seed_{seed}"
@@ -133,7 +136,7 @@ def lift_data(
 def _tastes(rng: np.random.Generator) -> list[Callable]:
     """Policies that lead a container through very different states."""
     return [
-        policies.random,
+        *[policies.random] * RANDOM_SHARE,
         *(
             policies.mixed(favourite, share)
             for favourite in (policies.highest, policies.nearest)
