@@ -98,7 +98,8 @@ def lift_data(
     behind.
 
     Args:
-        episodes: of 64 containers for each of the 20 tastes, and ``RANDOM_SHARE`` times as many of random picks.
+        episodes: of 64 containers for each of the 20 tastes, and ``RANDOM_SHARE`` times as
+            many of random picks.
         seed: of the episodes.
         folder: of the table.
         runs_dir: where the table is kept with its record, not to be computed again.
