@@ -3,8 +3,8 @@ import pytest
 
 from unload import comparison, evaluate, files, policies
 from unload.comparison import CONDITIONS, compare, comparison_data
-from unload.players import POLICIES, find_policy
-from unload.provenance import read_provenance
+from unload.players import POLICIES, find_policy, policy_digest
+from unload.provenance import read_provenance, revision
 
 
 def test_a_comparison_is_what_evaluate_tells():
@@ -13,7 +13,7 @@ def test_a_comparison_is_what_evaluate_tells():
     pd.testing.assert_frame_equal(rows[expected.columns], expected)
     assert rows["load"].tolist() == [0, 1]
     assert set(rows["condition"]) == {"σ 5 cm"}
-    assert record["wall_time_s"] >= 0
+    assert record["revision"] == revision()
 
 
 def test_the_highest_item_empties_containers_of_every_scale():
@@ -53,3 +53,9 @@ def test_every_simple_policy_has_its_name():
     for name in ("random", "nearest", "highest"):
         assert find_policy(name) is getattr(policies, name)
     assert len(POLICIES) == 5 and len(CONDITIONS) == 7
+
+
+@pytest.mark.parametrize("name", ["comparison", "robustness"])
+def test_committed_data_is_of_the_committed_policies(name):
+    played = read_provenance(files.DATA, name)["settings"]["policies"]
+    assert played == {name: policy_digest(name) for name in POLICIES}

@@ -150,6 +150,23 @@ def test_an_episode_that_is_stuck_is_given_up(few_items):
     assert frame["success_rate"].tolist() == pytest.approx(shares.tolist())
 
 
+@pytest.mark.parametrize("max_picks", [200, None])
+def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(
+    few_items, monkeypatch, max_picks
+):
+    monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, actions: fail(envs, actions))
+
+    def fail(envs, actions):
+        envs._containers.masks[np.arange(len(actions)), actions] = 0
+        envs._items = envs._distances = np.zeros(len(actions))
+        return np.full(len(actions), -1.0)
+
+    frame = evaluate(policies.random, 2, max_picks=max_picks, stack=lambda rng: few_items(rng, 40))
+    assert (frame["unloaded"] == 0).all() and (frame["deadlocked"] == 0).all()
+    if max_picks is None:
+        assert (frame["picks"] == 40).all() and not frame["emptied"].any()
+
+
 @pytest.mark.parametrize(
     ("kwargs", "error", "message"),
     [

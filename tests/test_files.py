@@ -37,6 +37,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     with pytest.raises(RuntimeError, match="power cut"):
         files.write_atomically(path, write)
     assert path.read_text() == "old"
+    assert [path] == list(tmp_path.iterdir())
 
 
 def test_a_reader_of_the_old_file_is_not_disturbed(tmp_path):

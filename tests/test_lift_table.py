@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from unload import files, task
-from unload.bullet import SETTINGS
+from unload.bullet import SETTINGS, World
 from unload.lift_table import HELD_DOWN, LiftTable
 from unload.physics import LIFTS, LocalPhysics
 from unload.situation import Surroundings
@@ -29,6 +29,21 @@ def test_table_gives_what_local_physics_gives(situations):
         assert table.lift(situation) == distance  # looked up
     assert 0 < len(table) <= len(light)
     local.close()
+
+
+def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
+    table = LiftTable()
+    one, *others = (each for each in situations if each.on_top < HELD_DOWN)
+
+    def interrupted(world, body):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(World, "pull", interrupted)
+        table.lift(one)
+    fresh = LiftTable()
+    for situation in (one, *others):
+        assert table.lift(situation) == fresh.lift(situation)
 
 
 def test_boxes_under_three_others_are_held_down_in_local_physics_too(situations):

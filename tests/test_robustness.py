@@ -32,6 +32,8 @@ def quick(monkeypatch, tmp_path):
     """``quick(names)``: two episodes of two picks in small loads, kept in ``tmp_path``."""
     monkeypatch.setattr(robustness, "front_load", lambda rng: front_walls(stack_load(rng), 1))
     monkeypatch.setattr(robustness, "RESTORED", ("highest",))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data/policies").symlink_to(files.DATA / "policies")
 
     def run(*names: str) -> pd.DataFrame:
         return robustness.robustness_data(
@@ -142,10 +144,10 @@ def test_all_policies_meet_the_same_loads(quick, monkeypatch):
     assert seeds[:2] == seeds[2:4] == seeds[4:6]
 
 
-def test_absent_and_unknown_policies_are_named(quick, monkeypatch, tmp_path):
-    monkeypatch.setattr(files, "DATA", tmp_path)
+def test_absent_and_unknown_policies_are_named(quick, tmp_path):
+    (tmp_path / "data/policies").unlink()
     with pytest.raises(FileNotFoundError, match="policies/paper.safetensors is absent"):
         quick("highest", "paper")
-    with pytest.raises(ValueError, match="policy is 'lowest'; expected one of 'random'"):
+    with pytest.raises(ValueError, match="name is 'lowest'; expected one of 'random'"):
         quick("lowest")
     assert not (tmp_path / "runs").exists()

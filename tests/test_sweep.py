@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+from concurrent.futures.process import BrokenProcessPool
 
 import pandas as pd
 import pytest
@@ -87,6 +88,15 @@ class Killer(threading.Thread):
                 self.killed.append(process)
                 time.sleep(0.1)  # into the run
                 os.kill(process, signal.SIGKILL)
+
+
+def test_processes_that_cannot_begin_are_given_up(configs, tmp_path, monkeypatch):
+    def broken(*args, **kwargs):
+        raise BrokenProcessPool("out of memory")
+
+    monkeypatch.setattr(sweep.Parallel, "__call__", broken)
+    with pytest.raises(BrokenProcessPool, match="out of memory"):
+        sweep.run_sweep(configs, tmp_path, n_jobs=2, progress=False)
 
 
 @pytest.mark.slow

@@ -150,6 +150,7 @@ def test_what_a_run_leaves(tmp_path, config):
     loaded = load_policy(tmp_path / "run" / "policy.safetensors")
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
     stored = json.loads((tmp_path / "run" / "config.json").read_text())
+    assert len(stored.pop("first_loads")) == 32
     assert TrainConfig(**stored) == config
 
 
@@ -425,6 +426,25 @@ def test_other_loads_than_at_the_start_are_refused(tmp_path):
         train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
 
 
+@pytest.mark.parametrize("stack", [None, lambda rng: stack_load(rng, walls=9)])
+def test_a_finished_run_on_other_loads_is_refused(tmp_path, stack):
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
+    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
+    with pytest.raises(ValueError, match="holds a run on other loads; expected the stack"):
+        train(config, tmp_path, progress=False, stack=stack)
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_run_may_go_on_with_another_checkpoint_interval(tmp_path, finished):
+    config = TrainConfig(**CONTAINER)
+    if finished:
+        train(config, tmp_path, progress=False)
+    else:
+        interrupt_run(config, tmp_path, 3)
+    train(TrainConfig(**CONTAINER | {"checkpoint_interval": 9.0}), tmp_path, progress=False)
+
+
 # --- configuration ------------------------------------------------------------------
 
 
@@ -435,6 +455,11 @@ def test_the_papers_configuration_is_the_default():
     assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
     assert (config.network, config.height_reward) == ("peq", 0)
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
+
+
+def test_attention_needs_features_for_its_heads():
+    with pytest.raises(ValueError, match="n_features is 33; expected a multiple of 2"):
+        TrainConfig(network="attention", n_features=33)
 
 
 def test_epsilon_falls_linearly_and_stays():

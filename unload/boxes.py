@@ -92,11 +92,9 @@ def _find(low, high, order, ends):
                     continue
                 across = min(y1[i], y1[j]) - y0[j]
                 along = min(x1[i], x1[j]) - max(x0[i], x0[j])
-                if max(across, upwards) <= TOLERANCE or along <= OVERLAP:
-                    continue
-                if min(across, upwards) > OVERLAP:
+                if min(across, upwards, along) > OVERLAP:
                     return found[:count], order[i], order[j]
-                if along <= TOLERANCE:
+                if max(across, upwards) <= TOLERANCE or along <= TOLERANCE:
                     continue
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
                 if across > TOLERANCE:

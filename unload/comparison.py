@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 
 from unload import checks, files
 from unload.evaluate import Policy, evaluate
-from unload.players import LEARNED, POLICIES, find_policy
+from unload.players import LEARNED, POLICIES, find_policy, policy_digest
 from unload.provenance import joined, run_record, write_provenance
 from unload.substacks import stack_load
 
@@ -59,12 +59,12 @@ def comparison_data(
     table = pd.concat([rows for rows, _ in results])
     text = table.to_csv(index=False, float_format="%.6g")
     files.write_text(Path(folder) / "comparison.csv", text)
-    settings = {"policies": list(names), "loads": loads, "seed": SEED}
+    weights = {name: policy_digest(name, folder) for name in names}
+    settings = {"policies": weights, "loads": loads, "seed": SEED}
     reduced = loads < LOADS or set(names) < set(POLICIES)
     record = joined(record for _, record in results)
-    write_provenance(
-        folder, "comparison", "python -m unload.reproduce comparison", settings, reduced, record
-    )
+    command = f"python -m unload.reproduce comparison --policies {' '.join(names)}"
+    write_provenance(folder, "comparison", command, settings, reduced, record)
 
 
 def compare(

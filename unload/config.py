@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from unload import checks
-from unload.architectures import NETWORKS
+from unload.architectures import HEADS, NETWORKS
 from unload.equalization import TIES
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
@@ -28,7 +28,8 @@ class TrainConfig:
     beta: float = 1.0  # Sec. III-G
     # h of Sec. V-A: a failed pick is learned from as -1 + h (z + 1) / 2, z as observed.
     height_reward: float = 0.0
-    network: str = "peq"  # Sec. III-G; the others: unload.architectures
+    # Sec. III-G; the others, in unload.architectures, take padded rows for items in training.
+    network: str = "peq"
     n_features: int = 64  # * n
     equalize: bool = True  # Sec. III-F
     ties: str = "noise"  # * see unload.equalize
@@ -58,6 +59,11 @@ class TrainConfig:
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
             self._set(name, checks.real(name, getattr(self, name), 0))
+        if self.network == "attention" and self.n_features % HEADS:
+            raise ValueError(
+                f"n_features is {self.n_features}; expected a multiple of {HEADS} for "
+                "network='attention'"
+            )
         if self.picks % self.num_envs:
             raise ValueError(
                 f"picks is {self.picks}; expected a multiple of num_envs={self.num_envs}"

@@ -13,8 +13,7 @@ from unload.env import ContainerEnv
 from unload.vector_env import ContainerVectorEnv
 
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
-# Failed picks in a row after which an episode without a limit is given up. A policy that
-# obeys the mask has tried every item after 128.
+# Failed picks in a row after which an episode without a limit is given up.
 GIVE_UP = 10 * task.N_VISIBLE
 
 
@@ -60,9 +59,10 @@ def evaluate(
             one after the other.
         mask: whether the policy is told which items failed since the last success. Which
             rows hold an item it is told in any case.
-        max_picks: most picks per episode; fewer if the container is empty before. With None
-            it is unloaded completely, however many picks that takes; only an episode in
-            which 1280 picks in a row fail is given up.
+        max_picks: most picks per episode; fewer if the container is empty before, or if all
+            items have failed and the policy is told so. With None it is unloaded completely,
+            however many picks that takes; only an episode in which 1280 picks in a row fail
+            is given up.
         **env_kwargs: further arguments of ``ContainerEnv``, such as ``stack``.
 
     Returns:
@@ -115,8 +115,13 @@ def _play(
     running, emptied = np.ones(len(seeds), bool), np.zeros(len(seeds), bool)
     picks, failures = np.zeros((2, len(seeds)), np.int64)  # so far, and failed ones in a row
     observations, infos = envs.reset(seed=seeds)
-    while running.any():
+    while True:
         allowed = infos["action_mask" if mask else "item_mask"]
+        hopeless = ~allowed.any(axis=1)  # the policy knows of every item that it has failed
+        running &= ~hopeless
+        if not running.any():
+            break
+        allowed = np.where(hopeless[:, np.newaxis], infos["item_mask"], allowed)
         actions = checks.integer_array(
             "what policy returned", policy(observations, allowed, rng), rows.shape
         )

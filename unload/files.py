@@ -20,11 +20,14 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], None]) -> Non
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".partial")
-    with open(partial, "wb") as file:
-        write(file)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(partial, path)
+    try:
+        with open(partial, "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)  # of a write that failed
     folder = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(folder)

@@ -20,20 +20,20 @@ def lift(world: World, situation: Situation) -> float:
     Returns:
         Distance in m, rounded to whole micrometres.
     """
-    boxes = situation.boxes * RESOLUTION
-    bodies = [
-        world.add_box(box[:3], slim(box[3:]), task.MASS if row < situation.dynamic else 0.0)
-        for row, box in enumerate(boxes)
-    ]
-    if situation.floor is not None:
-        bodies.append(world.add_box((0, 0, situation.floor * RESOLUTION - 0.5), (9, 9, 1), 0))
-    for side in situation.sides:
-        outwards = np.sign(side) * 0.5
-        bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-    distance = world.pull(bodies[0])
-    for body in reversed(bodies):
-        world.remove(body)
-    return round(distance, 6)
+    bodies: list[int] = []
+    try:
+        for row, box in enumerate(situation.boxes * RESOLUTION):
+            mass = task.MASS if row < situation.dynamic else 0.0
+            bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
+        if situation.floor is not None:
+            bodies.append(world.add_box((0, 0, situation.floor * RESOLUTION - 0.5), (9, 9, 1), 0))
+        for side in situation.sides:
+            outwards = np.sign(side) * 0.5
+            bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
+        return round(world.pull(bodies[0]), 6)
+    finally:  # also when interrupted: what stays behind would be in the way of the next lift
+        for body in reversed(bodies):
+            world.remove(body)
 
 
 def slim(size: np.ndarray) -> np.ndarray:

@@ -180,8 +180,12 @@ def _kept(features: str, seed: int, folder: Path, size: dict[str, int]) -> dict:
     """The row and record of a fit, from its file if it has been made before."""
     path = folder / f"{features}_{seed}.json"
     if not path.exists():
+        threads = torch.get_num_threads()
         torch.set_num_threads(1)  # the fits share the cores among themselves
         start = time.monotonic()
-        row = fit(features, seed, **size)
+        try:
+            row = fit(features, seed, **size)
+        finally:
+            torch.set_num_threads(threads)
         files.write_json(path, {"row": row, "record": run_record(time.monotonic() - start)})
     return files.read_json(path)

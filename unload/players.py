@@ -1,5 +1,6 @@
 """The policies that are compared with one another."""
 
+from hashlib import blake2b
 from pathlib import Path
 
 from unload import checks, files, policies
@@ -33,3 +34,15 @@ def find_policy(name: str, folder: str | Path = files.DATA) -> Policy:
     """
     checks.one_of("name", name, POLICIES)
     return SIMPLE[name] if name in SIMPLE else load_policy(policy_file(name, folder))
+
+
+def policy_digest(name: str, folder: str | Path = files.DATA) -> str | None:
+    """What tells one learned policy of this name from another; None for a simple policy.
+
+    Raises:
+        ValueError, FileNotFoundError: as ``find_policy`` does.
+    """
+    checks.one_of("name", name, POLICIES)
+    if name in SIMPLE:
+        return None
+    return blake2b(policy_file(name, folder).read_bytes(), digest_size=16).hexdigest()

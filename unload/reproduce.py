@@ -47,10 +47,7 @@ from unload.sweep import run_all
 from unload.train import TrainResult, train
 
 COMMAND = "python -m unload.reproduce"
-PARTS = (
-    "lifts", "agreement", "observation", "tuning", "training", "study", "offline", "comparison",
-    "robustness",
-)  # fmt: skip
+LIFT_EPISODES = 12
 PAPER_PICKS = TrainConfig().picks
 SEEDS = (0, 1, 2, 3, 4)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
@@ -84,7 +81,7 @@ def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
 
 
 def lift_data(
-    episodes: int = 12,
+    episodes: int = LIFT_EPISODES,
     seed: int = 0,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
@@ -131,7 +128,8 @@ def lift_data(
     table.save(Path(folder) / "lifts.npz")
     record = files.read_json(kept / "record.json")
     settings["lifts"] = len(table)
-    write_provenance(folder, "lifts", f"{COMMAND} lifts", settings, False, record)
+    reduced = episodes < LIFT_EPISODES
+    write_provenance(folder, "lifts", f"{COMMAND} lifts", settings, reduced, record)
 
 
 def _tastes(rng: np.random.Generator) -> list[Callable]:
@@ -339,50 +337,62 @@ def _listed(values: Sequence) -> str:
     return " ".join(f"{value:g}" for value in values)
 
 
+def _all_studies(experiments: Sequence[str] = EXPERIMENTS, n_jobs: int = -1) -> None:
+    for experiment in experiments:
+        study_data(experiment, n_jobs=n_jobs)
+
+
+# Option → the parameter it sets, and how it is read.
+OPTIONS = {
+    "--jobs": ("n_jobs", {"type": int, "default": -1, "help": "processes; one per core if -1"}),
+    "--picks": ("picks", {"type": int, "default": PAPER_PICKS}),
+    "--seeds": ("seeds", {"type": int, "nargs": "+", "default": SEEDS}),
+    "--learning-rates": (
+        "learning_rates", {"type": float, "nargs": "+", "default": tuning.LEARNING_RATES}
+    ),
+    "--batch-sizes": ("batch_sizes", {"type": int, "nargs": "+", "default": tuning.BATCH_SIZES}),
+    "--runs": ("runs", {"type": int, "default": tuning.RUNS, "help": "per configuration"}),
+    "--steps": ("steps", {"type": int, "default": tuning.STEPS, "help": "of a run"}),
+    "--experiments": (
+        "experiments", {"nargs": "+", "choices": EXPERIMENTS, "default": tuple(EXPERIMENTS)}
+    ),
+    "--policies": ("names", {"nargs": "+", "choices": POLICIES, "default": POLICIES}),
+}  # fmt: skip
+# Part → what makes its data, and the options that it has.
+PARTS: dict[str, tuple[Callable, tuple[str, ...]]] = {
+    "lifts": (lift_data, ()),
+    "agreement": (agreement_data, ("--jobs",)),
+    "observation": (observation_data, ()),
+    "tuning": (
+        tuning_data, ("--learning-rates", "--batch-sizes", "--runs", "--steps", "--jobs")
+    ),
+    "training": (training_data, ("--picks", "--seeds", "--jobs")),
+    "study": (_all_studies, ("--experiments", "--jobs")),
+    "offline": (offline_data, ("--jobs",)),
+    "comparison": (comparison_data, ("--policies", "--jobs")),
+    "robustness": (robustness_data, ("--policies", "--jobs")),
+}  # fmt: skip
+
+
+def _paper(n_jobs: int) -> None:
+    for make, options in PARTS.values():
+        make(**({"n_jobs": n_jobs} if "--jobs" in options else {}))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    add = parser.add_argument
-    add("what", choices=[*PARTS, "paper"])
-    add("--jobs", type=int, default=-1, help="processes; one per core by default")
-    add("--picks", type=int, default=PAPER_PICKS, help="of the training")
-    add("--seeds", type=int, nargs="+", default=SEEDS, help="of the training")
-    add("--learning-rates", type=float, nargs="+", default=tuning.LEARNING_RATES, help="tuned")
-    add("--batch-sizes", type=int, nargs="+", default=tuning.BATCH_SIZES, help="tuned")
-    add("--runs", type=int, default=tuning.RUNS, help="of each tuned configuration")
-    add("--steps", type=int, default=tuning.STEPS, help="of a tuning run")
-    add("--experiments", nargs="+", choices=EXPERIMENTS, default=EXPERIMENTS, help="of the study")
-    add("--policies", nargs="+", choices=POLICIES, default=POLICIES, help="of the robustness")
-    options = parser.parse_args()
-    chosen = {options.what}
-    if "paper" in chosen:
-        chosen = set(PARTS)
-    if "lifts" in chosen:
-        lift_data()
-    if "agreement" in chosen:
-        agreement_data(n_jobs=options.jobs)
-    if "observation" in chosen:
-        observation_data()
-    if "tuning" in chosen:
-        tuning_data(
-            options.learning_rates,
-            options.batch_sizes,
-            options.runs,
-            options.steps,
-            n_jobs=options.jobs,
-        )
-    if "training" in chosen:
-        training_data(options.picks, options.seeds, n_jobs=options.jobs)
-    if "study" in chosen:
-        for experiment in options.experiments:
-            study_data(experiment, n_jobs=options.jobs)
-    if "offline" in chosen:
-        offline_data(n_jobs=options.jobs)
-    if "comparison" in chosen:
-        comparison_data(n_jobs=options.jobs)
-    if "robustness" in chosen:
-        robustness_data(options.policies, n_jobs=options.jobs)
+    parts = parser.add_subparsers(dest="part", required=True, metavar="part")
+    for name, (make, options) in (PARTS | {"paper": (_paper, ("--jobs",))}).items():
+        part = parts.add_parser(name, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+        part.set_defaults(make=make)
+        for option in options:
+            parameter, how = OPTIONS[option]
+            part.add_argument(option, dest=parameter, **how)
+    chosen = vars(parser.parse_args())
+    del chosen["part"]
+    chosen.pop("make")(**chosen)
 
 
 if __name__ == "__main__":

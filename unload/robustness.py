@@ -11,7 +11,6 @@ the lift table, in whose loads only the picked box moves: what drift costs is se
 import sys
 import time
 from collections.abc import Callable, Sequence
-from hashlib import blake2b
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +22,7 @@ from unload import checks, files
 from unload.bullet import SETTINGS
 from unload.env import ContainerEnv
 from unload.evaluate import Policy, success_rate
-from unload.players import LEARNED, POLICIES, find_policy, policy_file
+from unload.players import POLICIES, find_policy, policy_digest
 from unload.provenance import joined, run_record, write_provenance
 from unload.situation import Surroundings
 from unload.substacks import FRONT_WALLS, Load, front_walls, stack_load
@@ -55,7 +54,7 @@ def robustness_data(
         episodes: containers per policy and ``after_pick``; only their front walls are
             simulated, see ``front_walls``.
         picks: per container, at most 100.
-        folder: of the data.
+        folder: of the data; it holds the learned policies.
         runs_dir: where finished episodes are kept.
         n_jobs: processes, as in joblib.
         progress: show a progress bar.
@@ -69,7 +68,7 @@ def robustness_data(
     """
     checks.integer("episodes", episodes, 1)
     checks.integer("picks", picks, 1, PICKS)
-    weights = {name: _digest(name) for name in names}
+    weights = {name: policy_digest(name, folder) for name in names}
     seeds = np.random.SeedSequence(SEED).generate_state(episodes).tolist()
     jobs = [
         {"policy": name, "after_pick": after_pick, "episode": episode}
@@ -88,6 +87,7 @@ def robustness_data(
                 "walls": FRONT_WALLS,
                 "settings": SETTINGS,
             },
+            folder,
             Path(runs_dir) / NAME,
         )
         for job in jobs
@@ -189,7 +189,7 @@ def front_load(rng: np.random.Generator) -> Load:
     return front_walls(stack_load(rng))
 
 
-def _kept(question: dict, folder: Path) -> tuple[dict[str, float], dict]:
+def _kept(question: dict, data: str | Path, folder: Path) -> tuple[dict[str, float], dict]:
     """What ``play`` returns and its ``run_record``; kept in ``folder``."""
     name, after_pick = question["policy"], question["after_pick"]
     path = folder / f"{name}_{after_pick}_{question['episode']}.json"
@@ -197,16 +197,8 @@ def _kept(question: dict, folder: Path) -> tuple[dict[str, float], dict]:
     if kept.get("question") == question:
         return kept["row"], kept["record"]
     start = time.monotonic()
-    policy = find_policy(name, files.DATA)
+    policy = find_policy(name, data)
     row = play(policy, after_pick, question["seed"], question["picks"], stack=front_load)
     record = run_record(time.monotonic() - start)
     files.write_json(path, {"question": question, "row": row, "record": record})
     return row, record
-
-
-def _digest(name: str) -> str | None:
-    """What tells one learned policy of this name from another; None for a simple policy."""
-    checks.one_of("policy", name, POLICIES)
-    if name not in LEARNED:
-        return None
-    return blake2b(policy_file(name, files.DATA).read_bytes(), digest_size=16).hexdigest()

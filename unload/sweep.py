@@ -54,6 +54,7 @@ def run_sweep(
         TypeError: ``configs`` is not a mapping of names to ``TrainConfig``.
         ValueError: a name is not a plain relative path, the backend is unknown, or there is
             no cluster.
+        BrokenProcessPool: the processes die before they can begin a run.
     """
     checks.entries("configs", configs, ())
     for name, config in configs.items():
@@ -118,6 +119,7 @@ def _outcomes(
     """
     left = dict(configs)
     while left:
+        begun = _begun(left, folders)
         interrupted = [name for name in left if _mark(folders[name]).exists()]
         jobs = [delayed(_run)(name, left[name], folders[name]) for name in interrupted[:1] or left]
         try:
@@ -126,7 +128,14 @@ def _outcomes(
                 del left[name]
                 yield name, error
         except BrokenProcessPool:
-            continue
+            if _begun(left, folders) == begun:  # the processes die before they begin a run
+                raise
+
+
+def _begun(left: Mapping[str, TrainConfig], folders: Mapping[str, Path]) -> dict[str, str]:
+    """The runs that are left, and the attempts at each."""
+    marks = {name: _mark(folders[name]) for name in left}
+    return {name: mark.read_text() if mark.exists() else "" for name, mark in marks.items()}
 
 
 def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:

@@ -66,8 +66,8 @@ def train(
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
     for the wall times, as one that was not, and so does one that was killed: it goes on
     from its last checkpoint. Ctrl-C writes one first; pressed again, it stops at once. A
-    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads, and
-    with the paper's network they go on while the environments step; the result does not
+    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads; with
+    the paper's network they go on while the environments step, and the result does not
     depend on the number of threads.
 
     Args:
@@ -77,7 +77,7 @@ def train(
             policies are kept there as ``snapshots/<picks>.safetensors``.
         progress: show picks/s, MSR, loss and the time left.
         stack: makes the loads, see ``ContainerEnv``; the paper's if None. It is not part
-            of the configuration: pass the same one to go on.
+            of the configuration: pass the same one to go on, or to read a finished run.
 
     Raises:
         TypeError: ``config`` is not a ``TrainConfig``.
@@ -96,7 +96,14 @@ def train(
     folder.mkdir(parents=True, exist_ok=True)
     if not (folder / "config.json").exists():
         _train(config, folder, progress, stack)
-    _check_same(files.read_json(folder / "config.json"), config, folder)
+    stored = files.read_json(folder / "config.json")
+    loads = stored.pop("first_loads", None)
+    _check_same(stored, config, folder)
+    if loads != _first_loads(config, stack):
+        raise ValueError(
+            f"run_dir {str(folder)!r} holds a run on other loads; expected the stack that it was "
+            "trained with, or an empty folder"
+        )
     for leftover in folder.glob("checkpoint.npz*"):
         leftover.unlink()
     return TrainResult(
@@ -116,13 +123,49 @@ def _train(config: TrainConfig, folder: Path, progress: bool, stack: Callable | 
         curve = pd.DataFrame(run.curve, columns=CURVE_COLUMNS)
         files.write_text(folder / "curve.csv", curve.to_csv(index=False))
         # Last: it marks the run as finished.
-        files.write_json(folder / "config.json", asdict(config))
+        finished = asdict(config) | {"first_loads": _first_loads(config, stack)}
+        files.write_json(folder / "config.json", finished)
+
+
+def _seeds(config: TrainConfig) -> list[int]:
+    """Of the environments, of exploration and replay, of the weights.
+
+    The key keeps the loads apart from those that ``evaluate`` draws with the same seed.
+    """
+    return np.random.SeedSequence(config.seed, spawn_key=(1,)).generate_state(3).tolist()
+
+
+def _environments(config: TrainConfig, stack: Callable | None) -> gymnasium.vector.VectorEnv:
+    return gymnasium.make_vec(
+        config.env,
+        config.num_envs,
+        equalize=config.equalize,
+        ties=config.ties,
+        max_picks=config.max_picks,
+        **({} if stack is None else {"stack": stack}),
+    )
+
+
+def _first_loads(config: TrainConfig, stack: Callable | None) -> str:
+    """Tells apart what a run is trained on: a digest of what it sees first."""
+    envs = _environments(config, stack)
+    try:
+        observations, infos = envs.reset(seed=_seeds(config)[0])
+    finally:
+        envs.close()
+    return _digest(observations, infos["action_mask"])
+
+
+def _digest(observations: np.ndarray, masks: np.ndarray) -> str:
+    """Tells apart what environments show."""
+    return blake2b(observations.tobytes() + masks.tobytes(), digest_size=16).hexdigest()
 
 
 def _check_same(stored: dict, config: TrainConfig, folder: Path) -> None:
     """Raise unless a stored configuration is ``config``."""
     wanted = json.loads(json.dumps(asdict(config)))
-    differing = [name for name in wanted | stored if stored.get(name) != wanted.get(name)]
+    names = [name for name in wanted | stored if name != "checkpoint_interval"]  # no result's
+    differing = [name for name in names if stored.get(name) != wanted.get(name)]
     if differing:
         details = ", ".join(f"{n} ({stored.get(n)!r}, not {wanted.get(n)!r})" for n in differing)
         raise ValueError(
@@ -159,11 +202,9 @@ class _Run:
     ) -> None:
         self.config, self.folder, self.interrupts = config, folder, interrupts
         self.checkpoint = folder / "checkpoint.npz"
-        # The key keeps the loads apart from those that ``evaluate`` draws with the same seed.
-        seeds = np.random.SeedSequence(config.seed, spawn_key=(1,))
-        env_seed, rng_seed, torch_seed = seeds.generate_state(3)
+        env_seed, rng_seed, torch_seed = _seeds(config)
         self.rng = np.random.default_rng(rng_seed)
-        weights = torch.Generator().manual_seed(int(torch_seed))
+        weights = torch.Generator().manual_seed(torch_seed)
         self.agent = DQN(
             NETWORKS[config.network](config.n_features, weights),
             config.learning_rate,
@@ -178,15 +219,8 @@ class _Run:
         shape = (config.picks // config.num_envs, config.num_envs)
         self.actions = np.empty(shape, np.uint8)
         self.steps = 0  # made so far
-        self.envs = gymnasium.make_vec(
-            config.env,
-            config.num_envs,
-            equalize=config.equalize,
-            ties=config.ties,
-            max_picks=config.max_picks,
-            **({} if stack is None else {"stack": stack}),
-        )
-        self._see(*self.envs.reset(seed=int(env_seed)))
+        self.envs = _environments(config, stack)
+        self._see(*self.envs.reset(seed=env_seed))
         # Of the episodes that the replay memory reaches back to: first step, state there.
         self.starts = deque([(0, self.envs.get_state())])
 
@@ -332,14 +366,9 @@ class _Run:
             "curve": np.array(self.curve, dtype=np.float64).reshape(-1, len(CURVE_COLUMNS)),
             "start": np.array(start),
             "actions": self.actions[start : self.steps],
-            "digest": self._digest(),
+            "digest": np.array(_digest(self.observations, self.masks)),
         }
         files.write_arrays(self.checkpoint, arrays)
-
-    def _digest(self) -> np.ndarray:
-        """Tells apart what the environments show."""
-        content = self.observations.tobytes() + self.masks.tobytes()
-        return np.array(blake2b(content, digest_size=16).hexdigest())
 
     def restore(self) -> None:
         """Go on from the checkpoint, if there is one."""
@@ -371,7 +400,7 @@ class _Run:
             _, remembered = self._pick(actions.astype(np.int64))
             self.replay.add(**remembered)
             self._check_interrupts(picks)
-        if self._digest() != stored["digest"]:
+        if _digest(self.observations, self.masks) != stored["digest"]:
             raise ValueError(
                 f"{self.checkpoint}: its picks lead to other observations here; expected the "
                 "same stack and version of unload as when it was written"

@@ -34,7 +34,7 @@ def view(
     Args:
         load: the boxes.
         present: (n,) bool, which of them to draw; all if None.
-        groups: name → item numbers, for example ``{"visible": env.visible}``. Each group
+        groups: name → item numbers, for example ``{"failed": failed}``. Each group
             has its colour and a line in the legend; of two groups that share an item the
             later one wins; items in no group are pale. If None, colours mean packages.
         height: of the figure in pixels.
