@@ -29,7 +29,7 @@ def test_each_library_has_its_rooms():
     assert importers("pybullet") == {"bullet"}
     assert importers("plotly") == {"view"}
     assert importers("torch") == {
-        "agent", "architectures", "fused", "network", "offline", "sweep", "train"
+        "agent", "architectures", "fused", "mixed_picks", "network", "offline", "sweep", "train"
     }  # fmt: skip
     in_figures = {path.stem for path in FILES if path.parent.name == "figures"}
     assert importers("matplotlib") <= in_figures

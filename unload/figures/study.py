@@ -24,7 +24,7 @@ OFFLINE = ["features", "seed", "loss", "msr_mask", "msr_no_mask", "deadlocked"]
 # Why 60 %: what is changed, in which cell of the factorial study, and the bar's colour.
 CHANGES = {
     "nothing": (("noisy ranks", False), "C1"),
-    "told which items have failed": (("noisy ranks", True), "C3"),
+    "mask in training": (("noisy ranks", True), "C3"),
     "equal coordinates share one rank": (("tied ranks", False), "C2"),
     "positions instead of ranks": (("positions", False), "C0"),
 }
