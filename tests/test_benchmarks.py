@@ -151,7 +151,7 @@ def test_kept_results_name_the_machine():
 @pytest.mark.parametrize(
     ("content", "error", "message"),
     [
-        (None, FileNotFoundError, "is missing; python benchmarks/run.py measures it"),
+        (None, FileNotFoundError, "is missing; python benchmarks/run.py makes it"),
         ("a,b\n1,2\n", ValueError, r"has columns \['a', 'b'\]; expected \['what', "),
         ("what,how,value,unit,ratio\n", ValueError, "has no rows; expected at least one"),
         ("what,how,value,unit,ratio\na,b,1,c,\n", ValueError, "holds nan"),

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pybullet
 import pytest
 
 from unload import files, task
@@ -44,6 +45,19 @@ def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
     fresh = LiftTable()
     for situation in (one, *others):
         assert table.lift(situation) == fresh.lift(situation)
+
+
+def test_a_closed_table_lifts_again(situations):
+    table = LiftTable()
+    table.close()  # nothing to free
+    one, other, *_ = (each for each in situations if each.on_top < HELD_DOWN)
+    distance = table.lift(one)
+    world = table._world
+    table.close()
+    with pytest.raises(pybullet.error):
+        world.pose(0)
+    assert table.lift(one) == distance
+    assert table.lift(other) == LiftTable().lift(other)
 
 
 def test_boxes_under_three_others_are_held_down_in_local_physics_too(situations):

@@ -14,6 +14,7 @@ from unload.evaluate import evaluate
 from unload.provenance import joined, write_provenance
 from unload.study import EXPERIMENTS, features_of
 from unload.sweep import run_all
+from unload.tables import read_table
 
 COMMAND = "python -m unload.reproduce study"
 LOADS = 200  # fresh containers that judge a trained policy
@@ -122,15 +123,11 @@ def read_study(
         FileNotFoundError: the experiment has not been made.
     """
     checks.one_of("experiment", experiment, EXPERIMENTS)
-    tables = []
-    for name in (experiment, f"{experiment}_curves"):
-        path = Path(folder) / "study" / f"{name}.csv"
-        if not path.is_file():
-            raise FileNotFoundError(
-                f"{path} is missing; {COMMAND} --experiments {experiment} computes it"
-            )
-        tables.append(pd.read_csv(path))
-    rows, curves = tables
+    command = f"{COMMAND} --experiments {experiment}"
+    rows, curves = (
+        read_table(Path(folder) / "study" / f"{experiment}{name}.csv", command, ["run"])
+        for name in ("", "_curves")
+    )
     settings = ["run", "features", *(name for name in asdict(TrainConfig()) if name in rows)]
     settings.remove("picks")  # of the whole run; the curve's are those so far
     return rows, curves.merge(rows[settings], on="run")

@@ -79,6 +79,12 @@ class LiftTable:
         """PyBullet, started at the first lift that is not known."""
         return World()
 
+    def close(self) -> None:
+        """Free the simulator; the next lift that is not known starts it again."""
+        if "_world" in vars(self):
+            self._world.close()
+            del self._world
+
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.entries()

@@ -158,7 +158,7 @@ class TablePhysics(SituationPhysics):
 
     Args:
         table: filled as situations are met. Share one among environments to share their
-            experience; a new one if None.
+            experience; one of its own if None, closed with it.
 
     Raises:
         TypeError: ``table`` is something else.
@@ -166,12 +166,18 @@ class TablePhysics(SituationPhysics):
 
     def __init__(self, table: LiftTable | None = None) -> None:
         super().__init__()
+        self._owns_table = table is None
         self.table = LiftTable() if table is None else table
         if not isinstance(self.table, LiftTable):
             raise TypeError(f"table is {table!r}; expected a LiftTable or None")
 
     def _lift(self, item: int) -> float:
         return self.table.lift(self.surroundings.situation(item))
+
+    def close(self) -> None:
+        super().close()
+        if self._owns_table:
+            self.table.close()
 
 
 class FullPhysics(Physics):

@@ -122,6 +122,7 @@ def lift_data(
                 actions = policy(observations, infos["action_mask"], rng)
                 observations, _, _, _, infos = envs.step(actions)
         envs.close()
+        envs.table.close()
         envs.table.save(kept / "lifts.npz")
         files.write_json(kept / "record.json", run_record(time.monotonic() - start))
     table = LiftTable.load(kept / "lifts.npz")

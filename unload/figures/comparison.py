@@ -8,11 +8,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from unload import checks, files
+from unload import files
 from unload.figures.style import styled
 from unload.intervals import with_intervals
 from unload.players import LEARNED, POLICIES
 from unload.robustness import RESTORED
+from unload.tables import read_table
 
 KEY = ["policy", "mask", "condition"]
 # Conditions from left to right and top to bottom; those of ``unload.comparison`` and, with
@@ -51,24 +52,16 @@ def read_comparison(folder: str | Path = files.DATA) -> pd.DataFrame:
         FileNotFoundError: there is no ``comparison.csv``; the message says how to compute it.
         ValueError: a table lacks a column.
     """
-    table = _read(Path(folder) / "comparison.csv", KEY)
-    robustness = Path(folder) / "robustness.csv"
-    if robustness.is_file():
-        full = _read(robustness, ["policy", "after_pick"])
+    path = Path(folder) / "comparison.csv"
+    table = read_table(path, "python -m unload.reproduce comparison", [*KEY, "success_rate"])
+    path = Path(folder) / "robustness.csv"
+    if path.is_file():
+        columns = ["policy", "after_pick", "success_rate"]
+        full = read_table(path, "python -m unload.reproduce robustness", columns)
         full = full[full["after_pick"].isin(FULL)]
         full = full.assign(mask=True, condition=full["after_pick"].map(FULL))
         table = pd.concat([table, full], ignore_index=True)
     return table[[*KEY, "success_rate"]]
-
-
-def _read(path: Path, key: list[str]) -> pd.DataFrame:
-    if not path.is_file():
-        raise FileNotFoundError(
-            f"{path} is missing; python -m unload.reproduce {path.stem} computes it"
-        )
-    table = pd.read_csv(path)
-    checks.entries(str(path), dict(table), [*key, "success_rate"])
-    return table
 
 
 def comparison_means(folder: str | Path = files.DATA) -> pd.DataFrame:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from unload import files
 from unload.figures.style import styled
+from unload.tables import read_table
 
 FOLDER = "obs_hist_equal"
 # The paper's colours, in this repository's shades.
@@ -33,17 +33,8 @@ def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
         ValueError: the file has other columns, no rows, or values that are not finite.
     """
     path = Path(folder) / FOLDER / f"{name}.csv"
-    if not path.is_file():
-        raise FileNotFoundError(
-            f"{path} is missing; python -m unload.reproduce observation computes it"
-        )
-    table = pd.read_csv(path)
-    if list(table.columns) != ["x", "y"]:
-        raise ValueError(f"{path} has columns {list(table.columns)}; expected ['x', 'y']")
-    points = table.to_numpy(dtype=np.float64)
-    if len(points) == 0 or not np.isfinite(points).all():
-        raise ValueError(f"{path} holds {len(points)} rows; expected at least one, all finite")
-    return points
+    table = read_table(path, "python -m unload.reproduce observation", ["x", "y"], exact=True)
+    return table.to_numpy(dtype=np.float64)
 
 
 @styled

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from unload import checks, files, task
+from unload import checks, files, tables, task
 from unload.figures.style import styled
 
 FOLDER = files.DATA / "benchmarks"
@@ -27,15 +27,7 @@ def read_table(name: str, folder: str | Path = FOLDER) -> pd.DataFrame:
     """
     checks.one_of("name", name, COLUMNS)
     path = Path(folder) / f"{name}.csv"
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; python benchmarks/run.py measures it")
-    table = pd.read_csv(path)
-    if list(table.columns) != COLUMNS[name]:
-        raise ValueError(f"{path} has columns {list(table.columns)}; expected {COLUMNS[name]}")
-    checks.finite_array(f"{path}", table.select_dtypes("number"), (None, None))
-    if table.empty:
-        raise ValueError(f"{path} has no rows; expected at least one")
-    return table
+    return tables.read_table(path, "python benchmarks/run.py", COLUMNS[name], exact=True)
 
 
 def three_digits(value: float) -> str:

@@ -16,7 +16,9 @@ from unload.intervals import bootstrap_interval, with_intervals
 from unload.judge import read_study
 from unload.provenance import read_provenance
 from unload.study import FEATURES
+from unload.tables import read_table
 
+COMMAND = "python -m unload.reproduce"
 CELL = ["features", "mask", "epsilon_final"]
 APPLIED = {"msr_mask": ("C0", "o", "told what failed"), "msr_no_mask": ("C1", "s", "not told")}
 PAPER_MSR = 0.6  # at the end of its Fig. 12
@@ -43,7 +45,8 @@ def why_60(folder: str | Path = files.DATA) -> Figure:
     Raises:
         FileNotFoundError: a table is missing; the message says how to compute it.
     """
-    training = _read(Path(folder) / "training_summary.csv", "training", ["msr_start", "msr_end"])
+    path = Path(folder) / "training_summary.csv"
+    training = read_table(path, f"{COMMAND} training", ["msr_start", "msr_end"])
     rows, _ = read_study("factorial", folder)
     cells = rows[rows["epsilon_final"] == 0].groupby(["features", "mask"])["msr_training"]
     count = EngFormatter(sep=" ")
@@ -88,7 +91,7 @@ def offline_msr(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: it is missing; the message says how to compute it.
         ValueError: it has other columns.
     """
-    rows = _read(Path(folder) / "study" / "offline.csv", "offline", OFFLINE)
+    rows = read_table(Path(folder) / "study" / "offline.csv", f"{COMMAND} offline", OFFLINE)
     cells = dict(list(rows.groupby("features", sort=False)))
     return _one_panel(list(cells), list(cells.values()))
 
@@ -205,15 +208,6 @@ def factorial_curves(folder: str | Path = files.DATA) -> Figure:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure
-
-
-def _read(path: Path, part: str, columns: Sequence[str]) -> pd.DataFrame:
-    """A table that a part of ``unload.reproduce`` makes; it must have some columns."""
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce {part} computes it")
-    table = pd.read_csv(path)
-    checks.entries(f"{path}", dict(table), columns)
-    return table
 
 
 def _one_panel(names: Sequence[str], cells: Sequence[pd.DataFrame]) -> Figure:

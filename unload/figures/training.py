@@ -7,8 +7,9 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from unload import checks, files, task
+from unload import files, task
 from unload.figures.style import mark_reduced, styled
+from unload.tables import read_table
 
 COLUMNS = ["Wall time", "Step", "Value"]
 
@@ -57,17 +58,7 @@ def read_curve(folder: str | Path, name: str) -> pd.DataFrame:
         ValueError: the file has other columns, no rows, or values that are not finite.
     """
     path = Path(folder) / f"{name}.csv"
-    if not path.is_file():
-        raise FileNotFoundError(
-            f"{path} is missing; python -m unload.reproduce training computes it"
-        )
-    table = pd.read_csv(path)
-    if list(table.columns) != COLUMNS:
-        raise ValueError(f"{path} has columns {list(table.columns)}; expected {COLUMNS}")
-    checks.finite_array(f"{path}", table, (None, len(COLUMNS)))
-    if table.empty:
-        raise ValueError(f"{path} has no rows; expected at least one")
-    return table
+    return read_table(path, "python -m unload.reproduce training", COLUMNS, exact=True)
 
 
 def _figure(

@@ -96,7 +96,7 @@ def read_curve(folder: str | Path, name: str, equalize: bool = True) -> np.ndarr
     """
     path = Path(folder) / set_name(equalize) / f"{name}.csv"
     if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce tuning computes it")
+        raise FileNotFoundError(f"{path} is missing; python -m unload.reproduce tuning makes it")
     try:
         curve = pd.read_csv(path, header=None, skip_blank_lines=False, dtype=float)
     except ValueError as error:
