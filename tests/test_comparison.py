@@ -52,7 +52,7 @@ def test_what_is_unknown_or_absent_is_refused_by_name(tmp_path):
 def test_every_simple_policy_has_its_name():
     for name in ("random", "nearest", "highest"):
         assert find_policy(name) is getattr(policies, name)
-    assert len(POLICIES) == 5 and len(CONDITIONS) == 7
+    assert len(POLICIES) == 6 and len(CONDITIONS) == 7
 
 
 @pytest.mark.parametrize("name", ["comparison", "robustness"])

@@ -8,7 +8,8 @@ from unload.agent import load_policy
 from unload.evaluate import Policy
 
 SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
-LEARNED = ("paper", "recommended")
+# Trainings of the paper's configuration end in two ways: one of each plays.
+LEARNED = ("paper", "paper_seed_2", "recommended")
 POLICIES = (*SIMPLE, *LEARNED)
 
 

@@ -32,7 +32,8 @@ ROWS = {
     for mask in ((True, False) if policy in LEARNED else (True,))
 }
 COLOURS = {
-    "random": "C5", "nearest": "C3", "highest": "C2", "paper": "C1", "recommended": "C0"
+    "random": "C5", "nearest": "C3", "highest": "C2",
+    "paper": "C1", "paper_seed_2": "C1", "recommended": "C0",
 }  # fmt: skip
 ABSENT = "–"
 
