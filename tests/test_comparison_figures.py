@@ -107,7 +107,7 @@ def test_figure_draws_the_means_of_every_condition(tmp_path, full):
         marked = (line for line in panels[condition].lines if line.get_marker() == "o")
         return {line.get_ydata()[0]: line.get_xdata()[0] for line in marked}
 
-    assert list(dots("complete").values()) == [0.5, 0.5, 0.5, 0.5, 0.5, 1, 1]
+    assert list(dots("complete").values()) == [0.5] * 7 + [1, 1]
     assert dots("full, kept") == {list(figures.POLICIES).index(each): 0.9 for each in full}
     note = panels["full, kept"].get_title("right")
     assert note == ("2 containers" if full else "")
