@@ -73,7 +73,7 @@ def long(picks: int = 20_000_000, seeds: int = 3) -> dict[str, TrainConfig]:
     return _varied([{}], ("positions",), picks, seeds)
 
 
-def endings(picks: int = 20_000_000, seeds: int = 6) -> dict[str, TrainConfig]:
+def endings(picks: int = 20_000_000, seeds: int = 4) -> dict[str, TrainConfig]:
     """The paper's features and picks, with more seeds than its batch would allow."""
     return _varied([{}], ("noisy ranks",), picks, seeds)
 
