@@ -16,7 +16,7 @@ from unload.adam import Adam
 from unload.architectures import NETWORKS
 from unload.equalization import TIES, equalize
 from unload.observation import holds_item
-from unload.policies import check_batch
+from unload.policies import any_allowed, check_batch
 
 # Rows of a batch per backward pass: what one pass stores stays in the cache.
 CHUNK = 64
@@ -272,18 +272,6 @@ def _best_actions(
         arguments.append(torch.from_numpy(present))
     values = network(*arguments)
     return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
-
-
-def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """An allowed action, each with the same probability, (batch,) int64.
-
-    Raises:
-        ValueError: a row allows none.
-    """
-    draws = np.where(allowed, rng.random(allowed.shape), -1.0)
-    if (draws.max(axis=1) < 0).any():
-        raise ValueError("allowed is False in a whole row; expected at least one item to pick")
-    return draws.argmax(axis=1)
 
 
 class Greedy:

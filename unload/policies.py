@@ -33,8 +33,19 @@ def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray
 def random(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Any allowed item, each with the same probability."""
     _, allowed = check_batch(observations, masks)
-    draws = checks.generator("rng", rng).random(allowed.shape)
-    return np.where(allowed, draws, -1.0).argmax(axis=1)
+    return any_allowed(allowed, checks.generator("rng", rng))
+
+
+def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """An allowed action, each with the same probability, (batch,) int64.
+
+    Raises:
+        ValueError: a row allows none.
+    """
+    draws = np.where(allowed, rng.random(allowed.shape), -1.0)
+    if (draws.max(axis=1) < 0).any():
+        raise ValueError("allowed is False in a whole row; expected at least one item to pick")
+    return draws.argmax(axis=1)
 
 
 def nearest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
