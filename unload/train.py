@@ -164,7 +164,8 @@ def _digest(observations: np.ndarray, masks: np.ndarray) -> str:
 def _check_same(stored: dict, config: TrainConfig, folder: Path) -> None:
     """Raise unless a stored configuration is ``config``."""
     wanted = json.loads(json.dumps(asdict(config)))
-    names = [name for name in wanted | stored if name != "checkpoint_interval"]  # no result's
+    # How often it is saved changes nothing in a run.
+    names = [name for name in wanted | stored if name != "checkpoint_interval"]
     differing = [name for name in names if stored.get(name) != wanted.get(name)]
     if differing:
         details = ", ".join(f"{n} ({stored.get(n)!r}, not {wanted.get(n)!r})" for n in differing)
