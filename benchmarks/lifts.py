@@ -6,7 +6,7 @@ import numpy as np
 
 import unload
 from benchmarks.timing import best_times
-from unload.physics import FullPhysics, LocalPhysics, Physics, TablePhysics
+from unload.physics.full import FullPhysics, LocalPhysics, Physics, TablePhysics
 
 
 def lift_rates(load: unload.Load, full: int = 2, others: int = 100, rounds: int = 2) -> dict:

@@ -13,10 +13,11 @@ import torch
 
 import unload
 from benchmarks.floors import bytes_per_second, operations_per_second
-from unload import fused, task
-from unload.adam import Adam
-from unload.replay import ReplayBuffer
-from unload.vector_env import ContainerVectorEnv
+from unload import task
+from unload.agent.fast import fused
+from unload.agent.fast.adam import Adam
+from unload.agent.replay import ReplayBuffer
+from unload.env.vector import ContainerVectorEnv
 
 # The fewest operations for one feature of one item. To learn: three multiply-adds make it; it
 # is compared with the lowest, the highest and 0; the item counts, and its x, y, z are added,

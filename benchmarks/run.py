@@ -27,9 +27,9 @@ from benchmarks.lifts import fill_rates, lift_rates
 from benchmarks.profile_step import step_profile
 from benchmarks.training import training_rates
 from benchmarks.updates import update_times
-from unload import files
-from unload.figures.speed import FOLDER, three_digits
-from unload.provenance import run_record, write_provenance
+from unload.reproduce.figures.speed import FOLDER, three_digits
+from unload.support import files
+from unload.support.provenance import run_record, write_provenance
 
 COMMAND = "python benchmarks/run.py"
 

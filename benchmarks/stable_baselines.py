@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 
-from unload.network import PEQNetwork
+from unload.network.peq import PEQNetwork
 
 
 class VectorEnvAdapter(VecEnv):

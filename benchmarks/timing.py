@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Mapping
 
-from unload import checks
+from unload.support import checks
 
 
 def best_times(calls: Mapping[str, Callable[[], object]], rounds: int = 5) -> dict[str, float]:

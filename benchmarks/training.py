@@ -12,7 +12,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 import unload
 from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
-from unload import fused
+from unload.agent.fast import fused
 
 
 def training_rates(

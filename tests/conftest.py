@@ -35,7 +35,7 @@ def few_items() -> Callable[[np.random.Generator, int], unload.Load]:
 
     def build(rng: np.random.Generator, count: int) -> unload.Load:
         load = unload.stack_load(rng)
-        last = np.sort(unload.observation.nearest(load.positions, len(load))[-count:])
+        last = np.sort(observation.nearest(load.positions, len(load))[-count:])
         return unload.Load(
             load.positions[last], load.sizes[last], load.packages[last], load.walls[last]
         )

@@ -21,10 +21,10 @@ from benchmarks.run import show
 from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
 from benchmarks.timing import best_times
 from benchmarks.updates import update_times
-from unload import files
-from unload.figures import speed
-from unload.figures.style import save
-from unload.provenance import read_provenance
+from unload.reproduce.figures import speed
+from unload.reproduce.figures.style import save
+from unload.support import files
+from unload.support.provenance import read_provenance
 
 matplotlib.use("Agg")
 FIGURES = (speed.speed_ratios, speed.speed_containers, speed.speed_profile)

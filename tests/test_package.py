@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import unload
-from unload import files
+from unload.support import files
 
 FILES = sorted(Path(unload.__file__).parent.rglob("*.py"))
 

@@ -2,7 +2,7 @@
 
 import re
 
-from unload import files
+from unload.support import files
 
 README = (files.ROOT / "README.md").read_text()
 

@@ -2,18 +2,18 @@
 
 import gymnasium
 
-from unload import policies
-from unload.agent import DQN, Greedy, load_policy, save_policy
-from unload.architectures import AttentionNetwork, EquivariantStack, TwoLayerScorer
-from unload.config import TrainConfig
-from unload.env import ContainerEnv
-from unload.equalization import equalize
-from unload.evaluate import evaluate, success_rate
-from unload.highest_item import HighestItemEnv
-from unload.network import PEQNetwork
-from unload.substacks import Load, build_load, stack_load
-from unload.train import train
-from unload.view import view
+from unload.agent import policies
+from unload.agent.config import TrainConfig
+from unload.agent.dqn import DQN, Greedy, load_policy, save_policy
+from unload.agent.evaluation import evaluate, success_rate
+from unload.agent.training import train
+from unload.env.container import ContainerEnv
+from unload.env.equalization import equalize
+from unload.env.highest_item import HighestItemEnv
+from unload.load.substacks import Load, build_load, stack_load
+from unload.load.view import view
+from unload.network.peq import PEQNetwork
+from unload.network.variants import AttentionNetwork, EquivariantStack, TwoLayerScorer
 
 __version__ = "0.1.0"
 __all__ = [
@@ -41,11 +41,11 @@ __all__ = [
 
 gymnasium.register(
     id="unload/Container-v0",
-    entry_point="unload.env:ContainerEnv",
-    vector_entry_point="unload.vector_env:ContainerVectorEnv",
+    entry_point="unload.env.container:ContainerEnv",
+    vector_entry_point="unload.env.vector:ContainerVectorEnv",
 )
 gymnasium.register(
     id="unload/HighestItem-v0",
-    entry_point="unload.highest_item:HighestItemEnv",
-    vector_entry_point="unload.vector_env:HighestItemVectorEnv",
+    entry_point="unload.env.highest_item:HighestItemEnv",
+    vector_entry_point="unload.env.vector:HighestItemVectorEnv",
 )

@@ -1,0 +1,357 @@
+"""The fused update and choice against PyTorch."""
+
+import multiprocessing
+import os
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import torch
+from torch.nn.functional import smooth_l1_loss
+
+from unload.agent.dqn import DQN
+from unload.agent.fast import fused
+from unload.env.equalization import equalize
+from unload.network.peq import PEQNetwork
+from unload.support import files
+
+BATCH, ITEMS = 300, 128
+FOR_TWO_THREADS = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
+
+
+def random_batch(rng, size):
+    return {
+        "observations": rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32),
+        "actions": rng.integers(ITEMS, size=size),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), size),
+    }
+
+
+@pytest.fixture
+def batch(rng):
+    return random_batch(rng, BATCH)
+
+
+def network(n_features, seed=0):
+    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
+
+
+def reference(net, batch, beta=1.0):
+    """Loss and gradients by PyTorch in double precision."""
+    double = PEQNetwork(net.n_features).double()
+    double.load_state_dict({name: value.double() for name, value in net.state_dict().items()})
+    values = double(torch.from_numpy(batch["observations"]).double())
+    chosen = values.gather(1, torch.from_numpy(batch["actions"])[:, None]).squeeze(1)
+    loss = smooth_l1_loss(chosen, torch.from_numpy(batch["rewards"]).double(), beta=beta)
+    loss.backward()
+    return loss.item(), [parameter.grad for parameter in double.parameters()]
+
+
+def check(net, batch, beta=1.0, tolerance=1e-5):
+    """Loss and gradients agree, the gradients relative to the largest of them."""
+    loss = fused.loss_and_gradients(net, *batch.values(), beta)
+    expected_loss, expected = reference(net, batch, beta)
+    assert loss == pytest.approx(expected_loss, rel=1e-5)
+    largest = max(gradient.abs().max().item() for gradient in expected)
+    for parameter, gradient in zip(net.parameters(), expected):
+        assert parameter.grad.shape == parameter.shape
+        error = (parameter.grad - gradient).abs().max().item()
+        assert error < tolerance * min(largest, 1)
+
+
+def gradients(net, batch):
+    fused.loss_and_gradients(net, *batch.values())
+    return [parameter.grad.numpy().tobytes() for parameter in net.parameters()]
+
+
+@pytest.mark.parametrize("n_features", [1, 16, 37, 64, 65, 130])
+@pytest.mark.parametrize("beta", [0.3, 1.0])
+def test_gradients_are_those_of_pytorch(batch, n_features, beta):
+    check(network(n_features), batch, beta)
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+@pytest.mark.parametrize("seed", range(3))
+def test_gradients_on_equalized_observations(batch, ties, seed):
+    coarse = np.round(batch["observations"] * 8) / 8  # many items at the same height
+    batch["observations"] = equalize(coarse, ties)
+    check(network(64, seed), batch)
+
+
+@pytest.mark.parametrize("scale", [0.1, 3.0])
+def test_gradients_of_quiet_and_of_saturated_networks(batch, scale):
+    net = network(64)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter *= scale
+    check(net, batch)
+
+
+@pytest.mark.parametrize("items", [1, 2, 5, 127, 200])
+def test_any_number_of_items_will_do(rng, items):
+    batch = {
+        "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=BATCH),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
+    }
+    check(network(16), batch)
+
+
+@pytest.mark.parametrize("size", [1, 31, 32, 33, 100])
+def test_any_batch_size_will_do(batch, size):
+    check(network(16), {name: array[:size] for name, array in batch.items()})
+
+
+def test_arrays_that_are_not_contiguous_will_do(batch):
+    net = network(16)
+    expected = gradients(net, {name: array[::3].copy() for name, array in batch.items()})
+    assert gradients(net, {name: array[::3] for name, array in batch.items()}) == expected
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("first", [3, 70])
+def test_a_near_tie_is_decided_as_in_double_precision(sign, first):
+    """Two items' values differ by less than single precision resolves, or not at all.
+
+    They are the highest (sign 1) or the lowest (-1) and stand at x = 0.3 and x = 0.6, so the
+    gradient of the weight of x tells which one was taken.
+    """
+    net = network(1)
+    with torch.no_grad():
+        net.extractor.weight[:] = torch.tensor([1.0, 1.0, 0.0])
+        net.extractor.bias[:] = 5
+        net.scorer.weight[:] = torch.tensor([0.0, 0.05, 0.05, 0.0])
+        net.scorer.bias[:] = 0
+    a, b = np.float32([0.3, 0.6])
+    for step in range(-3, 4):
+        observations = np.zeros((1, ITEMS, 3), np.float32)
+        observations[0, first] = a, b - a + step * np.float32(2.0**-25), 0
+        observations[0, 100] = b, 0, 0
+        batch = {
+            "observations": sign * observations,
+            "actions": np.zeros(1, np.int64),
+            "rewards": np.ones(1, np.float32),
+        }
+        check(net, batch, tolerance=1e-6)
+
+
+def test_items_that_tie_share_the_gradient_evenly(batch):
+    net = network(8)
+    with torch.no_grad():
+        net.extractor.weight[:, :2] = 0  # only the height counts
+        net.extractor.bias[:] = 1
+    batch["observations"][:, :, 2] = np.sign(batch["observations"][:, :, 2])  # two heights
+    check(net, batch)
+
+
+def test_a_dead_network_has_no_gradients_but_the_last_bias(batch):
+    net = network(16)
+    with torch.no_grad():
+        net.extractor.weight[:] = 0
+        net.extractor.bias[:] = 0
+    check(net, batch)
+
+
+@pytest.fixture
+def two_threads():
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
+    submitted = []
+    submit = ThreadPoolExecutor.submit
+    monkeypatch.setattr(
+        ThreadPoolExecutor,
+        "submit",
+        lambda pool, *work: submitted.append(submit(pool, *work)) or submitted[-1],
+    )
+    net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
+    two = gradients(net, batch)
+    assert len(submitted) == 1 and submitted[0].done()
+    torch.set_num_threads(1)
+    assert gradients(net, batch) == two
+    assert gradients(net, batch) == two  # and again
+    assert len(submitted) == 1  # no thread where one is asked for
+
+
+def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
+    net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
+    finish = fused.start(fused.weights_of(net), *batch.values())
+    everything = np.ones(batch["observations"].shape[:2], bool)
+    fused.greedy_actions(fused.weights_of(net), batch["observations"], everything)
+    total = finish()
+    assert fused.loss_and_gradients(net, *batch.values()) == total[-1]
+    flat = np.concatenate([parameter.grad.numpy().ravel() for parameter in net.parameters()])
+    assert np.array_equal(flat, total[:-1].astype(np.float32))
+
+
+def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
+    net, batch = network(8), random_batch(rng, FOR_TWO_THREADS)
+    here = fused.loss_and_gradients(net, *batch.values())
+    fork = multiprocessing.get_context("fork")
+    answers = fork.SimpleQueue()
+    process = fork.Process(
+        target=lambda: answers.put(fused.loss_and_gradients(net, *batch.values()))
+    )
+    process.start()
+    process.join(60)
+    try:
+        assert not process.is_alive() and answers.get() == here
+    finally:
+        process.kill()
+
+
+def test_choice_is_that_of_the_network(batch, rng):
+    net = network(64)
+    allowed = rng.random((BATCH, ITEMS)) < 0.3
+    values = net(torch.from_numpy(batch["observations"]))
+    expected = values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
+    actions = fused.greedy_actions(fused.weights_of(net), batch["observations"], allowed)
+    assert np.mean(actions == expected) > 0.99  # tanh may round two scores to one value
+    rows = np.arange(BATCH)
+    best = values.detach().numpy()
+    assert np.allclose(best[rows, actions], best[rows, expected], atol=1e-6)
+    assert allowed[rows, actions].all()
+
+
+def test_fused_and_plain_updates_learn_the_same(batch):
+    agents = [DQN(network(16), fused_update=choice) for choice in (True, False)]
+    losses = [[agent.update(batch) for _ in range(20)] for agent in agents]
+    assert losses[0] == pytest.approx(losses[1], abs=1e-5)
+    assert losses[0][-1] < losses[0][0]
+
+
+def test_two_updates_give_equal_bits(batch):
+    states = []
+    for _ in range(2):
+        agent = DQN(network(37), fused_update=True)
+        agent.update(batch)
+        states.append([p.detach().numpy().tobytes() for p in agent.network.parameters()])
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("name", ["observations", "rewards"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_input_that_is_not_finite_is_refused(batch, name, value):
+    net = network(16)
+    batch[name].flat[7] = value
+    with pytest.raises(FloatingPointError, match="expected finite"):
+        fused.loss_and_gradients(net, *batch.values())
+    assert all(parameter.grad is None for parameter in net.parameters())
+
+
+@pytest.mark.parametrize("parameter", range(4))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
+    net = network(16)
+    fused.loss_and_gradients(net, *batch.values())
+    before = [p.grad.numpy().copy() for p in net.parameters()]
+    with torch.no_grad():
+        list(net.parameters())[parameter].view(-1)[0] = value
+    with pytest.raises(FloatingPointError, match="expected finite"):
+        fused.loss_and_gradients(net, *batch.values())
+    assert all((p.grad.numpy() == kept).all() for p, kept in zip(net.parameters(), before))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("actions", np.full(BATCH, ITEMS), "actions holds 128; expected 0 to 127"),
+        ("actions", np.full(BATCH, -1), "actions holds -1"),
+        ("actions", np.zeros(BATCH), "actions has shape .* dtype float64"),
+        ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
+        ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
+        ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
+    ],
+)
+def test_bad_batches_are_refused(batch, name, value, message):
+    with pytest.raises(ValueError, match=message):
+        fused.loss_and_gradients(network(4), *(batch | {name: value}).values())
+
+
+def test_choice_among_nothing_finite_is_refused():
+    observations = np.full((2, ITEMS, 3), np.nan, np.float32)
+    with pytest.raises(FloatingPointError, match="no allowed action of a finite value"):
+        weights = fused.weights_of(network(4))
+        fused.greedy_actions(weights, observations, np.ones((2, ITEMS), bool))
+
+
+class Subclass(PEQNetwork):
+    pass
+
+
+@pytest.mark.parametrize(
+    "other", [PEQNetwork(4).double(), Subclass(4), torch.nn.Linear(3, 1)], ids=type
+)
+def test_rule_of_where_it_applies(other):
+    assert fused.applies(network(4))
+    assert not fused.applies(other)
+    with pytest.raises(ValueError, match="fused_update is True"):
+        DQN(other, fused_update=True)
+
+
+@pytest.mark.slow
+def test_fused_update_is_a_hundred_times_faster(rng):
+    """Than plain PyTorch, one thread each, at the paper's batch size."""
+    size = 2048
+    observations = rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32)
+    actions = rng.integers(ITEMS, size=size)
+    targets = rng.choice(np.array([-1, 1], np.float32), size)
+    net = network(64)
+
+    def plain():
+        values = net(torch.from_numpy(observations))
+        chosen = values.gather(1, torch.from_numpy(actions)[:, None]).squeeze(1)
+        smooth_l1_loss(chosen, torch.from_numpy(targets)).backward()
+
+    def seconds(function, repeats):
+        times = []
+        for _ in range(repeats + 1):
+            start = time.perf_counter()
+            function()
+            times.append(time.perf_counter() - start)
+        return min(times[1:])  # without the compilation
+
+    fast = seconds(lambda: fused.loss_and_gradients(net, observations, actions, targets), 100)
+    assert seconds(plain, 5) > 100 * fast
+
+
+def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bits(tmp_path):
+    program = """
+import numpy as np, torch
+from unload import PEQNetwork
+from unload.agent.fast import fused
+rng = np.random.default_rng(0)
+network = PEQNetwork(20, torch.Generator().manual_seed(0))
+observations = rng.uniform(-1, 1, (70, 9, 3)).astype(np.float32)
+targets = rng.choice([-1, 1], 70).astype(np.float32)
+fused.loss_and_gradients(network, observations, rng.integers(9, size=70), targets)
+print(*(p.grad.numpy().tobytes().hex() for p in network.parameters()))
+"""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(files.ROOT)}
+    first, second = (
+        subprocess.check_output([sys.executable, "-c", program], env=environment) for _ in range(2)
+    )
+    assert any(tmp_path.rglob("fused_kernel.add_chunks*"))
+    assert first == second
+
+
+def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
+    net, rows = network(16), rng.integers(BATCH, size=100)
+    expected = gradients(net, {name: array[rows] for name, array in batch.items()})
+    fused.loss_and_gradients(net, *batch.values(), rows=rows)
+    assert [parameter.grad.numpy().tobytes() for parameter in net.parameters()] == expected
+
+
+@pytest.mark.parametrize(
+    "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.zeros((2, 2), int)]
+)
+def test_bad_rows_are_refused_by_name(batch, rows):
+    with pytest.raises(ValueError, match="rows"):
+        fused.loss_and_gradients(network(4), *batch.values(), rows=rows)

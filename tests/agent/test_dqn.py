@@ -1,0 +1,410 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+from torch.nn.functional import smooth_l1_loss
+
+from unload import DQN, Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
+from unload.agent.dqn import greedy_actions
+from unload.network.variants import NETWORKS
+
+
+class HeightNetwork(torch.nn.Module):
+    """Values each item by its z, times a weight."""
+
+    def __init__(self, weight: float = 1.0) -> None:
+        super().__init__()
+        self.weight = torch.nn.Parameter(torch.tensor(weight))
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        return observations[..., 2] * self.weight
+
+
+def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
+    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
+
+
+def weights(network: torch.nn.Module) -> list[torch.Tensor]:
+    return [parameter.detach().clone() for parameter in network.parameters()]
+
+
+def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> dict:
+    masks = rng.integers(2, size=(size, items)).astype(bool)
+    masks[:, 0] = True
+    return {
+        "observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=size),
+        "rewards": rng.choice([-1.0, 1.0], size=size).astype(np.float32),
+        "next_observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
+        "next_masks": masks,
+        "terminations": rng.random(size) < 0.2,
+    }
+
+
+def of_network(name: object) -> dict[str, str]:
+    """The metadata of a policy's file."""
+    settings = {"network": name, "n_features": 8, "equalize": True, "ties": "noise"}
+    return {"policy": json.dumps(settings)}
+
+
+def without_next(batch: dict) -> dict:
+    return {name: batch[name] for name in ("observations", "actions", "rewards")}
+
+
+# --- acting -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("network", [peq(), HeightNetwork()], ids=["PEQ", "other"])
+def test_every_action_is_allowed(rng, epsilon, network):
+    observations = rng.uniform(-1, 1, (200, 12, 3)).astype(np.float32)
+    masks = rng.integers(2, size=(200, 12), dtype=np.int8)
+    masks[:, 3] |= ~masks.any(axis=1)
+    actions = DQN(network).act(observations, masks, epsilon, rng)
+    assert actions.shape == (200,) and masks[np.arange(200), actions].all()
+
+
+def test_without_exploration_the_best_allowed_item_is_chosen(rng):
+    observations = np.zeros((3, 4, 3), np.float32)
+    observations[..., 2] = [-0.9, 0.1, 0.8, 0.2]
+    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]])
+    assert DQN(HeightNetwork()).act(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
+    assert DQN(HeightNetwork(-1.0)).act(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
+
+
+def test_greedy_actions_are_those_of_the_highest_value(rng):
+    network = peq()
+    observations = rng.uniform(-1, 1, (100, 30, 3)).astype(np.float32)
+    masks = rng.integers(2, size=(100, 30)).astype(bool)
+    masks[:, 0] = True
+    values = network(torch.from_numpy(observations)).detach().numpy()
+    chosen = greedy_actions(network, observations, masks)
+    best = np.where(masks, values, -np.inf).max(axis=1)
+    assert masks[np.arange(100), chosen].all()
+    assert values[np.arange(100), chosen] == pytest.approx(best, abs=1e-6)
+
+
+def test_epsilon_is_the_share_of_random_actions(rng):
+    observations = np.zeros((20_000, 4, 3), np.float32)
+    observations[:, 2, 2] = 1
+    masks = np.tile([1, 1, 1, 0], (20_000, 1))
+    actions = DQN(HeightNetwork()).act(observations, masks, 0.3, rng)
+    shares = np.bincount(actions, minlength=4) / 20_000
+    assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
+
+
+@pytest.mark.parametrize(
+    ("masks", "epsilon", "message"),
+    [
+        (np.zeros((2, 4)), 0.5, "masks is all zero in row 0"),
+        (np.ones((2, 5)), 0.5, "masks has shape"),
+        (np.ones((2, 4)), 1.5, "epsilon is 1.5"),
+        (np.ones((2, 4)), float("nan"), "epsilon is nan"),
+    ],
+)
+def test_bad_calls_of_act_are_refused(rng, masks, epsilon, message):
+    with pytest.raises(ValueError, match=message):
+        DQN(HeightNetwork()).act(np.zeros((2, 4, 3), np.float32), masks, epsilon, rng)
+
+
+def test_act_takes_lists_and_needs_a_generator(rng):
+    agent, observations = DQN(HeightNetwork()), np.zeros((2, 3, 3))
+    observations[:, 1, 2] = 1
+    masks = [[1, 1, 1], [1, 0, 1]]
+    assert agent.act(observations.tolist(), masks, 0.0, rng).tolist() == [1, 0]
+    with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
+        agent.act(observations, masks, 0.0, None)
+
+
+# --- learning -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("beta", [1.0, 0.3])
+@pytest.mark.parametrize("gamma", [0.0, 0.9])
+@pytest.mark.parametrize("fused", [False, True])
+def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
+    """Against the whole batch at once, written down as the paper's equations have it."""
+    batch = make_batch(rng)
+    agent = DQN(peq(), learning_rate=0.01, gamma=gamma, beta=beta, fused_update=fused)
+    reference, target = peq(), peq()
+    optimizer = torch.optim.Adam(reference.parameters(), lr=0.01)
+    for _ in range(3):
+        following = target(torch.from_numpy(batch["next_observations"])).detach().numpy()
+        best = np.where(batch["next_masks"], following, -np.inf).max(axis=1)
+        bootstrap = gamma * best * ~batch["terminations"]
+        targets = torch.from_numpy((batch["rewards"] + bootstrap).astype(np.float32))
+        values = reference(torch.from_numpy(batch["observations"]))
+        chosen = values[torch.arange(len(values)), torch.from_numpy(batch["actions"])]
+        loss = smooth_l1_loss(chosen, targets, beta=beta)
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        given = batch if gamma else without_next(batch)
+        assert agent.update(given) == pytest.approx(loss.item(), rel=1e-5)
+    for mine, theirs in zip(weights(agent.network), weights(reference)):
+        assert torch.allclose(mine, theirs, atol=2e-5)
+
+
+@pytest.mark.parametrize("gamma", [0.0, 0.9])
+@pytest.mark.parametrize("fused", [True, False])
+def test_learning_from_some_rows_is_learning_from_a_copy_of_them(rng, gamma, fused):
+    batch, rows = make_batch(rng), rng.integers(150, size=200)
+    agents = [DQN(peq(), gamma=gamma, fused_update=fused) for _ in range(2)]
+    loss = agents[0].update({name: array[rows] for name, array in batch.items()})
+    assert agents[1].update(batch, rows) == loss
+    for one, other in zip(*(weights(agent.network) for agent in agents)):
+        assert torch.equal(one, other)
+
+
+def test_choosing_unchecked_is_acting(rng):
+    observations = rng.uniform(-1, 1, (50, 12, 3)).astype(np.float32)
+    masks = rng.integers(2, size=(50, 12)).astype(bool)
+    masks[:, 3] = True
+    agent = DQN(peq())
+    for epsilon in (0.0, 0.5, 1.0):
+        acted, chosen = (
+            method(observations, masks, epsilon, np.random.default_rng(1))
+            for method in (agent.act, agent.choose)
+        )
+        assert (acted == chosen).all()
+
+
+def test_choosing_from_nothing_is_refused(rng):
+    """By whoever chooses, the random numbers or the network."""
+    observations, allowed = np.zeros((2, 5, 3), np.float32), np.zeros((2, 5), bool)
+    for epsilon, error in ((1.0, ValueError), (0.0, FloatingPointError)):
+        with pytest.raises(error, match="expected"):
+            DQN(peq()).choose(observations, allowed, epsilon, rng)
+
+
+def test_with_gamma_zero_the_target_is_the_reward(rng):
+    """One item, a value of 0.5 and a reward of -1: the loss is 1.5 - 0.5."""
+    observations = np.full((1, 1, 3), 0.5, np.float32)
+    batch = {
+        "observations": observations,
+        "actions": np.array([0]),
+        "rewards": np.array([-1.0], np.float32),
+    }
+    assert DQN(HeightNetwork()).update(batch) == pytest.approx(1.0)
+    assert DQN(HeightNetwork(-1.0)).update(batch) == pytest.approx(0.5 * 0.5**2)
+
+
+@pytest.mark.parametrize(
+    ("mask", "terminated", "best"),
+    [([1, 1, 1], False, 0.8), ([1, 0, 1], False, 0.4), ([1, 1, 1], True, 0.0)],
+)
+def test_the_bootstrap_maximum_obeys_the_mask_and_the_end(mask, terminated, best):
+    following = np.zeros((1, 3, 3), np.float32)
+    following[0, :, 2] = [0.4, 0.8, -0.5]
+    batch = {
+        "observations": np.zeros((1, 3, 3), np.float32),
+        "actions": np.array([0]),
+        "rewards": np.array([0.1], np.float32),
+        "next_observations": following,
+        "next_masks": np.array([mask], dtype=bool),
+        "terminations": np.array([terminated]),
+    }
+    target = 0.1 + 0.5 * best
+    assert DQN(HeightNetwork(), gamma=0.5).update(batch) == pytest.approx(target**2 / 2)
+
+
+def test_the_target_network_lags_behind(rng):
+    batch = make_batch(rng)
+    agent = DQN(peq(), learning_rate=0.05, gamma=0.9)
+    fresh = {name: value.clone() for name, value in agent.network.state_dict().items()}
+    agent.update(batch)
+    assert all(torch.equal(agent.target[name], fresh[name]) for name in fresh)
+    agent.update_target()
+    moved = agent.network.state_dict()
+    assert all(torch.equal(agent.target[name], moved[name]) for name in moved)
+    assert not torch.equal(agent.target["scorer.weight"], fresh["scorer.weight"])
+
+
+@pytest.mark.parametrize("fused", [False, True])
+@pytest.mark.parametrize("name", ["observations", "rewards"])
+def test_a_loss_that_is_not_finite_leaves_the_weights(rng, fused, name):
+    batch = without_next(make_batch(rng))
+    agent = DQN(peq(), fused_update=fused)
+    agent.update(batch)
+    before = weights(agent.network)
+    broken = batch | {name: batch[name].copy()}
+    broken[name].flat[5] = np.nan
+    if name == "observations":  # of the chosen item too, whatever it is
+        broken[name][0] = np.nan
+    with pytest.raises(FloatingPointError, match="the loss is nan.*expected"):
+        agent.update(broken)
+    assert all(torch.equal(a, b) for a, b in zip(weights(agent.network), before))
+    agent.update(batch)
+    assert all(torch.isfinite(w).all() for w in weights(agent.network))
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_a_state_goes_on_bit_by_bit(rng, fused):
+    batch = make_batch(rng)
+    agent, other = (DQN(peq(seed), gamma=0.5, fused_update=fused) for seed in (0, 1))
+    for _ in range(2):
+        agent.update(batch)
+    other.load_state(agent.state())
+    losses = [(a.update(batch), a.update(batch)) for a in (agent, other)]
+    assert losses[0] == losses[1]
+    assert all(torch.equal(a, b) for a, b in zip(weights(agent.network), weights(other.network)))
+    assert agent.state().keys() == other.state().keys()
+
+
+def test_learning_finds_the_highest_item(rng):
+    observations = rng.uniform(-1, 1, (4000, 10, 3)).astype(np.float32)
+    actions = rng.integers(10, size=4000)
+    highest = observations[..., 2].argmax(axis=1)
+    rewards = np.where(actions == highest, 1, -1).astype(np.float32)
+    agent = DQN(peq(n_features=16), learning_rate=0.01)
+    for _ in range(300):
+        rows = rng.integers(4000, size=256)
+        loss = agent.update(
+            {"observations": observations[rows], "actions": actions[rows], "rewards": rewards[rows]}
+        )
+    assert loss < 0.12
+    chosen = greedy_actions(agent.network, observations, np.ones((4000, 10)))
+    assert (chosen == highest).mean() > 0.9
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"gamma": 1.5}, "gamma is 1.5"),
+        ({"beta": -1}, "beta is -1"),
+        ({"learning_rate": float("nan")}, "learning_rate is nan"),
+    ],
+)
+def test_bad_settings_are_refused(kwargs, message):
+    with pytest.raises(ValueError, match=message):
+        DQN(peq(), **kwargs)
+
+
+def test_what_is_no_network_or_no_batch_is_refused():
+    for kind in (DQN, lambda network: Greedy(network, equalize=False)):
+        with pytest.raises(TypeError, match="network is None; expected a torch.nn.Module"):
+            kind(None)
+    with pytest.raises(TypeError, match="fused_update is 1; expected True or False"):
+        DQN(peq(), fused_update=1)
+    with pytest.raises(ValueError, match="batch has no actions, observations, rewards"):
+        DQN(peq()).update({})
+    with pytest.raises(TypeError, match="equalize is 1.0; expected True or False"):
+        Greedy(peq(), equalize=1.0)
+
+
+def test_only_learned_policies_are_saved(tmp_path):
+    class Subclass(PEQNetwork):
+        """Its file would be read as another network."""
+
+    others = (Greedy(network, equalize=False) for network in (HeightNetwork(), Subclass()))
+    for policy in (policies.highest, *others):
+        with pytest.raises(TypeError, match="policy is .*; expected a Greedy of one of PEQNetwork"):
+            save_policy(policy, tmp_path / "policy.safetensors")
+    assert not list(tmp_path.iterdir())
+
+
+def test_bootstrapping_needs_what_follows(rng):
+    batch = without_next(make_batch(rng))
+    with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
+        DQN(peq(), gamma=0.9).update(batch)
+
+
+def test_a_fused_update_of_another_network_is_refused():
+    with pytest.raises(ValueError, match="fused_update is True; expected a PEQNetwork"):
+        DQN(HeightNetwork(), fused_update=True)
+
+
+# --- policies -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def observations(rng) -> np.ndarray:
+    return rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
+
+
+def test_greedy_equalizes_what_its_network_expects(observations, rng):
+    masks = np.ones(observations.shape[:2])
+    for ties in ("noise", "average"):
+        policy = Greedy(peq(), equalize=True, ties=ties)
+        expected = greedy_actions(policy.network, equalize(observations, ties), masks)
+        assert (policy(observations, masks, rng) == expected).all()
+    raw = Greedy(peq(), equalize=False)(observations, masks, rng)
+    assert (raw == greedy_actions(peq(), observations, masks)).all()
+    assert (raw != expected).any()
+
+
+@pytest.mark.parametrize("kind", NETWORKS.values())
+@pytest.mark.parametrize(("equalized", "ties"), [(True, "average"), (False, "noise")])
+def test_a_saved_policy_comes_back(tmp_path, observations, rng, equalized, ties, kind):
+    network = kind(6, torch.Generator().manual_seed(0))
+    policy, path = Greedy(network, equalized, ties), tmp_path / "policy.safetensors"
+    save_policy(policy, path)
+    loaded = load_policy(path)
+    assert type(loaded.network) is kind
+    assert (loaded.equalize, loaded.ties, loaded.network.n_features) == (equalized, ties, 6)
+    for mine, theirs in zip(weights(loaded.network), weights(policy.network)):
+        assert torch.equal(mine, theirs)
+    masks = np.ones(observations.shape[:2])
+    assert (loaded(observations, masks, rng) == policy(observations, masks, rng)).all()
+
+
+def test_equal_policies_give_equal_bytes(tmp_path):
+    paths = [tmp_path / "a.safetensors", tmp_path / "b.safetensors"]
+    for path in paths:
+        save_policy(Greedy(peq(), True), path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(FileNotFoundError, match="none.safetensors"):
+        load_policy(tmp_path / "none.safetensors")
+
+
+@pytest.mark.parametrize("content", [b"", b"weights", None], ids=["empty", "text", "half"])
+def test_a_damaged_file_is_refused(tmp_path, content):
+    path = tmp_path / "policy.safetensors"
+    save_policy(Greedy(peq(), True), path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2] if content is None else content)
+    with pytest.raises(ValueError, match="policy.safetensors is not a safetensors file"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize(
+    "metadata",
+    [None, {"format": "pt"}, *map(of_network, ("Unknown", "EquivariantStack", [], None))],
+)
+def test_weights_of_others_are_refused(tmp_path, metadata):
+    path = tmp_path / "foreign.safetensors"
+    save_file(peq().state_dict(), path, metadata=metadata)
+    with pytest.raises(ValueError, match="foreign.safetensors does not hold a policy"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "value"),
+    [
+        ("network", "n_features", 9),
+        ("network", "n_features", "many"),
+        ("network", "n_features", 0),
+        ("policy", "equalize", "maybe"),
+        ("policy", "ties", "coin"),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused_by_name(tmp_path, owner, name, value):
+    path, policy = tmp_path / "changed.safetensors", Greedy(peq(), True)
+    setattr(policy if owner == "policy" else policy.network, name, value)
+    save_policy(policy, path)
+    with pytest.raises(ValueError, match="changed.safetensors does not hold a policy"):
+        load_policy(path)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_weights_that_are_not_finite_are_refused(tmp_path, value):
+    path, policy = tmp_path / "nan.safetensors", Greedy(peq(), True)
+    torch.nn.init.constant_(policy.network.scorer.bias, value)
+    save_policy(policy, path)
+    with pytest.raises(ValueError, match="nan.safetensors does not hold a policy"):
+        load_policy(path)

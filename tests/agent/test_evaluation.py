@@ -1,0 +1,207 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload import evaluate, policies, success_rate
+from unload.env.vector import ContainerVectorEnv
+
+COLUMNS = ["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
+
+
+def lowest(observations, masks, rng) -> np.ndarray:
+    """A policy that goes for blocked items first."""
+    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
+
+
+@pytest.mark.parametrize(
+    ("rewards", "rate"),
+    [
+        ([1.0], 1.0),
+        ([-1.0], 0.0),
+        ([1, -1], 0.5),
+        (np.full((3, 4), 1), 1.0),
+        ([1, -1, -1, -1], 0.25),
+    ],
+)
+def test_success_rate(rewards, rate):
+    assert success_rate(rewards) == rate
+
+
+@pytest.mark.parametrize(
+    ("rewards", "message"),
+    [
+        ([], "rewards is empty"),
+        ([1, 0], r"rewards holds 0\.0"),
+        ([1, np.nan], "rewards holds nan"),
+        ([[1], [1, 1]], "rewards has rows of different lengths"),
+    ],
+)
+def test_success_rate_refuses(rewards, message):
+    with pytest.raises(ValueError, match=message):
+        success_rate(rewards)
+
+
+def test_one_row_per_episode():
+    frame = evaluate(policies.random, episodes=3, seed=1, max_picks=40)
+    assert list(frame.columns) == COLUMNS and len(frame) == 3
+    assert (frame["success_rate"] == frame["unloaded"] / 40).all()
+    assert frame["success_rate"].between(0.05, 0.7).all()
+
+
+def test_the_highest_item_is_always_liftable():
+    frame = evaluate(policies.highest, episodes=2, max_picks=150)
+    assert (frame["success_rate"] == 1).all() and (frame["unloaded"] == 150).all()
+    assert (frame[["deadlocked", "longest_deadlock"]] == 0).all(axis=None)
+
+
+def test_a_stubborn_policy_sits_in_a_deadlock_without_the_mask():
+    frame = evaluate(lowest, episodes=2, mask=False, max_picks=20)
+    assert (frame["success_rate"] == 0).all()
+    assert frame["deadlocked"].tolist() == [19 / 20] * 2
+    assert frame["longest_deadlock"].tolist() == [19, 19]
+
+
+def test_with_the_mask_it_does_not():
+    frame = evaluate(lowest, episodes=2, mask=True, max_picks=110)
+    assert (frame["deadlocked"] == 0).all() and (frame["longest_deadlock"] == 0).all()
+    assert (frame["unloaded"] > 0).all()
+
+
+def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
+    calls = iter([0, 0, 0, 1, 0, 0, 0, 0, 1, 0] * 2)
+
+    def sometimes_higher(observations, masks, rng):
+        return (policies.highest if next(calls) else lowest)(observations, masks, rng)
+
+    (row,) = evaluate(sometimes_higher, 1, mask=False, max_picks=10).to_dict("records")
+    # A success forgives the failed items, so the first try after it is no deadlock.
+    assert row["unloaded"] == 2
+    assert row["longest_deadlock"] == 3 and row["deadlocked"] == (2 + 3) / 10
+
+
+def test_a_load_does_not_depend_on_how_many_there_are():
+    few, many = (evaluate(lowest, n, seed=3, max_picks=30) for n in (2, 70))
+    pd.testing.assert_frame_equal(few, many.iloc[:2])
+
+
+def test_the_seed_decides():
+    first, same, other = (
+        evaluate(policies.random, 3, seed=seed, max_picks=60) for seed in (1, 1, 2)
+    )
+    pd.testing.assert_frame_equal(first, same)
+    assert not first.equals(other)
+
+
+def test_local_and_table_agree():
+    frames = [evaluate(policies.random, 1, physics=p, max_picks=40) for p in ("local", "table")]
+    pd.testing.assert_frame_equal(*frames)
+
+
+# --- complete unloading --------------------------------------------------------------
+
+
+def test_whole_containers_are_unloaded_by_picking_the_highest_item():
+    frame = evaluate(policies.highest, episodes=3, max_picks=None)
+    assert list(frame.columns) == [*COLUMNS, "picks", "emptied"]
+    assert frame["emptied"].dtype == bool and frame["emptied"].all()
+    assert frame["picks"].dtype == np.int64 and (frame["picks"] == frame["unloaded"]).all()
+    assert (frame["success_rate"] == 1).all() and frame["unloaded"].between(800, 1000).all()
+
+
+@pytest.mark.parametrize("policy", [policies.random, policies.nearest])
+@pytest.mark.parametrize("mask", [False, True])
+def test_each_episode_counts_to_its_own_end(few_items, policy, mask):
+    counts = iter([3, 60, 20] + [5] * 99)  # the first three loads, and those that follow
+
+    frame = evaluate(
+        policy, 3, max_picks=None, mask=mask, stack=lambda rng: few_items(rng, next(counts))
+    )
+    assert frame["unloaded"].tolist() == [3, 60, 20] and frame["emptied"].all()
+    shares = frame["unloaded"] / frame["picks"]
+    assert frame["success_rate"].tolist() == pytest.approx(shares.tolist())
+    assert (frame["picks"] >= frame["unloaded"]).all() and frame["picks"].nunique() == 3
+    assert not mask or (frame["deadlocked"] == 0).all()
+
+
+def test_an_episode_ends_with_the_last_item_whatever_the_limit(few_items):
+    def play(**kwargs):
+        return evaluate(policies.nearest, 3, stack=lambda rng: few_items(rng, 12), **kwargs)
+
+    limited, whole = play(max_picks=400), play(max_picks=None)
+    pd.testing.assert_frame_equal(limited, whole[COLUMNS])
+    assert (play(max_picks=7)["unloaded"] <= 7).all()
+
+
+def test_local_and_table_agree_to_the_last_item(few_items):
+    frames = [
+        evaluate(policies.random, 1, physics=p, max_picks=None, stack=lambda rng: few_items(rng, 9))
+        for p in ("local", "table")
+    ]
+    pd.testing.assert_frame_equal(*frames)
+    assert frames[0]["emptied"].all()
+
+
+def test_an_episode_that_is_stuck_is_given_up(few_items):
+    frame = evaluate(lowest, 2, mask=False, max_picks=None, stack=lambda rng: few_items(rng, 40))
+    assert not frame["emptied"].any() and (frame["unloaded"] < 40).all()
+    assert (frame["longest_deadlock"] == 1279).all()
+    assert (frame["picks"] >= 1280).all()
+    shares = frame["unloaded"] / frame["picks"]
+    assert frame["success_rate"].tolist() == pytest.approx(shares.tolist())
+
+
+@pytest.mark.parametrize("max_picks", [200, None])
+def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(
+    few_items, monkeypatch, max_picks
+):
+    monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, actions: fail(envs, actions))
+
+    def fail(envs, actions):
+        envs._containers.masks[np.arange(len(actions)), actions] = 0
+        envs._items = envs._distances = np.zeros(len(actions))
+        return np.full(len(actions), -1.0)
+
+    frame = evaluate(policies.random, 2, max_picks=max_picks, stack=lambda rng: few_items(rng, 40))
+    assert (frame["unloaded"] == 0).all() and (frame["deadlocked"] == 0).all()
+    if max_picks is None:
+        assert (frame["picks"] == 40).all() and not frame["emptied"].any()
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "message"),
+    [
+        ({"policy": "random"}, TypeError, "policy is 'random'; expected a function"),
+        ({"episodes": 0}, ValueError, "episodes is 0"),
+        ({"episodes": 2.0}, TypeError, "episodes is 2.0"),
+        ({"seed": -1}, ValueError, "seed is -1"),
+        ({"mask": None}, TypeError, "mask is None; expected True or False"),
+        ({"mask": 1}, TypeError, "mask is 1; expected True or False"),
+        ({"physics": "none"}, ValueError, "physics is 'none'"),
+        ({"max_picks": 0}, ValueError, "max_picks is 0"),
+        ({"ties": "coin"}, ValueError, "ties is 'coin'"),
+    ],
+)
+def test_bad_arguments_are_refused(kwargs, error, message):
+    with pytest.raises(error, match=message):
+        evaluate(**({"policy": policies.random, "episodes": 1} | kwargs))
+
+
+@pytest.mark.parametrize(
+    ("returned", "error", "message"),
+    [
+        ([3.7], TypeError, "what policy returned has dtype float64; expected integers"),
+        (3, ValueError, r"what policy returned has shape \(\); expected \(1,\)"),
+        ([3, 4], ValueError, r"what policy returned has shape \(2,\); expected \(1,\)"),
+        ([128], ValueError, "what policy returned is 128; expected an integer >= 0 and <= 127"),
+        ([-1], ValueError, "what policy returned is -1"),
+        (None, TypeError, "what policy returned has dtype object"),
+    ],
+)
+def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(
+    monkeypatch, returned, error, message
+):
+    closed = []
+    monkeypatch.setattr(ContainerVectorEnv, "close", lambda env: closed.append(env))
+    with pytest.raises(error, match=message):
+        evaluate(lambda *_: returned, 1)
+    assert len(closed) == 1

@@ -1,0 +1,122 @@
+import numpy as np
+import pytest
+
+from unload.agent.replay import ReplayBuffer
+
+
+def picks(first: int, count: int, items: int = 4, next_state: bool = False) -> dict:
+    """Picks that can be told apart: pick k has observation k, action k % items."""
+    number = np.arange(first, first + count)
+    observations = np.ones((count, items, 3), np.float32) * number[:, None, None]
+    batch = {
+        "observations": observations,
+        "actions": number % items,
+        "rewards": np.where(number % 2, 1.0, -1.0),
+    }
+    if next_state:
+        batch |= {
+            "next_observations": observations + 0.5,
+            "next_masks": np.arange(items) != (number % items)[:, None],
+            "terminations": number % 3 == 0,
+        }
+    return batch
+
+
+@pytest.mark.parametrize("next_state", [False, True])
+def test_samples_are_whole_picks(rng, next_state):
+    replay = ReplayBuffer(100, 4, next_state)
+    replay.add(**picks(0, 40, next_state=next_state))
+    sample = replay.sample(500, rng)
+    numbers = sample["observations"][:, 0, 0].astype(int)
+    assert set(numbers.tolist()) == set(range(40))
+    assert sample.keys() == replay.arrays.keys()
+    everything = picks(0, 40, next_state=next_state)
+    for name, values in sample.items():
+        assert len(values) == 500
+        np.testing.assert_array_equal(values, everything[name][numbers])
+
+
+def test_the_oldest_picks_are_overwritten(rng):
+    replay = ReplayBuffer(10, 4)
+    for first in range(0, 24, 6):
+        replay.add(**picks(first, 6))
+    assert len(replay) == 10 and replay.total == 24
+    kept = replay.sample(300, rng)["observations"][:, 0, 0]
+    assert set(kept.tolist()) == set(range(14, 24))
+
+
+def test_length_grows_to_the_size():
+    replay = ReplayBuffer(5, 4)
+    lengths = []
+    for first in range(0, 8, 2):
+        lengths.append(len(replay))
+        replay.add(**picks(first, 2))
+    assert lengths == [0, 2, 4, 5]
+
+
+def test_samples_are_uniform_and_seeded(rng):
+    replay = ReplayBuffer(8, 4)
+    replay.add(**picks(0, 8))
+    counts = np.bincount(replay.sample(40_000, rng)["observations"][:, 0, 0].astype(int))
+    assert counts / 40_000 == pytest.approx(np.full(8, 1 / 8), abs=0.01)
+    first, same = (replay.sample(50, np.random.default_rng(1))["rewards"] for _ in range(2))
+    assert (first == same).all()
+
+
+def test_a_sample_does_not_change_with_the_buffer(rng):
+    replay = ReplayBuffer(4, 4)
+    replay.add(**picks(0, 4))
+    sample = replay.sample(20, rng)
+    before = sample["observations"].copy()
+    replay.add(**picks(100, 4))
+    assert (sample["observations"] == before).all()
+
+
+def test_bad_batches_change_nothing():
+    replay = ReplayBuffer(10, 4)
+    replay.add(**picks(0, 2))
+    good = picks(2, 3)
+    for batch, message in (
+        ({k: v for k, v in good.items() if k != "actions"}, "batch has .*expected"),
+        (good | {"masks": np.ones(3)}, "batch has .*expected"),
+        (good | {"actions": np.zeros(2, int)}, r"actions has shape \(2,\); expected \(3,\)"),
+        (picks(2, 3, items=5), r"observations has shape \(3, 5, 3\); expected \(3, 4, 3\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            replay.add(**batch)
+    for changes, error, message in (
+        ({"actions": np.full(3, 1.7)}, TypeError, "actions has dtype float64; expected integers"),
+        ({"rewards": np.full(3, np.nan)}, ValueError, "rewards holds nan"),
+        ({"observations": np.full((3, 4, 3), np.inf)}, ValueError, "observations holds inf"),
+        ({"rewards": 1.0}, ValueError, r"rewards has shape \(\)"),
+    ):
+        with pytest.raises(error, match=message):
+            replay.add(**good | changes)
+    assert len(replay) == replay.total == 2
+    assert (replay.arrays["observations"][:2] == picks(0, 2)["observations"]).all()
+
+
+def test_sampling_refuses(rng):
+    replay = ReplayBuffer(10, 4)
+    with pytest.raises(ValueError, match="the replay buffer is empty"):
+        replay.sample(1, rng)
+    replay.add(**picks(0, 2))
+    with pytest.raises(ValueError, match="batch_size is 0"):
+        replay.sample(0, rng)
+    with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
+        replay.sample(1, None)
+
+
+def test_masks_and_ends_are_flags():
+    replay = ReplayBuffer(10, 4, next_state=True)
+    good = picks(0, 3, next_state=True)
+    replay.add(**good | {"next_masks": good["next_masks"].astype(np.int8)})
+    assert (replay.arrays["next_masks"][:3] == good["next_masks"]).all()
+    with pytest.raises(ValueError, match="next_masks holds 2"):
+        replay.add(**good | {"next_masks": np.full((3, 4), 2)})
+
+
+@pytest.mark.parametrize(("size", "items", "name"), [(0, 4, "size"), (4, 0, "items")])
+def test_bad_sizes_are_refused(size, items, name):
+    with pytest.raises(ValueError, match=f"{name} is 0"):
+        ReplayBuffer(size, items)

@@ -1,0 +1,166 @@
+"""Many runs side by side: what is kept, what is reported, and who does the work."""
+
+import os
+import signal
+import threading
+import time
+from concurrent.futures.process import BrokenProcessPool
+
+import pandas as pd
+import pytest
+
+from unload.agent import sweep
+from unload.agent.training import train
+from unload.reproduce.tuning import tuning_config
+from unload.support import files
+
+
+@pytest.fixture
+def configs():
+    """Two tiny runs."""
+    return {f"set/run_{run}": tuning_config(8, 1e-3, run, steps=4, n_features=4) for run in (0, 1)}
+
+
+def without_times(path):
+    return pd.read_csv(path).drop(columns="wall_time").to_csv()
+
+
+def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
+    report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    assert list(report.index) == list(configs)
+    assert (report["error"] == "").all()
+    assert report["seed"].tolist() == [0, 1]
+    assert capfd.readouterr() == ("", "")
+    for name, config in configs.items():
+        folder = tmp_path / "many" / name
+        assert report.loc[name, "folder"] == str(folder)
+        train(config, tmp_path / "alone" / name, progress=False)
+        assert without_times(folder / "curve.csv") == without_times(
+            tmp_path / "alone" / name / "curve.csv"
+        )
+        record = files.read_json(folder / "record.json")
+        assert not record["resumed"]
+        assert record["peak_memory_mib"] > 50
+        assert "256/256" in (folder / "log.txt").read_text()
+        assert not (folder / "attempts").exists()
+    written = sorted(tmp_path.glob("many/set/*/*[!t]"))  # all but log.txt
+    before = [path.stat().st_mtime_ns for path in written]
+    sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    assert [path.stat().st_mtime_ns for path in written] == before
+
+
+def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):
+    sweep.run_sweep(configs, tmp_path, n_jobs=1)
+    captured = capsys.readouterr()
+    assert "2/2" in captured.out
+    assert captured.err == ""
+
+
+def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "run_0").write_text("a file where the run's folder should be")
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert "run_0" in report["error"].iloc[0]
+    assert report["error"].iloc[1] == ""
+
+
+def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
+    other = tuning_config(8, 1e-3, 0, steps=4, n_features=5)
+    train(other, tmp_path / "set" / "run_0", progress=False)
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert "n_features (5, not 4)" in report["error"].iloc[0]
+    assert report["error"].iloc[1] == ""
+
+
+class Killer(threading.Thread):
+    """Kills the process of a run whenever it starts."""
+
+    def __init__(self, folder):
+        super().__init__(daemon=True)
+        self.path, self.done, self.killed = folder / "attempts", threading.Event(), []
+
+    def run(self):
+        while not self.done.wait(0.01):
+            try:
+                process = int(self.path.read_text().splitlines()[-1])
+            except (OSError, IndexError, ValueError):
+                continue
+            if process not in self.killed:
+                self.killed.append(process)
+                time.sleep(0.1)  # into the run
+                os.kill(process, signal.SIGKILL)
+
+
+def test_processes_that_cannot_begin_are_given_up(configs, tmp_path, monkeypatch):
+    def broken(*args, **kwargs):
+        raise BrokenProcessPool("out of memory")
+
+    monkeypatch.setattr(sweep.Parallel, "__call__", broken)
+    with pytest.raises(BrokenProcessPool, match="out of memory"):
+        sweep.run_sweep(configs, tmp_path, n_jobs=2, progress=False)
+
+
+@pytest.mark.slow
+def test_a_process_that_dies_is_reported_and_stops_no_other(configs, tmp_path):
+    runs = {"doomed": tuning_config(8, 1e-3, 0, steps=10_000, n_features=4), **configs}
+    killer = Killer(tmp_path / "doomed")
+    killer.start()
+    report = sweep.run_sweep(runs, tmp_path, n_jobs=2, progress=False)
+    killer.done.set()
+    assert report["error"].tolist() == ["its process died, 2 times", "", ""]
+    assert len(killer.killed) == 2
+    assert not list(tmp_path.rglob("attempts"))
+
+
+@pytest.mark.slow
+def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
+    distributed = pytest.importorskip("distributed")
+    configs = {
+        f"run_{run}": tuning_config(8, 1e-3, run, steps=200, n_features=4) for run in range(4)
+    }
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    )
+    with cluster, distributed.Client(cluster) as client:
+        workers = set(client.run(os.getpid).values())
+        report = sweep.run_sweep(configs, tmp_path / "dask", backend="dask", progress=False)
+    assert capfd.readouterr().err == ""
+    assert (report["error"] == "").all()
+    sweep.run_sweep(configs, tmp_path / "loky", n_jobs=2, progress=False)
+    for name in configs:
+        curves = [
+            without_times(tmp_path / backend / name / "curve.csv") for backend in ("dask", "loky")
+        ]
+        assert curves[0] == curves[1]
+    used = {
+        files.read_json(tmp_path / "dask" / name / "record.json")["process"] for name in configs
+    }
+    assert used == workers
+    assert len(used) == 2
+
+
+def test_dask_without_a_client_is_refused(configs, tmp_path):
+    with pytest.raises(ValueError, match="first create a Dask Client"):
+        sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
+
+
+@pytest.mark.parametrize(
+    ("configs", "error", "message"),
+    [
+        ([1], TypeError, r"configs is \[1\]; expected a dict"),
+        ({"a": 1}, TypeError, r"configs\['a'\] is 1; expected an unload.TrainConfig"),
+        *(
+            ({name: tuning_config(8, 1e-3, 0)}, ValueError, "configs has the name .*relative path")
+            for name in ("", ".", "/a", "../a", "a/", "a//b", 3)
+        ),
+    ],
+)
+def test_bad_configurations_are_refused(configs, error, message, tmp_path):
+    with pytest.raises(error, match=message):
+        sweep.run_sweep(configs, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_unknown_backend_is_refused(configs, tmp_path):
+    with pytest.raises(ValueError, match="backend is 'spark'; expected one of 'loky', 'dask'"):
+        sweep.run_sweep(configs, tmp_path, backend="spark")

@@ -1,0 +1,86 @@
+"""Algorithm 1 compiled, against ``unload.equalize``."""
+
+import numpy as np
+import pytest
+
+from unload import equalize
+from unload.env.equalization import TOLERANCE
+from unload.env.fast.ranking import features, nearest_first, rank, remove, replace
+
+WIDTH = np.float32(TOLERANCE)
+
+
+@pytest.fixture(params=["distinct", "ties", "equal"])
+def items(request, rng) -> np.ndarray:
+    """(3, 128) float32, one item per column."""
+    values = rng.uniform(-1, 1, (3, 128)).astype(np.float32)
+    if request.param == "ties":
+        values = np.round(values, 1)
+    return np.zeros_like(values) if request.param == "equal" else values
+
+
+def ranks_of(values: np.ndarray) -> np.ndarray:
+    return np.argsort(np.argsort(values, axis=-1, kind="stable"), axis=-1)
+
+
+def test_ranks_are_those_of_a_stable_sort(items):
+    for values in items:
+        ranks = np.empty(128, np.int32)
+        rank(values, ranks)
+        assert (ranks == ranks_of(values)).all()
+
+
+def test_replaced_items_leave_the_ranks_of_a_stable_sort(items, rng):
+    values = items[0].copy()
+    ranks = ranks_of(values).astype(np.int32)
+    for _ in range(300):
+        row, value = int(rng.integers(128)), np.float32(rng.choice(items[1]))
+        wanted = np.append(np.delete(values, row), value)
+        replace(values, ranks, row, value)
+        assert (values == wanted).all() and (ranks == ranks_of(wanted)).all()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_features_are_those_of_equalize(items, ties):
+    observation = np.empty((128, 3), np.float32)
+    ranks = ranks_of(items).astype(np.int32)
+    features(items, ranks, True, ties == "average", WIDTH, observation)
+    assert observation.tobytes() == equalize(items.T, ties).tobytes()
+    features(items, ranks, False, ties == "average", WIDTH, observation)
+    assert (observation == items.T).all()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_nearest_first_sorts_by_distance(items, rng, ties):
+    distances, flags = rng.random((2, 128)).round(2), rng.random((2, 128)) < 0.5
+    seen = np.stack([items.T, items.T[::-1]])
+    observations, rows = np.empty_like(seen), np.empty_like(flags)
+    nearest_first(distances, seen, flags, True, ties == "average", WIDTH, observations, rows)
+    for env in range(2):
+        order = np.argsort(distances[env], kind="stable")
+        assert observations[env].tobytes() == equalize(seen[env, order], ties).tobytes()
+        assert (rows[env] == flags[env, order]).all()
+
+
+def test_removed_items_leave_the_ranks_of_a_stable_sort(items, rng):
+    values = items[0].copy()
+    ranks = ranks_of(values).astype(np.int32)
+    for count in range(128, 0, -1):
+        row = int(rng.integers(count))
+        wanted = np.delete(values[:count], row)
+        remove(values[:count], ranks[:count], row)
+        assert (values[: count - 1] == wanted).all()
+        assert (ranks[: count - 1] == ranks_of(wanted)).all()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 64, 127, 128])
+def test_features_of_fewer_items_are_those_of_equalize(items, ties, count):
+    ranks = np.full((3, 128), 99, np.int32)
+    ranks[:, :count] = ranks_of(items[:, :count])
+    observation = np.empty((128, 3), np.float32)
+    present = np.arange(128) < count
+    features(items, ranks, True, ties == "average", WIDTH, observation, count)
+    assert observation.tobytes() == equalize(items.T, ties, present=present).tobytes()
+    features(items, ranks, False, ties == "average", WIDTH, observation, count)
+    assert (observation == np.where(present[:, None], items.T, -1)).all()

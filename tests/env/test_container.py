@@ -1,0 +1,573 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+from unload import ContainerEnv, Load, equalize, stack_load, task
+from unload.env import observation
+from unload.load.substacks import build_load
+
+ENV_ID = "unload/Container-v0"
+
+
+def play(env: gymnasium.Env, actions, seed: int = 0) -> list[tuple]:
+    """All that an episode shows, as comparable values."""
+    seen, info = env.reset(seed=seed)
+    record = [(seen.tobytes(), info["action_mask"].tobytes(), info["unloaded"])]
+    for action in actions:
+        seen, reward, terminated, truncated, info = env.step(int(action))
+        flags = (reward, terminated, truncated, info["unloaded"], info["item"], info["distance"])
+        record.append((seen.tobytes(), info["action_mask"].tobytes(), *flags))
+    return record
+
+
+def tall_load() -> Load:
+    """Few enough items to be quick, also where each of them is simulated."""
+    return build_load(np.zeros((2, 3, 4), dtype=int))
+
+
+# --- Gymnasium's interface ----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "kwargs",
+    [{"physics": "table"}, {"physics": "table", "equalize": True}, {"physics": "local"}],
+    ids=["table", "equalized", "local"],
+)
+@pytest.mark.filterwarnings("error")
+def test_check_env(kwargs):
+    env = gymnasium.make(ENV_ID, **kwargs)
+    check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+
+def test_spaces(make_env):
+    env = make_env()
+    assert env.observation_space == gymnasium.spaces.Box(-1, 1, (128, 3), np.float32)
+    assert env.action_space == gymnasium.spaces.Discrete(128)
+
+
+def test_reset_shows_the_nearest_items_scaled(make_env, full_load):
+    env = make_env(position_noise=0.0)
+    seen, info = env.reset(seed=0, options={"load": full_load})
+    rows = observation.nearest(full_load.positions)
+    assert (env.unwrapped.visible == rows).all()
+    assert (seen == observation.scale(full_load.positions[rows])).all()
+    assert seen.dtype == np.float32 and info["unloaded"] == 0
+
+
+def test_positions_are_blurred_and_sunk_once_per_load(make_env, full_load):
+    env = make_env()
+    env.reset(seed=0, options={"load": full_load})
+    blur = env.unwrapped.observed_positions() - full_load.positions
+    assert blur.std(axis=0) == pytest.approx(0.0005, rel=0.1)
+    assert blur.mean(axis=0) == pytest.approx([0, 0, -0.001], abs=1e-4)
+    env.step(0)
+    assert (env.unwrapped.observed_positions() - full_load.positions == blur).all()
+
+
+def test_equalized_observations(make_env):
+    raw, _ = make_env().reset(seed=4)
+    for ties in ("noise", "average"):
+        seen, _ = make_env(equalize=True, ties=ties).reset(seed=4)
+        assert (seen == equalize(raw, ties)).all()
+
+
+def test_observations_are_fresh_arrays(make_env):
+    env = make_env()
+    first, _ = env.reset(seed=0)
+    kept = first.copy()
+    second, *_ = env.step(127)
+    second[:] = 9
+    third, *_ = env.step(127)
+    assert (first == kept).all() and third.max() <= 1
+
+
+# --- picking ------------------------------------------------------------------------
+
+
+def test_a_success_removes_the_item_and_shows_the_next(make_env):
+    env = make_env()
+    seen, _ = env.reset(seed=0)
+    container = env.unwrapped
+    row = int(np.argmax(seen[:, 2]))
+    item, visible = int(container.visible[row]), set(container.visible.tolist())
+    after, reward, terminated, truncated, info = env.step(row)
+    assert (reward, terminated, truncated) == (1.0, False, False)
+    assert info["item"] == item and info["unloaded"] == 1
+    assert info["distance"] == pytest.approx(0.46, rel=0.02)
+    assert not container.physics.present[item]
+    now = set(container.visible.tolist())
+    assert item not in now and len(now) == 128 and len(now & visible) == 127
+    assert not (after == seen).all()
+
+
+def test_a_failure_changes_nothing_but_the_mask(make_env):
+    env = make_env()
+    seen, info = env.reset(seed=0)
+    row = int(np.argmin(seen[:, 2]))
+    assert info["action_mask"].dtype == np.int8 and info["action_mask"].tolist() == [1] * 128
+    after, reward, _, _, info = env.step(row)
+    assert reward == -1.0 and info["distance"] < task.LIFT_THRESHOLD and info["unloaded"] == 0
+    assert (after == seen).all() and env.unwrapped.physics.present.all()
+    expected = np.ones(128)
+    expected[row] = 0
+    assert info["action_mask"].dtype == np.int8 and (info["action_mask"] == expected).all()
+    masks = env.unwrapped.action_masks()
+    assert masks.dtype == bool and (masks == expected).all()
+
+
+def test_failures_add_up_and_a_success_forgives_them(make_env):
+    env = make_env()
+    seen, _ = env.reset(seed=0)
+    for row in np.argsort(seen[:, 2])[:3]:
+        _, _, _, _, info = env.step(int(row))
+    assert info["action_mask"].sum() == 125
+    _, reward, _, _, info = env.step(int(np.argmax(seen[:, 2])))
+    assert reward == 1 and info["action_mask"].tolist() == [1] * 128
+
+
+def test_a_failed_row_may_be_picked_again_and_fails_again(make_env):
+    env = make_env()
+    seen, _ = env.reset(seed=0)
+    row = int(np.argmin(seen[:, 2]))
+    assert [env.step(row)[1] for _ in range(3)] == [-1, -1, -1]
+
+
+def test_liftable_says_what_would_succeed(make_env):
+    env = make_env()
+    env.reset(seed=0)
+    liftable = env.unwrapped.liftable()
+    assert liftable.shape == (128,) and liftable.dtype == bool and 0 < liftable.sum() < 128
+    state = env.unwrapped.get_state()
+    for row in range(0, 128, 9):
+        env.unwrapped.set_state(state)
+        assert (env.step(row)[1] == 1) == liftable[row]
+
+
+def test_the_reward_needs_the_threshold(make_env, monkeypatch):
+    env = make_env()
+    env.reset(seed=0)
+    for distance, reward in ((0.2, 1), (0.1999, -1), (0.46, 1), (0.0, -1)):
+        monkeypatch.setattr(env.unwrapped.physics, "lift", lambda item, d=distance: d)
+        assert env.step(0)[1] == reward
+
+
+def test_truncation_after_max_picks(make_env):
+    env = make_env(max_picks=3)
+    env.reset(seed=0)
+    assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (False, True)]
+    with pytest.raises(ResetNeeded, match="the episode is finished; call reset first"):
+        env.unwrapped.step(0)
+    env.reset()
+    env.step(0)
+
+
+def test_an_episode_has_500_picks_by_default():
+    env = ContainerEnv(physics="table")
+    assert env.max_picks == 500
+    env.close()
+
+
+@pytest.mark.parametrize("physics", ["local", "table", "full"])
+def test_every_physics_plays(make_env, physics):
+    env = make_env(physics=physics, stack=lambda rng: tall_load(), max_picks=3)
+    seen, _ = env.reset(seed=0)
+    _, success, _, _, _ = env.step(int(np.argmax(seen[:, 2])))
+    _, failure, _, _, _ = env.step(int(np.argmin(seen[:, 2])))
+    assert (success, failure) == (1, -1)
+
+
+def test_drifting_boxes_are_seen_where_they_are(make_env):
+    env = make_env(physics="full", after_pick="keep", stack=lambda rng: tall_load(), max_picks=3)
+    env.reset(seed=0)
+    container = env.unwrapped
+    neat = container.physics.load.positions
+    assert (container.observed_positions() == neat).all()
+    seen, *_ = env.step(127)
+    drift = container.observed_positions() - neat
+    assert 0 < np.abs(drift).max() < 0.02
+    expected = observation.scale((neat + drift)[container.visible])
+    assert (seen == expected).all()
+    for call in (container.liftable, container.get_state):
+        with pytest.raises(ValueError, match="after_pick lets .*expected 'restore'"):
+            call()
+
+
+# --- unloading to the last item -----------------------------------------------------
+
+
+@pytest.fixture
+def small_env(make_env, few_items):
+    """``small_env(count, **kwargs)``: an environment whose loads hold so many items."""
+
+    def make(count: int, **kwargs) -> gymnasium.Env:
+        return make_env(stack=lambda rng: few_items(rng, count), **kwargs)
+
+    return make
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("equalized", [False, True])
+def test_check_env_with_few_items(small_env, equalized):
+    check_env(small_env(3, equalize=equalized).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("kwargs", [{}, {"equalize": True}, {"equalize": True, "ties": "average"}])
+def test_a_container_is_unloaded_to_the_last_item(small_env, kwargs):
+    env, raw = small_env(135, **kwargs), small_env(135)
+    _, info = env.reset(seed=0)
+    seen, _ = raw.reset(seed=0)
+    container = env.unwrapped
+    for left in range(134, -1, -1):
+        row = int(np.where(info["item_mask"], seen[:, 2], -2).argmax())
+        after, reward, terminated, truncated, info = env.step(row)
+        seen, *_ = raw.step(row)
+        assert (reward, terminated, truncated) == (1.0, left == 0, False)
+        held = np.arange(128) < left
+        assert info["item_mask"].dtype == np.int8 and (info["item_mask"] == held).all()
+        assert (info["action_mask"] == held).all() and (container.action_masks() == held).all()
+        assert (observation.holds_item(seen) == held).all()
+        assert (container.visible[:left] >= 0).all() and (container.visible[left:] == -1).all()
+        if container.equalize:
+            assert (after == equalize(seen, container.ties, present=held)).all()
+        else:
+            assert (after == seen).all()
+        assert (after[left:] == observation.PADDING).all() and env.observation_space.contains(after)
+    assert info["unloaded"] == 135 and info["item"] >= 0
+    with pytest.raises(ResetNeeded, match="the episode is finished"):
+        container.step(0)
+    assert not container.liftable().any()
+
+
+def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing(small_env):
+    env = small_env(5)
+    seen, info = env.reset(seed=0)
+    state = env.unwrapped.get_state()
+    after, reward, terminated, truncated, following = env.step(5)
+    assert (reward, terminated, truncated) == (-1.0, False, False)
+    assert following["item"] == -1 and following["distance"] == 0.0
+    assert (after == seen).all()
+    for name in ("action_mask", "item_mask", "unloaded"):
+        assert np.array_equal(following[name], info[name])
+    now = env.unwrapped.get_state()
+    assert (now.pop("counts") == [1, 0]).all() and (state.pop("counts") == [0, 0]).all()
+    assert all((now[name] == state[name]).all() for name in state)
+
+
+def test_a_failed_item_is_masked_in_the_action_mask_only(small_env):
+    env = small_env(20)
+    seen, _ = env.reset(seed=0)
+    row = int(seen[:20, 2].argmin())
+    _, reward, _, _, info = env.step(row)
+    held = np.arange(128) < 20
+    assert reward == -1 and (info["item_mask"] == held).all()
+    assert (info["action_mask"] == held & (np.arange(128) != row)).all()
+
+
+def test_an_item_that_is_alone_is_in_the_middle_of_its_ranks(small_env):
+    for ties in ("noise", "average"):
+        seen, _ = small_env(1, equalize=True, ties=ties).reset(seed=0)
+        assert (seen[0] == 0).all() and (seen[1:] == -1).all()
+
+
+def test_the_last_item_may_go_with_the_last_pick(small_env):
+    env = small_env(2, max_picks=2)
+    env.reset(seed=0)
+    env.step(0)
+    assert env.step(0)[2:4] == (True, True)
+
+
+@pytest.mark.parametrize(
+    "kwargs",
+    [{"physics": "local"}, {"physics": "full"}, {"physics": "full", "after_pick": "keep"}],
+    ids=str,
+)
+def test_every_physics_goes_to_the_last_item(small_env, kwargs):
+    env = small_env(3, render_mode="rgb_array", **kwargs)
+    seen, _ = env.reset(seed=0)
+    env.step(100)
+    rewards, terminated = [], False
+    while not terminated:
+        row = int(np.where(observation.holds_item(seen), seen[:, 2], -2).argmax())
+        seen, reward, terminated, _, _ = env.step(row)
+        rewards.append(reward)
+    assert rewards == [1, 1, 1] and env.render().shape == (480, 640, 3)
+
+
+def test_a_state_with_few_items_goes_on_identically(small_env, rng):
+    env, other = small_env(10), small_env(3)
+    env.reset(seed=0)
+    other.reset(seed=9)
+    for _ in range(10):
+        seen, _, terminated, _, _ = env.step(0 if rng.random() < 0.7 else 60)
+        other.unwrapped.set_state(env.unwrapped.get_state())
+        assert (other.unwrapped._observation == seen).all()
+        assert (other.unwrapped.visible == env.unwrapped.visible).all()
+    while not terminated:
+        one, two = env.step(0), other.step(0)
+        assert (one[0] == two[0]).all() and one[1:4] == two[1:4]
+        terminated = one[2]
+    other.unwrapped.set_state(env.unwrapped.get_state())
+    with pytest.raises(ResetNeeded, match="the episode is finished"):
+        other.unwrapped.step(0)
+
+
+# --- seeds, loads and states --------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_episode_byte_for_byte(make_env, rng):
+    actions = rng.integers(128, size=60)
+    assert play(make_env(), actions, seed=1) == play(make_env(), actions, seed=1)
+
+
+def test_local_and_table_give_the_same_rewards(make_env, rng):
+    actions = rng.integers(128, size=40)
+    local, table = (play(make_env(physics=p), actions) for p in ("local", "table"))
+    assert [row[:6] for row in local] == [row[:6] for row in table]
+
+
+def test_different_seeds_give_different_loads(make_env):
+    env = make_env()
+    seen = {env.reset(seed=seed)[0].tobytes() for seed in range(4)}
+    assert len(seen) == 4
+
+
+def test_a_reset_without_seed_goes_on_with_the_generator(make_env):
+    env, same = make_env(), make_env()
+    first, _ = env.reset(seed=0)
+    second, _ = env.reset()
+    assert (first != second).any()
+    same.reset(seed=0)
+    assert (same.reset()[0] == second).all()
+
+
+def test_a_given_load_is_used(make_env, full_load):
+    env = make_env()
+    env.reset(seed=0, options={"load": full_load})
+    assert env.unwrapped.physics.load is full_load
+
+
+def test_a_custom_stack_draws_from_the_environments_generator(make_env):
+    def stack(rng: np.random.Generator) -> Load:
+        return stack_load(rng, walls=3)
+
+    env = make_env(stack=stack, max_picks=20)
+    first, _ = env.reset(seed=0)
+    assert len(env.unwrapped.physics.load) < 400
+    assert (env.reset(seed=0)[0] == first).all() and (env.reset(seed=1)[0] != first).any()
+
+
+def test_a_state_goes_on_identically(make_env, rng):
+    before, after = rng.integers(128, size=30), rng.integers(128, size=30)
+    env, other = make_env(max_picks=45), make_env(max_picks=45)
+    play(env, before)
+    state = {name: array.copy() for name, array in env.unwrapped.get_state().items()}
+    assert all(array.dtype != object for array in state.values())
+    other.reset(seed=99)
+    other.unwrapped.set_state(state)
+
+    def go_on(env: gymnasium.Env) -> list:
+        rows = []
+        for action in after[:15]:
+            seen, reward, _, truncated, info = env.step(int(action))
+            rows.append((seen.tobytes(), reward, truncated, info["action_mask"].tobytes()))
+        return [*rows, env.reset()[0].tobytes()]  # the generator goes on too
+
+    assert go_on(env) == go_on(other)
+    assert play(env, before)[-1][2:6] == play(other, before)[-1][2:6]
+
+
+# --- vectors of environments --------------------------------------------------------
+
+
+def test_64_containers_side_by_side():
+    envs = gymnasium.make_vec(
+        ENV_ID, num_envs=64, vectorization_mode="sync", physics="table", max_picks=5
+    )
+    seen, infos = envs.reset(seed=0)
+    assert seen.shape == (64, 128, 3) and infos["action_mask"].shape == (64, 128)
+    assert len({row.tobytes() for row in seen}) == 64
+    alone = ContainerEnv(physics="table")
+    assert (alone.reset(seed=3)[0] == seen[3]).all()
+    highest = seen[..., 2].argmax(axis=1)
+    _, rewards, _, _, infos = envs.step(highest)
+    assert (rewards == 1).all() and (infos["unloaded"] == 1).all()
+    alone.close()
+    envs.close()
+
+
+def test_processes_give_what_one_process_gives():
+    outcomes = []
+    for mode in ("sync", "async"):
+        envs = gymnasium.make_vec(ENV_ID, num_envs=3, vectorization_mode=mode, physics="local")
+        seen, _ = envs.reset(seed=0)
+        record = [seen]
+        for action in (0, 40, 127):
+            seen, rewards, _, _, infos = envs.step(np.full(3, action))
+            record += [seen, rewards, infos["action_mask"]]
+        outcomes.append(record)
+        envs.close()
+    for one, other in zip(*outcomes):
+        np.testing.assert_array_equal(one, other)
+
+
+# --- other libraries ----------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_stable_baselines_dqn_learns(make_env):
+    dqn = pytest.importorskip("stable_baselines3").DQN
+    model = dqn(
+        "MlpPolicy", make_env(), buffer_size=2_000, learning_starts=100, seed=0, device="cpu"
+    )
+    before = [p.clone() for p in model.q_net.parameters()]
+    model.learn(2_000)
+    assert model.num_timesteps == 2_000
+    assert any((p != q).any() for p, q in zip(model.q_net.parameters(), before))
+
+
+@pytest.mark.slow
+def test_maskable_ppo_learns_and_obeys_the_mask(make_env, monkeypatch):
+    contrib = pytest.importorskip("sb3_contrib")
+    env, obeyed = make_env(), []
+    container = env.unwrapped
+    step = container.step
+
+    def watched(action):
+        obeyed.append(container.action_masks()[int(action)])
+        return step(action)
+
+    monkeypatch.setattr(container, "step", watched)
+    model = contrib.MaskablePPO("MlpPolicy", env, n_steps=500, batch_size=100, seed=0, device="cpu")
+    model.learn(2_000)
+    assert model.num_timesteps == 2_000 and len(obeyed) == 2_000 and all(obeyed)
+
+
+# --- bad input ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("action", "error"),
+    [(128, ValueError), (-1, ValueError), (3.5, TypeError), (float("nan"), TypeError),
+     (True, TypeError), (None, TypeError), ("3", TypeError), (np.array([3]), TypeError)],
+)  # fmt: skip
+def test_bad_actions_change_nothing(action, error):
+    env, untouched = (ContainerEnv(physics="table") for _ in range(2))
+    for container in (env, untouched):
+        container.reset(seed=0)
+    with pytest.raises(error, match="action is .*; expected an integer >= 0 and <= 127"):
+        env.step(action)
+    outcomes = [container.step(5) for container in (env, untouched)]
+    assert (outcomes[0][0] == outcomes[1][0]).all() and outcomes[0][1] == outcomes[1][1]
+    env.close()
+    untouched.close()
+
+
+def test_numpy_integers_are_actions(make_env):
+    env = make_env()
+    env.reset(seed=0)
+    env.step(np.int64(0))
+    env.step(np.array(1))
+
+
+@pytest.mark.parametrize("call", ["step", "render", "action_masks", "liftable", "get_state"])
+def test_nothing_works_before_reset_or_after_close(call):
+    env = ContainerEnv(physics="table", render_mode="rgb_array")
+    arguments = (0,) if call == "step" else ()
+    with pytest.raises(ResetNeeded, match="the episode is not started; call reset first"):
+        getattr(env, call)(*arguments)
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    with pytest.raises(ClosedEnvironmentError, match="the environment is closed"):
+        getattr(env, call)(*arguments)
+    with pytest.raises(ClosedEnvironmentError):
+        env.reset()
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "error", "message"),
+    [
+        ({"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
+        ({"physics": "full", "after_pick": "x"}, ValueError, "after_pick is 'x'; expected one of"),
+        ({"physics": "table", "after_pick": "keep"}, ValueError, "expected 'restore'"),
+        ({"render_mode": "human"}, ValueError, "render_mode is 'human'; .*None, 'rgb_array'"),
+        ({"ties": "coin"}, ValueError, "ties is 'coin'"),
+        ({"equalize": "yes"}, TypeError, "equalize is 'yes'; expected True or False"),
+        ({"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
+        ({"ties": np.zeros(2)}, ValueError, "ties is array"),
+        ({"max_picks": 0}, ValueError, "max_picks is 0"),
+        ({"max_picks": 1.5}, TypeError, "max_picks is 1.5"),
+        ({"position_noise": -1}, ValueError, "position_noise is -1"),
+        ({"position_noise": float("nan")}, ValueError, "position_noise is nan"),
+        ({"stack": "walls"}, TypeError, "stack is 'walls'; expected a function"),
+    ],
+)
+def test_bad_settings_are_refused(kwargs, error, message):
+    with pytest.raises(error, match=message):
+        ContainerEnv(**kwargs)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"lode": None}, ValueError, "options is 'lode'; expected one of 'load'"),
+        ({"load": None}, TypeError, "load is None; expected an unload.Load"),
+        (["load"], TypeError, r"options is \['load'\]; expected a dict"),
+        ("load", TypeError, "options is 'load'; expected a dict"),
+    ],
+)
+def test_bad_options_leave_the_episode_as_it_was(options, error, message):
+    env = ContainerEnv(physics="table")
+    first, _ = env.reset(seed=0)
+    env.step(0)
+    before = env.get_state()
+    with pytest.raises(error, match=message):
+        env.reset(seed=99, options=options)
+    after = env.get_state()
+    assert all((after[name] == before[name]).all() for name in before)
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"present": np.ones(3, bool)}, ValueError, r"state\['present'\] has shape \(3,\)"),
+        ({"present": "all"}, TypeError, r"state\['present'\] has dtype"),
+        ({"failed": np.zeros(128, bool)}, ValueError, r"state\['failed'\] has shape \(128,\)"),
+        ({"blur": np.zeros((9, 3))}, ValueError, r"state\['blur'\] has shape \(9, 3\)"),
+        ({"counts": [501, 1]}, ValueError, r"counts'\]\[0\] is 501; .* >= 1 and <= 500"),
+        ({"counts": [0, 1]}, ValueError, r"counts'\]\[0\] is 0; .* >= 1"),
+        ({"counts": [9, 0]}, ValueError, r"counts'\]\[1\] is 0; .* >= 1 and <= 1"),
+        ({"counts": [1.0, 1.0]}, TypeError, r"state\['counts'\] has dtype float64"),
+        ({"rng": np.array("{}")}, ValueError, r"state\['rng'\] is .*expected a generator"),
+        ({"rng": np.array("dice")}, ValueError, r"state\['rng'\] is .*expected a generator"),
+        ({"sizes": np.ones((2, 2))}, ValueError, "sizes has shape"),
+    ],
+)
+def test_bad_states_leave_the_episode_as_it_was(changes, error, message):
+    env = ContainerEnv(physics="table")
+    first, _ = env.reset(seed=0)
+    env.step(int(np.argmax(first[:, 2])))
+    before = env.get_state()
+    with pytest.raises(error, match=message):
+        env.set_state(before | changes)
+    after = env.get_state()
+    assert all((after[name] == before[name]).all() for name in before)
+    env.close()
+
+
+def test_a_state_must_be_a_whole_dict(make_env):
+    env = make_env().unwrapped
+    with pytest.raises(ValueError, match="state has no blur, counts, .*expected positions,"):
+        env.set_state({})
+    with pytest.raises(TypeError, match="state is None; expected a dict"):
+        env.set_state(None)
+
+
+def test_a_stack_of_something_else_is_refused(make_env):
+    env = make_env(stack=lambda rng: "boxes")
+    with pytest.raises(TypeError, match="load is 'boxes'; expected an unload.Load"):
+        env.reset(seed=0)

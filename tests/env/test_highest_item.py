@@ -1,0 +1,186 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+
+from unload import HighestItemEnv, equalize, stack_load
+from unload.env import observation
+from unload.env.highest_item import GRID
+
+ENV_ID = "unload/HighestItem-v0"
+
+
+@pytest.mark.parametrize("equalized", [False, True])
+@pytest.mark.filterwarnings("error")
+def test_check_env(equalized):
+    env = gymnasium.make(ENV_ID, equalize=equalized)
+    check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+
+def test_only_items_at_the_greatest_height_are_rewarded(make_env):
+    sharp, blurred = make_env(ENV_ID, position_noise=0.0), make_env(ENV_ID)
+    for env in (sharp, blurred):
+        seen, info = env.reset(seed=0)
+        for number in range(200):
+            assert info["action_mask"].dtype == np.int8 and info["action_mask"].all()
+            highest = seen[:, 2] > seen[:, 2].max() - 0.01  # levels are 0.028 apart
+            row = int(np.flatnonzero(highest == number % 2)[number % 5])
+            seen, reward, terminated, _, info = env.step(row)
+            assert reward == (1.0 if highest[row] else -1.0) and not terminated
+
+
+def test_items_are_at_places_of_a_load(make_env, full_load):
+    places = {tuple(place) for place in np.rint(GRID / 1e-6).astype(int).tolist()}
+    items = np.rint(full_load.positions / 1e-6).astype(int).tolist()
+    assert all(tuple(item) in places for item in items)
+    seen, _ = make_env(ENV_ID, position_noise=0.0).reset(seed=0)
+    grid = observation.scale(GRID)
+    nearest = np.abs(seen[:, None] - grid).max(axis=2).min(axis=1)
+    assert seen.shape == (128, 3) and nearest.max() == 0
+
+
+def test_items_are_blurred_and_nearest_first(make_env):
+    sharp, _ = make_env(ENV_ID, position_noise=0.0).reset(seed=0)
+    blurred, _ = make_env(ENV_ID).reset(seed=0)
+    assert len(np.unique(blurred[:, 2])) > 120 > len(np.unique(sharp[:, 2]))
+    for seen in (sharp, blurred):
+        distances = observation.distance((seen + 1) / 2 * [7.0, 2.5, 2.5])
+        assert (np.diff(distances) > -1e-5).all()
+
+
+def test_every_step_shows_new_items(make_env):
+    env = make_env(ENV_ID)
+    seen = [env.reset(seed=0)[0].tobytes()] + [env.step(0)[0].tobytes() for _ in range(9)]
+    assert len(set(seen)) == 10
+
+
+def test_equalized_observations_are_rewarded_alike(make_env):
+    raw, equalized = make_env(ENV_ID), make_env(ENV_ID, equalize=True)
+    seen, _ = raw.reset(seed=0)
+    ranks, _ = equalized.reset(seed=0)
+    for _ in range(5):
+        assert (ranks == equalize(seen)).all()
+        assert ranks[np.argmax(seen[:, 2]), 2] == 1
+        seen, *_ = raw.step(0)
+        ranks, reward, *_ = equalized.step(int(np.argmax(ranks[:, 2])))
+        assert reward == 1
+
+
+def test_seeds(make_env):
+    env = make_env(ENV_ID)
+
+    def episode(seed: int) -> list:
+        first = env.reset(seed=seed)[0].tobytes()
+        steps = [env.step(row) for row in range(20)]
+        return [first] + [(seen.tobytes(), reward) for seen, reward, *_ in steps]
+
+    assert episode(1) == episode(1) != episode(2)
+
+
+def test_truncation_and_a_state_that_goes_on(make_env):
+    env, other = make_env(ENV_ID, max_picks=6), make_env(ENV_ID, max_picks=6)
+    env.reset(seed=0)
+    for _ in range(4):
+        env.step(0)
+    other.reset(seed=7)
+    other.unwrapped.set_state(env.unwrapped.get_state())
+    for truncated in (False, True):
+        one, two = env.step(3), other.step(3)
+        assert (one[0] == two[0]).all() and one[1] == two[1]
+        assert one[3] == two[3] == truncated
+    with pytest.raises(ResetNeeded, match="the episode is finished"):
+        env.unwrapped.step(0)
+
+
+def test_a_random_load_is_no_load_of_this_environment(make_env, rng):
+    with pytest.raises(ValueError, match="(?s)options is .*expected none"):
+        make_env(ENV_ID).unwrapped.reset(options={"load": stack_load(rng)})
+
+
+def test_calls_out_of_order_are_refused():
+    env = HighestItemEnv()
+    for call in (lambda: env.step(0), env.get_state, env.action_masks, env.render):
+        with pytest.raises(ResetNeeded, match="the episode is not started"):
+            call()
+    env.reset(seed=0)
+    assert env.render() is None
+    env.close()
+    for call in (lambda: env.step(0), env.get_state, env.action_masks, env.render, env.reset):
+        with pytest.raises(ClosedEnvironmentError):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("state", "error", "message"),
+    [
+        (None, TypeError, "state is None; expected a dict"),
+        ({}, ValueError, "state has no highest, picks, rng"),
+        ({"picks": 7}, ValueError, r"state\['picks'\] is 7; expected an integer >= 0 and <= 6"),
+        ({"picks": 1.0}, TypeError, r"state\['picks'\] has dtype float64"),
+        ({"highest": np.ones(3)}, ValueError, r"state\['highest'\] has shape \(3,\)"),
+        ({"rng": "dice"}, ValueError, r"state\['rng'\] is 'dice'"),
+    ],
+)
+def test_bad_states_leave_the_episode_as_it_was(state, error, message):
+    env = HighestItemEnv(max_picks=6)
+    env.reset(seed=0)
+    before = env.get_state()
+    with pytest.raises(error, match=message):
+        env.set_state(before | state if state else state)
+    after = env.get_state()
+    assert all((after[name] == before[name]).all() for name in before)
+
+
+def test_strongly_blurred_items_stay_in_the_observation_space():
+    env = HighestItemEnv(position_noise=5.0)
+    seen, _ = env.reset(seed=0)
+    assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
+
+
+@pytest.mark.parametrize("action", [128, -1, 3.5, float("nan"), True, None])
+def test_bad_actions_are_refused(action):
+    env = HighestItemEnv(max_picks=1)
+    env.reset(seed=0)
+    with pytest.raises((TypeError, ValueError), match="action is .*; expected an integer"):
+        env.step(action)
+    assert env.step(0)[3]  # still the first pick
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"render_mode": "rgb_array"}, "render_mode is 'rgb_array'; expected one of None"),
+        ({"ties": None}, "ties is None"),
+        ({"max_picks": 0}, "max_picks is 0"),
+        ({"position_noise": float("inf")}, "position_noise is inf"),
+    ],
+)
+def test_bad_settings_are_refused(kwargs, message):
+    with pytest.raises(ValueError, match=message):
+        HighestItemEnv(**kwargs)
+
+
+@pytest.mark.slow
+def test_stable_baselines_dqn_learns(make_env):
+    dqn = pytest.importorskip("stable_baselines3").DQN
+    model = dqn(
+        "MlpPolicy", make_env(ENV_ID), buffer_size=2_000, learning_starts=100, seed=0, device="cpu"
+    )
+    before = [p.clone() for p in model.q_net.parameters()]
+    model.learn(2_000)
+    assert model.num_timesteps == 2_000
+    assert any((p != q).any() for p, q in zip(model.q_net.parameters(), before))
+
+
+@pytest.mark.slow
+def test_maskable_ppo_learns(make_env):
+    contrib = pytest.importorskip("sb3_contrib")
+    model = contrib.MaskablePPO(
+        "MlpPolicy", make_env(ENV_ID), n_steps=500, batch_size=100, seed=0, device="cpu"
+    )
+    before = [p.clone() for p in model.policy.parameters()]
+    model.learn(2_000)
+    assert model.num_timesteps == 2_000
+    assert any((p != q).any() for p, q in zip(model.policy.parameters(), before))

@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from unload import task
+from unload.env import observation
+
+
+def test_distance_ignores_y_and_counts_z_double():
+    view = task.VIEWPOINT
+    steps = np.array([(0, 0, 0), (-3, 0, 0), (0, 1, 0), (0, 0, -2), (-3, 1.25, -2)])
+    assert observation.distance(view + steps) == pytest.approx([0, 3, 0, 4, 5])
+
+
+def test_distance_is_the_papers_formula(rng):
+    points = rng.uniform(0, task.CONTAINER, (50, 3))
+    weights = np.diag([1.0, 0.0, 4.0])
+    for point, distance in zip(points, observation.distance(points)):
+        offset = np.array([7.0, 1.25, 2.5]) - point
+        assert distance == pytest.approx(np.sqrt(offset @ weights @ offset))
+
+
+def test_nearest_are_the_nearest_nearest_first(full_load):
+    distances = observation.distance(full_load.positions)
+    rows = observation.nearest(full_load.positions)
+    assert rows.shape == (128,) and rows.dtype == np.int64
+    assert (np.diff(distances[rows]) >= 0).all()
+    assert distances[rows].max() <= np.delete(distances, rows).min()
+
+
+def test_ties_go_to_the_smaller_index():
+    positions = np.tile([5.0, 1.0, 1.0], (6, 1))
+    positions[:, 1] = [0.1, 2.0, 0.5, 1.0, 1.5, 0.3]  # y does not count
+    positions[4, 0] = 6.0
+    assert observation.nearest(positions, 4).tolist() == [4, 0, 1, 2]
+
+
+def test_scale_maps_the_container_to_the_cube():
+    corners = np.array([[0, 0, 0], [7, 2.5, 2.5], [3.5, 1.25, 0.625]])
+    scaled = observation.scale(corners)
+    assert scaled.dtype == np.float32
+    assert scaled.tolist() == [[-1, -1, -1], [1, 1, 1], [0, 0, -0.5]]
+
+
+@pytest.mark.parametrize("function", [observation.distance, observation.nearest, observation.scale])
+@pytest.mark.parametrize(
+    ("positions", "error"),
+    [
+        (np.zeros((3, 2)), ValueError),
+        (np.zeros(3), ValueError),
+        (np.full((3, 3), np.nan), ValueError),
+        (np.full((3, 3), "x"), TypeError),
+    ],
+)
+def test_bad_positions_are_refused(function, positions, error):
+    with pytest.raises(error, match="^positions h"):
+        function(positions)
+
+
+def test_all_items_are_observed_if_there_are_fewer(rng):
+    positions = rng.uniform(0, task.CONTAINER, (127, 3))
+    rows = observation.nearest(positions)
+    assert (rows == np.argsort(observation.distance(positions))).all()
+    assert observation.nearest(np.zeros((0, 3))).shape == (0,)
+    with pytest.raises(ValueError, match="count is 0"):
+        observation.nearest(np.zeros((3, 3)), 0)
+
+
+def test_rows_that_hold_an_item(rng):
+    seen = rng.uniform(-1, 1, (2, 3, 6, 3)).astype(np.float32)
+    seen[0, 1, 4:] = observation.PADDING
+    seen[1, 2, :, :2] = -1  # in the corner in two of three columns
+    expected = np.ones((2, 3, 6), bool)
+    expected[0, 1, 4:] = False
+    held = observation.holds_item(seen)
+    assert held.dtype == bool and (held == expected).all()

@@ -1,0 +1,74 @@
+"""Which boxes overlap, and which touch."""
+
+import numpy as np
+import pytest
+
+from unload.load.contacts import ABOVE, BELOW, BESIDE, TOLERANCE, contacts, slabs
+
+
+def corners(load):
+    return load.positions - load.sizes / 2, load.positions + load.sizes / 2
+
+
+def test_slabs_are_the_walls(full_load):
+    low, high = corners(full_load)
+    assert (slabs(low[:, 0] + 1e-6, high[:, 0]) == full_load.walls).all()
+
+
+def test_slabs_join_what_overlaps_in_a_chain():
+    groups = slabs(np.array([0.0, 5.0, 0.5, 1.5]), np.array([1.0, 6.0, 2.0, 3.0]))
+    assert groups.tolist() == [0, 1, 0, 0]
+
+
+def test_contacts_are_those_found_pair_by_pair(full_load):
+    low, high = corners(full_load)
+    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low) > TOLERANCE
+    ends_where_begins = np.abs(high[:, None] - low) <= TOLERANCE  # [i, j]: j begins where i ends
+    in_line = shared[..., 0]
+    above = in_line & shared[..., 1] & ends_where_begins[..., 2]
+    beside = in_line & shared[..., 2] & (ends_where_begins[..., 1] | ends_where_begins[..., 1].T)
+    found = contacts(low, high)
+    for box in range(len(full_load)):
+        for kind, wanted in ((ABOVE, above[box]), (BELOW, above[:, box]), (BESIDE, beside[box])):
+            assert sorted(found.of(kind, box)) == np.flatnonzero(wanted).tolist()
+    assert len(found.boxes) == 2 * above.sum() + beside.sum()
+
+
+@pytest.mark.parametrize("walls", [1, 2])
+def test_boxes_at_random_places(rng, walls):
+    """Boxes that hardly touch, in one slab and in several."""
+    places = rng.permutation(400)[:60]
+    low = np.column_stack([places % walls, places // walls % 20, places // walls // 20]) * 0.5
+    found = contacts(low, low + 0.5)
+    for box in range(len(low)):
+        for kind, step in ((ABOVE, (0, 0, 0.5)), (BELOW, (0, 0, -0.5))):
+            wanted = np.flatnonzero((low == low[box] + step).all(axis=1))
+            assert found.of(kind, box).tolist() == wanted.tolist()
+        sideways = (np.abs(low - low[box]) == (0, 0.5, 0)).all(axis=1)
+        assert sorted(found.of(BESIDE, box)) == np.flatnonzero(sideways).tolist()
+
+
+def test_a_box_alone_touches_nothing():
+    found = contacts(np.zeros((1, 3)), np.ones((1, 3)))
+    assert len(found.boxes) == 0 and found.of(ABOVE, 0).tolist() == []
+
+
+def test_a_stack_of_more_contacts_than_expected():
+    """200 thin boxes on one wide box, and the wide box beside another."""
+    count = 200
+    low = np.vstack(
+        [
+            [0, 0, 0],
+            np.column_stack([np.zeros((count, 1)), np.arange(count) / count, np.ones(count)]),
+        ]
+    )
+    high = np.vstack([[1, 1, 1], low[1:] + (1, 1 / count, 1)])
+    found = contacts(low, high)
+    assert sorted(found.of(ABOVE, 0)) == list(range(1, count + 1))
+    assert len(found.boxes) == 2 * count + 2 * (count - 1)
+
+
+def test_overlaps_are_refused():
+    low = np.array([[0.0, 1.0, 0.0], [0.0, -0.5, 0.0], [0.0, 0.9, 0.5]])
+    with pytest.raises(ValueError, match="boxes 0 and 2 overlap"):
+        contacts(low, low + 1)

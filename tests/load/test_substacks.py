@@ -1,0 +1,298 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from unload import task
+from unload.env import observation
+from unload.env.container import ContainerEnv
+from unload.load.contacts import ABOVE, BELOW, BESIDE
+from unload.load.substacks import (
+    CELL,
+    CELLS_WIDE,
+    COLUMNS,
+    DEPTH,
+    FRONT_WALLS,
+    PACKAGES,
+    ROWS,
+    ROWS_HIGH,
+    WALLS,
+    Load,
+    build_load,
+    front_walls,
+    stack_load,
+    substacks_that_fit,
+    wall_cells,
+)
+
+FIELDS = ("positions", "sizes", "packages", "walls")
+
+
+def one_box(**changes) -> Load:
+    """A load of one valid box, with some fields replaced."""
+    fields = {
+        "positions": np.array([[3.5, 1.25, 0.5]]),
+        "sizes": np.ones((1, 3)),
+        "packages": np.array([0]),
+        "walls": np.array([0]),
+    }
+    return Load(**(fields | changes))
+
+
+@pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
+def test_every_combination_tiles_a_row(variants):
+    covered = np.zeros((ROWS_HIGH, CELLS_WIDE), dtype=int)
+    for package, left, lower in wall_cells([variants]):
+        width, height = PACKAGES[package]
+        assert left + width <= CELLS_WIDE and lower + height <= ROWS_HIGH
+        covered[lower : lower + height, left : left + width] += 1
+    assert (covered == 1).all()
+
+
+def test_the_thirteen_packages_of_fig_3_differ():
+    assert PACKAGES.shape == (13, 2)
+    assert len({tuple(package) for package in PACKAGES.tolist()}) == 13
+
+
+def test_all_packages_occur(rng):
+    for _ in range(5):
+        assert set(stack_load(rng).packages.tolist()) == set(range(13))
+
+
+def test_all_variants_of_all_substacks_occur(full_load):
+    low = full_load.positions - full_load.sizes / 2
+    cells = np.column_stack([full_load.packages, full_load.walls, np.rint(low[:, 1:] / CELL)])
+    items = {tuple(item) for item in cells.astype(int).tolist()}  # package, wall, left, lower
+    for column_left, substacks in COLUMNS:
+        seen = [
+            number
+            for number, variant in enumerate(substacks)
+            for wall, row in itertools.product(range(WALLS), range(ROWS))
+            if all(
+                (package, wall, column_left + left, row * ROWS_HIGH + lower) in items
+                for package, left, lower in variant
+            )
+        ]
+        assert set(seen) == {0, 1, 2}
+        assert len(seen) == WALLS * ROWS  # each place holds exactly one variant
+
+
+def test_a_load_keeps_the_papers_range_and_the_container(rng):
+    counts = []
+    for _ in range(30):
+        load = stack_load(rng)
+        counts.append(len(load))
+        assert (load.positions - load.sizes / 2 >= -1e-9).all()
+        assert (load.positions + load.sizes / 2 <= task.CONTAINER + 1e-9).all()
+        volume = load.sizes.prod(axis=1).sum()
+        assert volume == pytest.approx(7.0 * 2.5 * 3 * ROWS_HIGH * CELL)
+        assert set(load.walls.tolist()) == set(range(WALLS))
+        assert (load.sizes[:, 0] == DEPTH).all()
+    assert min(counts) >= 800 and max(counts) <= 1000 and len(set(counts)) > 10
+
+
+def test_variants_are_drawn_anew_until_the_count_fits():
+    low = build_load(np.full((WALLS, ROWS, 4), 2))
+    high = build_load(np.full((WALLS, ROWS, 4), 0))
+    assert len(low) < 800 and len(high) > 1000  # such draws exist and must be refused
+
+
+def test_the_same_seed_gives_the_same_load_byte_for_byte():
+    first, second, other = (stack_load(np.random.default_rng(seed)) for seed in (5, 5, 6))
+    for name in FIELDS:
+        assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+    assert first.positions.tobytes() != other.positions.tobytes()
+
+
+def test_build_load_places_the_walls_from_the_rear():
+    load = build_load(np.zeros((2, 3, 4), dtype=int))
+    assert np.unique(load.positions[:, 0]).tolist() == [1.75, 5.25]
+    assert (load.positions[load.walls == 1, 0] == 5.25).all()
+    assert load.positions[:, 2].max() < 3 * ROWS_HIGH * CELL
+
+
+# --- other scales -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scale", "fit"),
+    [
+        (1, (12, 3, 4)),
+        (0.8, (15, 4, 4)),
+        (1.2, (10, 3, 3)),
+        (0.5, (24, 7, 7)),
+        (1.5, (8, 2, 2)),
+    ],
+)
+def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
+    walls, rows, columns = fit
+    assert substacks_that_fit(scale) == fit
+    load = stack_load(rng, scale=scale)
+    reach = (load.positions + load.sizes / 2).max(axis=0)
+    width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale
+    height = rows * ROWS_HIGH * CELL * scale
+    assert reach == pytest.approx([7.0, width, height])
+    # Boxes do not overlap, or there were no load: so they leave no hole.
+    assert load.sizes.prod(axis=1).sum() == pytest.approx(7.0 * width * height)
+    assert len(np.unique(load.walls)) == walls
+    # No further substack would fit.
+    assert width + 10 * CELL * scale > 2.5 and height + ROWS_HIGH * CELL * scale > 2.5
+    expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
+    assert load.sizes == pytest.approx(scale * expected)
+
+
+def test_boxes_of_another_scale_touch_as_before(rng):
+    variants = rng.integers(3, size=(12, 3, 4))
+    load, small = build_load(variants), build_load(variants, 0.8)
+    assert (load.contacts.starts == small.contacts.starts).all()
+    for kind, box in itertools.product((ABOVE, BELOW, BESIDE), range(len(load))):
+        touching = (each.contacts.of(kind, box).tolist() for each in (load, small))
+        assert len({frozenset(boxes) for boxes in touching}) == 1
+
+
+@pytest.mark.parametrize("scale", [0.8, 1.2])
+def test_every_box_of_another_scale_is_supported(rng, scale):
+    load = stack_load(rng, scale=scale)
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    for box in np.flatnonzero(low[:, 2] > 1e-9):
+        below = load.contacts.of(BELOW, box)
+        shared = np.minimum(high[below, 1], high[box, 1]) - np.maximum(low[below, 1], low[box, 1])
+        assert shared.sum() == pytest.approx(load.sizes[box, 1])  # along its whole width
+
+
+def test_scale_1_is_the_papers_load():
+    default, named = (stack_load(np.random.default_rng(3), **kw) for kw in ({}, {"scale": 1.0}))
+    assert default.positions.tobytes() == named.positions.tobytes()
+    assert len(stack_load(np.random.default_rng(3), walls=2, scale=0.8)) < 300
+
+
+# --- the front ----------------------------------------------------------------------
+
+
+def test_front_walls_keep_their_place(full_load):
+    front = front_walls(full_load, 3)
+    kept = full_load.walls >= WALLS - 3
+    for name in FIELDS:
+        assert (getattr(front, name) == getattr(full_load, name)[kept]).all()
+    assert (front_walls(full_load, WALLS).positions == full_load.positions).all()
+    assert (front_walls(front, 2).positions == front_walls(full_load, 2).positions).all()
+
+
+def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
+    for _ in range(50):
+        load = stack_load(rng)
+        seen = observation.nearest(load.positions, task.N_VISIBLE + 100)
+        assert load.walls[seen].min() > WALLS - FRONT_WALLS
+
+
+def test_the_front_is_picked_as_the_whole_load(full_load):
+    envs = [ContainerEnv("table", max_picks=100, position_noise=0) for _ in range(2)]
+    for env, load in zip(envs, (full_load, front_walls(full_load))):
+        env.reset(options={"load": load})
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        action = int(rng.integers(40))
+        (seen, reward, *_), (also_seen, same_reward, *_) = (env.step(action) for env in envs)
+        assert (seen == also_seen).all() and reward == same_reward
+
+
+# --- a load -------------------------------------------------------------------------
+
+
+def test_a_load_cannot_be_changed(full_load):
+    for name in FIELDS:
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(full_load, name)[0] = 0
+
+
+def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
+    positions = np.array([[3.5, 1.25, 0.5]])
+    load = one_box(positions=positions)
+    positions[:] = 0
+    assert load.positions.tolist() == [[3.5, 1.25, 0.5]]
+
+
+def test_loads_are_compared_by_identity():
+    first, second = one_box(), one_box()
+    assert first == first and first != second and len({first, second}) == 2
+
+
+def test_touching_boxes_are_accepted(boxes):
+    assert len(boxes((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))) == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"positions": np.zeros((0, 3))}, ValueError, "positions is empty"),
+        ({"positions": np.zeros((1, 2))}, ValueError, r"positions has shape \(1, 2\)"),
+        ({"positions": [[1], [1, 2]]}, ValueError, "positions has rows of different lengths"),
+        ({"positions": [[np.nan, 1, 1]]}, ValueError, "positions holds nan"),
+        ({"positions": [["a", "b", "c"]]}, TypeError, "positions has dtype"),
+        ({"positions": [[6.6, 1.25, 0.5]]}, ValueError, "box 0 reaches from"),
+        ({"positions": [[3.5, 1.25, 0.4]]}, ValueError, "box 0 reaches from"),
+        ({"positions": [[3.5, 1.25, 2.1]]}, ValueError, "inside the container"),
+        ({"sizes": np.ones((2, 3))}, ValueError, r"sizes has shape \(2, 3\); expected \(1, 3\)"),
+        ({"sizes": [[1, 0, 1]]}, ValueError, "sizes of box 0 are"),
+        ({"sizes": [[1, -1, 1]]}, ValueError, "expected all > 0"),
+        ({"sizes": [[1, np.inf, 1]]}, ValueError, "sizes holds inf"),
+        ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
+        ({"packages": [True]}, TypeError, "packages has dtype bool"),
+        ({"packages": [0, 1]}, ValueError, r"packages has shape \(2,\)"),
+        ({"packages": [-1]}, ValueError, "packages holds -1"),
+        ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
+        ({"walls": ["0"]}, TypeError, "walls has dtype"),
+    ],
+)
+def test_bad_loads_are_refused(changes, error, message):
+    with pytest.raises(error, match=message):
+        one_box(**changes)
+
+
+@pytest.mark.parametrize(
+    "step", [(0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3), (0.3, 0.3, 0.3), (0, 0, 0)]
+)
+def test_overlapping_boxes_are_refused(step):
+    positions = np.array([[1.0, 0.5, 0.5], [3.0, 1.0, 0.5], [3.0, 1.0, 0.5] + np.array(step)])
+    labels = np.zeros(3, dtype=int)
+    with pytest.raises(ValueError, match="boxes 1 and 2 overlap"):
+        Load(positions, np.full((3, 3), 0.4), labels, labels)
+
+
+@pytest.mark.parametrize(
+    ("variants", "error", "message"),
+    [
+        (np.zeros((3, 4), dtype=int), ValueError, r"shape \(3, 4\); expected \(any, any, 4\)"),
+        (np.zeros((0, 3, 4), dtype=int), ValueError, "variants has no walls"),
+        (np.zeros((12, 0, 4), dtype=int), ValueError, "variants has no rows"),
+        (np.zeros((1, 3, 5), dtype=int), ValueError, r"expected \(any, any, 4\)"),
+        ([[[0, 0, 0, 0], [0]]], ValueError, "variants has rows of different lengths"),
+        (np.zeros((1, 3, 4)), TypeError, "dtype float64; expected integers"),
+        (np.full((1, 3, 4), 3), ValueError, "variants holds 3 to 3; expected 0 to 2"),
+        (np.full((1, 3, 4), -1), ValueError, "variants holds -1 to -1; expected 0 to 2"),
+    ],
+)
+def test_bad_variants_are_refused(variants, error, message):
+    with pytest.raises(error, match=message):
+        build_load(variants)
+
+
+def test_bad_arguments_of_stack_load_are_refused(rng):
+    with pytest.raises(TypeError, match="rng is 0; expected a numpy.random.Generator"):
+        stack_load(0)
+    with pytest.raises(ValueError, match="walls is 0"):
+        stack_load(rng, walls=0)
+    with pytest.raises(ValueError, match=r"scale is 0.1; expected .*\[0.5, 1.5\]"):
+        stack_load(rng, scale=0.1)
+    with pytest.raises(TypeError, match="scale is '1'"):
+        stack_load(rng, scale="1")
+    with pytest.raises(ValueError, match=r"variants has shape .* expected \(any, any, 3\)"):
+        build_load(np.zeros((1, 3, 4), dtype=int), scale=1.2)
+    with pytest.raises(ValueError, match="inside the container"):
+        build_load(np.zeros((1, 4, 4), dtype=int))
+
+
+@pytest.mark.parametrize(("count", "error"), [(0, ValueError), (13, ValueError), (2.0, TypeError)])
+def test_bad_numbers_of_front_walls_are_refused(full_load, count, error):
+    with pytest.raises(error, match=f"count is {count}"):
+        front_walls(full_load, count)

@@ -1,0 +1,202 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+
+from unload import AttentionNetwork, EquivariantStack, PEQNetwork, TwoLayerScorer
+from unload.network.variants import NETWORKS, linear_beside
+
+OURS = (TwoLayerScorer, EquivariantStack, AttentionNetwork)
+
+
+@pytest.fixture(params=OURS)
+def kind(request) -> type:
+    return request.param
+
+
+@pytest.fixture
+def items(rng) -> Callable[..., torch.Tensor]:
+    """``items(batch, count)``: random observations."""
+    return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
+
+
+def make(kind: type, n_features: int = 16, seed: int = 0) -> torch.nn.Module:
+    return kind(n_features, torch.Generator().manual_seed(seed))
+
+
+def test_all_are_registered():
+    assert tuple(NETWORKS.values()) == (PEQNetwork, *OURS)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 128, 300])
+def test_any_number_of_items_has_values_in_range(kind, items, count):
+    values = make(kind)(10 * items(3, count))
+    assert values.shape == (3, count) and values.dtype == torch.float32
+    assert values.abs().max() <= 1
+
+
+def test_permuting_the_items_permutes_the_values(kind, items, rng):
+    network, batch = make(kind, 64), items(4, 128)
+    order = torch.from_numpy(rng.permutation(128))
+    values = network(batch)
+    assert values.std(dim=1).min() > 1e-3
+    torch.testing.assert_close(network(batch[:, order]), values[:, order], atol=1e-6, rtol=0)
+
+
+def test_values_depend_on_the_other_items(kind, items):
+    network, batch = make(kind), items(1, 8)
+    changed = batch.clone()
+    changed[0, 7] = 5.0
+    assert (network(batch)[0, :7] != network(changed)[0, :7]).all()
+
+
+@pytest.mark.parametrize("other_kind", [PEQNetwork, *OURS])
+def test_other_items_change_the_choice_but_for_the_papers_network(items, other_kind):
+    """The better one of the same two items, in the company of six others."""
+    batch = 3 * items(500, 8)
+    batch[:, :2] = torch.tensor([[0.2, 0.1, 0.5], [0.1, 0.3, 0.4]])
+    orders = []
+    for seed in range(10):
+        values = make(other_kind, seed=seed)(batch)
+        orders.append(len((values[:, 0] > values[:, 1]).unique()))
+    assert max(orders) == (1 if other_kind is PEQNetwork else 2)
+
+
+def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):
+    """Written out as in Sec. III-G: global features beside each item's own."""
+    network, batch = make(TwoLayerScorer), items(3, 9)
+    own = torch.relu(network.extractor(batch))
+    pooled = torch.cat([own.amin(dim=1), own.amax(dim=1), own.mean(dim=1)], dim=1)
+    enhanced = torch.cat([own, pooled[:, None].expand(-1, 9, -1)], dim=2)
+    values = torch.tanh(network.scorer(torch.relu(network.hidden(enhanced)))).squeeze(2)
+    torch.testing.assert_close(network(batch), values)
+
+
+def test_linear_beside_is_linear_on_both(items):
+    layer, own, context = torch.nn.Linear(5, 4), items(2, 6), torch.rand(2, 2)
+    both = torch.cat([own, context[:, None].expand(-1, 6, -1)], dim=2)
+    torch.testing.assert_close(linear_beside(layer, own, context), layer(both))
+
+
+def test_the_generator_alone_decides_the_weights(kind):
+    weights = []
+    for seed in (3, 3, 4):
+        torch.manual_seed(len(weights))
+        weights.append(make(kind, seed=seed).state_dict())
+    first, same, other = weights
+    for name, value in first.items():
+        assert torch.equal(value, same[name])
+        assert "norm" in name or not torch.equal(value, other[name]), name
+
+
+def test_weights_are_drawn_from_plus_minus_one_over_root_inputs(kind):
+    network = make(kind, 64)
+    drawn = 0
+    for name, value in network.named_parameters():
+        if name.endswith("weight") and value.ndim == 2:
+            bound = value.shape[1] ** -0.5
+            bias = dict(network.named_parameters())[name.removesuffix("weight") + "bias"]
+            assert bias.abs().max() <= bound and value.abs().max() <= bound
+            assert value.abs().max() > 0.9 * bound
+            drawn += 2
+    norms = sum("norm" in name for name, _ in network.named_parameters())
+    assert drawn + norms == len(list(network.parameters()))
+
+
+def test_without_a_generator_pytorchs_own_decides(kind):
+    torch.manual_seed(0)
+    first, second = kind(4), kind(4)
+    assert not torch.equal(first.scorer.weight, second.scorer.weight)
+
+
+@pytest.mark.parametrize("training", [True, False])
+def test_padding_has_no_influence(kind, items, training):
+    """The values are the same without the empty rows, and whatever these hold."""
+    network, batch = make(kind).train(training), items(4, 32)
+    present = torch.zeros(4, 32, dtype=torch.bool)
+    present[:, ::2] = True
+    present[0, 1] = True  # not as many in each
+    with torch.no_grad():
+        values = network(batch, present)
+        alone = network(batch[0, present[0]][None])
+        batch[~present] = 100.0
+        padded = network(batch, present)
+    torch.testing.assert_close(values[0, present[0]], alone[0], atol=1e-6, rtol=1e-5)
+    assert torch.equal(padded[present], values[present])
+
+
+@pytest.mark.parametrize("training", [True, False])
+def test_values_and_gradients_are_finite_where_there_is_no_item(kind, items, training):
+    network = make(kind).train(training)
+    present = torch.tensor([[False] * 6, [True] + [False] * 5])
+    values = network(items(2, 6), present)
+    assert values.isfinite().all()
+    values.sum().backward()
+    assert all(value.grad.isfinite().all() for value in network.parameters())
+
+
+def test_all_present_is_as_none_given(kind, items):
+    network, batch = make(kind), items(3, 10)
+    present = torch.ones(3, 10, dtype=torch.bool)
+    torch.testing.assert_close(network(batch, present), network(batch), atol=1e-6, rtol=1e-5)
+
+
+def test_evaluation_gives_the_values_of_training(kind, items):
+    """PyTorch computes a transformer's block in another way there."""
+    network, batch = make(kind), items(3, 10)
+    values = network(batch).detach()
+    with torch.no_grad():
+        torch.testing.assert_close(network.eval()(batch), values, atol=1e-6, rtol=1e-5)
+
+
+@pytest.mark.parametrize("padded", [False, True])
+def test_every_weight_has_a_gradient(kind, items, padded):
+    network, batch = make(kind), items(8, 20)
+    present = torch.arange(20).expand(8, -1) < 12 if padded else None
+    values = network(batch, present)
+    values[:, :12].square().sum().backward()
+    for name, value in network.named_parameters():
+        assert value.grad.isfinite().all() and value.grad.any(), name
+
+
+@pytest.mark.parametrize("shape", [(4, 3), (2, 4, 2), (2, 0, 3), (2, 4, 3, 1)])
+def test_other_shapes_are_refused(kind, shape):
+    with pytest.raises(ValueError, match=r"observations has shape .*expected \(batch, items, 3\)"):
+        make(kind)(torch.zeros(shape))
+
+
+@pytest.mark.parametrize(
+    ("observations", "message"),
+    [
+        (np.zeros((1, 4, 3), np.float32), "observations is a ndarray; expected a tensor"),
+        (torch.zeros((1, 4, 3), dtype=int), "dtype torch.int64; expected torch.float32"),
+    ],
+)
+def test_other_types_are_refused(kind, observations, message):
+    with pytest.raises(TypeError, match=message):
+        make(kind)(observations)
+
+
+@pytest.mark.parametrize(
+    ("present", "error", "message"),
+    [
+        (np.ones((2, 4), bool), TypeError, "present is a ndarray; expected a tensor"),
+        (torch.ones(2, 4), TypeError, "present has dtype torch.float32; expected torch.bool"),
+        (torch.ones(2, 5, dtype=bool), ValueError, r"shape \(2, 5\); expected \(2, 4\)"),
+    ],
+)
+def test_bad_flags_of_presence_are_refused(kind, present, error, message):
+    with pytest.raises(error, match=message):
+        make(kind)(torch.zeros(2, 4, 3), present)
+
+
+@pytest.mark.parametrize(("n", "error"), [(0, ValueError), (1.5, TypeError), (True, TypeError)])
+def test_bad_numbers_of_features_are_refused(kind, n, error):
+    with pytest.raises(error, match="n_features is"):
+        kind(n)
+
+
+def test_each_head_has_as_many_features():
+    with pytest.raises(ValueError, match="n_features is 5; expected a multiple of 2"):
+        AttentionNetwork(5)

@@ -1,0 +1,168 @@
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import unload
+from unload import task
+from unload.physics.bullet import TIME_STEP, World
+
+# The appendix, for 20 N and 1 kg: one box and two stacked ones (m).
+ONE_BOX, TWO_BOXES = 0.46, 0.009
+
+
+@pytest.fixture(params=[True, False], ids=["maximal", "multibody"])
+def maximal(request) -> bool:
+    return request.param
+
+
+@pytest.fixture
+def make_world(maximal):
+    """``make_world(boxes, ...)``: a world with a floor and a tower of cubes of 0.3 m."""
+    made = []
+
+    def make(boxes: int = 1, mass: float = task.MASS) -> tuple[World, list[int]]:
+        world = World(maximal_coordinates=maximal)
+        made.append(world)
+        world.add_box((0, 0, -0.5), (9, 9, 1), 0)
+        centres = [(0, 0, 0.15 + 0.3 * level) for level in range(boxes)]
+        return world, [world.add_box(centre, (0.3, 0.3, 0.3), mass) for centre in centres]
+
+    yield make
+    for world in made:
+        world.close()
+
+
+def test_one_box_moves_as_far_as_the_appendix_says(make_world):
+    world, (box,) = make_world()
+    assert world.pull(box) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+def test_two_stacked_boxes_move_as_far_as_the_appendix_says(make_world):
+    world, (lower, _) = make_world(boxes=2)
+    assert world.pull(lower) == pytest.approx(TWO_BOXES, abs=0.002)
+
+
+def test_three_stacked_boxes_do_not_move(make_world):
+    world, (lowest, _, _) = make_world(boxes=3)
+    assert world.pull(lowest) < 0.001
+
+
+@pytest.mark.parametrize("force", [9.0, 12.0, 30.0])
+@pytest.mark.parametrize("mass", [1.0, 2.0])
+@pytest.mark.parametrize("seconds", [0.2, 0.3])
+def test_a_pull_follows_newton(make_world, force, mass, seconds):
+    world, (box,) = make_world(mass=mass)
+    expected = max(0.0, 0.5 * (force / mass - task.GRAVITY) * seconds**2)
+    assert world.pull(box, force, seconds) == pytest.approx(expected, rel=0.03, abs=1e-3)
+
+
+def test_a_box_at_rest_for_long_still_lifts(make_world):
+    """PyBullet's external force does not wake a sleeping body: no body may fall asleep."""
+    world, (box,) = make_world()
+    world.step(5.0)
+    assert world.pull(box) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+def test_a_box_whose_support_is_removed_falls(make_world):
+    world, (lower, upper) = make_world(boxes=2)
+    world.step(5.0)
+    world.remove(lower)
+    world.step(0.5)
+    assert world.pose(upper)[0][2] == pytest.approx(0.15, abs=0.01)
+
+
+def test_place_puts_a_box_at_rest(make_world):
+    world, (box,) = make_world()
+    world.pull(box)
+    world.place(box, (1.0, 0.5, 2.0))
+    assert world.pose(box) == ((1.0, 0.5, 2.0), (0.0, 0.0, 0.0, 1.0))
+    world.step(0.1)
+    fallen = np.array((1.0, 0.5, 2.0)) - world.pose(box)[0]
+    assert fallen == pytest.approx([0, 0, 0.5 * task.GRAVITY * 0.1**2], abs=0.003)
+
+
+def test_immovable_boxes_do_not_move(make_world):
+    world, _ = make_world()
+    shelf = world.add_box((2, 0, 1), (0.3, 0.3, 0.3), 0)
+    assert world.pull(shelf) == 0
+
+
+def _interleaved(worlds: list[tuple[World, list[int]]]) -> list[list[float]]:
+    """Heights of all boxes after each of 30 steps, the worlds taking turns."""
+    heights = [[] for _ in worlds]
+    for _ in range(30):
+        for (world, boxes), record in zip(worlds, heights):
+            world.pull(boxes[0], seconds=TIME_STEP)
+            record.extend(world.pose(box)[0][2] for box in boxes)
+    return heights
+
+
+def test_two_clients_side_by_side_do_not_disturb_each_other(make_world):
+    separate = [_interleaved([make_world(boxes=count)])[0] for count in (1, 2)]
+    together = _interleaved([make_world(boxes=count) for count in (1, 2)])
+    assert together == separate
+    assert together[0][-1] > 0.16 and together[1] != together[0]
+
+
+def test_closing_a_client_leaves_the_others(make_world):
+    (first, _), (second, (box,)) = make_world(), make_world()
+    first.close()
+    first.close()
+    assert second.pull(box) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+def test_a_picture_shows_the_colour_of_a_box(make_world):
+    world, (box,) = make_world()
+    world.paint(box, (1, 0, 0))
+    pixels = world.picture((2, 0, 0.5), (0, 0, 0.15), 80, 60)
+    assert pixels.shape == (60, 80, 3) and pixels.dtype == np.uint8
+    red, green, blue = pixels[30, 40].astype(int)
+    assert red > 100 and green < 60 and blue < 60
+
+
+def test_pybullet_is_imported_in_one_file_only():
+    package = Path(unload.__file__).parent
+    importing = [p.name for p in package.rglob("*.py") if "import pybullet" in p.read_text()]
+    assert importing == ["bullet.py"]
+
+
+def test_importing_is_silent():
+    command = [sys.executable, "-c", "import unload"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"position": (0, 0, np.nan)}, ValueError, "position holds nan"),
+        ({"position": (0, 0)}, ValueError, r"position has shape \(2,\); expected \(3,\)"),
+        ({"size": (1, -1, 1)}, ValueError, r"size is \[1.0, -1.0, 1.0\]; expected three edges > 0"),
+        ({"size": "big"}, TypeError, "size has dtype"),
+        ({"mass": -1}, ValueError, "mass is -1"),
+        ({"mass": None}, TypeError, "mass is None"),
+    ],
+)
+def test_bad_boxes_are_refused(make_world, changes, error, message):
+    world, _ = make_world()
+    with pytest.raises(error, match=message):
+        world.add_box(**({"position": (0, 0, 3), "size": (1, 1, 1), "mass": 1} | changes))
+
+
+def test_bad_times_and_forces_are_refused(make_world):
+    world, (box,) = make_world()
+    for call, message in (
+        (lambda: World(0), "time_step is 0"),
+        (lambda: World(float("nan")), "time_step is nan"),
+        (lambda: world.step(-1), "seconds is -1"),
+        (lambda: world.pull(box, seconds=-1), "seconds is -1"),
+        (lambda: world.pull(box, float("nan")), "force is nan"),
+        (lambda: world.pull(box, -5), "force is -5"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()
+    with pytest.raises(TypeError, match="force is '20'"):
+        world.pull(box, "20")

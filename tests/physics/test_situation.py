@@ -1,0 +1,99 @@
+import numpy as np
+import pytest
+
+from unload.load.substacks import CELL, Load
+from unload.physics.situation import Surroundings
+
+
+def surroundings(load: Load) -> Surroundings:
+    return Surroundings(load, np.ones(len(load), dtype=bool))
+
+
+def test_on_top_is_transitive_and_skips_removed_boxes(boxes):
+    tower = surroundings(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0), (1.4, 0.2)))
+    assert tower.on_top(0) == [1, 2]
+    assert tower.on_top(1) == [2]
+    assert tower.on_top(2) == tower.on_top(3) == []
+    tower.present[1] = False
+    assert tower.on_top(0) == []
+
+
+def test_a_box_that_bridges_two_rests_on_both(boxes):
+    bridge = surroundings(boxes((1.0, 0.2), (1.4, 0.2), (1.2, 0.6)))
+    assert bridge.on_top(0) == bridge.on_top(1) == [2]
+    situation = bridge.situation(0)
+    assert (situation.dynamic, situation.on_top) == (2, 1)
+    # The chosen box, the bridge on top of it, and the bridge's other support, in micrometres.
+    assert situation.boxes[:, 1:3].tolist() == [[0, 0], [200_000, 400_000], [400_000, 0]]
+    assert (situation.boxes[:, 3:] == 400_000).all() and situation.boxes.dtype == np.int32
+
+
+def test_boxes_that_touch_at_an_edge_only_do_not_rest_on_each_other(boxes):
+    assert surroundings(boxes((1.0, 0.2), (1.4, 0.6))).on_top(0) == []
+
+
+def test_boxes_of_other_walls_do_not_count():
+    positions = np.array([[1.0, 1.0, 0.2], [1.4, 1.0, 0.6], [1.4, 1.0, 0.2]])
+    labels = np.zeros(3, dtype=int)
+    situation = surroundings(Load(positions, np.full((3, 3), 0.4), labels, labels)).situation(0)
+    assert situation.on_top == 0 and len(situation.boxes) == 1
+
+
+def test_floor_and_side_walls(boxes):
+    load = boxes((0.2, 0.2), (0.2, 0.6), (1.25, 0.2), (2.3, 0.2))
+    around = surroundings(load)
+    assert around.situation(0).floor == -200_000 and around.situation(0).sides == (-200_000,)
+    assert around.situation(1).floor is None and around.situation(1).sides == (-200_000,)
+    assert around.situation(2).sides == ()
+    assert around.situation(3).sides == (200_000,)
+
+
+def test_equal_situations_at_different_places_have_equal_keys(boxes):
+    around = surroundings(boxes((0.8, 0.2), (1.0, 0.6), (1.6, 0.2), (1.8, 0.6)))
+    first, second = around.situation(0), around.situation(2)
+    assert first.key == second.key and first != second  # no comparison of arrays
+    around.present[3] = False
+    assert around.situation(2).key != first.key
+    assert around.situation(1).key != around.situation(0).key
+
+
+@pytest.mark.parametrize("change", ["a neighbour", "a side wall", "no floor", "on top"])
+def test_whatever_may_matter_is_in_the_key(boxes, change):
+    alone = surroundings(boxes((1.0, 0.2))).situation(0)
+    changed = {
+        "a neighbour": (boxes((1.0, 0.2), (1.4, 0.2)), 0),
+        "a side wall": (boxes((0.2, 0.2)), 0),
+        "no floor": (boxes((1.0, 0.6), (2.0, 0.2)), 0),
+        "on top": (boxes((1.0, 0.2), (1.0, 0.6)), 0),
+    }
+    load, item = changed[change]
+    assert surroundings(load).situation(item).key != alone.key
+
+
+def test_a_neat_load_stands_and_its_highest_centre_is_free(full_load):
+    around = surroundings(full_load)
+    low = full_load.positions[:, 2] - full_load.sizes[:, 2] / 2
+    for item in range(len(full_load)):
+        situation = around.situation(item)
+        supports = situation.boxes[situation.dynamic :]
+        below = supports[:, 2] + supports[:, 5] // 2 <= -(situation.boxes[0, 5] // 2) + 1
+        assert (situation.floor is not None) == (low[item] < CELL / 2)
+        assert situation.floor is not None or below.any()
+    assert around.on_top(int(np.argmax(full_load.positions[:, 2]))) == []
+
+
+def test_on_top_agrees_with_a_plain_definition(small_load):
+    low = small_load.positions - small_load.sizes / 2
+    high = small_load.positions + small_load.sizes / 2
+    count = len(small_load)
+    stands_on = np.zeros((count, count), dtype=bool)
+    for i in range(count):
+        for j in range(count):
+            stretch = min(high[i, 1], high[j, 1]) - max(low[i, 1], low[j, 1])
+            stands_on[i, j] = stretch > CELL / 2 and abs(low[i, 2] - high[j, 2]) < CELL / 2
+    reach = stands_on.copy()
+    for _ in range(count):  # transitive closure
+        reach |= (reach.astype(int) @ stands_on.astype(int)) > 0
+    around = surroundings(small_load)
+    for item in range(count):
+        assert around.on_top(item) == np.flatnonzero(reach[:, item]).tolist()

@@ -1,0 +1,51 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload.reproduce.intervals import bootstrap_interval, with_intervals
+
+
+def test_the_interval_covers_the_true_mean_about_as_often_as_it_says(rng):
+    covered = 0
+    for _ in range(300):
+        low, high = bootstrap_interval(rng.normal(3, 1, 40))
+        covered += low < 3 < high
+    assert 0.90 < covered / 300 < 0.98
+
+
+def test_one_value_and_equal_values_have_no_width():
+    assert bootstrap_interval([0.25]) == (0.25, 0.25)
+    assert bootstrap_interval([0.5, 0.5, 0.5]) == (0.5, 0.5)
+
+
+def test_a_higher_level_is_wider_and_the_seed_decides(rng):
+    values = rng.normal(size=20)
+    narrow, wide = bootstrap_interval(values, 0.5), bootstrap_interval(values, 0.99)
+    assert wide[0] < narrow[0] < narrow[1] < wide[1]
+    assert bootstrap_interval(values, seed=1) == bootstrap_interval(values, seed=1)
+    assert bootstrap_interval(values, seed=1) != bootstrap_interval(values, seed=2)
+
+
+@pytest.mark.parametrize(
+    ("values", "level", "name"),
+    [([], 0.95, "values"), ([np.nan], 0.95, "values"), ([1], 2, "level")],
+)
+def test_bad_values_are_refused_by_name(values, level, name):
+    with pytest.raises(ValueError, match=name):
+        bootstrap_interval(values, level)
+
+
+def test_groups_keep_their_order_and_their_means():
+    table = pd.DataFrame(
+        {"cell": ["b", "b", "a", "a"], "mask": [True] * 4, "msr": [0.0, 1.0, 0.5, 0.5]}
+    )
+    rows = with_intervals(table, ["cell", "mask"], ["msr"])
+    assert rows["cell"].tolist() == ["b", "a"]
+    assert rows["runs"].tolist() == [2, 2]
+    assert rows["msr"].tolist() == [0.5, 0.5]
+    assert rows[["msr_low", "msr_high"]].to_numpy().tolist() == [[0.0, 1.0], [0.5, 0.5]]
+
+
+def test_a_missing_column_is_refused_by_name():
+    with pytest.raises(ValueError, match="msr"):
+        with_intervals(pd.DataFrame({"cell": [1]}), ["cell"], ["msr"])

@@ -1,0 +1,92 @@
+"""The paper's hyperparameter grid: names, curves, summary."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload.reproduce import tuning
+
+
+def test_grid_is_the_papers():
+    grid = tuning.tuning_grid()
+    assert len(grid) == 3 * 4 * 10 * 2
+    configs = grid.values()
+    assert {config.learning_rate for config in configs} == {1e-1, 1e-2, 1e-3}
+    assert {config.batch_size for config in configs} == {64, 256, 1024, 2048}
+    assert {config.seed for config in configs} == set(range(10))
+    assert {config.picks for config in configs} == {3000 * 64}
+    assert {config.env for config in configs} == {"unload/HighestItem-v0"}
+    assert {config.equalize for config in configs} == {True, False}
+
+
+def test_runs_are_named_as_in_the_paper():
+    grid = tuning.tuning_grid()
+    config = grid["dummy_sim_without_hist_equal/bz_1024_lr_0.1_agent_6"]
+    assert (config.batch_size, config.learning_rate, config.seed) == (1024, 0.1, 6)
+    assert not config.equalize
+    assert grid["dummy_sim_with_hist_equal/bz_64_lr_0.001_agent_9"].equalize
+
+
+def test_slow_runs_come_first():
+    sizes = [config.batch_size for config in tuning.tuning_grid().values()]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+@pytest.mark.parametrize("steps", [0, -1, 2.5])
+def test_bad_steps(steps):
+    with pytest.raises((TypeError, ValueError), match="steps"):
+        tuning.tuning_config(8, 1e-3, 0, steps=steps)
+
+
+def test_exported_curves_have_one_value_per_step(tmp_path):
+    hits = np.arange(65) / 64
+    curve = pd.DataFrame({"success_rate": hits, "loss": [np.nan, *np.linspace(1, 1e-6, 64)]})
+    tuning.export_curves("dummy_sim_with_hist_equal/bz_8_lr_0.001_agent_0", curve, tmp_path)
+    folder = tmp_path / "dummy_sim_with_hist_equal"
+    stored = np.loadtxt(folder / "hitrate_curve_bz_8_lr_0.001_agent_0.csv")
+    assert (stored == hits).all()
+    lines = (folder / "loss_curve_bz_8_lr_0.001_agent_0.csv").read_text().splitlines()
+    assert len(lines) == 65
+    assert lines[:2] == ["nan", "1"]
+
+
+def curve(msr, loss):
+    return pd.DataFrame({"success_rate": msr, "loss": loss})
+
+
+def test_summary_of_a_run():
+    msr = np.concatenate([np.linspace(0, 1, 500), np.ones(500)])
+    loss = np.interp(np.arange(1000), [0, 300, 600, 999], [0.9, 0.1, 0.4, 0.0])
+    loss[:10] = np.nan
+    summary = tuning.run_summary(msr, loss)
+    assert summary["final_msr"] == 1
+    assert 480 < summary["solved_at"] < 510
+    assert summary["loss_start"] == loss[10]
+    assert summary["loss_dip"] == pytest.approx(0.1, abs=0.02)
+    assert summary["loss_peak"] == pytest.approx(0.4, abs=0.02)
+    assert summary["loss_end"] < 0.1
+
+
+def test_summary_of_a_run_that_fails_or_solves_at_once():
+    failed = tuning.run_summary(np.zeros(200), np.ones(200))
+    assert np.isnan(failed["solved_at"])
+    assert tuning.run_summary(np.ones(200), np.ones(200))["solved_at"] == 0
+
+
+def test_summary_has_a_row_per_configuration():
+    configs = tuning.tuning_grid([1e-2, 1e-3], [8], runs=2, equalize=[True], steps=200)
+    curves = {
+        name: curve(np.full(200, config.seed), np.ones(200)) for name, config in configs.items()
+    }
+    table = tuning.tuning_summary(configs, curves)
+    assert table["learning_rate"].tolist() == [1e-3, 1e-2]
+    assert table["runs"].tolist() == [2, 2]
+    assert table["final_msr"].tolist() == [0.5, 0.5]
+    assert table["final_msr_std"].tolist() == pytest.approx([0.5**0.5] * 2)
+    assert table["solved"].tolist() == [1, 1]
+
+
+def test_a_run_without_an_update_has_no_losses():
+    summary = tuning.run_summary(np.full(3, 0.5), np.full(3, np.nan))
+    assert summary["final_msr"] == 0.5
+    assert all(np.isnan(summary[name]) for name in tuning.LOSSES)

@@ -1,0 +1,159 @@
+"""How well a policy picks."""
+
+import sys
+from collections.abc import Callable
+
+import gymnasium
+import numpy as np
+import pandas as pd
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from unload import task
+from unload.env.container import ContainerEnv
+from unload.env.vector import ContainerVectorEnv
+from unload.support import checks
+
+Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
+# Failed picks in a row after which an episode without a limit is given up.
+GIVE_UP = 10 * task.N_VISIBLE
+
+
+def success_rate(rewards: np.ndarray) -> float:
+    """Mean success rate MSR = (mean reward + 1) / 2 (Sec. IV-A).
+
+    Args:
+        rewards: any shape, not empty, each +1 or -1.
+
+    Raises:
+        TypeError: ``rewards`` does not hold numbers.
+        ValueError: ``rewards`` is empty or holds another value.
+    """
+    rewards = checks.finite_array("rewards", rewards, None)
+    if rewards.size == 0:
+        raise ValueError("rewards is empty; expected at least one reward")
+    if not (np.abs(rewards) == 1).all():
+        wrong = rewards[np.abs(rewards) != 1].flat[0]
+        raise ValueError(f"rewards holds {wrong}; expected only +1 and -1")
+    return (float(rewards.mean()) + 1) / 2
+
+
+def evaluate(
+    policy: Policy,
+    episodes: int = 20,
+    seed: int = 0,
+    physics: str = "table",
+    mask: bool = True,
+    max_picks: int | None = task.MAX_PICKS,
+    **env_kwargs,
+) -> pd.DataFrame:
+    """Let a policy unload fresh containers.
+
+    A pick counts as deadlocked if its item has failed before since the last success:
+    the container has not changed, so it fails again (Sec. III-G).
+
+    Args:
+        policy: see ``unload.policies``.
+        episodes: number of containers.
+        seed: of the loads and of the policy's random numbers; load i is the same whatever
+            the number of episodes.
+        physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
+            one after the other.
+        mask: whether the policy is told which items failed since the last success. Which
+            rows hold an item it is told in any case.
+        max_picks: most picks per episode; fewer if the container is empty before, or if all
+            items have failed and the policy is told so. With None it is unloaded completely,
+            however many picks that takes; only an episode in which 1280 picks in a row fail
+            is given up.
+        **env_kwargs: further arguments of ``ContainerEnv``, such as ``stack``.
+
+    Returns:
+        One row per episode: ``success_rate``, ``unloaded`` (items), ``deadlocked``
+        (share of picks) and ``longest_deadlock`` (deadlocked picks in a row); with
+        ``max_picks=None`` also ``picks`` (int) and ``emptied`` (bool, False if given up).
+
+    Raises:
+        TypeError, ValueError: an argument is not as described, or ``policy`` returns
+            something other than one row of the observation.
+    """
+    checks.integer("episodes", episodes, 1)
+    checks.integer("seed", seed, 0)
+    checks.boolean("mask", mask)
+    if max_picks is not None:
+        checks.integer("max_picks", max_picks, 1)
+    if not callable(policy):
+        raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
+    at_once = task.NUM_ENVS if physics == "table" else 1
+    load_seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
+    frames = []
+    for first in range(0, episodes, at_once):
+        seeds = load_seeds[first : first + at_once]
+        limit = sys.maxsize if max_picks is None else max_picks
+        envs = _side_by_side(len(seeds), physics, max_picks=limit, **env_kwargs)
+        try:
+            frames.append(_play(envs, policy, seeds, mask, give_up=max_picks is None))
+        finally:
+            envs.close()
+    table = pd.concat(frames, ignore_index=True)
+    return table if max_picks is None else table.drop(columns=["picks", "emptied"])
+
+
+def _side_by_side(count: int, physics: str, **kwargs) -> gymnasium.vector.VectorEnv:
+    if physics == "table":
+        return ContainerVectorEnv(count, **kwargs)
+    return SyncVectorEnv(
+        [lambda: ContainerEnv(physics=physics, **kwargs)] * count,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+    )
+
+
+def _play(
+    envs: gymnasium.vector.VectorEnv, policy: Policy, seeds: list[int], mask: bool, give_up: bool
+) -> pd.DataFrame:
+    """One episode in each environment; what follows after its end does not count."""
+    rng = np.random.default_rng(seeds)
+    rows = np.arange(len(seeds))
+    rewards, deadlocked = [], []  # of each step, (num_envs,)
+    running, emptied = np.ones(len(seeds), bool), np.zeros(len(seeds), bool)
+    picks, failures = np.zeros((2, len(seeds)), np.int64)  # so far, and failed ones in a row
+    observations, infos = envs.reset(seed=seeds)
+    while True:
+        allowed = infos["action_mask" if mask else "item_mask"]
+        hopeless = ~allowed.any(axis=1)  # the policy knows of every item that it has failed
+        running &= ~hopeless
+        if not running.any():
+            break
+        allowed = np.where(hopeless[:, np.newaxis], infos["item_mask"], allowed)
+        actions = checks.integer_array(
+            "what policy returned", policy(observations, allowed, rng), rows.shape
+        )
+        for action in (int(actions.min()), int(actions.max())):
+            checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
+        deadlocked.append(infos["action_mask"][rows, actions] == 0)
+        observations, reward, terminations, truncations, infos = envs.step(actions)
+        rewards.append(reward)
+        picks += running
+        failures = np.where(reward > 0, 0, failures + 1)
+        emptied |= running & terminations
+        running &= ~(terminations | truncations)
+        if give_up:
+            running &= failures < GIVE_UP
+    rewards, deadlocked = (
+        [each[:count] for count, each in zip(picks, np.transpose(steps))]
+        for steps in (rewards, deadlocked)
+    )
+    return pd.DataFrame(
+        {
+            "success_rate": [success_rate(each) for each in rewards],
+            "unloaded": [(each > 0).sum() for each in rewards],
+            "deadlocked": [each.mean() for each in deadlocked],
+            "longest_deadlock": [_longest_run(each) for each in deadlocked],
+            "picks": picks,
+            "emptied": emptied,
+        }
+    )
+
+
+def _longest_run(flags: np.ndarray) -> int:
+    """The most 1s in a row."""
+    ends = np.flatnonzero(np.diff(flags, prepend=0, append=0))
+    return int((ends[1::2] - ends[::2]).max(initial=0))

@@ -1,0 +1,98 @@
+"""Memory of past picks to learn from."""
+
+import numpy as np
+
+from unload.support import checks
+
+# By the kind of an array's dtype: what may be written into it.
+CHECKS = {"f": checks.finite_array, "i": checks.integer_array, "b": checks.flag_array}
+
+
+def _checked(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+    """``values``, if they may be written into an array of this ``dtype``."""
+    if isinstance(values, np.ndarray) and (values.dtype, values.shape) == (dtype, shape):
+        if dtype.kind != "f" or np.isfinite(values).all():
+            return values  # nothing to convert
+    return CHECKS[dtype.kind](name, values, shape)
+
+
+class ReplayBuffer:
+    """The last ``size`` picks, in arrays.
+
+    What follows a pick is kept only if it is needed: with gamma = 0 the target is the
+    reward alone (Sec. III-E).
+
+    Args:
+        size: number of picks kept; older ones are overwritten.
+        items: items per observation.
+        next_state: keep the observation and mask after each pick, and whether the task
+            ended there.
+
+    Attributes:
+        arrays: name → array whose first axis is the slot. ``observations`` (size, items, 3)
+            float32, ``actions`` (size,) int64, ``rewards`` (size,) float32; with
+            ``next_state`` also ``next_observations`` (size, items, 3) float32,
+            ``next_masks`` (size, items) bool and ``terminations`` (size,) bool.
+        total: picks ever added.
+    """
+
+    def __init__(self, size: int, items: int, next_state: bool = False) -> None:
+        self.size = checks.integer("size", size, 1)
+        checks.integer("items", items, 1)
+        checks.boolean("next_state", next_state)
+        self.total = 0
+        self.arrays = {
+            "observations": np.empty((size, items, 3), np.float32),
+            "actions": np.empty(size, np.int64),
+            "rewards": np.empty(size, np.float32),
+        }
+        if next_state:
+            self.arrays |= {
+                "next_observations": np.empty((size, items, 3), np.float32),
+                "next_masks": np.empty((size, items), bool),
+                "terminations": np.empty(size, bool),
+            }
+
+    def __len__(self) -> int:
+        return min(self.total, self.size)
+
+    def add(self, **batch: np.ndarray) -> None:
+        """Add a batch of picks; the names are those of ``arrays``, the first axis the batch.
+
+        Raises:
+            TypeError: an array holds something else, such as actions that are not integers.
+            ValueError: a name is missing or unknown, a shape does not fit, or a number is
+                not finite. Nothing is added.
+        """
+        if batch.keys() != self.arrays.keys():
+            raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
+        count = len(checks.finite_array("rewards", batch["rewards"], (None,)))
+        checked = {
+            name: _checked(name, batch[name], (count, *array.shape[1:]), array.dtype)
+            for name, array in self.arrays.items()
+        }
+        start = self.total % self.size
+        slots = slice(start, start + count)
+        if start + count > self.size:  # round the end
+            slots = np.arange(start, start + count) % self.size
+        for name, values in checked.items():
+            self.arrays[name][slots] = values
+        self.total += count
+
+    def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
+        """Draw slots uniformly, with replacement, (batch_size,) int64.
+
+        Raises:
+            TypeError: ``rng`` is not a ``numpy.random.Generator``.
+            ValueError: nothing has been added yet.
+        """
+        checks.generator("rng", rng)
+        if not len(self):
+            raise ValueError("the replay buffer is empty; add picks before sampling")
+        return rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))
+
+    def sample(self, batch_size: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
+        """Copies of picks that ``sample_rows`` draws; raises as it does."""
+        rows = self.sample_rows(batch_size, rng)
+        # Indexing by ``array[rows]`` would take half as long again.
+        return {name: array.take(rows, axis=0) for name, array in self.arrays.items()}

@@ -1,0 +1,172 @@
+"""Many training runs side by side, on the cores of one machine or of a cluster."""
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import redirect_stdout
+from dataclasses import asdict
+from pathlib import Path, PurePosixPath
+
+import pandas as pd
+import torch
+from joblib import Parallel, delayed, parallel_config
+from tqdm import tqdm
+
+from unload.agent.config import TrainConfig
+from unload.agent.training import train
+from unload.support import checks, files, provenance
+
+BACKENDS = ("loky", "dask")
+ATTEMPTS = 2  # a run whose process died so often is given up
+
+
+def run_sweep(
+    configs: Mapping[str, TrainConfig],
+    folder: str | Path,
+    n_jobs: int = -1,
+    backend: str = "loky",
+    progress: bool = True,
+) -> pd.DataFrame:
+    """Train many configurations side by side; finished ones are kept, broken ones resumed.
+
+    A run that fails, or whose process dies, is reported and does not stop the others. Each
+    run uses one thread, shows its own progress in ``log.txt`` in its folder, and leaves
+    ``record.json`` there: what ``unload.provenance.run_record`` tells, ``process``, and
+    ``resumed``, whether all that is of the last part of a run that had been stopped.
+
+    Args:
+        configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
+            that in which they start.
+        folder: the run ``name`` is kept in ``folder/name``. Machines of a cluster must share it.
+        n_jobs: processes with ``"loky"``, -1 for one per core; 1 runs all in this process.
+            ``"dask"`` uses the whole cluster.
+        backend: joblib's: ``"loky"`` for processes on this machine, or ``"dask"`` for the
+            cluster of the ``distributed.Client`` that you have made before.
+        progress: show a progress bar over the runs.
+
+    Returns:
+        One row per run, in the order given, its name as index: ``error`` (what went wrong,
+        or empty), ``folder`` of the run, and the configuration's fields.
+
+    Raises:
+        TypeError: ``configs`` is not a mapping of names to ``TrainConfig``.
+        ValueError: a name is not a plain relative path, the backend is unknown, or there is
+            no cluster.
+        BrokenProcessPool: the processes die before they can begin a run.
+    """
+    checks.entries("configs", configs, ())
+    for name, config in configs.items():
+        if not isinstance(config, TrainConfig):
+            raise TypeError(f"configs[{name!r}] is {config!r}; expected an unload.TrainConfig")
+        if not _is_plain(name):
+            raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
+    checks.one_of("backend", backend, BACKENDS)
+    folders = {name: Path(folder) / name for name in configs}
+    for place in folders.values():
+        if _mark(place).exists():  # of a sweep that was stopped
+            _mark(place).unlink()
+    errors = {}
+    bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
+    with bar, parallel_config(backend=backend, n_jobs=n_jobs):
+        for name, error in _outcomes(configs, folders):
+            errors[name] = error
+            bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
+            bar.update()
+    rows = [
+        {"error": errors[name], "folder": str(folders[name]), **asdict(config)}
+        for name, config in configs.items()
+    ]
+    return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
+
+
+def run_all(
+    configs: Mapping[str, TrainConfig], folder: str | Path, n_jobs: int, progress: bool
+) -> list[dict]:
+    """``run_sweep``, insisting on every run; their records.
+
+    Raises:
+        RuntimeError: a run failed; the message says which and why.
+    """
+    report = run_sweep(configs, folder, n_jobs, progress=progress)
+    failed = report[report["error"] != ""]
+    if len(failed):
+        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+    return [files.read_json(Path(folder) / name / "record.json") for name in configs]
+
+
+def _is_plain(name: object) -> bool:
+    """Whether a run's name leads to a folder of its own inside the sweep's."""
+    if not isinstance(name, str):
+        return False
+    path = PurePosixPath(name)
+    return (
+        bool(path.parts)
+        and not path.is_absolute()
+        and ".." not in path.parts
+        and (str(path) == name)
+    )
+
+
+def _outcomes(
+    configs: Mapping[str, TrainConfig], folders: Mapping[str, Path]
+) -> Iterator[tuple[str, str]]:
+    """Name and error of each run, as they end.
+
+    loky gives up all runs when one process dies. Those that were under way then go on alone,
+    one after the other, so that it shows whose process it was.
+    """
+    left = dict(configs)
+    while left:
+        begun = _begun(left, folders)
+        interrupted = [name for name in left if _mark(folders[name]).exists()]
+        jobs = [delayed(_run)(name, left[name], folders[name]) for name in interrupted[:1] or left]
+        try:
+            runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
+            for name, error in runs(jobs):
+                del left[name]
+                yield name, error
+        except BrokenProcessPool:
+            if _begun(left, folders) == begun:  # the processes die before they begin a run
+                raise
+
+
+def _begun(left: Mapping[str, TrainConfig], folders: Mapping[str, Path]) -> dict[str, str]:
+    """The runs that are left, and the attempts at each."""
+    marks = {name: _mark(folders[name]) for name in left}
+    return {name: mark.read_text() if mark.exists() else "" for name, mark in marks.items()}
+
+
+def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
+    """Train one configuration; its name, and the error's text if it failed."""
+    mark = _mark(folder)
+    attempts = mark.read_text() if mark.exists() else ""
+    if attempts.count("\n") == ATTEMPTS:
+        mark.unlink()
+        return name, f"its process died, {ATTEMPTS} times"
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # the runs share the cores among themselves
+    start = time.monotonic()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        mark.write_text(f"{attempts}{os.getpid()}\n")
+        resumed = (folder / "checkpoint.npz").exists()
+        with open(folder / "log.txt", "a") as log, redirect_stdout(log):
+            train(config, folder)
+        if not (folder / "record.json").exists():
+            record = {"resumed": resumed, "process": os.getpid()}
+            record |= provenance.run_record(time.monotonic() - start)
+            files.write_json(folder / "record.json", record)
+    except Exception as error:  # whatever it was, the other runs go on
+        return name, f"{type(error).__name__}: {error}"
+    finally:
+        if mark.exists():
+            mark.unlink()
+        torch.set_num_threads(threads)
+    return name, ""
+
+
+def _mark(folder: Path) -> Path:
+    """The file that is there while a run is under way: one line, a process, per attempt."""
+    return folder / "attempts"

@@ -1,0 +1,283 @@
+"""The container as a Gymnasium environment (Sec. III-A to III-D)."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from unload import task
+from unload.env import observation
+from unload.env.base import POSITION_NOISE, PickingEnv
+from unload.env.render import Camera
+from unload.load.substacks import Load, stack_load
+from unload.physics.full import make_physics
+from unload.support import checks
+from unload.support import random_state as generators
+
+LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
+
+
+def check_stack(stack: object) -> None:
+    """Raise TypeError unless ``stack`` can make a load."""
+    if not callable(stack):
+        raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+
+
+def check_load(load: object) -> None:
+    """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
+    if not isinstance(load, Load):
+        raise TypeError(f"load is {load!r}; expected an unload.Load")
+
+
+class ContainerEnv(PickingEnv):
+    """Unload a container by choosing, at each step, the item to pick.
+
+    ## Description
+    A container of 7.0 × 2.5 × 2.5 m holds 800–1000 boxes, stacked in walls. At each step
+    the agent chooses one of the 128 boxes nearest to the entrance. It is pulled upwards
+    with 20 N for 0.3 s; if it moved at least 0.2 m it is unloaded, else the container
+    stays as it was. With ``max_picks`` large enough, it is unloaded to the last box.
+
+    ## Action space
+    ``Discrete(128)``: the row of the observation to pick. A row that failed before may be
+    picked again, and fails again. So does a row without a box: it is a failed pick of
+    item -1, which moves by 0 m, and changes nothing.
+
+    ## Observation space
+    ``Box(-1, 1, (128, 3), float32)``: centres of the 128 nearest boxes, nearest first,
+    scaled to the container; with ``equalize=True`` their equalized ranks instead.
+
+    | Column | Observation | -1 | 1 |
+    |---|---|---|---|
+    | 0 | x | rear wall | entrance |
+    | 1 | y | left side wall | right side wall |
+    | 2 | z | floor | ceiling |
+
+    Once fewer than 128 boxes are left, they come first, and each row after them holds -1 in
+    all columns, equalized or not. ``info["item_mask"]`` tells these rows; so does
+    ``unload.observation.holds_item``, if the observation is not equalized. Ranks are those
+    among the boxes that are there.
+
+    ## Rewards
+    +1 if the item was unloaded, -1 if not.
+
+    ## Starting state
+    A new random load from ``stack``, each position blurred once by the drift that a full
+    simulation shows (0.5 mm, and 1 mm down).
+
+    ## Episode end
+    Termination when the last box has been unloaded; nothing is left to pick then, and every
+    row is padded. Truncation after ``max_picks`` picks. The paper's loads of 800 boxes or
+    more are never emptied by its 500 picks.
+
+    ## Information
+    ``reset`` and ``step`` return a dict with
+
+    - ``action_mask``: (128,) int8, 0 for rows that failed since the last successful pick,
+      and for rows without a box;
+    - ``item_mask``: (128,) int8, 0 for rows without a box only: for learners that are not
+      told which rows failed;
+    - ``unloaded``: int, items unloaded in this episode;
+
+    and ``step`` also
+
+    - ``item``: int, the picked item's number in the load, -1 if the row held none;
+    - ``distance``: float, how far it moved in m.
+
+    Args:
+        physics: who answers a lift: ``"local"`` (the situation of the chosen box),
+            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered, and 0
+            without asking PyBullet if three or more boxes rest on the chosen one).
+        after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
+        equalize: give equalized observations (Alg. 1).
+        ties: see ``unload.equalize``.
+        max_picks: greatest length of an episode.
+        position_noise: standard deviation of the blur in m; 0 also switches off the
+            1 mm down. It applies where the boxes stay where they were put; ``"full"``
+            physics that is not restored drifts by itself, and its boxes are seen where
+            they are.
+        stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``.
+        render_mode: ``"rgb_array"`` for pictures by PyBullet's TinyRenderer, or None.
+
+    Attributes:
+        visible: (128,) int64, the item in each row of the observation, -1 in rows without.
+
+    Raises:
+        TypeError, ValueError: an argument, an action or a load is not as described.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step``
+            after the end of an episode.
+        gymnasium.error.ClosedEnvironmentError: use after ``close``.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
+
+    def __init__(
+        self,
+        physics: str = "local",
+        after_pick: str = "restore",
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = POSITION_NOISE,
+        stack: Callable[[np.random.Generator], Load] = stack_load,
+        render_mode: str | None = None,
+    ) -> None:
+        super().__init__(equalize, ties, max_picks, position_noise, render_mode)
+        check_stack(stack)
+        self.stack = stack
+        self.physics = make_physics(physics, after_pick)
+        self._camera: Camera | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Fill the container anew; ``options={"load": load}`` gives the load to use."""
+        self._check_open()
+        options = {} if options is None else options
+        checks.entries("options", options, ())
+        for name in options:
+            checks.one_of("options", name, ("load",))
+        if "load" in options:  # before the generator is seeded
+            check_load(options["load"])
+        super().reset(seed=seed)
+        self._fill(options["load"] if "load" in options else self.stack(self.np_random))
+        self._look()
+        return self._observation.copy(), self._info()
+
+    def step(self, action: int):
+        """Pick the item in row ``action`` of the observation."""
+        self._check_running()
+        item = int(self.visible[self._row(action)])
+        distance = self.physics.lift(item) if item >= 0 else 0.0
+        success = distance >= task.LIFT_THRESHOLD
+        self._picks += 1
+        if success:
+            self.physics.remove(item)
+            self._unloaded += 1
+            self._failed[:] = False
+        elif item >= 0:
+            self._failed[item] = True
+        if success or not self.physics.exact:
+            self._look()
+        terminated, truncated = self._ends()
+        if terminated or truncated:
+            self._state = "finished"
+        info = self._info() | {"item": item, "distance": distance}
+        return self._observation.copy(), 1.0 if success else -1.0, terminated, truncated, info
+
+    def action_masks(self) -> np.ndarray:
+        """(128,) bool, False for rows without a box or failed since the last successful pick."""
+        self._check_started()
+        return (self.visible >= 0) & ~self._failed[self.visible]
+
+    def liftable(self) -> np.ndarray:
+        """(128,) bool, which rows of the observation can be unloaded now.
+
+        Raises:
+            ValueError: the physics is not restored after a pick, so that asking would
+                change the container.
+        """
+        self._check_started()
+        if not self.physics.exact:
+            raise ValueError("after_pick lets lifts move other boxes; expected 'restore'")
+        lifts = [self.physics.lift(item) if item >= 0 else 0.0 for item in self.visible.tolist()]
+        return np.array(lifts) >= task.LIFT_THRESHOLD
+
+    def get_state(self) -> dict[str, np.ndarray]:
+        """All that ``set_state`` needs to go on from here, as plain arrays.
+
+        Raises:
+            ValueError: the physics is not restored after a pick, so that the boxes'
+                motion is part of the state.
+        """
+        self._check_started()
+        if not self.physics.exact:
+            raise ValueError("after_pick lets boxes drift; expected 'restore'")
+        load = self.physics.load
+        return {
+            "positions": load.positions,
+            "sizes": load.sizes,
+            "packages": load.packages,
+            "walls": load.walls,
+            "present": self.physics.present.copy(),
+            "blur": self._blur.copy(),
+            "failed": self._failed.copy(),
+            "counts": np.array([self._picks, self._unloaded]),
+            "rng": self._rng_state(),
+        }
+
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what ``get_state`` returned, here or in another environment.
+
+        Raises:
+            TypeError, ValueError: ``state`` is something else, or does not fit this
+                environment's ``max_picks``. The episode stays as it was.
+        """
+        self._check_open()
+        checks.entries("state", state, (*LOAD, "present", "blur", "failed", "counts", "rng"))
+        load = Load(**{name: state[name] for name in LOAD})
+        count = len(load)
+        present = checks.flag_array("state['present']", state["present"], (count,))
+        failed = checks.flag_array("state['failed']", state["failed"], (count,))
+        blur = checks.finite_array("state['blur']", state["blur"], (count, 3))
+        counts = checks.integer_array("state['counts']", state["counts"], (2,)).tolist()
+        removed = int((~present).sum())
+        picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
+        unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
+        generators.check_state_text("state['rng']", state["rng"])
+        self._fill(load)
+        for item in np.flatnonzero(~present).tolist():
+            self.physics.remove(item)
+        self._blur, self._failed = blur, failed
+        self._picks, self._unloaded = picks, unloaded
+        generators.set_state_text(state["rng"], self.np_random)
+        if any(self._ends()):
+            self._state = "finished"
+        self._look()
+
+    def render(self) -> np.ndarray | None:
+        """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
+        self._check_started()
+        if self.render_mode is None:
+            return None
+        if self._camera is None:
+            self._camera = Camera()
+        physics = self.physics
+        return self._camera.picture(physics.load, physics.present, physics.positions())
+
+    def close(self) -> None:
+        self.physics.close()
+        if self._camera is not None:
+            self._camera.close()
+        super().close()
+
+    def _fill(self, load: Load) -> None:
+        check_load(load)
+        self.physics.reset(load)
+        self._blur = self._drift(len(load))
+        self._failed = np.zeros(len(load), dtype=bool)
+        self._picks = self._unloaded = 0
+        self._state = "running"
+
+    def observed_positions(self) -> np.ndarray:
+        """(n, 3) float64, where all items of the load are seen to be, in m."""
+        self._check_started()
+        positions = self.physics.positions()
+        return positions + self._blur if self.physics.exact else positions
+
+    def _look(self) -> None:
+        """Update which items are visible, and the observation of them."""
+        present = np.flatnonzero(self.physics.present)
+        positions = self.observed_positions()[present]
+        rows = observation.nearest(positions)
+        self.visible = np.full(task.N_VISIBLE, -1)
+        self.visible[: len(rows)] = present[rows]
+        self._observation = self._features(positions[rows])
+
+    def _ends(self) -> tuple[bool, bool]:
+        """Whether the episode is terminated, and whether it is truncated."""
+        return self._unloaded == len(self.physics.load), self._picks == self.max_picks
+
+    def _info(self) -> dict:
+        return {
+            "action_mask": self.action_masks().astype(np.int8),
+            "item_mask": (self.visible >= 0).astype(np.int8),
+            "unloaded": self._unloaded,
+        }

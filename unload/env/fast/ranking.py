@@ -1,0 +1,137 @@
+"""Algorithm 1 compiled, for many observations: ranks by counting, kept while items change.
+
+``unload.equalize`` sorts; here an item's rank is the number of smaller items, which needs
+no sorting, and when one item leaves and another comes, no recounting either. Arrays are
+(axes, items), so that the items of one axis lie side by side. Of equal items the first
+has the smaller rank, as in a stable sort. Where fewer than 128 items are left, they are the
+first ones of the arrays.
+"""
+
+import numba
+import numpy as np
+
+from unload import task
+from unload.env.observation import PADDING
+
+# The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
+# odd. An item that is alone gets 0.
+LEVELS = np.zeros((task.N_VISIBLE + 1, 2 * task.N_VISIBLE - 1), np.float32)
+for _items in range(2, task.N_VISIBLE + 1):
+    _last = _items - 1
+    LEVELS[_items, : 2 * _last + 1] = (np.arange(2 * _last + 1) - _last) / _last
+
+
+@numba.njit(cache=True)
+def rank(values, ranks):
+    """The rank of each item: how many are smaller, or equal and before it.
+
+    Args:
+        values: (items,) float.
+        ranks: (items,) int32, filled.
+    """
+    ranks[:] = 0
+    for j in range(len(values)):
+        value = values[j]
+        for i in range(len(values)):
+            ranks[i] += np.int32((value < values[i]) | ((value == values[i]) & (j < i)))
+
+
+@numba.njit(cache=True)
+def replace(values, ranks, row, value):
+    """Take the item in ``row`` out, move the later ones up, and add one at the end."""
+    left, last = ranks[row], len(values) - 1
+    for i in range(row, last):
+        values[i], ranks[i] = values[i + 1], ranks[i + 1]
+    values[last] = value
+    smaller = np.int32(0)
+    for i in range(last):
+        above = values[i] > value
+        ranks[i] += np.int32(above) - np.int32(ranks[i] > left)
+        smaller += not above
+    ranks[last] = smaller
+
+
+@numba.njit(cache=True)
+def remove(values, ranks, row):
+    """Take the item in ``row`` out and move the later ones up; the last place is void then."""
+    left, last = ranks[row], len(values) - 1
+    for i in range(row, last):
+        values[i], ranks[i] = values[i + 1], ranks[i + 1]
+    for i in range(last):
+        ranks[i] -= np.int32(ranks[i] > left)
+
+
+@numba.njit(cache=True)
+def twice_shared_ranks(values, ranks, tolerance, twice):
+    """Twice the mean rank of each run of sorted values at most ``tolerance`` apart.
+
+    Args:
+        values, ranks: (items,) float32 and int32.
+        tolerance: float32.
+        twice: (items,) int32, filled.
+    """
+    order = np.empty(len(values), np.int32)
+    for i in range(len(values)):
+        order[ranks[i]] = i
+    first = 0
+    for r in range(len(values)):
+        if r + 1 == len(values) or values[order[r + 1]] - values[order[r]] > tolerance:
+            for member in range(first, r + 1):
+                twice[order[member]] = first + r
+            first = r + 1
+
+
+@numba.njit(cache=True)
+def features(values, ranks, equalize, average, tolerance, observation, items=task.N_VISIBLE):
+    """Write an observation: the values themselves, or equalized; then padding.
+
+    Args:
+        values, ranks: (axes, rows) float32 and int32.
+        equalize: whether to equalize, and, if so,
+        average: whether items in a tie share their mean rank.
+        tolerance: float32, see ``unload.equalize``.
+        observation: (rows, axes) float32, filled.
+        items: how many of the rows, the first ones, hold an item.
+    """
+    axes, rows = values.shape
+    twice, levels = np.empty(items, np.int32), LEVELS[items]
+    if items < rows:
+        observation[items:] = PADDING
+    for axis in range(axes):
+        if not equalize:
+            for i in range(items):
+                observation[i, axis] = values[axis, i]
+            continue
+        if average:
+            twice_shared_ranks(values[axis, :items], ranks[axis, :items], tolerance, twice)
+        else:
+            for i in range(items):
+                twice[i] = 2 * ranks[axis, i]
+        for i in range(items):
+            observation[i, axis] = levels[twice[i]]
+
+
+@numba.njit(cache=True)
+def nearest_first(distances, seen, flags, equalize, average, tolerance, observations, rows):
+    """Observations of items that are not yet sorted by distance.
+
+    Args:
+        distances, seen, flags: (E, items) float64, (E, items, axes) float32 and (E, items)
+            bool: how far each item is, where it is seen, and something else about it.
+        equalize, average, tolerance: see ``features``.
+        observations, rows: (E, items, axes) float32 and (E, items) bool, filled: what is
+            seen and the flags, nearest item first.
+    """
+    _, items, axes = seen.shape
+    places, ranks = np.empty(items, np.int32), np.empty((axes, items), np.int32)
+    values = np.empty((axes, items), np.float32)
+    for env in range(len(distances)):
+        rank(distances[env], places)
+        for i in range(items):
+            rows[env, places[i]] = flags[env, i]
+            for axis in range(axes):
+                values[axis, places[i]] = seen[env, i, axis]
+        if equalize:
+            for axis in range(axes):
+                rank(values[axis], ranks[axis])
+        features(values, ranks, equalize, average, tolerance, observations[env], items)

@@ -1,0 +1,143 @@
+"""The hyperparameter-tuning environment: choose the highest item (Sec. IV-A)."""
+
+import numpy as np
+
+from unload import task
+from unload.env import observation
+from unload.env.base import POSITION_NOISE, PickingEnv
+from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
+from unload.support import checks
+from unload.support import random_state as generators
+
+TOLERANCE = 1e-6  # m, places this close are at the same height
+# Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
+GRID = np.concatenate(
+    [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
+)
+
+
+def highest_places(places: np.ndarray) -> np.ndarray:
+    """(..., items) bool, which of the (..., items, 3) places in m no other one is higher than."""
+    heights = places[..., 2]
+    return heights > heights.max(axis=-1, keepdims=True) - TOLERANCE
+
+
+class HighestItemEnv(PickingEnv):
+    """Choose the item with the highest z among random ones on the grid of a load.
+
+    ## Description
+    At each step 128 items are put at random places that a load's items can take, blurred
+    as in ``unload/Container-v0``. There is no physics: the environment finds
+    hyperparameters quickly, for one picking rule that is optimal in the container, too.
+
+    ## Action space
+    ``Discrete(128)``: the row of the observation to pick.
+
+    ## Observation space
+    ``Box(-1, 1, (128, 3), float32)``: x, y, z of the items, nearest to the entrance
+    first, scaled to the container; with ``equalize=True`` their equalized ranks instead.
+
+    ## Rewards
+    +1 if no item's place is higher than that of the chosen one, -1 else. On the grid
+    several items, 12 on average, share the greatest height, and each of them counts: the
+    blur is not a matter of the task.
+
+    ## Starting state
+    Random items. Every step shows new ones, whatever was chosen before.
+
+    ## Episode end
+    Truncation after ``max_picks`` picks; there is no termination.
+
+    ## Information
+    ``action_mask`` and ``item_mask``: (128,) int8, all 1, since no row fails twice or is empty.
+
+    Args:
+        equalize: give equalized observations (Alg. 1).
+        ties: see ``unload.equalize``.
+        max_picks: length of an episode.
+        position_noise: standard deviation of the blur in m; 0 also switches off the
+            1 mm down.
+        render_mode: None; there is nothing to draw.
+
+    Raises:
+        TypeError, ValueError: an argument or an action is not as described.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step``
+            after the end of an episode.
+        gymnasium.error.ClosedEnvironmentError: use after ``close``.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(
+        self,
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = POSITION_NOISE,
+        render_mode: None = None,
+    ) -> None:
+        super().__init__(equalize, ties, max_picks, position_noise, render_mode)
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Draw the first items. There are no options."""
+        self._check_open()
+        if options:
+            raise ValueError(f"options is {options!r}; expected none")
+        super().reset(seed=seed)
+        self._picks, self._state = 0, "running"
+        return self._draw(), self._info()
+
+    def step(self, action: int):
+        """Choose row ``action`` of the observation."""
+        self._check_running()
+        reward = 1.0 if self._highest[self._row(action)] else -1.0
+        self._picks += 1
+        truncated = self._picks == self.max_picks
+        if truncated:
+            self._state = "finished"
+        return self._draw(), reward, False, truncated, self._info()
+
+    def action_masks(self) -> np.ndarray:
+        """(128,) bool, all True."""
+        self._check_started()
+        return np.ones(task.N_VISIBLE, dtype=bool)
+
+    def get_state(self) -> dict[str, np.ndarray]:
+        """All that ``set_state`` needs to go on from here, as plain arrays."""
+        self._check_started()
+        return {
+            "picks": np.array(self._picks),
+            "highest": self._highest.copy(),
+            "rng": self._rng_state(),
+        }
+
+    def set_state(self, state: dict[str, np.ndarray]) -> None:
+        """Go on from what ``get_state`` returned, here or in another environment.
+
+        Raises:
+            TypeError, ValueError: ``state`` is something else, or does not fit this
+                environment's ``max_picks``. The episode stays as it was.
+        """
+        self._check_open()
+        checks.entries("state", state, ("picks", "highest", "rng"))
+        picks = checks.integer_array("state['picks']", state["picks"], ()).item()
+        picks = checks.integer("state['picks']", picks, 0, self.max_picks)
+        highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
+        generators.check_state_text("state['rng']", state["rng"])
+        generators.set_state_text(state["rng"], self.np_random)
+        self._picks, self._highest = picks, highest
+        self._state = "finished" if picks == self.max_picks else "running"
+
+    def render(self) -> None:
+        """None: there is nothing to draw."""
+        self._check_started()
+
+    def _draw(self) -> np.ndarray:
+        places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
+        positions = places + self._drift(task.N_VISIBLE)
+        rows = observation.nearest(positions)
+        self._highest = highest_places(places)[rows]
+        return self._features(positions[rows])
+
+    def _info(self) -> dict:
+        return {name: np.ones(task.N_VISIBLE, np.int8) for name in ("action_mask", "item_mask")}

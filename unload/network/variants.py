@@ -1,0 +1,174 @@
+"""Other networks than the paper's, more expressive (Sec. V-A, "Network architecture").
+
+Each takes what ``PEQNetwork`` takes and gives what it gives: one value per item from the same
+weights for every item, so permuting the items permutes the values.
+"""
+
+import torch
+from torch import nn
+from torch.nn.functional import linear
+
+from unload.network.peq import PEQNetwork, check_observations, check_present, pooled
+from unload.support import checks
+
+HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 features
+
+
+class ScoringNetwork(nn.Module):
+    """Base of networks that score each item by one linear unit, tanh, on n features.
+
+    Subclasses make their layers and then call ``reset_parameters``.
+
+    Args:
+        n_features: n.
+
+    Subclasses also take ``generator``, the source of the initial weights: PyTorch's default
+    one if None.
+
+    Raises:
+        TypeError, ValueError: ``n_features`` is no number of features.
+    """
+
+    def __init__(self, n_features: int = 64) -> None:
+        super().__init__()
+        self.n_features = checks.integer("n_features", n_features, 1)
+        self.scorer = nn.Linear(n_features, 1)
+
+    def reset_parameters(self, generator: torch.Generator | None = None) -> None:
+        """Draw the weights and biases from U(±1/√inputs), as ``PEQNetwork`` does.
+
+        Layer normalizations begin as ones and zeros: there is nothing to draw.
+        """
+        for module in self.modules():
+            if isinstance(module, nn.Linear):
+                weights = (module.weight, module.bias)
+            elif isinstance(module, nn.MultiheadAttention):
+                weights = (module.in_proj_weight, module.in_proj_bias)
+            else:
+                continue
+            bound = weights[0].shape[1] ** -0.5
+            for weight in weights:
+                nn.init.uniform_(weight, -bound, bound, generator=generator)
+
+    def forward(
+        self, observations: torch.Tensor, present: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        """Action values.
+
+        Args:
+            observations: (batch, items, 3) of the weights' dtype, float32.
+            present: (batch, items) bool, the rows that hold an item; all if None. The other
+                rows have no influence on the values of these.
+
+        Returns:
+            (batch, items), of the same dtype, in [-1, 1]. Where a row holds no item, the
+            value is finite but means nothing.
+
+        Raises:
+            TypeError: no tensor, or another dtype.
+            ValueError: another shape, or no rows.
+        """
+        check_observations(observations, next(self.parameters()).dtype)
+        if present is not None:
+            check_present(present, observations)
+            # Where there is no item at all, all rows count: the maximum of none is infinite.
+            present = present | ~present.any(dim=1, keepdim=True)
+        return torch.tanh(self.scorer(self.features(observations, present))).squeeze(2)
+
+    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+        """What the scorer reads of each item, (batch, items, n)."""
+        raise NotImplementedError
+
+
+class TwoLayerScorer(ScoringNetwork):
+    """The paper's network with a hidden layer in its relation scorer.
+
+    In the paper's one linear unit, the global features shift all items' scores alike, and the
+    choice does not depend on them. Behind a hidden layer of n units, ReLU, it does.
+    """
+
+    def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
+        super().__init__(n_features)
+        self.extractor = nn.Linear(3, n_features)
+        self.hidden = nn.Linear(4 * n_features, n_features)
+        self.reset_parameters(generator)
+
+    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+        own = torch.relu(self.extractor(observations))
+        context = torch.cat(pooled(own, present), dim=1)
+        return torch.relu(linear_beside(self.hidden, own, context))
+
+
+class EquivariantStack(ScoringNetwork):
+    """Three equivariant layers (Zaheer et al., Deep Sets, 2017).
+
+    Each takes an item's own features beside the maximum of each feature over the items, and
+    gives n features, ReLU.
+    """
+
+    def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
+        super().__init__(n_features)
+        self.layers = nn.ModuleList(
+            nn.Linear(2 * inputs, n_features) for inputs in (3, n_features, n_features)
+        )
+        self.reset_parameters(generator)
+
+    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+        own = observations
+        for layer in self.layers:
+            own = torch.relu(linear_beside(layer, own, highest(own, present)))
+        return own
+
+
+class AttentionNetwork(ScoringNetwork):
+    """Each item attends to all: two transformer blocks with layer normalization first.
+
+    There is no encoding of the place in the row, no dropout, and 2 n hidden units per block.
+    ``n_features`` must be even, for the two heads.
+    """
+
+    def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
+        super().__init__(n_features)
+        if n_features % HEADS:
+            raise ValueError(f"n_features is {n_features}; expected a multiple of {HEADS}")
+        self.extractor = nn.Linear(3, n_features)
+        self.blocks = nn.ModuleList(
+            nn.TransformerEncoderLayer(
+                n_features, HEADS, 2 * n_features, dropout=0, batch_first=True, norm_first=True
+            )
+            for _ in range(2)
+        )
+        self.norm = nn.LayerNorm(n_features)
+        self.reset_parameters(generator)
+
+    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+        own = self.extractor(observations)
+        padding = None if present is None else ~present
+        for block in self.blocks:
+            own = block(own, src_key_padding_mask=padding)
+        return self.norm(own)
+
+
+NETWORKS = {
+    "peq": PEQNetwork,
+    "two_layer": TwoLayerScorer,
+    "stack": EquivariantStack,
+    "attention": AttentionNetwork,
+}
+
+
+def highest(features: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+    """The maximum of each feature over the items, (batch, features)."""
+    if present is not None:
+        features = features.masked_fill(~present.unsqueeze(2), -torch.inf)
+    return features.amax(dim=1)
+
+
+def linear_beside(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) -> torch.Tensor:
+    """``layer`` of each item's own features beside the context of all items.
+
+    The same as on (batch, items, own + context) features, but the context's share is
+    computed once per observation, not once per item.
+    """
+    for_own, for_context = layer.weight.split([own.shape[2], context.shape[1]], dim=1)
+    return linear(own, for_own, layer.bias) + linear(context, for_context).unsqueeze(1)

@@ -1,0 +1,206 @@
+"""PyBullet, and the only file that imports it.
+
+A ``World`` is one PyBullet client with boxes in it. It knows nothing of loads,
+observations or rewards.
+"""
+
+import os
+from collections.abc import Sequence
+from contextlib import contextmanager
+from importlib.metadata import version
+
+import numpy as np
+
+from unload import task
+from unload.support import checks
+
+
+@contextmanager
+def _quiet_stderr():
+    """PyBullet's C code prints its build time while it is imported."""
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 2)
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)
+
+
+with _quiet_stderr():
+    import pybullet
+
+TIME_STEP = 1 / 240  # s; halving it changes no lift, 1/60 changes 2 % of the hard ones
+# Bullet multiplies the friction of the two bodies in contact: 0.5 each gives 0.25.
+FRICTION = 0.5
+# Bullet's default for multibodies, stated here because maximal coordinates default to 0.
+DAMPING = 0.04
+# Boxes are made this much narrower (x and y), so that neighbours do not rub: side by
+# side without a gap, free boxes rise less, and in a full simulation many jam.
+GAP = 0.001  # m
+# All that a lift's outcome depends on besides the boxes.
+SETTINGS = {
+    "pybullet": version("pybullet"),
+    "time_step": TIME_STEP,
+    "friction": FRICTION,
+    "damping": DAMPING,
+    "gap": GAP,
+    "mass": task.MASS,
+    "gravity": task.GRAVITY,
+    "force": task.PICK_FORCE,
+    "lift_time": task.LIFT_TIME,
+}
+
+
+class World:
+    """One PyBullet client (about 28 MB) with gravity, holding axis-aligned boxes.
+
+    Bodies never fall asleep: PyBullet's external force does not wake a sleeping body,
+    so that a free box would not move at all.
+
+    Args:
+        time_step: s per ``stepSimulation``.
+        maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
+            2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
+
+    Raises:
+        TypeError, ValueError: ``time_step`` is no number from 1e-6 to 1.
+    """
+
+    def __init__(self, time_step: float = TIME_STEP, maximal_coordinates: bool = True) -> None:
+        self.time_step = checks.real("time_step", time_step, 1e-6, 1)
+        self._maximal = maximal_coordinates
+        self._shapes: dict[tuple[float, ...], int] = {}
+        self._client = pybullet.connect(pybullet.DIRECT)
+        pybullet.setGravity(0, 0, -task.GRAVITY, physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=time_step,
+            deterministicOverlappingPairs=1,
+            physicsClientId=self._client,
+        )
+
+    def add_box(self, position: Sequence[float], size: Sequence[float], mass: float) -> int:
+        """Create a box and return its body number; mass 0 makes it immovable.
+
+        Args:
+            position: (3,) centre in m.
+            size: (3,) edge lengths in m.
+            mass: kg.
+
+        Raises:
+            TypeError: an argument does not hold numbers.
+            ValueError: a number is not finite, an edge is not > 0, or the mass is < 0.
+        """
+        position = checks.finite_array("position", position, (3,)).tolist()
+        size = checks.finite_array("size", size, (3,)).tolist()
+        if min(size) <= 0:
+            raise ValueError(f"size is {size}; expected three edges > 0")
+        body = pybullet.createMultiBody(
+            checks.real("mass", mass, 0),
+            self._shape(tuple(size)),
+            basePosition=position,
+            useMaximalCoordinates=self._maximal,
+            physicsClientId=self._client,
+        )
+        pybullet.changeDynamics(
+            body,
+            -1,
+            lateralFriction=FRICTION,
+            linearDamping=DAMPING,
+            angularDamping=DAMPING,
+            physicsClientId=self._client,
+        )
+        return body
+
+    def _shape(self, size: tuple[float, ...]) -> int:
+        if size not in self._shapes:
+            self._shapes[size] = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[edge / 2 for edge in size],
+                physicsClientId=self._client,
+            )
+        return self._shapes[size]
+
+    def remove(self, body: int) -> None:
+        """Take a body out of the world; its number is not given again."""
+        pybullet.removeBody(body, physicsClientId=self._client)
+
+    def place(self, body: int, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
+        """Put a body at rest at ``position`` (m) with ``orientation`` (quaternion x, y, z, w)."""
+        # This call also sets the velocities to zero.
+        pybullet.resetBasePositionAndOrientation(
+            body, position, orientation, physicsClientId=self._client
+        )
+
+    def pose(self, body: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Position (m) and orientation (quaternion x, y, z, w) of a body."""
+        return pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
+
+    def step(self, seconds: float) -> None:
+        """Let time pass, rounded to whole time steps.
+
+        Raises:
+            TypeError, ValueError: ``seconds`` is no finite number >= 0.
+        """
+        for _ in range(self._steps(seconds)):
+            pybullet.stepSimulation(physicsClientId=self._client)
+
+    def _steps(self, seconds: float) -> int:
+        return round(checks.real("seconds", seconds, 0) / self.time_step)
+
+    def pull(
+        self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
+    ) -> float:
+        """Pull a body upwards at its centre of mass (Sec. III-C).
+
+        Args:
+            body: which one.
+            force: N.
+            seconds: how long, rounded to whole time steps.
+
+        Returns:
+            How far the body moved, in m.
+
+        Raises:
+            TypeError, ValueError: ``force`` or ``seconds`` is no finite number >= 0.
+        """
+        force = checks.real("force", force, 0)
+        start = np.array(self.pose(body)[0])
+        for _ in range(self._steps(seconds)):
+            # The force acts for one step only, so it is applied anew before each.
+            pybullet.applyExternalForce(
+                body,
+                -1,
+                (0, 0, force),
+                self.pose(body)[0],
+                pybullet.WORLD_FRAME,
+                physicsClientId=self._client,
+            )
+            pybullet.stepSimulation(physicsClientId=self._client)
+        return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
+
+    def paint(self, body: int, colour: tuple[float, float, float]) -> None:
+        """Give a body a colour, RGB in [0, 1]."""
+        pybullet.changeVisualShape(body, -1, rgbaColor=(*colour, 1), physicsClientId=self._client)
+
+    def picture(self, eye, target, width: int, height: int) -> np.ndarray:
+        """(height, width, 3) uint8, the world seen from ``eye`` towards ``target`` (m)."""
+        view = pybullet.computeViewMatrix(eye, target, (0, 0, 1))
+        lens = pybullet.computeProjectionMatrixFOV(30, width / height, 0.1, 50)
+        pixels = pybullet.getCameraImage(
+            width,
+            height,
+            view,
+            lens,
+            lightDirection=(6, -8, 12),
+            shadow=0,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self._client,
+        )[2]
+        return np.reshape(pixels, (height, width, 4))[:, :, :3].astype(np.uint8)
+
+    def close(self) -> None:
+        """Disconnect the client; may be called again."""
+        if pybullet.isConnected(self._client):
+            pybullet.disconnect(self._client)

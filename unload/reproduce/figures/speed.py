@@ -1,0 +1,126 @@
+"""How fast the parts are, drawn from what ``benchmarks/run.py`` measured."""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from unload import task
+from unload.reproduce import tables
+from unload.reproduce.figures.style import styled
+from unload.support import checks, files
+
+FOLDER = files.DATA / "benchmarks"
+COLUMNS = {
+    "speeds": ["what", "how", "value", "unit", "ratio"],
+    "containers": ["containers", "step_ns", "reset_ns", "picks_per_s", "memory_mb"],
+    "profile": ["part", "us", "floor_us", "floor"],
+}
+
+
+def read_table(name: str, folder: str | Path = FOLDER) -> pd.DataFrame:
+    """A table of the benchmarks: ``"speeds"``, ``"containers"`` or ``"profile"``.
+
+    Raises:
+        FileNotFoundError: it is missing; the message says how to measure it.
+        ValueError: an unknown name, other columns, no rows, or values that are not finite.
+    """
+    checks.one_of("name", name, COLUMNS)
+    path = Path(folder) / f"{name}.csv"
+    return tables.read_table(path, "python benchmarks/run.py", COLUMNS[name], exact=True)
+
+
+def three_digits(value: float) -> str:
+    """A positive number rounded to three digits, without a power of ten: 1,230,000."""
+    return f"{float(f'{value:.3g}'):,.10g}"
+
+
+@styled
+def speed_ratios(folder: str | Path = FOLDER) -> Figure:
+    """How many times as fast each way of doing a thing is as the first one.
+
+    Args:
+        folder: of the tables.
+
+    Raises:
+        FileNotFoundError, ValueError: see ``read_table``.
+    """
+    table = read_table("speeds", folder)
+    groups = table.groupby("what", sort=False)
+    figure, panels = plt.subplots(
+        len(groups), 1, figsize=(6.4, 0.34 * len(table) + 0.5 * len(groups)), sharex=True,
+        height_ratios=[len(group) + 0.6 for _, group in groups],
+    )  # fmt: skip
+    for number, (axes, (what, group)) in enumerate(zip(np.atleast_1d(panels), groups)):
+        places = np.arange(len(group))
+        axes.barh(places, group["ratio"], color=f"C{number}")
+        for place, ratio, value, unit in zip(places, group["ratio"], group["value"], group["unit"]):
+            axes.text(
+                max(ratio, 1) * 1.15,
+                place,
+                f"{three_digits(value)} {unit}",
+                va="center",
+                fontsize=8,
+            )
+        axes.set_yticks(places, group["how"], fontsize=8)
+        axes.set(xscale="log", ylim=(len(group) - 0.4, -0.6), xlim=(0.5, 20 * table["ratio"].max()))
+        axes.set_title(what, loc="left", fontsize=9)
+        axes.minorticks_off()
+        axes.grid(False, axis="y")
+    axes.set_xlabel("times as fast as the first way of its kind")
+    return figure
+
+
+@styled
+def speed_containers(folder: str | Path = FOLDER) -> Figure:
+    """What a pick costs in the array environment over the number of containers.
+
+    Arguments and errors as in ``speed_ratios``.
+    """
+    table = read_table("containers", folder)
+    counts, cost = table["containers"], table["step_ns"] + table["reset_ns"]
+    figure, axes = plt.subplots()
+    axes.plot(counts, cost, "o-", label="together")
+    axes.plot(counts, table["step_ns"], "o--", color="0.45", markersize=3, label="picking")
+    axes.plot(counts, table["reset_ns"], "o:", color="0.45", markersize=3, label="new loads")
+    axes.set(xscale="log", yscale="log", xlabel="containers in one environment")
+    axes.set(ylabel="time per pick (ns)", ylim=(10**2.5, 10**5))
+    axes.set_xticks(counts, [str(count) for count in counts])
+    axes.minorticks_off()
+    rates = axes.secondary_yaxis("right", functions=(_reciprocal, _reciprocal))
+    rates.set_ylabel("picks/s")
+    rates.set_yticks([1e4, 1e5, 1e6], ["10,000", "100,000", "1,000,000"])
+    rates.minorticks_off()
+    rates.spines["right"].set_visible(True)
+    axes.legend()
+    return figure
+
+
+def _reciprocal(nanoseconds: np.ndarray) -> np.ndarray:
+    """ns per pick to picks per second, and back."""
+    return 1e9 / np.maximum(nanoseconds, 1e-9)
+
+
+@styled
+def speed_profile(folder: str | Path = FOLDER) -> Figure:
+    """The parts of a training step: measured, and at the floor of the machine.
+
+    Arguments and errors as in ``speed_ratios``.
+    """
+    table = read_table("profile", folder)
+    figure, axes = plt.subplots(figsize=(6.4, 3.2))
+    places = np.arange(len(table))
+    axes.barh(places - 0.18, table["us"], height=0.36, label="measured")
+    axes.barh(places + 0.18, table["floor_us"], height=0.36, label="operations or bytes alone")
+    for place, measured, floor, why in zip(places, table["us"], table["floor_us"], table["floor"]):
+        axes.text(measured, place - 0.18, f" {measured:,.0f}", va="center", fontsize=8)
+        if floor:
+            axes.text(floor, place + 0.18, f" {floor:,.1f}: {why}", va="center", fontsize=8)
+    axes.set_yticks(places, table["part"])
+    axes.set(xlabel=f"µs per step of {task.NUM_ENVS} picks", ylim=(len(table) - 0.5, -0.5))
+    axes.set_xlim(0, 1.15 * table["us"].max())
+    axes.grid(False, axis="y")
+    axes.legend(loc="lower right")
+    return figure

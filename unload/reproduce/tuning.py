@@ -1,0 +1,180 @@
+"""The hyperparameter grid of Sec. IV-A: its runs, their names, their curves and summary."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from unload import task
+from unload.agent.config import TrainConfig
+from unload.support import checks, files
+
+LEARNING_RATES = (1e-1, 1e-2, 1e-3)
+BATCH_SIZES = (64, 256, 1024, 2048)
+RUNS = 10
+STEPS = 3000  # K, one pick in each of 64 environments and one update per step
+
+WINDOW = 25  # steps of the running means
+FINAL = 100  # steps at the end of a run that its final values are means of
+SOLVED = 0.99  # MSR
+LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
+
+
+def tuning_config(
+    batch_size: int,
+    learning_rate: float,
+    run: int,
+    equalize: bool = True,
+    steps: int = STEPS,
+    **changes,
+) -> TrainConfig:
+    """One run in the hyperparameter-tuning environment (Sec. IV-A).
+
+    Args:
+        batch_size: b.
+        learning_rate: μ.
+        run: number of the run, its seed.
+        equalize: with the paper's feature engineering or without.
+        steps: K.
+        **changes: further fields of ``TrainConfig``.
+    """
+    checks.integer("steps", steps, 1)
+    return TrainConfig(
+        env="unload/HighestItem-v0",
+        picks=steps * task.NUM_ENVS,
+        batch_size=batch_size,
+        learning_rate=learning_rate,
+        seed=run,
+        equalize=equalize,
+        log_interval=1,
+        **changes,
+    )
+
+
+def tuning_grid(
+    learning_rates: Sequence[float] = LEARNING_RATES,
+    batch_sizes: Sequence[int] = BATCH_SIZES,
+    runs: int = RUNS,
+    equalize: Sequence[bool] = (True, False),
+    steps: int = STEPS,
+) -> dict[str, TrainConfig]:
+    """All runs of the paper's grid, for ``run_sweep``.
+
+    The slow ones, of large batches, come first, so that no process is left with one of them
+    at the end. Each is named as the paper names its curves, such as
+    ``dummy_sim_with_hist_equal/bz_64_lr_0.1_agent_3``.
+    """
+    return {
+        f"{set_name(equalized)}/{run_name(batch_size, learning_rate, run)}": tuning_config(
+            batch_size, learning_rate, run, equalized, steps
+        )
+        for batch_size in sorted(batch_sizes, reverse=True)
+        for run in range(checks.integer("runs", runs, 1))
+        for equalized in equalize
+        for learning_rate in learning_rates
+    }
+
+
+def run_name(batch_size: int, learning_rate: float, run: int | str) -> str:
+    """The paper's name of a tuning run, such as ``bz_64_lr_0.1_agent_3``."""
+    return f"bz_{batch_size}_lr_{learning_rate:g}_agent_{run}"
+
+
+def set_name(equalize: bool) -> str:
+    """The paper's name for the tuning runs with or without feature engineering."""
+    return f"dummy_sim_{'with' if equalize else 'without'}_hist_equal"
+
+
+def export_curves(name: str, curve: pd.DataFrame, folder: str | Path) -> None:
+    """Write a tuning run's curves as the paper's plots read them.
+
+    ``folder/dummy_sim_{with,without}_hist_equal/{hitrate,loss}_curve_<run name>.csv``: one
+    value per step and no header; the loss before the first update is ``nan``, which the plots
+    leave out.
+
+    Args:
+        name: of the run in ``tuning_grid``.
+        curve: what ``unload.train`` left.
+        folder: of the data.
+    """
+    place = Path(folder) / name
+    # A hit rate is a multiple of 1/64: six digits are exact.
+    for kind, column, digits in (("hitrate", "success_rate", 6), ("loss", "loss", 4)):
+        form = {"float_format": f"%.{digits}g", "na_rep": "nan"}
+        text = curve[column].to_csv(index=False, header=False, **form)
+        files.write_text(place.with_name(f"{kind}_curve_{place.name}.csv"), text)
+
+
+def running_mean(values: np.ndarray) -> np.ndarray:
+    """Means over 25 steps around each one, fewer at the ends; NaN does not count."""
+    return pd.Series(values).rolling(WINDOW, min_periods=1, center=True).mean().to_numpy()
+
+
+def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
+    """What became of a tuning run.
+
+    Args:
+        success_rate: (steps,) MSR at each step.
+        loss: (steps,) loss, NaN before the first update.
+
+    Returns:
+        ``final_msr``: mean over the last 100 steps. ``solved_at``: the first step from which
+        on the running mean of the MSR stays at 99 % or above, NaN if it does not end there.
+        ``loss_start``: the first loss; ``loss_dip`` and ``loss_peak``: where the running mean of
+        the loss begins and ends its largest rise; ``loss_end``: mean over the last 100 steps.
+        These are NaN if the run was too short for an update.
+    """
+    below = np.flatnonzero(running_mean(success_rate) < SOLVED)
+    solved_at = below[-1] + 1 if below.size else 0
+    return {
+        "final_msr": success_rate[-FINAL:].mean(),
+        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
+        **_loss_summary(loss),
+    }
+
+
+def _loss_summary(loss: np.ndarray) -> dict[str, float]:
+    known = np.isfinite(loss)
+    if not known.any():
+        return dict.fromkeys(LOSSES, np.nan)
+    smooth = running_mean(loss)[known]
+    lowest = np.minimum.accumulate(smooth)
+    peak = np.argmax(smooth - lowest)
+    ends = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
+    return dict(zip(LOSSES, ends))
+
+
+def tuning_summary(
+    configs: dict[str, TrainConfig], curves: dict[str, pd.DataFrame]
+) -> pd.DataFrame:
+    """One row per configuration: means over its runs of what ``run_summary`` tells.
+
+    Columns: ``equalize``, ``batch_size``, ``learning_rate``, ``runs``; ``final_msr`` and its
+    standard deviation, lowest and highest value; ``solved``, the number of runs that end at
+    99 % or above, and ``solved_at`` of these; and the four losses.
+    """
+    rows = [
+        {
+            "equalize": config.equalize,
+            "batch_size": config.batch_size,
+            "learning_rate": config.learning_rate,
+            **run_summary(curves[name]["success_rate"].to_numpy(), curves[name]["loss"].to_numpy()),
+        }
+        for name, config in configs.items()
+    ]
+    return (
+        pd.DataFrame(rows)
+        .groupby(["equalize", "batch_size", "learning_rate"])
+        .agg(
+            runs=("final_msr", "size"),
+            final_msr=("final_msr", "mean"),
+            final_msr_std=("final_msr", "std"),
+            final_msr_min=("final_msr", "min"),
+            final_msr_max=("final_msr", "max"),
+            solved=("solved_at", "count"),
+            solved_at=("solved_at", "mean"),
+            **{name: (name, "mean") for name in LOSSES},
+        )
+        .reset_index()
+    )
