@@ -7,9 +7,9 @@ import numpy as np
 import torch
 
 import unload
-import unload.agent
 from benchmarks.timing import best_times
 from unload import task
+from unload.agent.dqn import CHUNK
 
 
 def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) -> dict[str, float]:
@@ -30,7 +30,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) 
         "rewards": rng.choice(np.array([-1, 1], np.float32), batch_size),
     }
 
-    def update(fused: bool, threads: int, chunk: int = unload.agent.CHUNK) -> Callable[[], float]:
+    def update(fused: bool, threads: int, chunk: int = CHUNK) -> Callable[[], float]:
         network = unload.PEQNetwork(n_features, torch.Generator().manual_seed(0))
         agent = unload.DQN(network, fused_update=fused)
 
@@ -44,7 +44,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) 
     times = best_times(
         {
             "PyTorch, whole batch": update(False, 1, batch_size),
-            f"PyTorch, chunks of {unload.agent.CHUNK}": update(False, 1),
+            f"PyTorch, chunks of {CHUNK}": update(False, 1),
             "fused": update(True, 1),
             "fused, 2 threads": update(True, 2),
         },

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 import unload
+from unload.env import observation
 
 torch.set_num_threads(1)
 

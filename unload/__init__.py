@@ -4,13 +4,16 @@ import gymnasium
 
 from unload.agent import policies
 from unload.agent.config import TrainConfig
-from unload.agent.dqn import DQN, Greedy, load_policy, save_policy
+from unload.agent.dqn import DQN
 from unload.agent.evaluation import evaluate, success_rate
+from unload.agent.greedy import Greedy
 from unload.agent.training import train
+from unload.agent.weights import load_policy, save_policy
 from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
 from unload.env.highest_item import HighestItemEnv
-from unload.load.substacks import Load, build_load, stack_load
+from unload.load.boxes import Load
+from unload.load.substacks import build_load, stack_load
 from unload.load.view import view
 from unload.network.peq import PEQNetwork
 from unload.network.variants import AttentionNetwork, EquivariantStack, TwoLayerScorer

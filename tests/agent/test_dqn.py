@@ -7,7 +7,7 @@ from safetensors.torch import save_file
 from torch.nn.functional import smooth_l1_loss
 
 from unload import DQN, Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
-from unload.agent.dqn import greedy_actions
+from unload.agent.greedy import greedy_actions
 from unload.network.variants import NETWORKS
 
 

@@ -6,6 +6,7 @@ import pytest
 from unload import task
 from unload.env import observation
 from unload.env.container import ContainerEnv
+from unload.load.boxes import Load
 from unload.load.contacts import ABOVE, BELOW, BESIDE
 from unload.load.substacks import (
     CELL,
@@ -17,7 +18,6 @@ from unload.load.substacks import (
     ROWS,
     ROWS_HIGH,
     WALLS,
-    Load,
     build_load,
     front_walls,
     stack_load,

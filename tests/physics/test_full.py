@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from unload import task
-from unload.load.substacks import CELL, Load, build_load, stack_load
+from unload.load.boxes import Load
+from unload.load.substacks import CELL, build_load, stack_load
 from unload.physics.bullet import World
 from unload.physics.full import (
     DEPOT,

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from unload.load.substacks import CELL, Load
+from unload.load.boxes import Load
+from unload.load.substacks import CELL
 from unload.physics.situation import Surroundings
 
 

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from unload import policies, task
-from unload.agent.dqn import load_policy
+from unload.agent.weights import load_policy
 from unload.physics.table import LiftTable
 from unload.reproduce import __main__ as reproduce
 from unload.reproduce.figures import training, tuning

@@ -6,7 +6,8 @@ import pytest
 
 from unload import policies
 from unload.agent.evaluation import evaluate
-from unload.load.substacks import Load, front_walls, stack_load
+from unload.load.boxes import Load
+from unload.load.substacks import front_walls, stack_load
 from unload.physics.bullet import World
 from unload.reproduce import robustness
 from unload.support import files

@@ -1,23 +1,17 @@
 """The masked DQN agent (Sec. II-B and III-G), and the greedy policy it leaves behind."""
 
-import json
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 from torch.nn.functional import smooth_l1_loss
 
 from unload.agent.fast import fused
 from unload.agent.fast.adam import Adam
+from unload.agent.greedy import best_actions, check_network
 from unload.agent.policies import any_allowed, check_batch
-from unload.env.equalization import TIES, equalize
-from unload.env.observation import holds_item
-from unload.network.variants import NETWORKS
-from unload.support import checks, files
+from unload.support import checks
 
 # Rows of a batch per backward pass: what one pass stores stays in the cache.
 CHUNK = 64
@@ -51,7 +45,7 @@ class DQN:
         beta: float = 1.0,
         fused_update: bool | None = None,
     ) -> None:
-        self.network = _check_network(network)
+        self.network = check_network(network)
         if fused_update is None:
             fused_update = fused.applies(network)
         self.fused_update = checks.boolean("fused_update", fused_update)
@@ -112,7 +106,7 @@ class DQN:
             if self.fused_update:
                 actions[exploit] = fused.greedy_actions(self.weights, *seen)
             else:
-                actions[exploit] = _best_actions(self.network, *seen)
+                actions[exploit] = best_actions(self.network, *seen)
         return actions
 
     def update(self, batch: dict[str, np.ndarray], rows: np.ndarray | None = None) -> float:
@@ -236,115 +230,3 @@ class DQN:
 
 def _tensors(arrays: dict[str, np.ndarray]) -> dict[str, torch.Tensor]:
     return {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
-
-
-def _check_network(network: torch.nn.Module) -> torch.nn.Module:
-    if not isinstance(network, torch.nn.Module):
-        raise TypeError(f"network is {network!r}; expected a torch.nn.Module")
-    return network
-
-
-def greedy_actions(
-    network: torch.nn.Module,
-    observations: np.ndarray,
-    masks: np.ndarray,
-    present: np.ndarray | None = None,
-) -> np.ndarray:
-    """The allowed action of the highest value, (batch,) int64.
-
-    ``present``: (batch, items) bool, the rows that hold an item; all if None.
-    """
-    return _best_actions(network, *check_batch(observations, masks), present)
-
-
-@torch.no_grad()
-def _best_actions(
-    network: torch.nn.Module,
-    observations: np.ndarray,
-    allowed: np.ndarray,
-    present: np.ndarray | None = None,
-) -> np.ndarray:
-    """``greedy_actions`` on what ``check_batch`` has returned."""
-    if fused.applies(network):  # the item's own features decide, whatever else there is
-        observations = observations.astype(np.float32, copy=False)
-        return fused.greedy_actions(fused.weights_of(network), observations, allowed)
-    arguments = [torch.as_tensor(observations, dtype=torch.float32)]
-    if present is not None and not present.all():  # other modules need not know of padding
-        arguments.append(torch.from_numpy(present))
-    values = network(*arguments)
-    return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
-
-
-class Greedy:
-    """The policy of a trained network: the allowed item of the highest value.
-
-    Called like the functions of ``unload.policies``, on observations that are not
-    equalized; it equalizes them itself if the network was trained so.
-
-    Args:
-        network: the trained network.
-        equalize: whether the network expects equalized observations.
-        ties: see ``unload.equalize``.
-    """
-
-    def __init__(self, network: torch.nn.Module, equalize: bool, ties: str = "noise") -> None:
-        self.network = _check_network(network).eval()
-        self.equalize = checks.boolean("equalize", equalize)
-        checks.one_of("ties", ties, TIES)
-        self.ties = ties
-
-    def __call__(
-        self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
-    ) -> np.ndarray:
-        present = holds_item(observations)
-        if self.equalize:
-            observations = equalize(observations, self.ties, present=present)
-        return greedy_actions(self.network, observations, masks, present)
-
-
-def save_policy(policy: Greedy, path: str | Path) -> None:
-    """Write a policy's weights and how to use them, as safetensors, in one atomic step.
-
-    Raises:
-        TypeError: ``policy`` is no ``Greedy`` of one of ``unload.architectures.NETWORKS``.
-    """
-    if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
-        known = ", ".join(kind.__name__ for kind in NETWORKS.values())
-        raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
-    settings = {
-        "network": type(policy.network).__name__,
-        "n_features": policy.network.n_features,
-        "equalize": policy.equalize,
-        "ties": policy.ties,
-    }
-    # One entry only: safetensors writes several in random order.
-    content = save(policy.network.state_dict(), metadata={"policy": json.dumps(settings)})
-    files.write_atomically(path, lambda file: file.write(content))
-
-
-def load_policy(path: str | Path) -> Greedy:
-    """Read a policy that ``save_policy`` wrote.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file is not one of a policy, or its tensors do not fit.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
-    try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}
-    except SafetensorError as error:
-        raise ValueError(f"{path} is not a safetensors file: {error}") from error
-    try:
-        settings = json.loads(metadata["policy"])
-        kinds = {kind.__name__: kind for kind in NETWORKS.values()}
-        network = kinds[settings["network"]](settings["n_features"])
-        network.load_state_dict(tensors)
-        if not all(tensor.isfinite().all() for tensor in tensors.values()):
-            raise ValueError("a weight is not finite")
-        return Greedy(network, settings["equalize"], settings["ties"])
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise ValueError(f"{path} does not hold a policy of unload: {error}") from error

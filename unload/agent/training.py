@@ -28,9 +28,11 @@ from tqdm import tqdm
 
 from unload import task
 from unload.agent.config import ENVS, TrainConfig
-from unload.agent.dqn import DQN, Greedy, load_policy, save_policy
+from unload.agent.dqn import DQN
+from unload.agent.greedy import Greedy
 from unload.agent.replay import ReplayBuffer
-from unload.load.substacks import Load
+from unload.agent.weights import load_policy, save_policy
+from unload.load.boxes import Load
 from unload.network.variants import NETWORKS
 from unload.support import files
 

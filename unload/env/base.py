@@ -7,29 +7,7 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from unload import task
 from unload.env import observation
 from unload.env.equalization import TIES, equalize
-from unload.support import checks
-from unload.support import random_state as generators
-
-# Drift of the boxes of a settled full simulation, measured in notebook 04: how far they
-# spread around the places they were put at, and how far they sink in the mean (m).
-POSITION_NOISE = 0.0005
-SINK = 0.001
-
-
-def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
-    """How far a simulator's boxes are from where they were put, (count, 3) float64 in m."""
-    offsets = rng.normal(0, position_noise, (count, 3))
-    if position_noise:
-        offsets[:, 2] -= SINK
-    return offsets
-
-
-def scaled(positions: np.ndarray) -> np.ndarray:
-    """``observation.scale`` of (n, 3) positions in m, within [-1, 1].
-
-    An item that is outside the container is seen at its edge.
-    """
-    return np.clip(observation.scale(positions), -1, 1)
+from unload.support import checks, random_state
 
 
 class PickingEnv(gymnasium.Env):
@@ -68,18 +46,18 @@ class PickingEnv(gymnasium.Env):
         Equalized if asked for, and padded.
         """
         seen = np.full((task.N_VISIBLE, 3), observation.PADDING, np.float32)
-        seen[: len(positions)] = scaled(positions)
+        seen[: len(positions)] = observation.scaled(positions)
         if not self.equalize:
             return seen
         present = np.arange(task.N_VISIBLE) < len(positions)
         return equalize(seen, self.ties, present=present)
 
     def _drift(self, count: int) -> np.ndarray:
-        return drift(count, self.position_noise, self.np_random)
+        return observation.drift(count, self.position_noise, self.np_random)
 
     def _rng_state(self) -> np.ndarray:
         """The state of ``np_random`` as a plain array."""
-        return np.array(generators.state_text(self.np_random))
+        return np.array(random_state.to_text(self.np_random))
 
     def _row(self, action: int) -> int:
         if isinstance(action, np.ndarray) and action.ndim == 0:

@@ -6,12 +6,13 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import POSITION_NOISE, PickingEnv
+from unload.env.base import PickingEnv
+from unload.env.observation import POSITION_NOISE
 from unload.env.render import Camera
-from unload.load.substacks import Load, stack_load
+from unload.load.boxes import Load, check_load
+from unload.load.substacks import stack_load
 from unload.physics.full import make_physics
-from unload.support import checks
-from unload.support import random_state as generators
+from unload.support import checks, random_state
 
 LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
 
@@ -20,12 +21,6 @@ def check_stack(stack: object) -> None:
     """Raise TypeError unless ``stack`` can make a load."""
     if not callable(stack):
         raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
-
-
-def check_load(load: object) -> None:
-    """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
-    if not isinstance(load, Load):
-        raise TypeError(f"load is {load!r}; expected an unload.Load")
 
 
 class ContainerEnv(PickingEnv):
@@ -221,13 +216,13 @@ class ContainerEnv(PickingEnv):
         removed = int((~present).sum())
         picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
         unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
-        generators.check_state_text("state['rng']", state["rng"])
+        random_state.check_text("state['rng']", state["rng"])
         self._fill(load)
         for item in np.flatnonzero(~present).tolist():
             self.physics.remove(item)
         self._blur, self._failed = blur, failed
         self._picks, self._unloaded = picks, unloaded
-        generators.set_state_text(state["rng"], self.np_random)
+        random_state.set_text(state["rng"], self.np_random)
         if any(self._ends()):
             self._state = "finished"
         self._look()

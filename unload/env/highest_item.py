@@ -4,10 +4,10 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import POSITION_NOISE, PickingEnv
+from unload.env.base import PickingEnv
+from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
-from unload.support import checks
-from unload.support import random_state as generators
+from unload.support import checks, random_state
 
 TOLERANCE = 1e-6  # m, places this close are at the same height
 # Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
@@ -123,8 +123,8 @@ class HighestItemEnv(PickingEnv):
         picks = checks.integer_array("state['picks']", state["picks"], ()).item()
         picks = checks.integer("state['picks']", picks, 0, self.max_picks)
         highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
-        generators.check_state_text("state['rng']", state["rng"])
-        generators.set_state_text(state["rng"], self.np_random)
+        random_state.check_text("state['rng']", state["rng"])
+        random_state.set_text(state["rng"], self.np_random)
         self._picks, self._highest = picks, highest
         self._state = "finished" if picks == self.max_picks else "running"
 

@@ -11,6 +11,10 @@ from unload import task
 from unload.support import checks
 
 PADDING = -1.0
+# Drift of the boxes of a settled full simulation, measured in notebook 04: how far they
+# spread around the places they were put at, and how far they sink in the mean (m).
+POSITION_NOISE = 0.0005
+SINK = 0.001
 
 
 def distance(positions: np.ndarray) -> np.ndarray:
@@ -58,6 +62,22 @@ def scale(positions: np.ndarray) -> np.ndarray:
     """
     positions = checks.finite_array("positions", positions, (None, 3))
     return (2 / task.CONTAINER * positions - 1).astype(np.float32)
+
+
+def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
+    """How far a simulator's boxes are from where they were put, (count, 3) float64 in m."""
+    offsets = rng.normal(0, position_noise, (count, 3))
+    if position_noise:
+        offsets[:, 2] -= SINK
+    return offsets
+
+
+def scaled(positions: np.ndarray) -> np.ndarray:
+    """``scale`` of (n, 3) positions in m, within [-1, 1].
+
+    An item that is outside the container is seen at its edge.
+    """
+    return np.clip(scale(positions), -1, 1)
 
 
 def holds_item(observations: np.ndarray) -> np.ndarray:

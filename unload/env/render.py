@@ -3,8 +3,8 @@
 import numpy as np
 
 from unload import task
-from unload.load.palette import package_colour
-from unload.load.substacks import Load
+from unload.load.boxes import Load
+from unload.load.substacks import package_colour
 from unload.physics.bullet import World
 from unload.support import checks
 

@@ -19,17 +19,17 @@ from gymnasium.vector.utils import batch_space
 
 from unload import task
 from unload.env import observation
-from unload.env.base import POSITION_NOISE, drift, scaled
-from unload.env.container import check_load, check_stack
+from unload.env.container import check_stack
 from unload.env.equalization import TIES, TOLERANCE
 from unload.env.fast import containers
 from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
-from unload.load.substacks import Load, stack_load
+from unload.env.observation import POSITION_NOISE, drift, scaled
+from unload.load.boxes import Load, check_load
+from unload.load.substacks import stack_load
 from unload.physics.full import shared_table
 from unload.physics.situation import Surroundings
-from unload.support import checks
-from unload.support import random_state as generators
+from unload.support import checks, random_state
 
 
 class PickingVectorEnv(gymnasium.vector.VectorEnv):
@@ -185,7 +185,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         if texts.shape != (self.num_envs,):
             raise ValueError(f"state['rng'] has shape {texts.shape}; expected ({self.num_envs},)")
         for text in texts:
-            generators.check_state_text("state['rng']", text)
+            random_state.check_text("state['rng']", text)
         actions = checks.integer_array("state['actions']", state["actions"], (None, self.num_envs))
         if actions.size and not (-1 <= actions.min() and actions.max() < task.N_VISIBLE):
             raise ValueError(
@@ -196,7 +196,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             raise ValueError("state['actions'] holds -1 after a pick; expected -1 before all picks")
         self._rngs = [np.random.default_rng() for _ in range(self.num_envs)]
         for rng, text in zip(self._rngs, texts):
-            generators.set_state_text(text, rng)
+            random_state.set_text(text, rng)
         observations, infos = self._restart()
         self._picks -= (actions < 0).sum(axis=0)
         for row in actions:
@@ -218,7 +218,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         """Begin an episode in some environments, (num_envs,) bool."""
         envs = np.flatnonzero(where)
         for env in envs:
-            self._starts[env] = generators.state_text(self._rngs[env])
+            self._starts[env] = random_state.to_text(self._rngs[env])
         self._picks[envs] = 0
         self._fill(envs)
 

@@ -9,14 +9,13 @@ Boxes of another scale, and the front of a load alone, are not in the paper: the
 a policy fares elsewhere, and make a simulation of all boxes affordable.
 """
 
-from dataclasses import dataclass, field
 from functools import cache
 
 import numba
 import numpy as np
 
 from unload import task
-from unload.load.contacts import Contacts, contacts
+from unload.load.boxes import Load
 from unload.support import checks
 
 CELLS_WIDE = 36
@@ -33,6 +32,15 @@ PACKAGES = np.array(
         (10, 6), (6, 4), (4, 4), (6, 6), (7, 6), (3, 5), (3, 3),
         (3, 2), (6, 2), (4, 2), (6, 3), (5, 2), (2, 2),
     ]
+)  # fmt: skip
+
+# Packages 0–12 as RGB in [0, 1]: large packages dark, small ones light.
+PACKAGE_COLOURS = tuple(
+    tuple(int(code[i : i + 2], 16) / 255 for i in (0, 2, 4))
+    for code in (
+        "1f3a5f", "2e6f95", "5fa8d3", "264d3b", "3f8f63", "7a3b69", "c05299",
+        "e07a5f", "b5838d", "f2b880", "8d6a9f", "d4a373", "f6e27f",
+    )
 )  # fmt: skip
 
 # Variants 0, 1, 2 of each substack: (package, left edge, lower edge) in cells (Fig. 3).
@@ -61,66 +69,9 @@ ENDS_CELLS = 16  # width of a row of a left and a right substack only
 SCALES = 0.5, 1.5  # smallest and largest scale of the boxes
 
 
-@dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
-class Load:
-    """The boxes of one container, before anything is unloaded.
-
-    Attributes:
-        positions: (n, 3) float64, centre of each box in m, inside the container.
-        sizes: (n, 3) float64, edge lengths along x, y and z in m, positive.
-        packages: (n,) int64, package number (0–12 in the paper's loads).
-        walls: (n,) int64, number of the item wall, 0 at the rear.
-        contacts: which boxes touch, found from the others.
-
-    Raises:
-        TypeError: a field's dtype is not numeric.
-        ValueError: a field's shape or a value is wrong, a box sticks out of the
-            container, or two boxes overlap.
-    """
-
-    positions: np.ndarray
-    sizes: np.ndarray
-    packages: np.ndarray
-    walls: np.ndarray
-    contacts: Contacts = field(init=False)
-
-    def __post_init__(self) -> None:
-        positions = checks.finite_array("positions", self.positions, (None, 3))
-        count = len(positions)
-        if count == 0:
-            raise ValueError("positions is empty; expected at least one box")
-        sizes = checks.finite_array("sizes", self.sizes, (count, 3))
-        if (sizes <= 0).any():
-            item = int(np.argwhere(sizes <= 0)[0, 0])
-            raise ValueError(f"sizes of box {item} are {sizes[item]}; expected all > 0")
-        labels = {}
-        for name in ("packages", "walls"):
-            labels[name] = checks.integer_array(name, getattr(self, name), (count,))
-            if (labels[name] < 0).any():
-                raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
-        low, high = positions - sizes / 2, positions + sizes / 2
-        _check_inside(low, high)
-        object.__setattr__(self, "contacts", contacts(low, high))
-        for name, array in {"positions": positions, "sizes": sizes, **labels}.items():
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
-    def __len__(self) -> int:
-        return len(self.positions)
-
-    def __repr__(self) -> str:
-        return f"Load({len(self)} items in {len(np.unique(self.walls))} walls)"
-
-
-def _check_inside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> None:
-    if (low >= -tolerance).all() and (high <= task.CONTAINER + tolerance).all():
-        return
-    outside = ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
-    item = int(np.argmax(outside))
-    raise ValueError(
-        f"box {item} reaches from {low[item]} to {high[item]} m; "
-        f"expected it inside the container, [0 0 0] to {task.CONTAINER}"
-    )
+def package_colour(package: int) -> tuple[float, float, float]:
+    """RGB of a package; numbers above 12 start again from 0."""
+    return PACKAGE_COLOURS[package % len(PACKAGE_COLOURS)]
 
 
 def check_variants(name: str, variants: object, columns: int = len(COLUMNS)) -> np.ndarray:

@@ -6,8 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 
 from unload import task
-from unload.load.palette import package_colour
-from unload.load.substacks import Load
+from unload.load.boxes import Load
+from unload.load.substacks import package_colour
 from unload.support import checks
 
 # The corners of a box, and the twelve triangles of its faces.

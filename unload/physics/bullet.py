@@ -53,6 +53,11 @@ SETTINGS = {
 }
 
 
+def slim(size: np.ndarray) -> np.ndarray:
+    """A box's edges in m with half the gap taken off each of its sides in x and y."""
+    return size - np.array([GAP, GAP, 0.0])
+
+
 class World:
     """One PyBullet client (about 28 MB) with gravity, holding axis-aligned boxes.
 

@@ -20,10 +20,9 @@ from functools import cache
 import numpy as np
 
 from unload import task
-from unload.load.substacks import Load
-from unload.physics.bullet import TIME_STEP, World
-from unload.physics.lift import lift, slim
-from unload.physics.situation import RESOLUTION, Situation, Surroundings
+from unload.load.boxes import Load
+from unload.physics.bullet import TIME_STEP, World, slim
+from unload.physics.situation import RESOLUTION, Situation, Surroundings, lift
 from unload.physics.table import LiftTable
 from unload.support import checks, files
 

@@ -16,8 +16,7 @@ import numba
 import numpy as np
 
 from unload.physics.bullet import SETTINGS, World
-from unload.physics.lift import lift
-from unload.physics.situation import Situation
+from unload.physics.situation import Situation, lift
 from unload.support import files
 
 HELD_DOWN = 3  # boxes on top that no lift moves

@@ -32,10 +32,10 @@ from tqdm import tqdm
 from unload import task
 from unload.agent import policies
 from unload.agent.config import TrainConfig
-from unload.agent.dqn import save_policy
 from unload.agent.evaluation import evaluate
 from unload.agent.sweep import run_all
 from unload.agent.training import TrainResult, train
+from unload.agent.weights import save_policy
 from unload.env import observation
 from unload.env.equalization import equalize
 from unload.physics.table import LiftTable

@@ -24,7 +24,7 @@ from tqdm import tqdm
 
 from unload import task
 from unload.agent import policies
-from unload.load.substacks import Load
+from unload.load.boxes import Load
 from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics, LocalPhysics, TablePhysics, shared_table
 from unload.support import checks, files

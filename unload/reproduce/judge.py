@@ -8,11 +8,12 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from unload.agent.config import TrainConfig
-from unload.agent.dqn import Greedy, load_policy, save_policy
 from unload.agent.evaluation import evaluate
+from unload.agent.greedy import Greedy
 from unload.agent.sweep import run_all
+from unload.agent.weights import load_policy, save_policy
+from unload.reproduce.results import read_table
 from unload.reproduce.study import EXPERIMENTS, features_of
-from unload.reproduce.tables import read_table
 from unload.support import checks, files
 from unload.support.provenance import joined, write_provenance
 

@@ -11,8 +11,9 @@ import numpy as np
 import torch
 
 from unload import task
-from unload.agent.dqn import DQN, greedy_actions
+from unload.agent.dqn import DQN
 from unload.agent.evaluation import Policy
+from unload.agent.greedy import greedy_actions
 from unload.agent.policies import random
 from unload.agent.replay import ReplayBuffer
 from unload.network.peq import PEQNetwork

@@ -4,8 +4,8 @@ from hashlib import blake2b
 from pathlib import Path
 
 from unload.agent import policies
-from unload.agent.dqn import load_policy
 from unload.agent.evaluation import Policy
+from unload.agent.weights import load_policy
 from unload.support import checks, files
 
 SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}

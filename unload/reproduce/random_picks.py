@@ -16,8 +16,9 @@ import torch
 from joblib import Parallel, delayed
 
 from unload import task
-from unload.agent.dqn import DQN, greedy_actions
+from unload.agent.dqn import DQN
 from unload.agent.evaluation import evaluate
+from unload.agent.greedy import greedy_actions
 from unload.env.equalization import equalize
 from unload.network.peq import PEQNetwork
 from unload.support import checks, files

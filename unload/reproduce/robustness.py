@@ -20,7 +20,8 @@ from tqdm import tqdm
 
 from unload.agent.evaluation import Policy, success_rate
 from unload.env.container import ContainerEnv
-from unload.load.substacks import FRONT_WALLS, Load, front_walls, stack_load
+from unload.load.boxes import Load
+from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
 from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Surroundings
 from unload.reproduce.players import POLICIES, find_policy, policy_digest

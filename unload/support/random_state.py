@@ -5,13 +5,13 @@ import json
 import numpy as np
 
 
-def state_text(rng: np.random.Generator) -> str:
+def to_text(rng: np.random.Generator) -> str:
     """The state of a generator as JSON."""
     return json.dumps(rng.bit_generator.state)
 
 
-def check_state_text(name: str, text: object) -> None:
-    """Raise ValueError unless ``text`` is a ``PCG64``'s state, as ``state_text`` writes it.
+def check_text(name: str, text: object) -> None:
+    """Raise ValueError unless ``text`` is a ``PCG64``'s state, as ``to_text`` writes it.
 
     Args:
         name: what the error calls it.
@@ -23,6 +23,6 @@ def check_state_text(name: str, text: object) -> None:
         raise ValueError(f"{name} is {text!r}; expected a generator's state") from error
 
 
-def set_state_text(text: object, rng: np.random.Generator) -> None:
-    """Let ``rng`` go on from a state that ``state_text`` wrote."""
+def set_text(text: object, rng: np.random.Generator) -> None:
+    """Let ``rng`` go on from a state that ``to_text`` wrote."""
     rng.bit_generator.state = json.loads(str(text))

@@ -11,8 +11,8 @@ from matplotlib.ticker import PercentFormatter
 from unload.reproduce.figures.style import styled
 from unload.reproduce.intervals import with_intervals
 from unload.reproduce.players import LEARNED, POLICIES
+from unload.reproduce.results import read_table
 from unload.reproduce.robustness import RESTORED
-from unload.reproduce.tables import read_table
 from unload.support import files
 
 KEY = ["policy", "mask", "condition"]

@@ -8,8 +8,7 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
 from unload.env import observation
 from unload.env.equalization import equalize
-from unload.load.palette import package_colour
-from unload.load.substacks import stack_load
+from unload.load.substacks import package_colour, stack_load
 from unload.reproduce.figures.style import styled
 
 INK, GREY = "#333333", "#9a9a9a"

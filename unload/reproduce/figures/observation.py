@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from unload.reproduce.figures.style import styled
-from unload.reproduce.tables import read_table
+from unload.reproduce.results import read_table
 from unload.support import files
 
 FOLDER = "obs_hist_equal"

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from unload import task
-from unload.reproduce import tables
+from unload.reproduce import results
 from unload.reproduce.figures.style import styled
 from unload.support import checks, files
 
@@ -29,7 +29,7 @@ def read_table(name: str, folder: str | Path = FOLDER) -> pd.DataFrame:
     """
     checks.one_of("name", name, COLUMNS)
     path = Path(folder) / f"{name}.csv"
-    return tables.read_table(path, "python benchmarks/run.py", COLUMNS[name], exact=True)
+    return results.read_table(path, "python benchmarks/run.py", COLUMNS[name], exact=True)
 
 
 def three_digits(value: float) -> str:

@@ -13,8 +13,8 @@ from matplotlib.ticker import EngFormatter, PercentFormatter
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.intervals import bootstrap_interval, with_intervals
 from unload.reproduce.judge import read_study
+from unload.reproduce.results import read_table
 from unload.reproduce.study import FEATURES
-from unload.reproduce.tables import read_table
 from unload.support import checks, files
 from unload.support.provenance import read_provenance
 

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from unload.load.palette import package_colour
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
@@ -19,6 +18,7 @@ from unload.load.substacks import (
     RIGHT,
     ROWS_HIGH,
     check_variants,
+    package_colour,
 )
 from unload.reproduce.figures.style import styled
 

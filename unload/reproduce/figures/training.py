@@ -9,7 +9,7 @@ from matplotlib.ticker import EngFormatter
 
 from unload import task
 from unload.reproduce.figures.style import mark_reduced, styled
-from unload.reproduce.tables import read_table
+from unload.reproduce.results import read_table
 from unload.support import files
 
 COLUMNS = ["Wall time", "Step", "Value"]

@@ -1,6 +1,6 @@
 import pytest
 
-from unload.reproduce.tables import read_table
+from unload.reproduce.results import read_table
 
 
 @pytest.mark.parametrize(

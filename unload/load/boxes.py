@@ -1,0 +1,77 @@
+"""The boxes of one container: where they stand, how large they are, and which of them touch."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from unload import task
+from unload.load.contacts import Contacts, contacts
+from unload.support import checks
+
+
+@dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
+class Load:
+    """The boxes of one container, before anything is unloaded.
+
+    Attributes:
+        positions: (n, 3) float64, centre of each box in m, inside the container.
+        sizes: (n, 3) float64, edge lengths along x, y and z in m, positive.
+        packages: (n,) int64, package number (0–12 in the paper's loads).
+        walls: (n,) int64, number of the item wall, 0 at the rear.
+        contacts: which boxes touch, found from the others.
+
+    Raises:
+        TypeError: a field's dtype is not numeric.
+        ValueError: a field's shape or a value is wrong, a box sticks out of the
+            container, or two boxes overlap.
+    """
+
+    positions: np.ndarray
+    sizes: np.ndarray
+    packages: np.ndarray
+    walls: np.ndarray
+    contacts: Contacts = field(init=False)
+
+    def __post_init__(self) -> None:
+        positions = checks.finite_array("positions", self.positions, (None, 3))
+        count = len(positions)
+        if count == 0:
+            raise ValueError("positions is empty; expected at least one box")
+        sizes = checks.finite_array("sizes", self.sizes, (count, 3))
+        if (sizes <= 0).any():
+            item = int(np.argwhere(sizes <= 0)[0, 0])
+            raise ValueError(f"sizes of box {item} are {sizes[item]}; expected all > 0")
+        labels = {}
+        for name in ("packages", "walls"):
+            labels[name] = checks.integer_array(name, getattr(self, name), (count,))
+            if (labels[name] < 0).any():
+                raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
+        low, high = positions - sizes / 2, positions + sizes / 2
+        _check_inside(low, high)
+        object.__setattr__(self, "contacts", contacts(low, high))
+        for name, array in {"positions": positions, "sizes": sizes, **labels}.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __repr__(self) -> str:
+        return f"Load({len(self)} items in {len(np.unique(self.walls))} walls)"
+
+
+def _check_inside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> None:
+    if (low >= -tolerance).all() and (high <= task.CONTAINER + tolerance).all():
+        return
+    outside = ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
+    item = int(np.argmax(outside))
+    raise ValueError(
+        f"box {item} reaches from {low[item]} to {high[item]} m; "
+        f"expected it inside the container, [0 0 0] to {task.CONTAINER}"
+    )
+
+
+def check_load(load: object) -> None:
+    """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
+    if not isinstance(load, Load):
+        raise TypeError(f"load is {load!r}; expected an unload.Load")
