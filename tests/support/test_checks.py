@@ -1,7 +1,14 @@
+from decimal import Decimal
+from fractions import Fraction
+
 import numpy as np
 import pytest
+import torch
 
 from unload.support import checks
+
+HUGE = (10**400, -(10**400), 10**5000)  # beyond float; Python does not print the last one
+NO_NUMBERS = (Fraction(1, 3), Decimal("0.5"), np.array([True]), np.array(1), torch.tensor(1))
 
 
 @pytest.mark.parametrize("value", [2, np.int64(2), np.uint8(2)])
@@ -26,9 +33,37 @@ def test_integer_without_an_upper_bound():
     assert checks.integer("n", 10**12, 1) == 10**12
     with pytest.raises(ValueError, match="n is 0; expected an integer >= 1$"):
         checks.integer("n", 0, 1)
+    assert checks.integer("n", np.uint64(2**63 - 1), 1) == 2**63 - 1
+    for value in (2**63, np.uint64(2**63)):  # would be negative in an array
+        with pytest.raises(ValueError, match="n is .*9223372036854775808.*<= 9223372036854775807"):
+            checks.integer("n", value, 1)
 
 
-@pytest.mark.parametrize("value", [0, 1, 0.25, np.float32(0.25)])
+@pytest.mark.parametrize("value", HUGE, ids=["1e400", "-1e400", "1e5000"])
+def test_huge_integers_are_refused_in_few_words(value):
+    for check in (
+        lambda: checks.integer("n", value, 0),
+        lambda: checks.integer("n", value, 0, 5),
+        lambda: checks.real("n", value, -1),
+        lambda: checks.one_of("n", value, (1, 2)),
+    ):
+        with pytest.raises(ValueError, match=r"^n is an integer of \d+ bits; expected "):
+            check()
+    for check in (checks.boolean, checks.generator):
+        with pytest.raises(TypeError, match=r"^n is an integer of \d+ bits; expected "):
+            check("n", value)
+
+
+@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
+def test_other_kinds_of_numbers_are_refused(value):
+    """A caller could not rely on them: NumPy and PyTorch take no Fraction, for example."""
+    with pytest.raises(TypeError, match=r"^n is .*; expected an integer >= 0$"):
+        checks.integer("n", value, 0)
+    with pytest.raises(TypeError, match=r"^x is .*; expected a number in \[0, 1\]$"):
+        checks.real("x", value, 0, 1)
+
+
+@pytest.mark.parametrize("value", [0, 1, 0.25, np.float32(0.25), np.int8(1), np.longdouble(0.25)])
 def test_real_returns_a_python_float(value):
     result = checks.real("x", value, 0, 1)
     assert result == value and type(result) is float
@@ -52,10 +87,13 @@ def test_one_of_lists_the_options():
         checks.one_of("colour", "blue", ("red", None))
 
 
-@pytest.mark.parametrize("value", [np.array(["red", "red"]), ["red"], {"red": 1}, float("nan")])
+@pytest.mark.parametrize(
+    "value",
+    [np.array(["red", "red"]), np.array(["red"]), torch.ones(2), ["red"], {"red": 1}, float("nan")],
+)
 def test_one_of_refuses_what_is_not_one_value(value):
-    with pytest.raises(ValueError, match="colour is .*; expected one of 'red', None"):
-        checks.one_of("colour", value, ("red", None))
+    with pytest.raises(ValueError, match="colour is .*; expected one of 'red', None, 1"):
+        checks.one_of("colour", value, ("red", None, 1))
 
 
 @pytest.mark.parametrize("value", [True, False, np.True_])
@@ -105,6 +143,10 @@ def test_finite_array_returns_a_float64_copy():
         ([[1j, 0, 0]], TypeError, "a has dtype complex128"),
         ([[1.0], [1.0, 2.0]], ValueError, "a has rows of different lengths; expected an array"),
         ([], ValueError, r"a has shape \(0,\); expected \(any, 3\)"),
+        ([[10**400, 0, 0]], TypeError, "a has dtype object; expected real numbers"),
+        ([[Fraction(1, 3), 0, 0]], TypeError, "a has dtype object; expected real numbers"),
+        (np.full((1, 3), np.longdouble("1e4000")), ValueError, r"a holds inf at index \(0, 0\)"),
+        (torch.ones(1, 3, requires_grad=True), TypeError, "a cannot be read as an array"),
     ],
 )
 def test_finite_array_refuses(value, error, message):
@@ -125,6 +167,8 @@ def test_integer_array():
             checks.integer_array("a", value, (2,))
     with pytest.raises(ValueError, match=r"a has shape \(1,\); expected \(2,\)"):
         checks.integer_array("a", [1], (2,))
+    with pytest.raises(ValueError, match=f"a holds {2**63}; expected integers <= {2**63 - 1}"):
+        checks.integer_array("a", np.array([1, 2**63], np.uint64), (2,))
 
 
 def test_flag_array():

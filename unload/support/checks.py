@@ -1,53 +1,69 @@
 """Errors for bad input: each names the argument, its value and what was expected."""
 
 from collections.abc import Hashable, Iterable, Mapping
-from numbers import Integral, Real
+from numbers import Integral
 
 import numpy as np
 
 # Of an array: None on an axis admits any length, None alone any shape.
 Shape = tuple[int | None, ...] | None
+LARGEST = np.iinfo(np.int64).max  # larger integers fit no array
 
 
 def one_of(name: str, value: object, options: Iterable[object]) -> None:
     """Raise ValueError unless ``value`` is one of ``options``."""
     options = list(options)
-    if not (isinstance(value, Hashable) and value in options):  # an array is not hashable
+    single = isinstance(value, Hashable) and getattr(value, "shape", ()) == ()  # no array or tensor
+    if not (single and value in options):
         known = ", ".join(repr(option) for option in options)
-        raise ValueError(f"{name} is {value!r}; expected one of {known}")
+        raise ValueError(f"{name} is {_text(value)}; expected one of {known}")
 
 
 def boolean(name: str, value: object) -> bool:
     """Return ``value`` as bool; raise TypeError unless it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} is {value!r}; expected True or False")
+        raise TypeError(f"{name} is {_text(value)}; expected True or False")
     return bool(value)
 
 
 def integer(name: str, value: object, low: int, high: int | None = None) -> int:
-    """Return ``value`` as int; raise unless it is an integer in [low, high]."""
-    upper = "" if high is None else f" and <= {high}"
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Integral):
-        raise TypeError(f"{name} is {value!r}; expected an integer >= {low}{upper}")
+    """Return ``value`` as int; raise unless it is an integer in [low, high].
+
+    Without ``high``, the limit is that of int64, 2**63 - 1.
+    """
+    wanted = f"expected an integer >= {low}" + ("" if high is None else f" and <= {high}")
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{name} is {_text(value)}; {wanted}")
+    value = int(value)
     if value < low or (high is not None and value > high):
-        raise ValueError(f"{name} is {value!r}; expected an integer >= {low}{upper}")
-    return int(value)
+        raise ValueError(f"{name} is {_text(value)}; {wanted}")
+    if value > LARGEST:
+        raise ValueError(f"{name} is {_text(value)}; {wanted} and <= {LARGEST}")
+    return value
 
 
 def real(name: str, value: object, low: float, high: float = np.inf) -> float:
-    """Return ``value`` as float; raise unless it is a finite number in [low, high]."""
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise TypeError(f"{name} is {value!r}; expected a number in [{low}, {high}]")
-    if not np.isfinite(value) or not low <= value <= high:
-        raise ValueError(f"{name} is {value!r}; expected a finite number in [{low}, {high}]")
-    return float(value)
+    """Return ``value`` as float; raise unless it is a finite number in [low, high].
+
+    Numbers are those of Python and NumPy; a ``Fraction`` or ``Decimal`` is a TypeError.
+    """
+    numbers = (int, float, np.integer, np.floating)
+    if isinstance(value, bool) or not isinstance(value, numbers):
+        raise TypeError(f"{name} is {_text(value)}; expected a number in [{low}, {high}]")
+    try:
+        number = float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        number = np.inf
+    if not np.isfinite(number) or not low <= number <= high:
+        raise ValueError(f"{name} is {_text(value)}; expected a finite number in [{low}, {high}]")
+    return number
 
 
 def generator(name: str, value: object) -> np.random.Generator:
     """Return ``value``; raise TypeError unless it is a ``numpy.random.Generator``."""
     if not isinstance(value, np.random.Generator):
         raise TypeError(
-            f"{name} is {value!r}; expected a numpy.random.Generator, "
+            f"{name} is {_text(value)}; expected a numpy.random.Generator, "
             "for example numpy.random.default_rng(0)"
         )
     return value
@@ -56,7 +72,7 @@ def generator(name: str, value: object) -> np.random.Generator:
 def entries(name: str, value: object, required: Iterable[str]) -> None:
     """Raise unless ``value`` is a mapping that holds all ``required`` names."""
     if not isinstance(value, Mapping):
-        raise TypeError(f"{name} is {value!r}; expected a dict")
+        raise TypeError(f"{name} is {_text(value)}; expected a dict")
     missing = sorted(set(required) - set(value))
     if missing:
         raise ValueError(f"{name} has no {', '.join(missing)}; expected {', '.join(required)}")
@@ -64,7 +80,9 @@ def entries(name: str, value: object, required: Iterable[str]) -> None:
 
 def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
     """Return ``value`` as a float64 array; raise unless it is finite and has ``shape``."""
-    array = _array(name, value, shape, "fiu", "real numbers").astype(np.float64)
+    array = _array(name, value, shape, "fiu", "real numbers")
+    with np.errstate(over="ignore"):  # a long double may become infinite, which is refused below
+        array = array.astype(np.float64)
     if not np.isfinite(array).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise ValueError(f"{name} holds {array[where]} at index {where}; expected finite numbers")
@@ -73,7 +91,10 @@ def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
 
 def integer_array(name: str, value: object, shape: Shape) -> np.ndarray:
     """Return ``value`` as an int64 array; raise unless it holds integers and has ``shape``."""
-    return _array(name, value, shape, "iu", "integers").astype(np.int64)
+    array = _array(name, value, shape, "iu", "integers")
+    if array.dtype == np.uint64 and array.size and array.max() > LARGEST:
+        raise ValueError(f"{name} holds {array.max()}; expected integers <= {LARGEST}")
+    return array.astype(np.int64)
 
 
 def flag_array(name: str, value: object, shape: Shape) -> np.ndarray:
@@ -91,6 +112,8 @@ def _array(name: str, value: object, shape: Shape, kinds: str, expected: str) ->
         array = np.asarray(value)
     except ValueError as error:
         raise ValueError(f"{name} has rows of different lengths; expected an array") from error
+    except (TypeError, RuntimeError) as error:  # PyTorch's, of a tensor with a gradient
+        raise TypeError(f"{name} cannot be read as an array ({error}); expected one") from error
     if array.size and array.dtype.kind not in kinds:
         raise TypeError(f"{name} has dtype {array.dtype}; expected {expected}")
     fits = shape is None or (
@@ -101,3 +124,10 @@ def _array(name: str, value: object, shape: Shape, kinds: str, expected: str) ->
         wanted = str(shape).replace("None", "any")
         raise ValueError(f"{name} has shape {array.shape}; expected {wanted}")
     return array
+
+
+def _text(value: object) -> str:
+    """``repr`` of a value, shortened: Python refuses to print more than 4300 digits."""
+    if isinstance(value, int) and abs(value) > 10**40:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
