@@ -7,6 +7,7 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
 
 import unload
+from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import LiftTable
 
 CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
@@ -307,7 +308,7 @@ def test_bad_actions_change_nothing(actions, error, message):
 )
 def test_bad_settings_are_refused(kwargs, error, message):
     with pytest.raises(error, match=message):
-        unload.vector_env.ContainerVectorEnv(**kwargs)
+        ContainerVectorEnv(**kwargs)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from unload.load.contacts import ABOVE, BELOW, BESIDE, TOLERANCE, contacts, slabs
+from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, contacts, slabs
 
 
 def corners(load):
@@ -22,8 +22,9 @@ def test_slabs_join_what_overlaps_in_a_chain():
 
 def test_contacts_are_those_found_pair_by_pair(full_load):
     low, high = corners(full_load)
-    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low) > TOLERANCE
-    ends_where_begins = np.abs(high[:, None] - low) <= TOLERANCE  # [i, j]: j begins where i ends
+    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low) > CONTACT_TOLERANCE
+    # [i, j]: j begins where i ends.
+    ends_where_begins = np.abs(high[:, None] - low) <= CONTACT_TOLERANCE
     in_line = shared[..., 0]
     above = in_line & shared[..., 1] & ends_where_begins[..., 2]
     beside = in_line & shared[..., 2] & (ends_where_begins[..., 1] | ends_where_begins[..., 1].T)

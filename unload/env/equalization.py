@@ -8,13 +8,13 @@ from unload.support import checks
 TIES = ("noise", "average")
 # Suits scaled positions: noise of a few mm is bridged, the 3.5 cm between the grid's heights
 # (0.028 scaled) are not.
-TOLERANCE = 0.005
+TIE_TOLERANCE = 0.005
 
 
 def equalize(
     positions: np.ndarray,
     ties: str = "noise",
-    tolerance: float = TOLERANCE,
+    tolerance: float = TIE_TOLERANCE,
     present: np.ndarray | None = None,
 ) -> np.ndarray:
     """Replace each coordinate by its rank among the items, spread evenly over [-1, 1].

@@ -9,7 +9,7 @@ from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 from unload.support import checks, random_state
 
-TOLERANCE = 1e-6  # m, places this close are at the same height
+HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
 # Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
 GRID = np.concatenate(
     [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
@@ -19,7 +19,7 @@ GRID = np.concatenate(
 def highest_places(places: np.ndarray) -> np.ndarray:
     """(..., items) bool, which of the (..., items, 3) places in m no other one is higher than."""
     heights = places[..., 2]
-    return heights > heights.max(axis=-1, keepdims=True) - TOLERANCE
+    return heights > heights.max(axis=-1, keepdims=True) - HEIGHT_TOLERANCE
 
 
 class HighestItemEnv(PickingEnv):

@@ -10,7 +10,7 @@ from unload.support import checks
 
 EYE = (12.5, -2.0, 4.2)  # m
 TARGET = (4.6, 1.25, 0.7)  # m
-WIDTH, HEIGHT = 640, 480  # pixels
+PICTURE_WIDTH, PICTURE_HEIGHT = 640, 480  # pixels
 WALL_COLOUR = (0.82, 0.82, 0.8)
 
 
@@ -46,7 +46,7 @@ class Camera:
                 self._bodies[item] = None
         for item in np.flatnonzero(present):
             self._world.place(self._bodies[item], positions[item])
-        return self._world.picture(EYE, TARGET, WIDTH, HEIGHT)
+        return self._world.picture(EYE, TARGET, PICTURE_WIDTH, PICTURE_HEIGHT)
 
     def _build(self, load: Load) -> None:
         self.close()

@@ -20,7 +20,7 @@ from gymnasium.vector.utils import batch_space
 from unload import task
 from unload.env import observation
 from unload.env.container import check_stack
-from unload.env.equalization import TIES, TOLERANCE
+from unload.env.equalization import TIE_TOLERANCE, TIES
 from unload.env.fast import containers
 from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
@@ -69,7 +69,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self.single_action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._features = (self.equalize, ties == "average", np.float32(TOLERANCE))
+        self._features = (self.equalize, ties == "average", np.float32(TIE_TOLERANCE))
         self._rngs: list[np.random.Generator] = []
         self._starts: list[str] = []  # the generators' states before each episode's reset
         # Of each episode so far. An environment that waits for others counts up to 0.

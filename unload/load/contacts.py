@@ -1,4 +1,4 @@
-"""Axis-aligned boxes: which of them overlap, and which touch.
+"""Overlaps and contacts of axis-aligned boxes.
 
 Boxes are given by their lower and upper corners, ``low`` and ``high``, (n, 3) float64 in m.
 """
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-TOLERANCE = 1e-4  # m, faces this close touch
+CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
 ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
 
@@ -49,9 +49,12 @@ class Contacts(NamedTuple):
 
 
 def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
-    """Who stands on whom, and who stands side by side.
+    """Find which boxes stand on each other, and which stand side by side.
 
     Boxes touch only where they share a stretch of depth, and of height or width.
+
+    Args:
+        low, high: (n, 3) float64, corners in m.
 
     Raises:
         ValueError: two boxes overlap.
@@ -67,11 +70,12 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
 
 @numba.njit(cache=True)
 def _find(low, high, order, ends):
-    """Rows (kind, box, the box that touches it so), and two boxes that overlap, or 0 twice.
+    """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
     Args:
         low, high: corners.
-        order, ends: the boxes, slab by slab, from left to right in each; where the slabs end.
+        order: (n,) the boxes, slab by slab, from left to right in each.
+        ends: where in ``order`` each slab ends.
     """
     count, start = 0, 0
     found = np.empty((8 * len(order) + 4, 3), np.int32)
@@ -82,22 +86,22 @@ def _find(low, high, order, ends):
         for i in range(start, end):
             if count + 2 * (end - i) > len(found):
                 found = np.concatenate((found, np.empty_like(found)))
-            limit = y1[i] + TOLERANCE
+            limit = y1[i] + CONTACT_TOLERANCE
             for j in range(i + 1, end):
                 if y0[j] > limit:
                     break  # j begins to the right of i, and so do all further ones
                 # Lengths of the stretches that both share; below 0 the gap between them.
                 upwards = min(z1[i], z1[j]) - max(z0[i], z0[j])
-                if upwards < -TOLERANCE:
+                if upwards < -CONTACT_TOLERANCE:
                     continue
                 across = min(y1[i], y1[j]) - y0[j]
                 along = min(x1[i], x1[j]) - max(x0[i], x0[j])
                 if min(across, upwards, along) > OVERLAP:
                     return found[:count], order[i], order[j]
-                if max(across, upwards) <= TOLERANCE or along <= TOLERANCE:
+                if max(across, upwards) <= CONTACT_TOLERANCE or along <= CONTACT_TOLERANCE:
                     continue
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
-                if across > TOLERANCE:
+                if across > CONTACT_TOLERANCE:
                     one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
                 found[count, 0], found[count, 1], found[count, 2] = one, order[i], order[j]
                 count += 1

@@ -12,7 +12,7 @@ import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
-from unload.load.contacts import ABOVE, BELOW, BESIDE, TOLERANCE
+from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
 from unload.physics.bullet import World, slim
 
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
@@ -89,11 +89,11 @@ class Surroundings:
         boxes = self._geometry[members]
         centre = boxes[0, :3].copy()
         boxes[:, :3] -= centre  # before rounding: equal situations are equal wherever they are
-        floor = -centre[2] if self._low[item, 2] <= TOLERANCE else None
+        floor = -centre[2] if self._low[item, 2] <= CONTACT_TOLERANCE else None
         sides = []
-        if self._low[dynamic, 1].min() <= TOLERANCE:
+        if self._low[dynamic, 1].min() <= CONTACT_TOLERANCE:
             sides.append(-centre[1])
-        if self._high[dynamic, 1].max() >= task.CONTAINER[1] - TOLERANCE:
+        if self._high[dynamic, 1].max() >= task.CONTAINER[1] - CONTACT_TOLERANCE:
             sides.append(task.CONTAINER[1] - centre[1])
         return Situation(
             boxes=np.rint(boxes / RESOLUTION).astype(np.int32),

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from unload import equalize
-from unload.env.equalization import TOLERANCE
+from unload.env.equalization import TIE_TOLERANCE
 from unload.env.fast.ranking import features, nearest_first, rank, remove, replace
 
-WIDTH = np.float32(TOLERANCE)
+TOLERANCE = np.float32(TIE_TOLERANCE)
 
 
 @pytest.fixture(params=["distinct", "ties", "equal"])
@@ -44,9 +44,9 @@ def test_replaced_items_leave_the_ranks_of_a_stable_sort(items, rng):
 def test_features_are_those_of_equalize(items, ties):
     observation = np.empty((128, 3), np.float32)
     ranks = ranks_of(items).astype(np.int32)
-    features(items, ranks, True, ties == "average", WIDTH, observation)
+    features(items, ranks, True, ties == "average", TOLERANCE, observation)
     assert observation.tobytes() == equalize(items.T, ties).tobytes()
-    features(items, ranks, False, ties == "average", WIDTH, observation)
+    features(items, ranks, False, ties == "average", TOLERANCE, observation)
     assert (observation == items.T).all()
 
 
@@ -55,7 +55,7 @@ def test_nearest_first_sorts_by_distance(items, rng, ties):
     distances, flags = rng.random((2, 128)).round(2), rng.random((2, 128)) < 0.5
     seen = np.stack([items.T, items.T[::-1]])
     observations, rows = np.empty_like(seen), np.empty_like(flags)
-    nearest_first(distances, seen, flags, True, ties == "average", WIDTH, observations, rows)
+    nearest_first(distances, seen, flags, True, ties == "average", TOLERANCE, observations, rows)
     for env in range(2):
         order = np.argsort(distances[env], kind="stable")
         assert observations[env].tobytes() == equalize(seen[env, order], ties).tobytes()
@@ -80,7 +80,7 @@ def test_features_of_fewer_items_are_those_of_equalize(items, ties, count):
     ranks[:, :count] = ranks_of(items[:, :count])
     observation = np.empty((128, 3), np.float32)
     present = np.arange(128) < count
-    features(items, ranks, True, ties == "average", WIDTH, observation, count)
+    features(items, ranks, True, ties == "average", TOLERANCE, observation, count)
     assert observation.tobytes() == equalize(items.T, ties, present=present).tobytes()
-    features(items, ranks, False, ties == "average", WIDTH, observation, count)
+    features(items, ranks, False, ties == "average", TOLERANCE, observation, count)
     assert (observation == np.where(present[:, None], items.T, -1)).all()

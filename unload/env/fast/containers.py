@@ -13,11 +13,11 @@ import numpy as np
 
 from unload import task
 from unload.env.fast.ranking import features, rank, remove, replace
-from unload.load.contacts import ABOVE, BELOW, BESIDE, TOLERANCE
+from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
 from unload.physics.situation import RESOLUTION
 from unload.physics.table import EMPTY, HELD_DOWN, absorb, find
 
-WIDTH = float(task.CONTAINER[1])
+CONTAINER_WIDTH = float(task.CONTAINER[1])
 N_VISIBLE = task.N_VISIBLE
 UNKNOWN = -1.0  # in place of a distance that is not in the table
 
@@ -202,12 +202,12 @@ def situation_digest(containers, env, item, members):
             for link in range(starts[kind, box], starts[kind, box + 1]):
                 if present[links[link]] and not _holds(members, count, links[link]):
                     count = _insert(members, dynamic, count, links[link])
-    on_floor = geometry[item, 2] - geometry[item, 5] / 2 <= TOLERANCE
+    on_floor = geometry[item, 2] - geometry[item, 5] / 2 <= CONTACT_TOLERANCE
     lowest, highest = np.inf, -np.inf
     for mover in range(dynamic):
         y, width = geometry[members[mover], 1], geometry[members[mover], 4]
         lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
-    at_left, at_right = lowest <= TOLERANCE, highest >= WIDTH - TOLERANCE
+    at_left, at_right = lowest <= CONTACT_TOLERANCE, highest >= CONTAINER_WIDTH - CONTACT_TOLERANCE
     digest = np.uint64(2 + on_floor + at_left + at_right + 6 * count)  # words of the key
     digest = absorb(digest, np.int32(dynamic))
     digest = absorb(digest, np.int32(on_floor))
@@ -216,7 +216,7 @@ def situation_digest(containers, env, item, members):
     if at_left:
         digest = absorb(digest, _micrometres(-geometry[item, 1]))
     if at_right:
-        digest = absorb(digest, _micrometres(WIDTH - geometry[item, 1]))
+        digest = absorb(digest, _micrometres(CONTAINER_WIDTH - geometry[item, 1]))
     for number in range(count):
         for axis in range(3):
             offset = geometry[members[number], axis] - geometry[item, axis]
