@@ -1,4 +1,9 @@
 import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
 from io import BytesIO
 
 import numpy as np
@@ -6,6 +11,8 @@ import pytest
 
 from unload.support import files
 
+# Other processes import the module alone: the package takes seconds.
+ALONE = os.path.dirname(files.__file__)
 ARRAYS = {"a": np.arange(6).reshape(2, 3), "b": np.array("text"), "c": np.array([True, False])}
 
 
@@ -38,6 +45,69 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         files.write_atomically(path, write)
     assert path.read_text() == "old"
     assert [path] == list(tmp_path.iterdir())
+
+
+def test_two_writers_of_one_file_do_not_meet(tmp_path):
+    path = tmp_path / "file"
+
+    def write_slowly(file):
+        file.write(b"slow")
+        files.write_text(path, "another process was faster")
+        assert path.read_text() == "another process was faster"
+
+    files.write_atomically(path, write_slowly)
+    assert path.read_text() == "slow"
+    assert [path] == list(tmp_path.iterdir())
+
+
+def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tmp_path):
+    path = tmp_path / "file"
+    files.write_text(path, "old")
+    script = """if True:
+        import os, sys
+        import files
+
+        def write(file):
+            file.write(b"half of the n")
+            file.flush()
+            os._exit(9)
+
+        files.write_atomically(sys.argv[1], write)
+    """
+    killed = subprocess.run([sys.executable, "-c", script, path], cwd=ALONE)
+    assert killed.returncode == 9
+    (leftover,) = set(tmp_path.iterdir()) - {path}
+    assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", leftover.name)
+    assert "*.partial" in (files.ROOT / ".gitignore").read_text().splitlines()
+    files.write_text(path, "new")
+    assert path.read_text() == "new" and leftover.read_bytes() == b"half of the n"
+
+
+@pytest.fixture
+def full_disk():
+    """A limit on the size of files: writing beyond it is an OSError, as on a full disk."""
+    resource = pytest.importorskip("resource", reason="Windows has no limit on file sizes")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_a_full_disk_is_an_error_that_names_the_file(tmp_path, full_disk):
+    for path, write, content in (
+        (tmp_path / "long.txt", files.write_text, "x" * 10_000),
+        (tmp_path / "large.npz", files.write_arrays, {"a": np.ones(10_000)}),
+    ):
+        with pytest.raises(OSError, match=f"cannot write this file: .*'{path}'$"):
+            write(path, content)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_in_the_place_of_the_file_is_named(tmp_path):
+    (tmp_path / "x.json").mkdir()
+    with pytest.raises(IsADirectoryError, match=f"cannot write this file: .*'{tmp_path}/x.json'$"):
+        files.write_json(tmp_path / "x.json", {})
+    assert [tmp_path / "x.json"] == list(tmp_path.iterdir())
 
 
 def test_a_reader_of_the_old_file_is_not_disturbed(tmp_path):
@@ -90,6 +160,148 @@ def test_damaged_arrays_are_refused_by_name(tmp_path, damage):
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
         files.read_arrays(path)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "{'descr': '<i8', 'fortran_order': False, 'shape': (10_000_000_000_000,)}",
+        "{'descr': '<i8', 'fortran_order': False, 'shape': (",
+        "'" * 3,
+    ],
+    ids=["too large", "no end", "no string"],
+)
+def test_bad_headers_of_arrays_are_refused_by_name(tmp_path, header):
+    """Intact zip files, whose checksums are right."""
+    start = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little")
+    with zipfile.ZipFile(tmp_path / "arrays.npz", "w") as file:
+        file.writestr("a.npy", start + header.encode())
+    with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
+        files.read_arrays(tmp_path / "arrays.npz")
+
+
+def test_zip_files_of_something_else_are_refused_by_name(tmp_path):
+    with zipfile.ZipFile(tmp_path / "arrays.npz", "w") as file:
+        file.writestr("a.txt", "hello")
+    with pytest.raises(ValueError, match="arrays.npz is not .*: a.txt is not an array"):
+        files.read_arrays(tmp_path / "arrays.npz")
+
+
+def test_every_damaged_byte_is_refused_by_name_or_harmless(tmp_path, rng):
+    path = tmp_path / "arrays.npz"
+    files.write_arrays(path, ARRAYS)
+    whole = path.read_bytes()
+    refused = 0
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + rng.bytes(1) + whole[place + 1 :])
+        try:
+            arrays = files.read_arrays(path)
+            assert all(isinstance(array, np.ndarray) for array in arrays.values())
+        except ValueError as error:
+            assert str(error).startswith(f"{path} is not a readable .npz file")
+            refused += 1
+    assert refused > len(whole) / 2
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is not a readable JSON file"),
+        ('{"a": 1', "is not a readable JSON file"),
+        ("[" * 100_000, "is not a readable JSON file: maximum recursion depth"),
+        ('{"a": ' + "1" * 5_000 + "}", "is not a readable JSON file: Exceeds the limit"),
+        ("[1, 2]", "holds a list; expected an object"),
+        ("[" * 900 + "]" * 900, "holds a list; expected an object"),
+    ],
+    ids=["empty", "no end", "too deep", "too many digits", "a list", "deep"],
+)
+def test_bad_json_is_refused_by_name(tmp_path, text, message):
+    (tmp_path / "x.json").write_text(text)
+    with pytest.raises(ValueError, match=f"^{tmp_path}/x.json {message}"):
+        files.read_json(tmp_path / "x.json")
+
+
+def test_json_of_other_encodings_is_refused_by_name(tmp_path):
+    (tmp_path / "x.json").write_bytes(b'{"a": "\xff"}')
+    with pytest.raises(ValueError, match="x.json is not a readable JSON file"):
+        files.read_json(tmp_path / "x.json")
+
+
+def test_digest_is_that_of_the_content(tmp_path):
+    """Known from the command ``b2sum --length 128``."""
+    path = tmp_path / "file"
+    path.write_bytes(b"abc")
+    digest = files.digest(path)
+    assert digest == "cf4ab791c62b8d2b2109c90275287816"
+    files.check_digest(path, digest)
+    path.write_bytes(b"abd")
+    with pytest.raises(ValueError, match=f"{path} was changed or damaged: .*, expected {digest}"):
+        files.check_digest(path, digest)
+    with pytest.raises(FileNotFoundError, match="missing"):
+        files.digest(tmp_path / "missing")
+
+
+def hold(folder, then):
+    """Start a process that locks a folder, says so, and goes on with ``then``."""
+    script = f"""if True:
+        import sys, time
+        import files
+
+        with files.locked(sys.argv[1]):
+            print("locked", flush=True)
+            {then}
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-c", script, folder],
+        cwd=ALONE, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout.readline() == "locked\n"
+    return process
+
+
+def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
+    folder = tmp_path / "run"
+    with hold(folder, "sys.stdin.read()") as owner:
+        for _ in range(2):  # the lock survives the first refusal
+            message = f"{folder} is in use by process {owner.pid} on .+ since 20.*; wait, or take"
+            with pytest.raises(RuntimeError, match=message), files.locked(folder):
+                pytest.fail("two processes hold one lock")
+        with files.locked(tmp_path / "another"):
+            pass
+        owner.communicate("")  # it leaves the block
+    with files.locked(folder):
+        pass
+    assert not list(folder.iterdir())
+
+
+def test_a_killed_process_holds_no_lock(tmp_path):
+    with hold(tmp_path, "time.sleep(600)") as owner:
+        owner.kill()
+    assert (tmp_path / "lock").read_text().startswith(f"process {owner.pid} on ")
+    with files.locked(tmp_path):
+        assert (tmp_path / "lock").read_text().startswith(f"process {os.getpid()} on ")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_lock_is_released_after_an_error_and_kept_from_another_block(tmp_path):
+    with pytest.raises(KeyError), files.locked(tmp_path):
+        message = f"in use by process {os.getpid()} on"
+        with pytest.raises(RuntimeError, match=message), files.locked(tmp_path):
+            pytest.fail("two blocks hold one lock")
+        raise KeyError
+    with files.locked(tmp_path):
+        pass
+
+
+def test_without_locks_of_the_system_the_file_itself_is_the_lock(tmp_path, monkeypatch):
+    """As on Windows."""
+    monkeypatch.setattr(files, "fcntl", None)
+    for _ in range(2):
+        with files.locked(tmp_path):
+            message = f"by process {os.getpid()} on .*; if it has ended, remove {tmp_path}/lock"
+            with pytest.raises(RuntimeError, match=message), files.locked(tmp_path):
+                pytest.fail("two blocks hold one lock")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_missing_file_is_named(tmp_path):

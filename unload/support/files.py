@@ -1,13 +1,26 @@
-"""Files that are either whole or absent, and the folders of the repository."""
+"""Files that are either whole or absent, their digests, locked folders, and the repository's.
+
+Errors name the file: a damaged one is a ValueError whatever the decoder raises, one that
+cannot be written an OSError.
+"""
 
 import json
 import os
-from collections.abc import Callable
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
+from hashlib import blake2b, file_digest
 from pathlib import Path
-from typing import BinaryIO
-from zipfile import BadZipFile
+from typing import BinaryIO, TextIO
+from uuid import uuid4
 
 import numpy as np
+
+try:
+    import fcntl
+except ImportError:  # on Windows
+    fcntl = None
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "data"
@@ -16,23 +29,41 @@ RUNS = ROOT / "runs"  # training runs, not kept in the repository
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], None]) -> None:
-    """Let ``write`` fill a file that replaces ``path`` only once it is complete on disk."""
+    """Let ``write`` fill a file that replaces ``path`` only once it is complete on disk.
+
+    Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
+    processes may write one file: the last to finish wins. A killed writer leaves its partial
+    file behind, which nothing reads and git ignores.
+
+    Raises:
+        OSError: the disk is full or the folder cannot be written to; the error names ``path``.
+    """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(path.name + ".partial")
+    partial = path.with_name(f"{path.name}.{uuid4().hex}.partial")
     try:
-        with open(partial, "wb") as file:
+        with open(partial, "xb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, path)
+        _sync_folder(path.parent)
+    except OSError as error:
+        reason = f"cannot write this file: {error.strerror or error}"
+        raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
-    folder = os.open(path.parent, os.O_RDONLY)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Let the new name of a file outlast a power cut."""
+    if os.name != "posix":
+        return  # Windows cannot open a folder
+    descriptor = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(folder)
+        os.fsync(descriptor)
     finally:
-        os.close(folder)
+        os.close(descriptor)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -53,11 +84,11 @@ def read_json(path: str | Path) -> dict:
         ValueError: it is damaged or holds something else.
     """
     try:
-        value = json.loads(Path(path).read_text())
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        value = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError, MemoryError) as error:  # RecursionError: of deep nesting
         raise ValueError(f"{path} is not a readable JSON file: {error}") from error
     if not isinstance(value, dict):
-        raise ValueError(f"{path} holds {value!r}; expected an object")
+        raise ValueError(f"{path} holds a {type(value).__name__}; expected an object")
     return value
 
 
@@ -70,12 +101,102 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
     """Read an ``.npz`` file of plain arrays.
 
     Raises:
+        FileNotFoundError: there is no such file.
         ValueError: the file is damaged or not of this kind.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            arrays = {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, KeyError, EOFError, TypeError, BadZipFile) as error:
+    except Exception as error:  # zipfile, zlib, tokenize and NumPy each raise errors of their own
         raise ValueError(f"{path} is not a readable .npz file: {error}") from error
+    for name, array in arrays.items():
+        if not isinstance(array, np.ndarray):
+            raise ValueError(f"{path} is not a readable .npz file: {name} is not an array")
+    return arrays
+
+
+def digest(path: str | Path) -> str:
+    """Digest of a file's bytes: BLAKE2b, 32 hexadecimal digits.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    with open(path, "rb") as file:
+        return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
+
+
+def check_digest(path: str | Path, wanted: str) -> None:
+    """Raise ValueError unless a file's bytes have the digest that was stored elsewhere.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file has been changed or damaged since.
+    """
+    found = digest(path)
+    if found != wanted:
+        raise ValueError(f"{path} was changed or damaged: its digest is {found}, expected {wanted}")
+
+
+@contextmanager
+def locked(folder: str | Path) -> Iterator[None]:
+    """Keep all other processes that ask for it out of ``folder``, which is made if missing.
+
+    ``folder/lock`` names the owner while the lock is held, and is removed afterwards. The
+    operating system releases the lock of a process that dies, so that a ``lock`` file which a
+    killed process has left behind stops nobody. (On Windows it does, and has to be removed.)
+
+    Raises:
+        RuntimeError: another process, or another block of this one, holds the lock.
+        OSError: the folder's file system has no locks; the error names the folder.
+    """
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "lock"
+    file = _take_lock(path)
+    if file is None:
+        owner = _read_owner(path)
+        hint = "" if fcntl else f"; if it has ended, remove {path}"
+        raise RuntimeError(f"{folder} is in use by {owner}; wait, or take another folder{hint}")
+    started = datetime.now().astimezone().isoformat(timespec="seconds")
+    with file:
+        file.truncate(0)
+        file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n")
+        file.flush()
+        try:
+            yield
+        finally:
+            if not fcntl:
+                file.close()  # Windows removes no open file
+            path.unlink(missing_ok=True)  # before the lock goes, or it might be the next one's
+
+
+def _take_lock(path: Path) -> TextIO | None:
+    """The lock's file, open and owned by the caller; None if it has another owner."""
+    if not fcntl:
+        try:
+            return open(path, "x")
+        except FileExistsError:
+            return None
+    while True:
+        file = open(path, "a")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            file.close()
+            if isinstance(error, BlockingIOError):
+                return None
+            reason = f"cannot lock this folder: {error.strerror}"
+            raise OSError(error.errno, reason, str(path.parent)) from error
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                return file
+        file.close()  # the owner before has removed this file meanwhile: lock the one that counts
+
+
+def _read_owner(path: Path) -> str:
+    """What a lock's file says of its owner, who may be about to write it or to leave."""
+    with suppress(OSError):
+        return path.read_text().strip() or "another process"
+    return "another process"
