@@ -1,10 +1,14 @@
 """Where results come from."""
 
 import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
-from unload.support import provenance
+from unload.support import files, provenance
 
 
 def test_written_and_read(tmp_path):
@@ -35,3 +39,74 @@ def test_records_are_joined():
     assert together["peak_memory_mib"] == 10**6
     assert together["revision"] == [first["revision"], "another"]
     assert together["machine"] == first["machine"]
+
+
+# Git sets variables for its hooks, which would lead the tests' git to another repository.
+OUTSIDE = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+
+
+def commit(folder: Path) -> str:
+    """Make a repository of a folder; its commit."""
+    git = ["git", "-C", str(folder), "-c", "user.name=a", "-c", "user.email=a@b"]
+    git += ["-c", "commit.gpgsign=false"]
+    for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "theirs"]):
+        subprocess.run([*git, *command], check=True, env=OUTSIDE)
+    command = [*git, "rev-parse", "--short=12", "HEAD"]
+    return subprocess.check_output(command, text=True, env=OUTSIDE).strip()
+
+
+def revision_of_copy(folder: Path, **environment: str) -> str:
+    """What the package's copy in ``folder`` gives as its revision."""
+    script = "from unload.support import provenance; print(provenance.revision())"
+    return subprocess.check_output(
+        [sys.executable, "-c", script], cwd=folder, text=True, env=OUTSIDE | environment
+    ).strip()
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A folder with the part of the package that finds the revision, and no repository."""
+    package = tmp_path / "copy" / "unload"
+    shutil.copytree(
+        files.ROOT / "unload" / "support", package / "support",
+        ignore=shutil.ignore_patterns("__pycache__"),
+    )  # fmt: skip
+    (package / "__init__.py").touch()
+    return package.parent
+
+
+def test_the_projects_own_commit_is_its_revision(copy):
+    shutil.copy(files.ROOT / "pyproject.toml", copy)
+    own = commit(copy)
+    (copy / "README.md").write_text("not part of the package")
+    (copy / ".gitignore").write_text("__pycache__\n")
+    assert revision_of_copy(copy) == own
+    (copy / "unload" / "task.py").touch()
+    assert revision_of_copy(copy) == f"{own}+"
+
+
+@pytest.mark.parametrize("with_project", [True, False])
+def test_an_enclosing_repositorys_commit_is_not_the_revision(copy, with_project):
+    """As where the package was copied into the work of others, with all its files or alone."""
+    if with_project:
+        shutil.copy(files.ROOT / "pyproject.toml", copy)
+    commit(copy.parent)
+    assert revision_of_copy(copy) == "unknown"
+
+
+@pytest.mark.parametrize("project", [None, '[project]\nname = "theirs"\n', "[tool]\n", "["])
+def test_a_repository_of_another_project_is_not_ours(copy, project):
+    if project is not None:
+        (copy / "pyproject.toml").write_text(project)
+    commit(copy)
+    assert revision_of_copy(copy) == "unknown"
+
+
+def test_a_repository_named_by_the_environment_is_not_ours(copy, tmp_path):
+    """Git sets GIT_DIR for its hooks."""
+    shutil.copy(files.ROOT / "pyproject.toml", copy)
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "file").touch()
+    commit(other)
+    assert revision_of_copy(copy, GIT_DIR=str(other / ".git")) == "unknown"

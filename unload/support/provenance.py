@@ -1,9 +1,10 @@
-"""Where a result comes from, written beside it."""
+"""Provenance of results: command, settings, code, versions, machine and time, as JSON."""
 
 import os
 import platform
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import version
@@ -25,8 +26,8 @@ def write_provenance(
     """Write ``folder/name.provenance.json``.
 
     Args:
-        folder: of the data.
-        name: of the data file or set, for example ``"observation"``.
+        folder: folder of the data.
+        name: name of the data file or set, for example ``"observation"``.
         command: what computes it again.
         settings: configuration and seeds.
         reduced: whether the run is smaller than the paper's.
@@ -37,16 +38,17 @@ def write_provenance(
 
 
 def read_provenance(folder: str | Path, name: str) -> dict:
-    """What ``write_provenance`` wrote.
+    """Return the content of ``folder/name.provenance.json``.
 
     Raises:
         FileNotFoundError: the data has no provenance.
+        ValueError: the file is damaged.
     """
     return files.read_json(Path(folder) / f"{name}.provenance.json")
 
 
 def run_record(seconds: float) -> dict:
-    """What this process can say about a result that it has computed.
+    """Record of the process that has computed a result.
 
     Args:
         seconds: wall time.
@@ -66,9 +68,10 @@ def run_record(seconds: float) -> dict:
 
 
 def joined(records: Iterable[dict]) -> dict:
-    """One record of several runs: their wall times added up, the highest peak of memory.
+    """Return one record of several runs.
 
-    Where they differ in the rest, all values are listed.
+    Their number, the sum of their wall times, the highest peak of memory; and of the rest the
+    one value that all share, or the list of those that occur.
     """
     records = list(records)
     rest = {}
@@ -88,24 +91,32 @@ def joined(records: Iterable[dict]) -> dict:
 
 @cache
 def revision() -> str:
-    """The commit the code is at, with ``+`` if it was changed since."""
+    """The project's commit, with ``+`` if the package was changed since.
 
-    def git(*arguments: str) -> str:
-        command = ["git", "-C", str(files.ROOT), *arguments]
-        return subprocess.check_output(command, text=True, stderr=subprocess.DEVNULL)
+    ``"unknown"`` where the package does not lie in the project's own repository: a copy of it
+    in another one must not report that one's commits.
+    """
+    root = files.ROOT
+    # A named repository, because git would otherwise take an enclosing one.
+    git = ["git", "--git-dir", str(root / ".git"), "--work-tree", str(root)]
+
+    def output(*arguments: str) -> str:
+        command = [*git, *arguments]
+        return subprocess.check_output(command, cwd=root, text=True, stderr=subprocess.DEVNULL)
 
     try:
-        commit, changed = (
-            git("rev-parse", "--short=12", "HEAD"),
-            git("status", "--porcelain", "unload"),
-        )
-    except (OSError, subprocess.CalledProcessError):
+        project = tomllib.loads((root / "pyproject.toml").read_text())["project"]["name"]
+        if project != "unload":
+            return "unknown"
+        commit = output("rev-parse", "--short=12", "HEAD").strip()
+        changed = output("status", "--porcelain", "unload")
+    except (OSError, KeyError, tomllib.TOMLDecodeError, subprocess.CalledProcessError):
         return "unknown"
-    return commit.strip() + ("+" if changed else "")
+    return commit + ("+" if changed else "")
 
 
 def _cpu() -> str:
-    """The processor's name."""
+    """Name of the processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
         return next(line.split(": ", 1)[1] for line in lines if line.startswith("model name"))
@@ -114,7 +125,7 @@ def _cpu() -> str:
 
 
 def _peak_memory() -> int | None:
-    """The most memory that this process has held so far, in MiB; None where not known."""
+    """Highest memory use of this process so far, in MiB; None where the system does not say."""
     try:
         import resource  # not on Windows
     except ImportError:
