@@ -1,14 +1,10 @@
-import json
-
 import numpy as np
 import pytest
 import torch
-from safetensors.torch import save_file
 from torch.nn.functional import smooth_l1_loss
 
-from unload import DQN, Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
+from unload import DQN, Greedy, PEQNetwork
 from unload.agent.greedy import greedy_actions
-from unload.network.variants import NETWORKS
 
 
 class HeightNetwork(torch.nn.Module):
@@ -43,12 +39,6 @@ def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> di
     }
 
 
-def of_network(name: object) -> dict[str, str]:
-    """The metadata of a policy's file."""
-    settings = {"network": name, "n_features": 8, "equalize": True, "ties": "noise"}
-    return {"policy": json.dumps(settings)}
-
-
 def without_next(batch: dict) -> dict:
     return {name: batch[name] for name in ("observations", "actions", "rewards")}
 
@@ -72,18 +62,6 @@ def test_without_exploration_the_best_allowed_item_is_chosen(rng):
     masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]])
     assert DQN(HeightNetwork()).act(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
     assert DQN(HeightNetwork(-1.0)).act(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
-
-
-def test_greedy_actions_are_those_of_the_highest_value(rng):
-    network = peq()
-    observations = rng.uniform(-1, 1, (100, 30, 3)).astype(np.float32)
-    masks = rng.integers(2, size=(100, 30)).astype(bool)
-    masks[:, 0] = True
-    values = network(torch.from_numpy(observations)).detach().numpy()
-    chosen = greedy_actions(network, observations, masks)
-    best = np.where(masks, values, -np.inf).max(axis=1)
-    assert masks[np.arange(100), chosen].all()
-    assert values[np.arange(100), chosen] == pytest.approx(best, abs=1e-6)
 
 
 def test_epsilon_is_the_share_of_random_actions(rng):
@@ -294,17 +272,6 @@ def test_what_is_no_network_or_no_batch_is_refused():
         Greedy(peq(), equalize=1.0)
 
 
-def test_only_learned_policies_are_saved(tmp_path):
-    class Subclass(PEQNetwork):
-        """Its file would be read as another network."""
-
-    others = (Greedy(network, equalize=False) for network in (HeightNetwork(), Subclass()))
-    for policy in (policies.highest, *others):
-        with pytest.raises(TypeError, match="policy is .*; expected a Greedy of one of PEQNetwork"):
-            save_policy(policy, tmp_path / "policy.safetensors")
-    assert not list(tmp_path.iterdir())
-
-
 def test_bootstrapping_needs_what_follows(rng):
     batch = without_next(make_batch(rng))
     with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
@@ -314,97 +281,3 @@ def test_bootstrapping_needs_what_follows(rng):
 def test_a_fused_update_of_another_network_is_refused():
     with pytest.raises(ValueError, match="fused_update is True; expected a PEQNetwork"):
         DQN(HeightNetwork(), fused_update=True)
-
-
-# --- policies -----------------------------------------------------------------------
-
-
-@pytest.fixture
-def observations(rng) -> np.ndarray:
-    return rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
-
-
-def test_greedy_equalizes_what_its_network_expects(observations, rng):
-    masks = np.ones(observations.shape[:2])
-    for ties in ("noise", "average"):
-        policy = Greedy(peq(), equalize=True, ties=ties)
-        expected = greedy_actions(policy.network, equalize(observations, ties), masks)
-        assert (policy(observations, masks, rng) == expected).all()
-    raw = Greedy(peq(), equalize=False)(observations, masks, rng)
-    assert (raw == greedy_actions(peq(), observations, masks)).all()
-    assert (raw != expected).any()
-
-
-@pytest.mark.parametrize("kind", NETWORKS.values())
-@pytest.mark.parametrize(("equalized", "ties"), [(True, "average"), (False, "noise")])
-def test_a_saved_policy_comes_back(tmp_path, observations, rng, equalized, ties, kind):
-    network = kind(6, torch.Generator().manual_seed(0))
-    policy, path = Greedy(network, equalized, ties), tmp_path / "policy.safetensors"
-    save_policy(policy, path)
-    loaded = load_policy(path)
-    assert type(loaded.network) is kind
-    assert (loaded.equalize, loaded.ties, loaded.network.n_features) == (equalized, ties, 6)
-    for mine, theirs in zip(weights(loaded.network), weights(policy.network)):
-        assert torch.equal(mine, theirs)
-    masks = np.ones(observations.shape[:2])
-    assert (loaded(observations, masks, rng) == policy(observations, masks, rng)).all()
-
-
-def test_equal_policies_give_equal_bytes(tmp_path):
-    paths = [tmp_path / "a.safetensors", tmp_path / "b.safetensors"]
-    for path in paths:
-        save_policy(Greedy(peq(), True), path)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
-
-
-def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(FileNotFoundError, match="none.safetensors"):
-        load_policy(tmp_path / "none.safetensors")
-
-
-@pytest.mark.parametrize("content", [b"", b"weights", None], ids=["empty", "text", "half"])
-def test_a_damaged_file_is_refused(tmp_path, content):
-    path = tmp_path / "policy.safetensors"
-    save_policy(Greedy(peq(), True), path)
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2] if content is None else content)
-    with pytest.raises(ValueError, match="policy.safetensors is not a safetensors file"):
-        load_policy(path)
-
-
-@pytest.mark.parametrize(
-    "metadata",
-    [None, {"format": "pt"}, *map(of_network, ("Unknown", "EquivariantStack", [], None))],
-)
-def test_weights_of_others_are_refused(tmp_path, metadata):
-    path = tmp_path / "foreign.safetensors"
-    save_file(peq().state_dict(), path, metadata=metadata)
-    with pytest.raises(ValueError, match="foreign.safetensors does not hold a policy"):
-        load_policy(path)
-
-
-@pytest.mark.parametrize(
-    ("owner", "name", "value"),
-    [
-        ("network", "n_features", 9),
-        ("network", "n_features", "many"),
-        ("network", "n_features", 0),
-        ("policy", "equalize", "maybe"),
-        ("policy", "ties", "coin"),
-    ],
-)
-def test_settings_that_do_not_fit_are_refused_by_name(tmp_path, owner, name, value):
-    path, policy = tmp_path / "changed.safetensors", Greedy(peq(), True)
-    setattr(policy if owner == "policy" else policy.network, name, value)
-    save_policy(policy, path)
-    with pytest.raises(ValueError, match="changed.safetensors does not hold a policy"):
-        load_policy(path)
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_weights_that_are_not_finite_are_refused(tmp_path, value):
-    path, policy = tmp_path / "nan.safetensors", Greedy(peq(), True)
-    torch.nn.init.constant_(policy.network.scorer.bias, value)
-    save_policy(policy, path)
-    with pytest.raises(ValueError, match="nan.safetensors does not hold a policy"):
-        load_policy(path)

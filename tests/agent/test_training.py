@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from importlib import import_module
 from pathlib import Path
 
 import gymnasium
@@ -18,7 +17,11 @@ import pytest
 import torch
 
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
-from unload.agent.training import CURVE_COLUMNS, ENVS
+from unload.agent.checkpoint import RunFolder
+from unload.agent.config import ENVS
+from unload.agent.curve import CURVE_COLUMNS
+from unload.agent.rollout import Rollout
+from unload.agent.training import Training
 from unload.env.vector import ContainerVectorEnv
 from unload.network.variants import NETWORKS
 from unload.support import files
@@ -52,15 +55,10 @@ def config(request) -> TrainConfig:
     return TrainConfig(**RUNS[request.param])
 
 
-def run_class() -> type:
-    """What ``train`` keeps of a run in progress."""
-    return import_module("unload.agent.training")._Run  # unload.train itself is the function
-
-
 @contextmanager
-def at(method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
-    """Do something right after a call of a run's method; calls are counted from 1."""
-    call, count = getattr(run_class(), method), itertools.count(1)
+def at(owner: type, method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Do something right after a call of a method; calls are counted from 1."""
+    call, count = getattr(owner, method), itertools.count(1)
 
     def watched(*arguments):
         result = call(*arguments)
@@ -69,13 +67,18 @@ def at(method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
         return result
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_class(), method, watched)
+        patch.setattr(owner, method, watched)
         yield
 
 
 def at_step(number: int, action: Callable[[], None]):
     """Do something right after a training step."""
-    return at("_step", number, action)
+    return at(Training, "step", number, action)
+
+
+def at_pick(number: int, action: Callable[[], None]):
+    """Do something right after the picks of a step, be they new or repeated."""
+    return at(Rollout, "pick", number, action)
 
 
 def crash() -> None:
@@ -94,14 +97,15 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
 
 
 @contextmanager
-def begun(config: TrainConfig, folder: Path) -> Iterator:
+def begun(config: TrainConfig, folder: Path) -> Iterator[Training]:
     """A run in progress that has gone on from its checkpoint, if it has one."""
-    run = run_class()(config, folder, None, [])
+    run = Training(config)
     try:
-        run.restore()
+        for _ in RunFolder(folder).restore(run):
+            pass
         yield run
     finally:
-        run.envs.close()
+        run.rollout.close()
 
 
 def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
@@ -152,6 +156,7 @@ def test_what_a_run_leaves(tmp_path, config):
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
     stored = json.loads((tmp_path / "run" / "config.json").read_text())
     assert len(stored.pop("first_loads")) == 32
+    assert stored.pop("digests").keys() == {"policy.safetensors", "curve.csv"}
     assert TrainConfig(**stored) == config
 
 
@@ -180,9 +185,9 @@ def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
     with begun(config, tmp_path) as run:
         run.agent.choose = lambda *arguments: np.array([5])
         for _ in range(11):
-            run._step()
+            run.step()
     rewards = run.replay.arrays["rewards"]
-    point = dict(zip(CURVE_COLUMNS, run.curve[-1], strict=True))
+    point = dict(zip(CURVE_COLUMNS, run.curve.points[-1], strict=True))
     assert 0 < (rewards[:-1] < 0).sum() < 10
     assert point["deadlocked"] == pytest.approx((rewards[:-1] < 0).sum() / 11)
     assert point["mean_reward"] == pytest.approx(rewards.mean())
@@ -216,9 +221,9 @@ def test_a_failed_pick_is_the_less_bad_the_higher_its_item(tmp_path, equalize):
         config = TrainConfig(**plain | {"height_reward": height_reward})
         with begun(config, tmp_path / str(height_reward)) as run:
             for _ in range(25):
-                run._step()
+                run.step()
         memories.append(run.replay.arrays)
-        curves.append(dict(zip(CURVE_COLUMNS, run.curve[-1], strict=True)))
+        curves.append(dict(zip(CURVE_COLUMNS, run.curve.points[-1], strict=True)))
     true, shaped = memories
     assert (true["actions"] == shaped["actions"]).all()
     heights = shaped["observations"][np.arange(100), shaped["actions"], 2]
@@ -294,27 +299,28 @@ def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):
     for steps in (1, 23, 24, 25, config.picks // config.num_envs):
         with begun(config, tmp_path / str(steps)) as run:
             for _ in range(steps):
-                run._step()
-            run._save()
+                run.step()
+            RunFolder(tmp_path / str(steps)).save(run)
             with begun(config, tmp_path / str(steps)) as other:
-                assert other.steps == steps and other.replay.total == run.replay.total
+                assert other.rollout.steps == steps and other.replay.total == run.replay.total
                 filled = len(run.replay)
                 for name, array in run.replay.arrays.items():
                     assert (array[:filled] == other.replay.arrays[name][:filled]).all(), name
-                assert (run.observations == other.observations).all()
-                assert (run.masks == other.masks).all()
+                assert (run.rollout.observations == other.rollout.observations).all()
+                assert (run.rollout.masks == other.rollout.masks).all()
                 assert (run.agent.state()["network.scorer.weight"]
                         == other.agent.state()["network.scorer.weight"]).all()  # fmt: skip
-                assert [first for first, _ in run.starts] == [first for first, _ in other.starts]
+                assert run.rollout.state()["start"] == other.rollout.state()["start"]
 
 
 def test_a_checkpoint_is_small(tmp_path):
     config = TrainConfig(num_envs=64, picks=6400, replay_size=6400, batch_size=8, n_features=4)
     with begun(config, tmp_path) as run:
         for _ in range(100):
-            run._step()
-        run._save()
-        assert run.checkpoint.stat().st_size < 0.01 * run.replay.arrays["observations"].nbytes
+            run.step()
+        folder = RunFolder(tmp_path)
+        folder.save(run)
+        assert folder.checkpoint.stat().st_size < 0.01 * run.replay.arrays["observations"].nbytes
 
 
 def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):
@@ -323,7 +329,7 @@ def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):
     interrupt_run(config, tmp_path / "broken", 20)
     before = (tmp_path / "broken" / "checkpoint.npz").read_bytes()
     message = "stopped after 80 picks; call train again with run_dir="
-    with at("_pick", 3, interrupt), pytest.raises(KeyboardInterrupt, match=message):
+    with at_pick(3, interrupt), pytest.raises(KeyboardInterrupt, match=message):
         train(config, tmp_path / "broken", progress=False)
     assert (tmp_path / "broken" / "checkpoint.npz").read_bytes() == before
     train(config, tmp_path / "broken", progress=False)
@@ -356,7 +362,7 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path):
         interrupt()
         pytest.fail("still running")
 
-    with at("_pick", 7, twice), pytest.raises(KeyboardInterrupt, match="^$"):
+    with at_pick(7, twice), pytest.raises(KeyboardInterrupt, match="^$"):
         train(config, tmp_path / "broken", progress=False)
     train(config, tmp_path / "broken", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "broken")
@@ -519,7 +525,7 @@ def test_the_bootstrap_maximum_obeys_the_mask(tmp_path, mask):
     config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
     with begun(config, tmp_path) as run:
         for _ in range(12):
-            run._step()
+            run.step()
     stored = run.replay.arrays
     failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
     assert len(failed) > 10
@@ -585,7 +591,7 @@ def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
 
 def test_training_meets_other_loads_than_evaluate_does_with_its_seed(tmp_path):
     with begun(TrainConfig(**CONTAINER), tmp_path) as run:
-        met = {observation.tobytes() for observation in run.observations}
+        met = {observation.tobytes() for observation in run.rollout.observations}
     envs = ContainerVectorEnv(8, equalize=True)
     shown, _ = envs.reset(seed=np.random.SeedSequence(0).generate_state(8).tolist())
     envs.close()
@@ -597,6 +603,6 @@ def test_without_updates_the_weights_stay(tmp_path):
     with begun(config, tmp_path) as run:
         before = run.agent.state()
         for _ in range(20):
-            run._step()
+            run.step()
         after = run.agent.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)

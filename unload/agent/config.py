@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from unload.env.equalization import TIES
 from unload.network.variants import HEADS, NETWORKS
 from unload.support import checks
@@ -44,8 +46,10 @@ class TrainConfig:
         checks.one_of("env", self.env, ENVS)
         checks.one_of("ties", self.ties, TIES)
         checks.one_of("network", self.network, NETWORKS)
+        for name in ("env", "ties", "network"):
+            self._set(name, str(getattr(self, name)))
         for name in ("equalize", "mask"):
-            checks.boolean(name, getattr(self, name))
+            self._set(name, checks.boolean(name, getattr(self, name)))
         for name in (
             "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
             "target_update_interval", "log_interval",
@@ -73,8 +77,8 @@ class TrainConfig:
                 f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
             )
 
-    def _set(self, name: str, value: float) -> None:
-        """Keep a checked value as Python's own number, which JSON can hold."""
+    def _set(self, name: str, value: object) -> None:
+        """Keep a checked value as one of Python's own types, which JSON can hold."""
         object.__setattr__(self, name, value)
 
     def epsilon(self, picks: int) -> float:
@@ -82,3 +86,11 @@ class TrainConfig:
         span = self.epsilon_fraction * self.picks
         progress = min(1.0, picks / span) if span else 1.0
         return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
+
+    def seeds(self) -> tuple[int, int, int]:
+        """Return the seeds of the environments, of exploration and batches, and of the weights.
+
+        The key keeps the loads apart from those that ``unload.evaluate`` draws with the same
+        seed.
+        """
+        return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(3).tolist())

@@ -14,6 +14,8 @@ from unload.env.vector import ContainerVectorEnv
 from unload.support import checks
 
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
+# Arguments of ``ContainerEnv`` that ``evaluate`` passes on.
+ENV_KWARGS = ("after_pick", "equalize", "position_noise", "stack", "ties")
 # Failed picks in a row after which an episode without a limit is given up.
 GIVE_UP = 10 * task.N_VISIBLE
 
@@ -64,7 +66,8 @@ def evaluate(
             items have failed and the policy is told so. With None it is unloaded completely,
             however many picks that takes; only an episode in which 1280 picks in a row fail
             is given up.
-        **env_kwargs: further arguments of ``ContainerEnv``, such as ``stack``.
+        **env_kwargs: ``after_pick``, ``equalize``, ``position_noise``, ``stack`` and ``ties`` of
+            ``ContainerEnv``.
 
     Returns:
         One row per episode: ``success_rate``, ``unloaded`` (items), ``deadlocked``
@@ -82,6 +85,10 @@ def evaluate(
         checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
+    for name in env_kwargs:
+        checks.one_of("an argument of evaluate", name, ENV_KWARGS)
+    if physics == "table":
+        checks.one_of("after_pick", env_kwargs.pop("after_pick", "restore"), ("restore",))
     at_once = task.NUM_ENVS if physics == "table" else 1
     load_seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     frames = []

@@ -10,10 +10,48 @@ from unload.env.observation import holds_item
 from unload.support import checks
 
 
-def check_network(network: torch.nn.Module) -> torch.nn.Module:
+def check_network(network: object) -> torch.nn.Module:
+    """Return ``network``; raise TypeError unless it is a ``torch.nn.Module``."""
     if not isinstance(network, torch.nn.Module):
         raise TypeError(f"network is {network!r}; expected a torch.nn.Module")
     return network
+
+
+@torch.no_grad()
+def highest_values(
+    network: torch.nn.Module,
+    observations: np.ndarray,
+    allowed: np.ndarray,
+    present: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the allowed action of the highest value, in plain PyTorch.
+
+    Args:
+        network: (batch, items, 3) → (batch, items) action values.
+        observations: (batch, items, 3) float32.
+        allowed: (batch, items) bool, at least one per row.
+        present: (batch, items) bool, the rows that hold an item; all if None.
+
+    Returns:
+        (batch,) int64.
+
+    Raises:
+        FloatingPointError: a row has no allowed action, or an allowed action's value is not
+            finite.
+    """
+    arguments = [torch.from_numpy(observations)]
+    if present is not None and not present.all():  # other modules need not know of padding
+        arguments.append(torch.from_numpy(present))
+    values = network(*arguments).masked_fill(torch.from_numpy(~allowed), -torch.inf)
+    actions = values.argmax(dim=1)  # NaN counts as the highest
+    finite = values.gather(1, actions[:, None]).isfinite()
+    if not finite.all():
+        row = int(finite.int().argmin())
+        raise FloatingPointError(
+            f"row {row} has no allowed action of a finite value; "
+            "expected finite observations and weights"
+        )
+    return actions.numpy()
 
 
 def greedy_actions(
@@ -22,33 +60,30 @@ def greedy_actions(
     masks: np.ndarray,
     present: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The allowed action of the highest value, (batch,) int64.
+    """Return the allowed action of the highest value, by the fastest way for the network.
 
-    ``present``: (batch, items) bool, the rows that hold an item; all if None.
+    Args:
+        network: see ``highest_values``.
+        observations: (batch, items, 3) float.
+        masks: (batch, items), bool or 0 and 1, where an item may be picked.
+        present: (batch, items) bool, the rows that hold an item; all if None.
+
+    Returns:
+        (batch,) int64.
+
+    Raises:
+        TypeError, ValueError: see ``unload.agent.policies.check_batch``.
+        FloatingPointError: see ``highest_values``.
     """
-    return best_actions(network, *check_batch(observations, masks), present)
-
-
-@torch.no_grad()
-def best_actions(
-    network: torch.nn.Module,
-    observations: np.ndarray,
-    allowed: np.ndarray,
-    present: np.ndarray | None = None,
-) -> np.ndarray:
-    """``greedy_actions`` on what ``check_batch`` has returned."""
-    if fused.applies(network):  # the item's own features decide, whatever else there is
-        observations = observations.astype(np.float32, copy=False)
+    observations, allowed = check_batch(observations, masks)
+    observations = observations.astype(np.float32, copy=False)
+    if fused.applies(network):  # an item's own features decide: padded rows do not matter
         return fused.greedy_actions(fused.weights_of(network), observations, allowed)
-    arguments = [torch.as_tensor(observations, dtype=torch.float32)]
-    if present is not None and not present.all():  # other modules need not know of padding
-        arguments.append(torch.from_numpy(present))
-    values = network(*arguments)
-    return values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
+    return highest_values(network, observations, allowed, present)
 
 
 class Greedy:
-    """The policy of a trained network: the allowed item of the highest value.
+    """Policy of a trained network: the allowed item of the highest value.
 
     Called like the functions of ``unload.policies``, on observations that are not
     equalized; it equalizes them itself if the network was trained so.
@@ -57,6 +92,9 @@ class Greedy:
         network: the trained network.
         equalize: whether the network expects equalized observations.
         ties: see ``unload.equalize``.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, network: torch.nn.Module, equalize: bool, ties: str = "noise") -> None:

@@ -28,6 +28,9 @@ class ReplayBuffer:
         next_state: keep the observation and mask after each pick, and whether the task
             ended there.
 
+    Raises:
+        MemoryError: the arrays do not fit into memory.
+
     Attributes:
         arrays: name → array whose first axis is the slot. ``observations`` (size, items, 3)
             float32, ``actions`` (size,) int64, ``rewards`` (size,) float32; with
@@ -41,17 +44,25 @@ class ReplayBuffer:
         checks.integer("items", items, 1)
         checks.boolean("next_state", next_state)
         self.total = 0
-        self.arrays = {
-            "observations": np.empty((size, items, 3), np.float32),
-            "actions": np.empty(size, np.int64),
-            "rewards": np.empty(size, np.float32),
+        kinds = {
+            "observations": ((items, 3), np.float32),
+            "actions": ((), np.int64),
+            "rewards": ((), np.float32),
         }
         if next_state:
-            self.arrays |= {
-                "next_observations": np.empty((size, items, 3), np.float32),
-                "next_masks": np.empty((size, items), bool),
-                "terminations": np.empty(size, bool),
+            kinds |= {
+                "next_observations": ((items, 3), np.float32),
+                "next_masks": ((items,), bool),
+                "terminations": ((), bool),
             }
+        try:
+            self.arrays = {
+                name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
+            }
+        except (MemoryError, ValueError) as error:  # ValueError: larger than any address
+            raise MemoryError(
+                f"size is {size}; its arrays do not fit into memory: {error}"
+            ) from error
 
     def __len__(self) -> int:
         return min(self.total, self.size)

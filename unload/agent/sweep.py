@@ -5,7 +5,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import redirect_stdout
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 
@@ -145,15 +145,13 @@ def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
     if attempts.count("\n") == ATTEMPTS:
         mark.unlink()
         return name, f"its process died, {ATTEMPTS} times"
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # the runs share the cores among themselves
     start = time.monotonic()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         mark.write_text(f"{attempts}{os.getpid()}\n")
         resumed = (folder / "checkpoint.npz").exists()
-        with open(folder / "log.txt", "a") as log, redirect_stdout(log):
-            train(config, folder)
+        with open(folder / "log.txt", "a") as log, one_thread():
+            train(config, folder, progress=log)
         if not (folder / "record.json").exists():
             record = {"resumed": resumed, "process": os.getpid()}
             record |= provenance.run_record(time.monotonic() - start)
@@ -163,8 +161,18 @@ def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
     finally:
         if mark.exists():
             mark.unlink()
-        torch.set_num_threads(threads)
     return name, ""
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let PyTorch and the fused update use one thread, because runs share the cores."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _mark(folder: Path) -> Path:

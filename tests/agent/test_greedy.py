@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+import torch
+
+from unload import Greedy, PEQNetwork, equalize
+from unload.agent.greedy import greedy_actions, highest_values
+from unload.network.variants import NETWORKS
+
+
+def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
+    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
+
+
+@pytest.fixture
+def observations(rng) -> np.ndarray:
+    return rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
+
+
+def test_greedy_actions_are_those_of_the_highest_value(rng):
+    network = peq()
+    observations = rng.uniform(-1, 1, (100, 30, 3)).astype(np.float32)
+    masks = rng.integers(2, size=(100, 30)).astype(bool)
+    masks[:, 0] = True
+    values = network(torch.from_numpy(observations)).detach().numpy()
+    chosen = greedy_actions(network, observations, masks)
+    best = np.where(masks, values, -np.inf).max(axis=1)
+    assert masks[np.arange(100), chosen].all()
+    assert values[np.arange(100), chosen] == pytest.approx(best, abs=1e-6)
+
+
+def test_greedy_equalizes_what_its_network_expects(observations, rng):
+    masks = np.ones(observations.shape[:2])
+    for ties in ("noise", "average"):
+        policy = Greedy(peq(), equalize=True, ties=ties)
+        expected = greedy_actions(policy.network, equalize(observations, ties), masks)
+        assert (policy(observations, masks, rng) == expected).all()
+    raw = Greedy(peq(), equalize=False)(observations, masks, rng)
+    assert (raw == greedy_actions(peq(), observations, masks)).all()
+    assert (raw != expected).any()
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_weights_that_are_not_finite_choose_nothing(observations, name):
+    """They once picked row 0 without a word."""
+    network = NETWORKS[name](4, torch.Generator().manual_seed(0))
+    allowed = np.ones(observations.shape[:2], bool)
+    torch.nn.init.constant_(network.scorer.weight, torch.nan)
+    for choose in (greedy_actions, highest_values):
+        with pytest.raises(FloatingPointError, match="row 0 has no allowed action of a finite"):
+            choose(network, observations, allowed)

@@ -1,0 +1,196 @@
+"""A training run on disk: its checkpoint while it goes on, and what it leaves."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from unload.agent.config import TrainConfig
+from unload.agent.greedy import Greedy
+from unload.agent.rollout import Rollout
+from unload.agent.weights import load_policy, save_policy
+from unload.support import checks, files
+
+FORMAT = 4  # of the checkpoints
+PARTS = ("agent", "curve", "rollout")
+
+
+class TrainResult(NamedTuple):
+    """What a training run leaves.
+
+    Attributes:
+        policy: the trained network, as a greedy policy.
+        curve: one row per ``log_interval`` steps, means over it: ``picks`` so far,
+            ``mean_reward``, ``success_rate`` (MSR of the exploring agent), ``deadlocked``
+            (share of picks whose item had already failed since the last success), ``loss``
+            (NaN before the first update), ``epsilon``, and ``wall_time`` in s since the epoch.
+    """
+
+    policy: Greedy
+    curve: pd.DataFrame
+
+
+class RunFolder:
+    """The folder of one training run.
+
+    Args:
+        run_dir: made if it does not exist.
+
+    Attributes:
+        path: of the folder.
+        checkpoint: the file from which a run that was stopped goes on.
+
+    Raises:
+        ValueError: ``run_dir`` is empty or a file.
+        OSError: it cannot be made.
+    """
+
+    def __init__(self, run_dir: str | Path) -> None:
+        if not isinstance(run_dir, (str, Path)):
+            raise TypeError(f"run_dir is {run_dir!r}; expected the path of a folder")
+        self.path = Path(run_dir)
+        if str(run_dir) in ("", "."):
+            raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
+        if self.path.exists() and not self.path.is_dir():
+            raise ValueError(f"run_dir is {str(run_dir)!r}, a file; expected a folder")
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OSError(f"run_dir is {str(run_dir)!r}, which cannot be made: {error}") from error
+        self.checkpoint = self.path / "checkpoint.npz"
+        self._policy, self._curve = self.path / "policy.safetensors", self.path / "curve.csv"
+        self._config = self.path / "config.json"
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other processes out of the folder, see ``files.locked``.
+
+        What a killed process has left half written there is removed.
+        """
+        with files.locked(self.path):
+            for leftover in self.path.glob("*.partial"):
+                leftover.unlink()
+            yield
+
+    @property
+    def finished(self) -> bool:
+        """Whether the run has made all its picks."""
+        return self._config.exists()
+
+    def save(self, run) -> None:
+        """Write a checkpoint of a ``Training``."""
+        arrays = {
+            f"{part}.{name}": array
+            for part in PARTS
+            for name, array in getattr(run, part).state().items()
+        }
+        arrays |= {
+            "format": np.array(FORMAT),
+            "config": np.array(json.dumps(asdict(run.config))),
+            "rng": np.array(json.dumps(run.rng.bit_generator.state)),
+        }
+        files.write_arrays(self.checkpoint, arrays)
+
+    def restore(self, run) -> Iterator[int]:
+        """Let a ``Training`` go on from the checkpoint, if there is one.
+
+        Yields:
+            How many picks the checkpoint holds, after each step that is repeated.
+
+        Raises:
+            ValueError: the checkpoint is damaged, or of another configuration, version or stack.
+        """
+        if not self.checkpoint.exists():
+            return
+        stored = files.read_arrays(self.checkpoint)
+        checks.entries(str(self.checkpoint), stored, ("config",))
+        if stored.get("format") != FORMAT:
+            raise ValueError(
+                f"{self.checkpoint} was written by another version of unload; expected format "
+                f"{FORMAT}. Remove it to start anew, or go on with that version"
+            )
+        self._check_same(json.loads(str(stored["config"])), run.config)
+        parts: dict[str, dict[str, np.ndarray]] = {part: {} for part in PARTS}
+        for name, array in stored.items():
+            part, _, rest = name.partition(".")
+            if part in parts:
+                parts[part][rest] = array
+        try:
+            run.agent.load_state(parts["agent"])
+            run.curve.load_state(parts["curve"])
+            run.rng.bit_generator.state = json.loads(str(stored["rng"]))
+            first = int(parts["rollout"]["start"])
+            run.replay.total = first * run.config.num_envs
+            picks = run.replay.total + parts["rollout"]["actions"].size
+            for transitions in run.rollout.load_state(parts["rollout"]):
+                run.replay.add(**transitions)
+                yield picks
+        except KeyError as error:
+            raise ValueError(f"{self.checkpoint} has no array {error}; it is damaged") from error
+        except (TypeError, ValueError, RuntimeError) as error:
+            raise ValueError(f"{self.checkpoint}: {error}") from error
+
+    def save_snapshot(self, run) -> None:
+        """Keep the policy learned so far by a ``Training``."""
+        path = self.path / f"snapshots/{run.rollout.picks:09d}.safetensors"
+        save_policy(run.policy(), path)
+
+    def finish(self, run, first_shown: str) -> None:
+        """Write what a ``Training`` leaves.
+
+        Args:
+            run: at its end.
+            first_shown: digest of its first observations, which shows what loads it was on.
+        """
+        save_policy(run.policy(), self._policy)
+        files.write_text(self._curve, run.curve.table().to_csv(index=False))
+        digests = {path.name: files.digest(path) for path in (self._policy, self._curve)}
+        # Last, because it marks the run as finished.
+        files.write_json(
+            self._config,
+            asdict(run.config) | {"first_loads": first_shown, "digests": digests},
+        )
+
+    def result(self, config: TrainConfig, stack: Callable | None = None) -> TrainResult:
+        """Read back what a finished run has left.
+
+        Args:
+            config, stack: of the run, see ``unload.train``.
+
+        Raises:
+            ValueError: a file is damaged, or the run is of another configuration or stack.
+        """
+        stored = files.read_json(self._config)
+        loads, digests = stored.pop("first_loads", None), stored.pop("digests", {})
+        self._check_same(stored, config)
+        rollout = Rollout(config, 1, stack)
+        rollout.close()
+        if loads != rollout.digest():
+            raise ValueError(
+                f"run_dir {str(self.path)!r} holds a run on other loads; expected the stack that "
+                "it was trained with, or an empty folder"
+            )
+        for path in (self._policy, self._curve):
+            files.check_digest(path, digests.get(path.name))
+        self.checkpoint.unlink(missing_ok=True)
+        return TrainResult(load_policy(self._policy), pd.read_csv(self._curve))
+
+    def _check_same(self, stored: dict, config: TrainConfig) -> None:
+        """Raise ValueError unless a stored configuration is ``config``."""
+        wanted = json.loads(json.dumps(asdict(config)))
+        # How often it is saved changes nothing in a run.
+        names = [name for name in wanted | stored if name != "checkpoint_interval"]
+        differing = [name for name in names if stored.get(name) != wanted.get(name)]
+        if differing:
+            details = ", ".join(
+                f"{name} ({stored.get(name)!r}, not {wanted.get(name)!r})" for name in differing
+            )
+            raise ValueError(
+                f"run_dir {str(self.path)!r} holds a run of another configuration: {details}; "
+                "expected the same one or an empty folder"
+            )

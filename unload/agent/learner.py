@@ -1,0 +1,85 @@
+"""The update of a deep Q-network in plain PyTorch (Sec. II-B and III-G).
+
+This is the version to read first. ``unload.agent.fast.learner`` does the same for the paper's
+network on a CPU, a few hundred times faster; a test holds the two equal.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+from torch.nn.functional import smooth_l1_loss
+
+from unload.agent.greedy import highest_values
+
+# Rows of a batch per backward pass, because what a pass stores then stays in the cache.
+CHUNK = 64
+
+
+class PlainLearner:
+    """Fits a network's values of chosen actions to their targets, with Adam.
+
+    Args:
+        network: (batch, items, 3) → (batch, items) action values; changed in place.
+        learning_rate: of Adam.
+        beta: threshold of the smooth-L1 loss.
+    """
+
+    def __init__(self, network: torch.nn.Module, learning_rate: float, beta: float) -> None:
+        self.network, self.beta = network, beta
+        self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
+
+    def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+        """Return the allowed action of the highest value, (batch,) int64."""
+        return highest_values(self.network, observations, allowed)
+
+    def start(
+        self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
+    ) -> Callable[[], float]:
+        """Return the update as a function that carries it out and returns the loss before it.
+
+        Args:
+            batch: ``observations`` (k, items, 3) float32 and ``actions`` (k,) int64.
+            targets: (k,) float32.
+            rows: which of the k rows to learn from, int64; all if None.
+        """
+        if rows is None:
+            rows = np.arange(len(targets))
+        observations, actions, targets = (
+            torch.from_numpy(array.take(rows, axis=0))
+            for array in (batch["observations"], batch["actions"], targets)
+        )
+        return lambda: self._update(observations, actions, targets)
+
+    def _update(
+        self, observations: torch.Tensor, actions: torch.Tensor, targets: torch.Tensor
+    ) -> float:
+        self.optimizer.zero_grad()
+        total = 0.0
+        for start in range(0, len(targets), CHUNK):
+            rows = slice(start, start + CHUNK)
+            values = self.network(observations[rows])
+            chosen = values.gather(1, actions[rows, None]).squeeze(1)
+            loss = smooth_l1_loss(chosen, targets[rows], reduction="sum", beta=self.beta)
+            (loss / len(targets)).backward()
+            total += loss.item() / len(targets)
+        if not np.isfinite(total):
+            raise FloatingPointError(f"the loss is {total}; expected a finite number")
+        self.optimizer.step()
+        return total
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return copies of Adam's moments, by parameter number and name."""
+        return {
+            f"{number}.{key}": value.numpy().copy()
+            for number, moments in self.optimizer.state_dict()["state"].items()
+            for key, value in moments.items()
+        }
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` returned."""
+        moments: dict[int, dict[str, torch.Tensor]] = {}
+        for name, array in arrays.items():
+            number, _, key = name.partition(".")
+            moments.setdefault(int(number), {})[key] = torch.from_numpy(np.array(array))
+        self.optimizer.load_state_dict({**self.optimizer.state_dict(), "state": moments})

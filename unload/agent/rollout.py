@@ -1,0 +1,160 @@
+"""The picks of a training run, and how the latest of them are repeated.
+
+A checkpoint does not hold the replay memory, which is 1.6 GB in the paper's configuration.
+The environments are deterministic, so it holds their state at the start of the oldest
+episode that the memory reaches back to, and the actions since: repeating these fills the
+memory again, pick by pick as it was.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from hashlib import blake2b
+
+import gymnasium
+import numpy as np
+
+from unload.agent.config import TrainConfig
+from unload.load.boxes import Load
+
+
+class Rollout:
+    """The environments of a run, and all its picks so far.
+
+    Args:
+        config: of the run.
+        reach: picks that the replay memory holds, which a checkpoint must bring back.
+        stack: makes the loads, see ``unload.train``.
+
+    Attributes:
+        observations: (num_envs, 128, 3) float32, what is seen now.
+        masks: (num_envs, 128) int8, ``info["action_mask"]``.
+        allowed: (num_envs, 128) bool, what may be picked in training: rows that hold an item,
+            with ``config.mask`` only those that have not failed.
+        steps: made so far; one pick in each environment per step.
+    """
+
+    def __init__(self, config: TrainConfig, reach: int, stack: Callable | None = None) -> None:
+        self._config, self._reach = config, reach
+        # Every pick of the run; a row of the observation fits a byte.
+        shape = (config.picks // config.num_envs, config.num_envs)
+        self._actions = np.empty(shape, np.uint8)
+        self.steps = 0
+        self.envs = _make_envs(config, stack)
+        self._see(*self.envs.reset(seed=config.seeds()[0]))
+        # Of the episodes that the replay memory reaches back to: first step, state there.
+        self._starts = deque([(0, self.envs.get_state())])
+
+    def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
+        self.observations, self.masks = observations, infos["action_mask"]
+        self.allowed = infos["action_mask" if self._config.mask else "item_mask"].astype(bool)
+
+    @property
+    def picks(self) -> int:
+        """Picks so far, over all environments."""
+        return self.steps * self._config.num_envs
+
+    @property
+    def finished(self) -> bool:
+        """Whether all picks of the run have been made."""
+        return self.steps == len(self._actions)
+
+    def deadlocked(self, actions: np.ndarray) -> np.ndarray:
+        """Return which actions pick an item that failed since the last success, bool."""
+        return self.masks[np.arange(len(actions)), actions] == 0
+
+    def pick(self, actions: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Pick in every environment.
+
+        Args:
+            actions: (num_envs,) int64.
+
+        Returns:
+            The rewards, (num_envs,), and what to add to a ``ReplayBuffer``.
+        """
+        following, rewards, terminations, _, infos = self.envs.step(actions)
+        transitions = {
+            "observations": self.observations,
+            "actions": actions,
+            "rewards": self._shaped(rewards, actions),
+        }
+        if self._config.gamma > 0:
+            transitions |= _next_states(following, terminations, infos)
+        self._actions[self.steps] = actions
+        self.steps += 1
+        self._see(following, infos)
+        if self.steps % self._config.max_picks == 0:  # an episode's end in most environments
+            self._starts.append((self.steps, self.envs.get_state()))
+            while (self.steps - self._starts[1][0]) * self._config.num_envs >= self._reach:
+                self._starts.popleft()
+        return rewards, transitions
+
+    def _shaped(self, rewards: np.ndarray, actions: np.ndarray) -> np.ndarray:
+        """Rewards to learn from: a failed pick is the less bad, the higher its item (Sec. V-A)."""
+        if not self._config.height_reward:
+            return rewards
+        heights = (self.observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
+        return np.where(rewards < 0, rewards + self._config.height_reward * heights, rewards)
+
+    def digest(self) -> str:
+        """Return a digest of what is seen now."""
+        shown = self.observations.tobytes() + self.masks.tobytes()
+        return blake2b(shown, digest_size=16).hexdigest()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return what ``load_state`` needs to go on from here."""
+        start, envs = self._starts[0]
+        return {f"envs.{name}": array for name, array in envs.items()} | {
+            "start": np.array(start),
+            "actions": self._actions[start : self.steps],
+            "digest": np.array(self.digest()),
+        }
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> Iterator[dict[str, np.ndarray]]:
+        """Go on from what ``state`` returned, by repeating the picks.
+
+        Yields:
+            What ``pick`` returns to be remembered, for each repeated step.
+
+        Raises:
+            ValueError: the picks lead to other observations than they did.
+        """
+        prefix = "envs."
+        envs = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+        self.steps = int(arrays["start"])
+        self._starts = deque([(self.steps, envs)])
+        self._see(*self.envs.set_state(envs))
+        for actions in arrays["actions"].astype(np.int64):
+            yield self.pick(actions)[1]
+        if self.digest() != arrays["digest"]:
+            raise ValueError(
+                "its picks lead to other observations here; expected the same stack and version "
+                "of unload as when it was written"
+            )
+
+    def close(self) -> None:
+        """Free the environments."""
+        self.envs.close()
+
+
+def _make_envs(
+    config: TrainConfig, stack: Callable[[np.random.Generator], Load] | None
+) -> gymnasium.vector.VectorEnv:
+    return gymnasium.make_vec(
+        config.env,
+        config.num_envs,
+        equalize=config.equalize,
+        ties=config.ties,
+        max_picks=config.max_picks,
+        **({} if stack is None else {"stack": stack}),
+    )
+
+
+def _next_states(
+    observations: np.ndarray, terminations: np.ndarray, infos: dict[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """What followed each pick; at an episode's end its last observation, not the reset's."""
+    observations, masks = observations.copy(), infos["action_mask"].astype(bool)
+    for env in np.flatnonzero(infos.get("_final_obs", [])):
+        observations[env] = infos["final_obs"][env]
+        masks[env] = infos["final_info"]["action_mask"][env]
+    return {"next_observations": observations, "next_masks": masks, "terminations": terminations}
