@@ -5,12 +5,12 @@ import pytest
 import torch
 
 from unload import AttentionNetwork, EquivariantStack, PEQNetwork, TwoLayerScorer
-from unload.network.variants import NETWORKS, linear_beside
+from unload.network.variants import NETWORKS, linear_with_context
 
-OURS = (TwoLayerScorer, EquivariantStack, AttentionNetwork)
+VARIANTS = (TwoLayerScorer, EquivariantStack, AttentionNetwork)
 
 
-@pytest.fixture(params=OURS)
+@pytest.fixture(params=VARIANTS)
 def kind(request) -> type:
     return request.param
 
@@ -26,7 +26,7 @@ def make(kind: type, n_features: int = 16, seed: int = 0) -> torch.nn.Module:
 
 
 def test_all_are_registered():
-    assert tuple(NETWORKS.values()) == (PEQNetwork, *OURS)
+    assert tuple(NETWORKS.values()) == (PEQNetwork, *VARIANTS)
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 128, 300])
@@ -51,7 +51,7 @@ def test_values_depend_on_the_other_items(kind, items):
     assert (network(batch)[0, :7] != network(changed)[0, :7]).all()
 
 
-@pytest.mark.parametrize("other_kind", [PEQNetwork, *OURS])
+@pytest.mark.parametrize("other_kind", [PEQNetwork, *VARIANTS])
 def test_other_items_change_the_choice_but_for_the_papers_network(items, other_kind):
     """The better one of the same two items, in the company of six others."""
     batch = 3 * items(500, 8)
@@ -73,10 +73,45 @@ def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):
     torch.testing.assert_close(network(batch), values)
 
 
-def test_linear_beside_is_linear_on_both(items):
+def test_the_stack_is_three_layers_on_own_features_and_maxima(items):
+    network, own = make(EquivariantStack), items(3, 9)
+    values = network(own)
+    for layer in network.layers:
+        maxima = own.amax(dim=1)[:, None].expand_as(own)
+        own = torch.relu(layer(torch.cat([own, maxima], dim=2)))
+    assert len(network.layers) == 3
+    torch.testing.assert_close(values, torch.tanh(network.scorer(own)).squeeze(2))
+
+
+def test_the_attention_network_is_two_blocks_with_normalization_first(items):
+    network, batch = make(AttentionNetwork), items(3, 9)
+    own = network.extractor(batch)
+    for block in network.blocks:
+        normed = block.norm1(own)
+        own = own + block.self_attn(normed, normed, normed)[0]
+        own = own + block.linear2(torch.relu(block.linear1(block.norm2(own))))
+    values = torch.tanh(network.scorer(network.norm(own))).squeeze(2)
+    assert len(network.blocks) == 2
+    torch.testing.assert_close(network(batch), values)
+
+
+@pytest.mark.parametrize("n", [2, 64])
+def test_parameter_counts(n):
+    attention = 2 * ((3 * n * n + 3 * n) + (n * n + n) + (4 * n * n + 3 * n) + 4 * n)
+    counts = {
+        PEQNetwork: 8 * n + 1,
+        TwoLayerScorer: 4 * n + (4 * n * n + n) + (n + 1),
+        EquivariantStack: (6 * n + n) + 2 * (2 * n * n + n) + (n + 1),
+        AttentionNetwork: 4 * n + attention + 2 * n + (n + 1),
+    }
+    for kind, count in counts.items():
+        assert sum(parameter.numel() for parameter in kind(n).parameters()) == count, kind
+
+
+def test_linear_with_context_is_the_layer_on_both(items):
     layer, own, context = torch.nn.Linear(5, 4), items(2, 6), torch.rand(2, 2)
     both = torch.cat([own, context[:, None].expand(-1, 6, -1)], dim=2)
-    torch.testing.assert_close(linear_beside(layer, own, context), layer(both))
+    torch.testing.assert_close(linear_with_context(layer, own, context), layer(both))
 
 
 def test_the_generator_alone_decides_the_weights(kind):
@@ -124,6 +159,23 @@ def test_padding_has_no_influence(kind, items, training):
         padded = network(batch, present)
     torch.testing.assert_close(values[0, present[0]], alone[0], atol=1e-6, rtol=1e-5)
     assert torch.equal(padded[present], values[present])
+
+
+@pytest.mark.parametrize("any_kind", NETWORKS.values())
+@pytest.mark.parametrize("content", [-100.0, 0.0, 100.0])
+def test_what_absent_rows_hold_has_no_influence(any_kind, items, content):
+    """Zeros, too, where all that is present is negative: a maximum may not begin at 0."""
+    network, batch = make(any_kind), -items(5, 6).abs()
+    present = torch.arange(6) < torch.arange(1, 6)[:, None]
+    changed = batch.clone()
+    changed[~present] = content
+    with torch.no_grad():
+        values = network(batch, present)
+        assert torch.equal(network(changed, present)[present], values[present])
+        assert not torch.equal(network(changed)[present], values[present])
+        for row in range(5):
+            alone = network(batch[row : row + 1, : row + 1])[0]
+            torch.testing.assert_close(values[row, : row + 1], alone, atol=1e-6, rtol=1e-5)
 
 
 @pytest.mark.parametrize("training", [True, False])

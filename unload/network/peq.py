@@ -21,6 +21,10 @@ class PEQNetwork(nn.Module):
     Args:
         n_features: n; the paper does not give it. 4 n + 4 n + 1 parameters.
         generator: source of the initial weights, PyTorch's default one if None.
+
+    Raises:
+        TypeError: ``n_features`` is not an integer.
+        ValueError: ``n_features`` is less than 1.
     """
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:

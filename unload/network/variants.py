@@ -1,7 +1,7 @@
-"""Other networks than the paper's, more expressive (Sec. V-A, "Network architecture").
+"""Networks more expressive than the paper's (Sec. V-A, "Network architecture").
 
-Each takes what ``PEQNetwork`` takes and gives what it gives: one value per item from the same
-weights for every item, so permuting the items permutes the values.
+Their input and output are those of ``PEQNetwork``. They are permutation-equivariant, too: the
+same weights serve every item, so permuting the items permutes the values.
 """
 
 import torch
@@ -17,16 +17,16 @@ HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 featu
 class ScoringNetwork(nn.Module):
     """Base of networks that score each item by one linear unit, tanh, on n features.
 
-    Subclasses make their layers and then call ``reset_parameters``.
+    A subclass makes its layers, calls ``reset_parameters`` and defines ``features``. Its
+    arguments are ``n_features`` and ``generator``, the source of the initial weights
+    (PyTorch's default one if None).
 
     Args:
         n_features: n.
 
-    Subclasses also take ``generator``, the source of the initial weights: PyTorch's default
-    one if None.
-
     Raises:
-        TypeError, ValueError: ``n_features`` is no number of features.
+        TypeError: ``n_features`` is not an integer.
+        ValueError: ``n_features`` is less than 1.
     """
 
     def __init__(self, n_features: int = 64) -> None:
@@ -76,15 +76,16 @@ class ScoringNetwork(nn.Module):
         return torch.tanh(self.scorer(self.features(observations, present))).squeeze(2)
 
     def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
-        """What the scorer reads of each item, (batch, items, n)."""
+        """Features of each item that the scorer reads, (batch, items, n)."""
         raise NotImplementedError
 
 
 class TwoLayerScorer(ScoringNetwork):
     """The paper's network with a hidden layer in its relation scorer.
 
-    In the paper's one linear unit, the global features shift all items' scores alike, and the
-    choice does not depend on them. Behind a hidden layer of n units, ReLU, it does.
+    In the paper's one linear unit, the global features shift the scores of all items by the
+    same amount, so the choice does not depend on them. With a hidden layer of n units, ReLU,
+    it does.
     """
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
@@ -96,7 +97,7 @@ class TwoLayerScorer(ScoringNetwork):
     def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
         own = torch.relu(self.extractor(observations))
         context = torch.cat(pooled(own, present), dim=1)
-        return torch.relu(linear_beside(self.hidden, own, context))
+        return torch.relu(linear_with_context(self.hidden, own, context))
 
 
 class EquivariantStack(ScoringNetwork):
@@ -116,15 +117,18 @@ class EquivariantStack(ScoringNetwork):
     def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
         own = observations
         for layer in self.layers:
-            own = torch.relu(linear_beside(layer, own, highest(own, present)))
+            own = torch.relu(linear_with_context(layer, own, maximum_over_items(own, present)))
         return own
 
 
 class AttentionNetwork(ScoringNetwork):
     """Each item attends to all: two transformer blocks with layer normalization first.
 
-    There is no encoding of the place in the row, no dropout, and 2 n hidden units per block.
-    ``n_features`` must be even, for the two heads.
+    There is no positional encoding, because the order of the items means nothing, no dropout,
+    and 2 n hidden units per block.
+
+    Raises:
+        ValueError: ``n_features`` is odd; the two heads share the features.
     """
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
@@ -149,7 +153,7 @@ class AttentionNetwork(ScoringNetwork):
         return self.norm(own)
 
 
-NETWORKS = {
+NETWORKS = {  # by their names in TrainConfig
     "peq": PEQNetwork,
     "two_layer": TwoLayerScorer,
     "stack": EquivariantStack,
@@ -157,18 +161,25 @@ NETWORKS = {
 }
 
 
-def highest(features: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+def maximum_over_items(features: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
     """The maximum of each feature over the items, (batch, features)."""
     if present is not None:
         features = features.masked_fill(~present.unsqueeze(2), -torch.inf)
     return features.amax(dim=1)
 
 
-def linear_beside(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) -> torch.Tensor:
-    """``layer`` of each item's own features beside the context of all items.
+def linear_with_context(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) -> torch.Tensor:
+    """Apply ``layer`` to each item's own features concatenated with the context.
 
-    The same as on (batch, items, own + context) features, but the context's share is
-    computed once per observation, not once per item.
+    The context's share of the sum is computed once per observation instead of once per item.
+
+    Args:
+        layer: of own + context inputs.
+        own: (batch, items, own).
+        context: (batch, context), the features that all items of an observation share.
+
+    Returns:
+        (batch, items, outputs).
     """
     for_own, for_context = layer.weight.split([own.shape[2], context.shape[1]], dim=1)
     return linear(own, for_own, layer.bias) + linear(context, for_context).unsqueeze(1)
