@@ -281,3 +281,33 @@ def test_bootstrapping_needs_what_follows(rng):
 def test_a_fused_update_of_another_network_is_refused():
     with pytest.raises(ValueError, match="fused_update is True; expected a PEQNetwork"):
         DQN(HeightNetwork(), fused_update=True)
+
+
+@pytest.mark.parametrize("fused", [True, False])
+def test_the_target_network_is_a_copy(rng, fused):
+    """Both learners change the network's weights in place."""
+    agent = DQN(peq(), learning_rate=0.05, gamma=0.9, fused_update=fused)
+    for _ in range(2):
+        before = {name: value.clone() for name, value in agent.target.items()}
+        agent.update(make_batch(rng))
+        assert all(torch.equal(agent.target[name], before[name]) for name in before)
+        agent.update_target()
+
+
+def test_a_next_state_without_a_choice_is_refused(rng):
+    """Its loss was once infinite."""
+    batch, agent = make_batch(rng), DQN(peq(), gamma=0.9)
+    batch["next_masks"][7] = False
+    batch["terminations"][7] = True
+    agent.update(batch)
+    batch["terminations"][7] = False
+    with pytest.raises(ValueError, match="next_masks is all zero in row 7, which is not terminal"):
+        agent.update(batch)
+
+
+def test_weights_that_are_not_finite_are_named():
+    agent = DQN(peq())
+    agent.check_finite()
+    torch.nn.init.constant_(agent.network.scorer.bias, torch.inf)
+    with pytest.raises(FloatingPointError, match="scorer.bias is not finite; expected"):
+        agent.check_finite()

@@ -205,3 +205,15 @@ def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(
     with pytest.raises(error, match=message):
         evaluate(lambda *_: returned, 1)
     assert len(closed) == 1
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"num_envs": 3}, "an argument of evaluate is 'num_envs'; expected one of 'after_pick'"),
+        ({"after_pick": "keep"}, "after_pick is 'keep'; expected one of 'restore'"),
+    ],
+)
+def test_settings_of_something_else_are_refused(settings, message):
+    with pytest.raises(ValueError, match=message):
+        evaluate(policies.random, episodes=1, max_picks=2, **settings)

@@ -120,3 +120,9 @@ def test_masks_and_ends_are_flags():
 def test_bad_sizes_are_refused(size, items, name):
     with pytest.raises(ValueError, match=f"{name} is 0"):
         ReplayBuffer(size, items)
+
+
+@pytest.mark.parametrize("size", [10**12, 10**18])
+def test_a_memory_that_does_not_fit_is_refused_by_name(size):
+    with pytest.raises(MemoryError, match=f"size is {size}; its arrays do not fit into memory"):
+        ReplayBuffer(size, 128)

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
@@ -149,12 +150,11 @@ class RunFolder:
         """
         save_policy(run.policy(), self._policy)
         files.write_text(self._curve, run.curve.table().to_csv(index=False))
-        digests = {path.name: files.digest(path) for path in (self._policy, self._curve)}
-        # Last, because it marks the run as finished.
-        files.write_json(
-            self._config,
-            asdict(run.config) | {"first_loads": first_shown, "digests": digests},
-        )
+        marks = {"first_loads": first_shown}
+        marks |= {path.name: files.digest(path) for path in (self._policy, self._curve)}
+        content = asdict(run.config) | {"marks": marks}
+        marks[self._config.name] = _digest(content)
+        files.write_json(self._config, content)  # last, because it marks the run as finished
 
     def result(self, config: TrainConfig, stack: Callable | None = None) -> TrainResult:
         """Read back what a finished run has left.
@@ -166,17 +166,19 @@ class RunFolder:
             ValueError: a file is damaged, or the run is of another configuration or stack.
         """
         stored = files.read_json(self._config)
-        loads, digests = stored.pop("first_loads", None), stored.pop("digests", {})
-        self._check_same(stored, config)
+        marks = stored.get("marks", {})
+        self._check_same({name: stored[name] for name in stored if name != "marks"}, config)
+        if marks.pop(self._config.name, None) != _digest(stored):
+            raise ValueError(f"{self._config} was changed or damaged")
         rollout = Rollout(config, 1, stack)
         rollout.close()
-        if loads != rollout.digest():
+        if marks.get("first_loads") != rollout.digest():
             raise ValueError(
                 f"run_dir {str(self.path)!r} holds a run on other loads; expected the stack that "
                 "it was trained with, or an empty folder"
             )
         for path in (self._policy, self._curve):
-            files.check_digest(path, digests.get(path.name))
+            files.check_digest(path, marks.get(path.name))
         self.checkpoint.unlink(missing_ok=True)
         return TrainResult(load_policy(self._policy), pd.read_csv(self._curve))
 
@@ -194,3 +196,7 @@ class RunFolder:
                 f"run_dir {str(self.path)!r} holds a run of another configuration: {details}; "
                 "expected the same one or an empty folder"
             )
+
+
+def _digest(content: dict) -> str:
+    return blake2b(json.dumps(content).encode(), digest_size=16).hexdigest()

@@ -178,13 +178,18 @@ class DQN:
         return {f"{group}.{k}": v for group, arrays in groups.items() for k, v in arrays.items()}
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned."""
+        """Go on from what ``state`` returned.
+
+        Raises:
+            KeyError, RuntimeError: an array is missing or of another shape.
+        """
         groups: dict[str, dict[str, np.ndarray]] = {"network": {}, "target": {}, "adam": {}}
         for name, array in arrays.items():
             group, _, rest = name.partition(".")
             groups[group][rest] = array
         self.network.load_state_dict(_tensors(groups["network"]))
-        self.target = _tensors(groups["target"])
+        target = _tensors(groups["target"])
+        self.target = {name: target[name] for name in self.target}
         self.learner.load_state(groups["adam"])
 
 

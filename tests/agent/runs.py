@@ -1,0 +1,100 @@
+"""What the tests of training share: small runs, and ways to stop them."""
+
+import itertools
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from unload import TrainConfig, train
+from unload.agent.checkpoint import RunFolder
+from unload.agent.rollout import Rollout
+from unload.agent.training import Training
+
+# Small runs that still meet every event: episode ends, updates, points of the curve and,
+# with gamma > 0, updates of the target network.
+SMALL = {"num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5}
+CONTAINER = SMALL | {
+    "picks": 200,
+    "max_picks": 12,
+    "target_update_interval": 24,
+}
+RUNS = {
+    "container": CONTAINER,
+    "container, masked": CONTAINER | {"mask": True, "equalize": False, "gradient_steps": 2},
+    "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
+    "container, height reward": CONTAINER | {"height_reward": 0.5},
+    "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100, "gradient_steps": 1},
+}
+
+
+class Breakdown(Exception):
+    """A crash at a moment of the test's choosing."""
+
+
+@contextmanager
+def at(owner: type, method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Do something right after a call of a method; calls are counted from 1."""
+    call, count = getattr(owner, method), itertools.count(1)
+
+    def watched(*arguments):
+        result = call(*arguments)
+        if next(count) == number:
+            action()
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(owner, method, watched)
+        yield
+
+
+def at_step(number: int, action: Callable[[], None]):
+    """Do something right after a training step."""
+    return at(Training, "step", number, action)
+
+
+def at_pick(number: int, action: Callable[[], None]):
+    """Do something right after the picks of a step, be they new or repeated."""
+    return at(Rollout, "pick", number, action)
+
+
+def crash() -> None:
+    raise Breakdown
+
+
+def interrupt() -> None:
+    signal.raise_signal(signal.SIGINT)
+
+
+def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
+    """Start a run and press Ctrl-C after some steps."""
+    message = f"stopped after {4 * steps} picks; call train again with run_dir='.*{folder.name}'"
+    with at_step(steps, interrupt), pytest.raises(KeyboardInterrupt, match=message):
+        train(config, folder, progress=False)
+
+
+@contextmanager
+def begun(config: TrainConfig, folder: Path) -> Iterator[Training]:
+    """A run in progress that has gone on from its checkpoint, if it has one."""
+    run = Training(config)
+    try:
+        for _ in RunFolder(folder).restore(run):
+            pass
+        yield run
+    finally:
+        run.rollout.close()
+
+
+def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
+    """What a run leaves, but for the time of day."""
+    curve = pd.read_csv(folder / "curve.csv").drop(columns="wall_time")
+    return (folder / "policy.safetensors").read_bytes(), curve
+
+
+def assert_same(one: Path, other: Path) -> None:
+    (weights, curve), (other_weights, other_curve) = content(one), content(other)
+    pd.testing.assert_frame_equal(curve, other_curve, check_exact=True)
+    assert weights == other_weights

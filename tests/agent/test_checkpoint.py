@@ -1,0 +1,247 @@
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.agent.runs import (
+    CONTAINER,
+    RUNS,
+    Breakdown,
+    assert_same,
+    at_pick,
+    at_step,
+    begun,
+    crash,
+    interrupt,
+    interrupt_run,
+)
+from unload import TrainConfig, stack_load, train
+from unload.agent.checkpoint import RunFolder
+from unload.support import files
+
+KILLED_RUN = Path(__file__).with_name("killed_run.py")
+
+
+@pytest.mark.parametrize("steps", [1, 17, 31])
+def test_an_interrupted_run_goes_on_to_the_same_result(tmp_path, config, steps):
+    train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "broken", steps)
+    assert (tmp_path / "broken" / "checkpoint.npz").exists()
+    assert not (tmp_path / "broken" / "config.json").exists()
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_a_crashed_run_goes_on_from_its_last_checkpoint(tmp_path):
+    config = TrainConfig(**CONTAINER, checkpoint_interval=0)
+    train(config, tmp_path / "straight", progress=False)
+    for number in (9, 14):  # twice
+        with at_step(number, crash), pytest.raises(Breakdown):
+            train(config, tmp_path / "broken", progress=False)
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_a_killed_run_ends_as_if_nothing_had_happened(tmp_path):
+    fields = CONTAINER | {"picks": 400, "checkpoint_interval": 0}
+    train(TrainConfig(**fields), tmp_path / "straight", progress=False)
+    done = subprocess.run(
+        [sys.executable, KILLED_RUN, tmp_path / "killed", json.dumps(fields)],
+        env=os.environ | {"PYTHONPATH": str(files.ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+    print(done.stdout)
+    kills, inside = map(int, re.search(r"(\d+) kills, (\d+) inside a save", done.stdout).groups())
+    assert kills >= 20 and inside >= 5
+    assert_same(tmp_path / "straight", tmp_path / "killed")
+    assert len(list((tmp_path / "killed").iterdir())) == 3  # nothing half written is left
+
+
+@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("changes", [{}, {"replay_size": 61}, {"replay_size": 5000}])
+def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):
+    """A memory smaller and larger than the run, and one of no whole number of steps."""
+    config = TrainConfig(**RUNS[name] | changes)
+    for steps in (1, 23, 24, 25, config.picks // config.num_envs):
+        with begun(config, tmp_path / str(steps)) as run:
+            for _ in range(steps):
+                run.step()
+            RunFolder(tmp_path / str(steps)).save(run)
+            with begun(config, tmp_path / str(steps)) as other:
+                assert other.rollout.steps == steps and other.replay.total == run.replay.total
+                filled = len(run.replay)
+                for name, array in run.replay.arrays.items():
+                    assert (array[:filled] == other.replay.arrays[name][:filled]).all(), name
+                assert (run.rollout.observations == other.rollout.observations).all()
+                assert (run.rollout.masks == other.rollout.masks).all()
+                assert (run.agent.state()["network.scorer.weight"]
+                        == other.agent.state()["network.scorer.weight"]).all()  # fmt: skip
+                assert run.rollout.state()["start"] == other.rollout.state()["start"]
+
+
+def test_a_checkpoint_is_small(tmp_path):
+    config = TrainConfig(num_envs=64, picks=6400, replay_size=6400, batch_size=8, n_features=4)
+    with begun(config, tmp_path) as run:
+        for _ in range(100):
+            run.step()
+        folder = RunFolder(tmp_path)
+        folder.save(run)
+        assert folder.checkpoint.stat().st_size < 0.01 * run.replay.arrays["observations"].nbytes
+
+
+def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "broken", 20)
+    before = (tmp_path / "broken" / "checkpoint.npz").read_bytes()
+    message = "stopped after 80 picks; call train again with run_dir="
+    with at_pick(3, interrupt), pytest.raises(KeyboardInterrupt, match=message):
+        train(config, tmp_path / "broken", progress=False)
+    assert (tmp_path / "broken" / "checkpoint.npz").read_bytes() == before
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_run_of_another_configuration_is_refused(tmp_path, finished):
+    if finished:
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    else:
+        interrupt_run(TrainConfig(**CONTAINER), tmp_path, 3)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    other = TrainConfig(**CONTAINER | {"seed": 5, "learning_rate": 0.5})
+    message = r"another configuration: seed \(0, not 5\), learning_rate \(0.001, not 0.5\)"
+    with pytest.raises(ValueError, match=message):
+        train(other, tmp_path, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("kept", [0, 0.5, 0.99])
+def test_a_damaged_checkpoint_is_refused_by_name(tmp_path, kept):
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 3)
+    path = tmp_path / "checkpoint.npz"
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(kept * len(whole))])
+    with pytest.raises(ValueError, match="checkpoint.npz is not a readable .npz file"):
+        train(config, tmp_path, progress=False)
+
+
+def test_a_foreign_checkpoint_is_refused_by_name(tmp_path):
+    np.savez(tmp_path / "checkpoint.npz", a=np.zeros(3))
+    with pytest.raises(ValueError, match="checkpoint.npz"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+def test_a_checkpoint_of_another_version_is_refused(tmp_path):
+    """The first version's configuration had a further field, and its checkpoints no format."""
+    old = json.dumps(asdict(TrainConfig(**CONTAINER)) | {"physics": "table"})
+    np.savez(tmp_path / "checkpoint.npz", config=np.array(old))
+    with pytest.raises(ValueError, match="checkpoint.npz was written by another version"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    (tmp_path / "checkpoint.npz").unlink()
+    (tmp_path / "config.json").write_text(old)
+    with pytest.raises(ValueError, match=r"another configuration: physics \('table', not None\)"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+def test_other_loads_than_at_the_start_are_refused(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 20)
+    with pytest.raises(ValueError, match="checkpoint.npz: its picks lead to other observations"):
+        train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
+
+
+@pytest.mark.parametrize("stack", [None, lambda rng: stack_load(rng, walls=9)])
+def test_a_finished_run_on_other_loads_is_refused(tmp_path, stack):
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
+    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
+    with pytest.raises(ValueError, match="holds a run on other loads; expected the stack"):
+        train(config, tmp_path, progress=False, stack=stack)
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_run_may_go_on_with_another_checkpoint_interval(tmp_path, finished):
+    config = TrainConfig(**CONTAINER)
+    if finished:
+        train(config, tmp_path, progress=False)
+    else:
+        interrupt_run(config, tmp_path, 3)
+    train(TrainConfig(**CONTAINER | {"checkpoint_interval": 9.0}), tmp_path, progress=False)
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "\xff"])
+def test_damaged_config_is_refused_by_name(tmp_path, content):
+    (tmp_path / "config.json").write_text(content)
+    with pytest.raises(ValueError, match="config.json"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+def test_run_dir_that_is_a_file_is_refused_before_training(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(ValueError, match="a file; expected a folder"):
+        train(TrainConfig(), tmp_path / "file", progress=False)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Path:
+    """The folder of a finished run; tests bring back what they change."""
+    folder = tmp_path_factory.mktemp("finished") / "run"
+    train(TrainConfig(**CONTAINER), folder, progress=False)
+    return folder
+
+
+@pytest.mark.parametrize("name", ["policy.safetensors", "curve.csv", "config.json"])
+def test_every_flipped_bit_is_noticed(finished, rng, name):
+    """33 of 40 once passed."""
+    path = finished / name
+    whole = path.read_bytes()
+    for place in rng.choice(len(whole), 40, replace=False):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(7))
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match=f"{name}|run_dir '.*run' holds"):
+            RunFolder(finished).result(TrainConfig(**CONTAINER))
+    path.write_bytes(whole)
+    RunFolder(finished).result(TrainConfig(**CONTAINER))
+
+
+@pytest.mark.parametrize("name", ["policy.safetensors", "curve.csv"])
+def test_a_truncated_or_missing_file_is_named(finished, name):
+    path = finished / name
+    whole = path.read_bytes()
+    path.write_bytes(whole[: whole.rindex(b"\n", 0, -1) + 1] if b"\n" in whole else whole[:-8])
+    with pytest.raises(ValueError, match=name):
+        train(TrainConfig(**CONTAINER), finished, progress=False)
+    path.unlink()
+    with pytest.raises(FileNotFoundError, match=name):
+        train(TrainConfig(**CONTAINER), finished, progress=False)
+    path.write_bytes(whole)
+
+
+def test_a_checkpoint_that_lacks_an_array_is_refused_by_name(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 20)
+    path = tmp_path / "checkpoint.npz"
+    arrays = files.read_arrays(path)
+    for name in arrays:
+        files.write_arrays(path, {each: array for each, array in arrays.items() if each != name})
+        with pytest.raises(ValueError, match="checkpoint.npz"):
+            train(config, tmp_path, progress=False)
+
+
+def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
+    (tmp_path / "checkpoint.npz.0123.partial").write_bytes(b"half")
+    train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    assert not list(tmp_path.glob("*.partial"))

@@ -1,0 +1,82 @@
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+
+from unload import TrainConfig
+from unload.agent.config import ENVS
+
+
+def test_the_papers_configuration_is_the_default():
+    config = TrainConfig()
+    assert (config.picks, config.num_envs, config.learning_rate) == (20_000_000, 64, 1e-3)
+    assert (config.batch_size, config.replay_size) == (2048, 2**20)
+    assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
+    assert (config.network, config.height_reward) == ("peq", 0)
+    assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
+
+
+def test_attention_needs_features_for_its_heads():
+    with pytest.raises(ValueError, match="n_features is 33; expected a multiple of 2"):
+        TrainConfig(network="attention", n_features=33)
+
+
+def test_epsilon_falls_linearly_and_stays():
+    config = TrainConfig(picks=6400, epsilon_init=0.9, epsilon_final=0.1, epsilon_fraction=0.5)
+    values = [config.epsilon(picks) for picks in (0, 1600, 3200, 3201, 6400)]
+    assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
+    assert TrainConfig(picks=64, epsilon_fraction=0).epsilon(0) == 0
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "error"),
+    [
+        ("env", "CartPole-v1", ValueError),
+        ("ties", "coin", ValueError),
+        ("picks", 0, ValueError),
+        ("picks", 100, ValueError),  # no multiple of 64
+        ("picks", 6.4e3, TypeError),
+        ("seed", -1, ValueError),
+        ("seed", None, TypeError),
+        ("num_envs", 0, ValueError),
+        ("learning_rate", -1e-3, ValueError),
+        ("learning_rate", "fast", TypeError),
+        ("batch_size", 0, ValueError),
+        ("replay_size", 63, ValueError),  # less than a step of all environments
+        ("epsilon_init", 1.1, ValueError),
+        ("epsilon_final", -0.1, ValueError),
+        ("epsilon_fraction", 2, ValueError),
+        ("gamma", float("nan"), ValueError),
+        ("gamma", True, TypeError),
+        ("beta", float("inf"), ValueError),
+        ("height_reward", 1.1, ValueError),
+        ("height_reward", "high", TypeError),
+        ("network", "mlp", ValueError),
+        ("n_features", 0, ValueError),
+        ("equalize", "no", TypeError),
+        ("mask", None, TypeError),
+        ("gradient_steps", -1, ValueError),
+        ("target_update_interval", 0, ValueError),
+        ("log_interval", 0, ValueError),
+        ("checkpoint_interval", -1, ValueError),
+    ],
+)
+def test_bad_values_are_refused_by_name(field, value, error):
+    with pytest.raises(error, match=f"^{field} is "):
+        TrainConfig(**{field: value})
+
+
+def test_numpy_numbers_make_the_same_configuration():
+    config = TrainConfig(picks=np.int64(6400), learning_rate=np.float32(0.5))
+    assert json.dumps(asdict(config)) == json.dumps(
+        asdict(TrainConfig(picks=6400, learning_rate=0.5))
+    )
+
+
+def test_numpy_flags_and_strings_make_the_same_configuration():
+    """``numpy.bool_`` was once accepted, and failed at the end of training."""
+    config = TrainConfig(mask=np.bool_(True), equalize=np.False_, ties=np.str_("average"))
+    same = TrainConfig(mask=True, equalize=False, ties="average")
+    assert json.dumps(asdict(config)) == json.dumps(asdict(same))
+    assert type(config.mask) is bool and type(config.ties) is str

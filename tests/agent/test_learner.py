@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+import torch
+from torch.nn.functional import smooth_l1_loss
+
+from unload import DQN, PEQNetwork
+from unload.agent.fast.learner import FusedLearner
+from unload.agent.learner import CHUNK, PlainLearner
+from unload.network.variants import NETWORKS
+
+SIZE, ITEMS = CHUNK + 30, 9  # more than one chunk
+
+
+def batch_of(rng: np.random.Generator) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    batch = {
+        "observations": rng.uniform(-1, 1, (SIZE, ITEMS, 3)).astype(np.float32),
+        "actions": rng.integers(ITEMS, size=SIZE),
+    }
+    return batch, rng.uniform(-1, 1, SIZE).astype(np.float32)
+
+
+def network() -> PEQNetwork:
+    return PEQNetwork(8, torch.Generator().manual_seed(0))
+
+
+def test_gradients_are_those_of_the_mean_loss(rng):
+    """Adam hides a constant factor, so the gradients themselves are compared."""
+    batch, targets = batch_of(rng)
+    learner, reference = PlainLearner(network(), 1e-3, 0.5), network()
+    loss = learner.start(batch, targets)()
+    values = reference(torch.from_numpy(batch["observations"]))
+    chosen = values[torch.arange(SIZE), torch.from_numpy(batch["actions"])]
+    expected = smooth_l1_loss(chosen, torch.from_numpy(targets), beta=0.5)
+    expected.backward()
+    assert loss == pytest.approx(expected.item(), rel=1e-6)
+    for mine, theirs in zip(learner.network.parameters(), reference.parameters()):
+        assert torch.allclose(mine.grad, theirs.grad, rtol=1e-4, atol=1e-8)
+
+
+@pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
+def test_learners_have_one_interface(rng, kind):
+    batch, targets = batch_of(rng)
+    one, other = kind(network(), 1e-3, 1.0), kind(network(), 1e-3, 1.0)
+    rows = rng.integers(SIZE, size=70)
+    picked = {name: array[rows] for name, array in batch.items()}
+    assert one.start(batch, targets, rows)() == other.start(picked, targets[rows])()
+    other.load_state(one.state())
+    assert one.start(batch, targets)() == other.start(batch, targets)()
+    allowed = np.ones((SIZE, ITEMS), bool)
+    chosen = [learner.best_actions(batch["observations"], allowed) for learner in (one, other)]
+    assert np.array_equal(*chosen)
+
+
+def test_plain_means_plain_everywhere(rng, monkeypatch):
+    """Without the fused update, nothing of it is called, neither to learn nor to choose."""
+    for name in ("start", "greedy_actions"):
+        monkeypatch.setattr(
+            f"unload.agent.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain")
+        )
+    batch, targets = batch_of(rng)
+    agent = DQN(network(), fused_update=False)
+    agent.update(batch | {"rewards": targets})
+    agent.choose(batch["observations"], np.ones((SIZE, ITEMS), bool), 0.0, rng)
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_every_network_can_be_fitted(rng, name):
+    batch, targets = batch_of(rng)
+    learner = PlainLearner(NETWORKS[name](4, torch.Generator().manual_seed(0)), 0.01, 1.0)
+    losses = [learner.start(batch, targets)() for _ in range(30)]
+    assert losses[-1] < losses[0]
