@@ -1,4 +1,8 @@
-"""What the two environments share: spaces, settings, and the order of calls."""
+"""The base of the two environments: spaces, settings, and the order of calls."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import gymnasium
 import numpy as np
@@ -10,11 +14,38 @@ from unload.env.equalization import TIES, equalize
 from unload.support import checks, random_state
 
 
+def check_settings(
+    equalize: bool, ties: str, max_picks: int, position_noise: float
+) -> tuple[bool, str, int, float]:
+    """Return the settings that all environments have, as Python's own types.
+
+    Raises:
+        TypeError, ValueError: one of them is not as ``ContainerEnv`` describes it.
+    """
+    checks.one_of("ties", ties, TIES)
+    return (
+        checks.boolean("equalize", equalize),
+        ties,
+        checks.integer("max_picks", max_picks, 1, sys.maxsize),
+        checks.real("position_noise", position_noise, 0, observation.MOST_NOISE),
+    )
+
+
+@contextmanager
+def all_or_reset(env: object) -> Iterator[None]:
+    """Let ``env`` ask for a reset if the block raises an error, since half may have been done."""
+    try:
+        yield
+    except BaseException:
+        env._state = "broken off"
+        raise
+
+
 class PickingEnv(gymnasium.Env):
     """Base of environments whose action picks one of the 128 observed items.
 
     Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
-    episode's end.
+    episode's end. What changes the episode stands in ``all_or_reset``.
     """
 
     def __init__(
@@ -25,12 +56,9 @@ class PickingEnv(gymnasium.Env):
         position_noise: float,
         render_mode: str | None,
     ) -> None:
-        self.equalize = checks.boolean("equalize", equalize)
-        checks.one_of("ties", ties, TIES)
+        checked = check_settings(equalize, ties, max_picks, position_noise)
+        self.equalize, self.ties, self.max_picks, self.position_noise = checked
         checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        self.ties = ties
-        self.max_picks = checks.integer("max_picks", max_picks, 1)
-        self.position_noise = checks.real("position_noise", position_noise, 0)
         self.render_mode = render_mode
         self.observation_space = gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32)
         self.action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
@@ -52,12 +80,15 @@ class PickingEnv(gymnasium.Env):
         present = np.arange(task.N_VISIBLE) < len(positions)
         return equalize(seen, self.ties, present=present)
 
-    def _drift(self, count: int) -> np.ndarray:
-        return observation.drift(count, self.position_noise, self.np_random)
-
     def _rng_state(self) -> np.ndarray:
         """The state of ``np_random`` as a plain array."""
         return np.array(random_state.to_text(self.np_random))
+
+    def _set_rng_state(self, text: np.ndarray) -> None:
+        """Let ``np_random`` go on from what ``_rng_state`` returned."""
+        rng = np.random.default_rng()
+        random_state.set_text(text, rng)
+        self._np_random = rng
 
     def _row(self, action: int) -> int:
         if isinstance(action, np.ndarray) and action.ndim == 0:
@@ -68,12 +99,12 @@ class PickingEnv(gymnasium.Env):
         if self._state == "closed":
             raise ClosedEnvironmentError("the environment is closed; make a new one")
 
-    def _check_running(self) -> None:
-        self._check_open()
-        if self._state != "running":
-            raise ResetNeeded(f"the episode is {self._state}; call reset first")
-
     def _check_started(self) -> None:
         self._check_open()
-        if self._state == "not started":
-            raise ResetNeeded("the episode is not started; call reset first")
+        if self._state in ("not started", "broken off"):
+            raise ResetNeeded(f"the episode is {self._state}; call reset first")
+
+    def _check_running(self) -> None:
+        self._check_started()
+        if self._state == "finished":
+            raise ResetNeeded("the episode is finished; call reset first")

@@ -3,17 +3,19 @@
 from collections.abc import Callable
 
 import numpy as np
+from gymnasium.utils import seeding
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingEnv
+from unload.env.base import PickingEnv, all_or_reset
 from unload.env.observation import POSITION_NOISE
 from unload.env.render import Camera
 from unload.load.boxes import Load, check_load
 from unload.load.substacks import stack_load
-from unload.physics.full import make_physics
+from unload.physics.choose import make_physics
 from unload.support import checks, random_state
 
+MOST_BLUR = 100.0  # m, ten times the largest standard deviation
 LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
 
 
@@ -123,17 +125,26 @@ class ContainerEnv(PickingEnv):
         self._camera: Camera | None = None
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
-        """Fill the container anew; ``options={"load": load}`` gives the load to use."""
+        """Fill the container anew; ``options={"load": load}`` gives the load to use.
+
+        If ``stack`` fails, the episode and the generator stay as they were.
+        """
         self._check_open()
         options = {} if options is None else options
         checks.entries("options", options, ())
         for name in options:
             checks.one_of("options", name, ("load",))
-        if "load" in options:  # before the generator is seeded
-            check_load(options["load"])
-        super().reset(seed=seed)
-        self._fill(options["load"] if "load" in options else self.stack(self.np_random))
-        self._look()
+        rng, number = self.np_random, self._np_random_seed
+        if seed is not None:
+            rng, number = seeding.np_random(seed)
+        with random_state.kept_on_error([rng]):
+            load = options["load"] if "load" in options else self.stack(rng)
+            check_load(load)
+            blur = observation.drift(len(load), self.position_noise, rng)
+        with all_or_reset(self):
+            self._np_random, self._np_random_seed = rng, number
+            self._fill(load, blur)
+            self._look()
         return self._observation.copy(), self._info()
 
     def step(self, action: int):
@@ -142,18 +153,19 @@ class ContainerEnv(PickingEnv):
         item = int(self.visible[self._row(action)])
         distance = self.physics.lift(item) if item >= 0 else 0.0
         success = distance >= task.LIFT_THRESHOLD
-        self._picks += 1
-        if success:
-            self.physics.remove(item)
-            self._unloaded += 1
-            self._failed[:] = False
-        elif item >= 0:
-            self._failed[item] = True
-        if success or not self.physics.exact:
-            self._look()
-        terminated, truncated = self._ends()
-        if terminated or truncated:
-            self._state = "finished"
+        with all_or_reset(self):
+            self._picks += 1
+            if success:
+                self.physics.remove(item)
+                self._unloaded += 1
+                self._failed[:] = False
+            elif item >= 0:
+                self._failed[item] = True
+            if success or not self.physics.exact:
+                self._look()
+            terminated, truncated = self._ends()
+            if terminated or truncated:
+                self._state = "finished"
         info = self._info() | {"item": item, "distance": distance}
         return self._observation.copy(), 1.0 if success else -1.0, terminated, truncated, info
 
@@ -212,20 +224,25 @@ class ContainerEnv(PickingEnv):
         present = checks.flag_array("state['present']", state["present"], (count,))
         failed = checks.flag_array("state['failed']", state["failed"], (count,))
         blur = checks.finite_array("state['blur']", state["blur"], (count, 3))
+        if np.abs(blur).max() > MOST_BLUR:
+            raise ValueError(
+                f"state['blur'] reaches {np.abs(blur).max()}; expected <= {MOST_BLUR} m"
+            )
         counts = checks.integer_array("state['counts']", state["counts"], (2,)).tolist()
         removed = int((~present).sum())
         picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
         unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
         random_state.check_text("state['rng']", state["rng"])
-        self._fill(load)
-        for item in np.flatnonzero(~present).tolist():
-            self.physics.remove(item)
-        self._blur, self._failed = blur, failed
-        self._picks, self._unloaded = picks, unloaded
-        random_state.set_text(state["rng"], self.np_random)
-        if any(self._ends()):
-            self._state = "finished"
-        self._look()
+        with all_or_reset(self):
+            self._set_rng_state(state["rng"])
+            self._fill(load, blur)
+            for item in np.flatnonzero(~present).tolist():
+                self.physics.remove(item)
+            self._failed = failed
+            self._picks, self._unloaded = picks, unloaded
+            if any(self._ends()):
+                self._state = "finished"
+            self._look()
 
     def render(self) -> np.ndarray | None:
         """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
@@ -243,10 +260,9 @@ class ContainerEnv(PickingEnv):
             self._camera.close()
         super().close()
 
-    def _fill(self, load: Load) -> None:
-        check_load(load)
+    def _fill(self, load: Load, blur: np.ndarray) -> None:
         self.physics.reset(load)
-        self._blur = self._drift(len(load))
+        self._blur = blur
         self._failed = np.zeros(len(load), dtype=bool)
         self._picks = self._unloaded = 0
         self._state = "running"

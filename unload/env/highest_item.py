@@ -4,7 +4,7 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingEnv
+from unload.env.base import PickingEnv, all_or_reset
 from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 from unload.support import checks, random_state
@@ -17,7 +17,7 @@ GRID = np.concatenate(
 
 
 def highest_places(places: np.ndarray) -> np.ndarray:
-    """(..., items) bool, which of the (..., items, 3) places in m no other one is higher than."""
+    """(..., items) bool, True where no other of the (..., items, 3) places in m is higher."""
     heights = places[..., 2]
     return heights > heights.max(axis=-1, keepdims=True) - HEIGHT_TOLERANCE
 
@@ -84,18 +84,20 @@ class HighestItemEnv(PickingEnv):
         if options:
             raise ValueError(f"options is {options!r}; expected none")
         super().reset(seed=seed)
-        self._picks, self._state = 0, "running"
-        return self._draw(), self._info()
+        with all_or_reset(self):
+            self._picks, self._state = 0, "running"
+            return self._draw(), self._info()
 
     def step(self, action: int):
         """Choose row ``action`` of the observation."""
         self._check_running()
         reward = 1.0 if self._highest[self._row(action)] else -1.0
-        self._picks += 1
-        truncated = self._picks == self.max_picks
-        if truncated:
-            self._state = "finished"
-        return self._draw(), reward, False, truncated, self._info()
+        with all_or_reset(self):
+            self._picks += 1
+            truncated = self._picks == self.max_picks
+            if truncated:
+                self._state = "finished"
+            return self._draw(), reward, False, truncated, self._info()
 
     def action_masks(self) -> np.ndarray:
         """(128,) bool, all True."""
@@ -124,9 +126,10 @@ class HighestItemEnv(PickingEnv):
         picks = checks.integer("state['picks']", picks, 0, self.max_picks)
         highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
         random_state.check_text("state['rng']", state["rng"])
-        random_state.set_text(state["rng"], self.np_random)
-        self._picks, self._highest = picks, highest
-        self._state = "finished" if picks == self.max_picks else "running"
+        with all_or_reset(self):
+            self._set_rng_state(state["rng"])
+            self._picks, self._highest = picks, highest
+            self._state = "finished" if picks == self.max_picks else "running"
 
     def render(self) -> None:
         """None: there is nothing to draw."""
@@ -134,7 +137,7 @@ class HighestItemEnv(PickingEnv):
 
     def _draw(self) -> np.ndarray:
         places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
-        positions = places + self._drift(task.N_VISIBLE)
+        positions = places + observation.drift(task.N_VISIBLE, self.position_noise, self.np_random)
         rows = observation.nearest(positions)
         self._highest = highest_places(places)[rows]
         return self._features(positions[rows])

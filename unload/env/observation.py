@@ -15,6 +15,7 @@ PADDING = -1.0
 # spread around the places they were put at, and how far they sink in the mean (m).
 POSITION_NOISE = 0.0005
 SINK = 0.001
+MOST_NOISE = 10.0  # m, more than the container is long
 
 
 def distance(positions: np.ndarray) -> np.ndarray:

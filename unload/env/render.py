@@ -61,11 +61,12 @@ class Camera:
         self._bodies: list[int | None] = []
         for position, size, package in zip(load.positions, load.sizes, load.packages):
             # Drawn a little smaller, so that the seams between boxes show.
-            body = self._world.add_box(position, size - 0.015, 0)
+            body = self._world.add_box(position, np.maximum(size - 0.015, size / 2), 0)
             self._world.paint(body, package_colour(package))
             self._bodies.append(body)
 
     def close(self) -> None:
+        """Free the renderer; the next picture starts it again."""
         if self._world is not None:
             self._world.close()
             self._world = None

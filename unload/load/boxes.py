@@ -1,4 +1,4 @@
-"""The boxes of one container: where they stand, how large they are, and which of them touch."""
+"""The boxes of one container: their places, sizes and contacts."""
 
 from dataclasses import dataclass, field
 
@@ -8,6 +8,9 @@ from unload import task
 from unload.load.contacts import Contacts, contacts
 from unload.support import checks
 
+# Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
+SMALLEST_EDGE = 0.002
+
 
 @dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
 class Load:
@@ -15,10 +18,10 @@ class Load:
 
     Attributes:
         positions: (n, 3) float64, centre of each box in m, inside the container.
-        sizes: (n, 3) float64, edge lengths along x, y and z in m, positive.
+        sizes: (n, 3) float64, edge lengths along x, y and z in m, at least 0.002.
         packages: (n,) int64, package number (0–12 in the paper's loads).
         walls: (n,) int64, number of the item wall, 0 at the rear.
-        contacts: which boxes touch, found from the others.
+        contacts: which boxes touch, computed from positions and sizes.
 
     Raises:
         TypeError: a field's dtype is not numeric.
@@ -38,9 +41,11 @@ class Load:
         if count == 0:
             raise ValueError("positions is empty; expected at least one box")
         sizes = checks.finite_array("sizes", self.sizes, (count, 3))
-        if (sizes <= 0).any():
-            item = int(np.argwhere(sizes <= 0)[0, 0])
-            raise ValueError(f"sizes of box {item} are {sizes[item]}; expected all > 0")
+        if sizes.min() < SMALLEST_EDGE:
+            item = int(sizes.min(axis=1).argmin())
+            raise ValueError(
+                f"sizes of box {item} are {sizes[item]}; expected >= {SMALLEST_EDGE} m"
+            )
         labels = {}
         for name in ("packages", "walls"):
             labels[name] = checks.integer_array(name, getattr(self, name), (count,))

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from unload import task
-from unload.load.boxes import Load
+from unload.load.boxes import Load, check_load
 from unload.load.substacks import package_colour
 from unload.support import checks
 
@@ -46,8 +46,7 @@ def view(
         ValueError: ``present`` has another shape, more than four groups, or a group
             holds a number that is no item.
     """
-    if not isinstance(load, Load):
-        raise TypeError(f"load is {load!r}; expected an unload.Load")
+    check_load(load)
     present = np.ones(len(load), dtype=bool) if present is None else np.asarray(present)
     if present.shape != (len(load),) or present.dtype != bool:
         raise ValueError(
@@ -108,7 +107,8 @@ def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.nda
 
 
 def _mesh(load: Load, items: np.ndarray, colours: np.ndarray) -> go.Mesh3d:
-    vertices = load.positions[items, None] + CORNERS * (load.sizes[items, None] - SEAM)
+    sizes = np.maximum(load.sizes - SEAM, load.sizes / 2)[items, None]
+    vertices = load.positions[items, None] + CORNERS * sizes
     triangles = (TRIANGLES + np.arange(len(items))[:, None, None] * len(CORNERS)).reshape(-1, 3)
     labels = [f"item {item}, package {load.packages[item]}" for item in items]
     return go.Mesh3d(

@@ -5,6 +5,7 @@ observations or rewards.
 """
 
 import os
+import weakref
 from collections.abc import Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -61,6 +62,8 @@ def slim(size: np.ndarray) -> np.ndarray:
 class World:
     """One PyBullet client (about 28 MB) with gravity, holding axis-aligned boxes.
 
+    The client is disconnected by ``close``, or when nothing refers to the world any more.
+
     Bodies never fall asleep: PyBullet's external force does not wake a sleeping body,
     so that a free box would not move at all.
 
@@ -78,6 +81,7 @@ class World:
         self._maximal = maximal_coordinates
         self._shapes: dict[tuple[float, ...], int] = {}
         self._client = pybullet.connect(pybullet.DIRECT)
+        self._disconnect = weakref.finalize(self, pybullet.disconnect, self._client)
         pybullet.setGravity(0, 0, -task.GRAVITY, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step,
@@ -117,6 +121,11 @@ class World:
             physicsClientId=self._client,
         )
         return body
+
+    @property
+    def shapes(self) -> int:
+        """Number of different box sizes so far."""
+        return len(self._shapes)
 
     def _shape(self, size: tuple[float, ...]) -> int:
         if size not in self._shapes:
@@ -207,5 +216,4 @@ class World:
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""
-        if pybullet.isConnected(self._client):
-            pybullet.disconnect(self._client)
+        self._disconnect()

@@ -1,4 +1,4 @@
-"""Which boxes decide whether a box can be lifted.
+"""The situation of a box: the boxes that decide whether it can be lifted.
 
 A box is held down by what rests on it, directly or over others. It may rub against its
 neighbours in the same wall, and it can tip aside only what its surroundings let fall.
@@ -13,7 +13,6 @@ import numpy as np
 from unload import task
 from unload.load.boxes import Load
 from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
-from unload.physics.bullet import World, slim
 
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 
@@ -49,9 +48,9 @@ class Situation:
 
 
 class Surroundings:
-    """The situations of all boxes of a load, as it is unloaded.
+    """The situations of all boxes of a load, while it is unloaded.
 
-    Who touches whom is known to the load; picks only take boxes away.
+    The load knows which boxes touch; picks only take boxes away.
 
     Attributes:
         load: the load.
@@ -101,32 +100,3 @@ class Surroundings:
             floor=None if floor is None else round(floor / RESOLUTION),
             sides=tuple(round(side / RESOLUTION) for side in sides),
         )
-
-
-def lift(world: World, situation: Situation) -> float:
-    """Pull the chosen box of a situation; how far it moved, in m.
-
-    The chosen box and all that rests on it are free to move, the rest is fixed. The world
-    is left empty, and what was lifted in it before makes no difference, not in one bit.
-
-    Args:
-        world: an empty one.
-        situation: the box and its surroundings.
-
-    Returns:
-        Distance in m, rounded to whole micrometres.
-    """
-    bodies: list[int] = []
-    try:
-        for row, box in enumerate(situation.boxes * RESOLUTION):
-            mass = task.MASS if row < situation.dynamic else 0.0
-            bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
-        if situation.floor is not None:
-            bodies.append(world.add_box((0, 0, situation.floor * RESOLUTION - 0.5), (9, 9, 1), 0))
-        for side in situation.sides:
-            outwards = np.sign(side) * 0.5
-            bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-        return round(world.pull(bodies[0]), 6)
-    finally:  # also when interrupted: what stays behind would be in the way of the next lift
-        for body in reversed(bodies):
-            world.remove(body)

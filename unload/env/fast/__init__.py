@@ -1,0 +1,4 @@
+"""Compiled code for many containers at once, equal in bits to the plain environments.
+
+Read ``ranking`` and ``containers``, in this order.
+"""

@@ -14,8 +14,9 @@ import numpy as np
 from unload import task
 from unload.env.fast.ranking import features, rank, remove, replace
 from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
+from unload.physics.lift_table import EMPTY, absorb, slot_of
 from unload.physics.situation import RESOLUTION
-from unload.physics.table import EMPTY, HELD_DOWN, absorb, find
+from unload.physics.table import HELD_DOWN
 
 CONTAINER_WIDTH = float(task.CONTAINER[1])
 N_VISIBLE = task.N_VISIBLE
@@ -126,7 +127,7 @@ def look_up(containers, actions, digests, micrometres):
         if digest == EMPTY:
             distances[env] = 0
             continue
-        slot = find(digests, digest)
+        slot = slot_of(digests, digest)
         known = digests[slot] != EMPTY
         distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
     return items, distances

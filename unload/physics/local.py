@@ -1,0 +1,73 @@
+"""Lifts of a box in its situation: nothing else in the container is simulated."""
+
+import numpy as np
+
+from unload import task
+from unload.physics.base import Physics
+from unload.physics.bullet import World, slim
+from unload.physics.situation import RESOLUTION, Situation, Surroundings
+
+# A world keeps the shape of every box size that it has met, 3.4 kB each, and cannot free
+# one. At this number it is replaced by a new one, which gives the same answers.
+MOST_SHAPES = 10_000
+
+
+class LocalPhysics(Physics):
+    """Simulates the situation of the chosen box, on the load's exact grid.
+
+    The chosen box and all that rests on it are free to move; what they stand on, their
+    neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
+    A failed lift has no effect on the container (Sec. III-D).
+
+    Attributes:
+        surroundings: the situations of the load's items.
+    """
+
+    def simulate(self, situation: Situation) -> float:
+        """Lift the chosen box of a situation; return how far it moved, in m.
+
+        Raises:
+            RuntimeError: the physics is closed.
+        """
+        with self._lock:
+            self._check_open()
+            if self._world is not None and self._world.shapes >= MOST_SHAPES:
+                self._stop()
+            if self._world is None:
+                self._world = World()
+            return lift(self._world, situation)
+
+    def _reset(self) -> None:
+        self.surroundings = Surroundings(self.load, self.present)
+
+    def _lift(self, item: int) -> float:
+        return self.simulate(self.surroundings.situation(item))
+
+
+def lift(world: World, situation: Situation) -> float:
+    """Pull the chosen box of a situation; return how far it moved, in m.
+
+    The chosen box and all that rests on it are free to move, the rest is fixed. The world
+    is left empty, and what was lifted in it before makes no difference, not in one bit.
+
+    Args:
+        world: an empty one.
+        situation: the box and its surroundings.
+
+    Returns:
+        Distance in m, rounded to whole micrometres.
+    """
+    bodies: list[int] = []
+    try:
+        for row, box in enumerate(situation.boxes * RESOLUTION):
+            mass = task.MASS if row < situation.dynamic else 0.0
+            bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
+        if situation.floor is not None:
+            bodies.append(world.add_box((0, 0, situation.floor * RESOLUTION - 0.5), (9, 9, 1), 0))
+        for side in situation.sides:
+            outwards = np.sign(side) * 0.5
+            bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
+        return round(world.pull(bodies[0]), 6)
+    finally:  # also when interrupted: what stays behind would be in the way of the next lift
+        for body in reversed(bodies):
+            world.remove(body)
