@@ -1,98 +1,25 @@
+"""Lifts in a simulation of every box."""
+
 import time
 from collections.abc import Callable
 from statistics import median
 
 import numpy as np
+import pybullet
 import pytest
 
+from tests.physics.kinds import ONE_BOX
 from unload import task
 from unload.load.boxes import Load
-from unload.load.substacks import CELL, build_load, stack_load
+from unload.load.substacks import build_load, stack_load
+from unload.physics.base import Physics
 from unload.physics.bullet import World
-from unload.physics.full import (
-    DEPOT,
-    FullPhysics,
-    LocalPhysics,
-    Physics,
-    TablePhysics,
-    make_physics,
-)
+from unload.physics.full import DEPOT, FullPhysics
 from unload.physics.situation import Surroundings
-from unload.physics.table import HELD_DOWN
-
-KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
-ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, the appendix
-
-
-@pytest.fixture
-def make():
-    """``make(kind, load)``: a physics that holds ``load``; closed after the test."""
-    made = []
-
-    def build(kind: str, load: Load, **kwargs) -> Physics:
-        made.append(KINDS[kind](**kwargs))
-        made[-1].reset(load)
-        return made[-1]
-
-    yield build
-    for physics in made:
-        physics.close()
 
 
 def lifts(physics: Physics, items) -> list[float]:
     return [physics.lift(int(item)) for item in items]
-
-
-def hard_items(load: Load, present: np.ndarray) -> list[int]:
-    """Items under exactly one box that rests only partly on them."""
-    around = Surroundings(load, present)
-    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
-    hard = []
-    for item in np.flatnonzero(present).tolist():
-        above = around.on_top(item)
-        if len(above) == 1:
-            inside = low[above[0], 1] > low[item, 1] - CELL / 2
-            inside &= high[above[0], 1] < high[item, 1] + CELL / 2
-            if not inside:
-                hard.append(item)
-    return hard
-
-
-def partly_unloaded(load: Load, share: float, rng: np.random.Generator) -> Load:
-    """The load after a share of its items, each with nothing on it, has been taken out."""
-    present = np.ones(len(load), dtype=bool)
-    around = Surroundings(load, present)
-    while present.mean() > 1 - share:
-        free = [item for item in np.flatnonzero(present).tolist() if not around.on_top(item)]
-        present[rng.choice(free)] = False
-    fields = (load.positions, load.sizes, load.packages, load.walls)
-    return Load(*(field[present] for field in fields))
-
-
-# --- the appendix -------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_free_box_is_lifted_as_far_as_the_appendix_says(make, boxes, kind):
-    physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
-    assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_two_stacked_boxes_move_as_far_as_the_appendix_says(make, boxes, kind):
-    physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
-    assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.002)
-    assert physics.lift(1) == pytest.approx(ONE_BOX, rel=0.02)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_free_boxes_of_a_neat_wall_do_not_jam(make, small_load, kind):
-    """They would, mostly, if the boxes had no gap between them."""
-    physics = make(kind, small_load)
-    around = Surroundings(small_load, physics.present)
-    free = [item for item in range(len(small_load)) if not around.on_top(item)]
-    assert len(free) >= 8
-    assert lifts(physics, free[:8]) == pytest.approx([ONE_BOX] * 8, rel=0.02)
 
 
 def test_boxes_of_a_full_world_at_rest_for_long_still_lift(make, small_load):
@@ -102,110 +29,7 @@ def test_boxes_of_a_full_world_at_rest_for_long_still_lift(make, small_load):
     assert physics.lift(top) == pytest.approx(ONE_BOX, rel=0.02)
 
 
-@pytest.mark.parametrize("scale", [0.8, 1.2])
-@pytest.mark.parametrize("kind", KINDS)
-def test_boxes_of_another_scale_lift_alike(make, rng, kind, scale):
-    load = stack_load(rng, walls=1, scale=scale)
-    physics = make(kind, load)
-    around = Surroundings(load, physics.present)
-    on_top = np.array([len(around.on_top(item)) for item in range(len(load))])
-    assert lifts(physics, np.flatnonzero(on_top == 0)[:3]) == pytest.approx([ONE_BOX] * 3, rel=0.05)
-    assert max(lifts(physics, np.flatnonzero(on_top > 2)[:3])) < 0.02
-
-
-# --- one physics against another ----------------------------------------------------
-
-
-def test_table_equals_local_exactly(make, rng):
-    load = stack_load(rng, walls=2)
-    local, table = make("local", load), make("table", load)
-    for item in rng.permutation(len(load)):
-        distance = local.lift(item)
-        if local.surroundings.situation(item).on_top < HELD_DOWN:
-            assert table.lift(item) == table.lift(item) == distance
-        else:  # not asked, because never lifted
-            assert table.lift(item) == 0 and distance < 0.02
-        if distance >= task.LIFT_THRESHOLD:
-            local.remove(item)
-            table.remove(item)
-    assert (~local.present).sum() > 20
-
-
-def test_a_shared_table_simulates_each_situation_once(make, boxes, monkeypatch):
-    load = boxes((1.2, 0.2), (2.0, 0.2))
-    first = make("table", load)
-    known = lifts(first, range(2))
-    second = make("table", load, table=first.table)
-    monkeypatch.setattr(World, "pull", lambda *_: pytest.fail("asked PyBullet again"))
-    assert lifts(second, range(2)) == known
-    fresh = make("table", load)
-    with pytest.raises(pytest.fail.Exception):
-        fresh.lift(0)
-
-
-@pytest.mark.slow
-def test_local_agrees_with_full():
-    """On 105 picks of 3 walls in all states, half of them of the hard class if there are any."""
-    rng = np.random.default_rng(2)
-    full, local = FullPhysics(), LocalPhysics()
-    results = []
-    for share in (0.0, 0.4, 0.6, 0.7, 0.8):
-        load = partly_unloaded(stack_load(rng, walls=3), share, rng)
-        full.reset(load)
-        local.reset(load)
-        for number in range(21):
-            hard = hard_items(load, local.present) if number % 2 else []
-            item = int(rng.choice(hard if hard else np.flatnonzero(local.present)))
-            distances = full.lift(item), local.lift(item)
-            results.append((bool(hard), *distances))
-            if min(distances) >= task.LIFT_THRESHOLD and not hard:
-                full.remove(item)
-                local.remove(item)
-    full.close()
-    local.close()
-    hard, distances = np.array(results)[:, 0].astype(bool), np.array(results)[:, 1:]
-    success = distances >= task.LIFT_THRESHOLD
-    agree = success[:, 0] == success[:, 1]
-    print(
-        f"\nlocal and full agree on {agree.sum()} of {len(agree)} picks and on "
-        f"{agree[hard].sum()} of {hard.sum()} hard ones; lifted: {success[:, 0].sum()} and "
-        f"{success[hard, 0].sum()}"
-    )
-    assert len(agree) >= 100 and hard.sum() >= 40 and success[:, 0].sum() >= 10
-    near = ((distances > 0.17) & (distances < 0.23)).all(axis=1)
-    assert (agree | near).all(), distances[~agree]
-    assert agree.mean() >= 0.97
-
-
 # --- effects of a lift --------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", ["local", "table"])
-def test_a_lift_has_no_effect(make, small_load, kind):
-    physics = make(kind, small_load)
-    items = range(20, len(small_load))
-    forwards = lifts(physics, items)
-    assert lifts(physics, reversed(items)) == forwards[::-1]
-    assert (physics.positions() == small_load.positions).all() and physics.present.all()
-
-
-def test_removing_a_box_frees_the_one_below(make, boxes):
-    for kind in KINDS:
-        physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
-        physics.remove(1)
-        assert physics.present.tolist() == [True, False]
-        assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
-
-
-def test_interleaved_containers_answer_as_separate_ones(make, rng):
-    loads = [stack_load(rng, walls=1) for _ in range(2)]
-    items = (0, 30, 60)
-    for kind in ("local", "full"):
-        separate = [lifts(make(kind, load), items) for load in loads]
-        first, second = (make(kind, load) for load in loads)
-        together = [(first.lift(item), second.lift(item)) for item in items]
-        assert list(zip(*separate)) == together
-
 
 # Two boxes side by side, one across both, and the lift of a support: it fails, and tilts
 # the box above. The lift of the upper box succeeds.
@@ -258,6 +82,21 @@ def test_the_ways_to_simulate_a_full_world_lift_alike(make, rng):
         assert kept.lift(item) == pytest.approx(restored.lift(item), abs=0.005)
 
 
+@pytest.mark.parametrize("after_pick", ["restore", "restore_failure", "keep"])
+def test_an_interrupted_lift_moves_no_box(make, boxes, after_pick, monkeypatch):
+    load = boxes(*BRIDGE)
+    physics, pull = make("full", load, after_pick=after_pick), World.pull
+
+    def interrupted(world, body):
+        pull(world, body)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(World, "pull", interrupted)
+        physics.lift(0)
+    assert physics.lift(0) == pytest.approx(make("full", load).lift(0), abs=0.002)
+
+
 # --- reset --------------------------------------------------------------------------
 
 
@@ -289,7 +128,7 @@ def test_boxes_stay_in_place_after_a_reset(make, rng, after_pick):
 
 def test_spare_bodies_stay_out_of_the_container(make):
     many = build_load(np.zeros((1, 3, 4), dtype=int))
-    few = build_load(np.full((1, 3, 4), 2))
+    few = build_load([[[2] * 4, [2] * 4, [0] * 4]])  # of the same sizes, and others
     physics = make("full", many)
     physics.reset(few)
     physics.settle(1.0)
@@ -324,80 +163,29 @@ def test_reset_is_ten_times_cheaper_than_building_anew():
     assert building >= 10 * resetting
 
 
-# --- bad input ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("call", ["lift", "remove"])
-@pytest.mark.parametrize(
-    ("item", "error", "message"),
-    [
-        (1, ValueError, "item 1 has been removed"),
-        (2, ValueError, "item is 2; expected an integer >= 0 and <= 1"),
-        (-1, ValueError, "item is -1"),
-        (0.0, TypeError, "item is 0.0"),
-        (True, TypeError, "item is True"),
-    ],
-)
-def test_bad_items_are_refused(make, boxes, kind, call, item, error, message):
-    physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
-    physics.remove(1)
-    with pytest.raises(error, match=message):
-        getattr(physics, call)(item)
-    assert physics.present.tolist() == [True, False]
-
-
-def calls_of(physics: Physics) -> list[Callable]:
-    calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
-    if isinstance(physics, FullPhysics):
-        calls.append(lambda: physics.settle(0.1))
-    return calls
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_calls_out_of_order_are_refused(boxes, kind):
-    physics, load = KINDS[kind](), boxes((1.2, 0.2))
-    for call in calls_of(physics):
-        with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
-            call()
-    physics.reset(load)
-    if kind == "local":
-        situation = physics.surroundings.situation(0)
+def test_boxes_of_ever_new_sizes_do_not_pile_up():
+    """Spare boxes are simulated, too: with each of them a step takes longer."""
+    rng = np.random.default_rng(0)
+    physics, bodies = FullPhysics(), []
+    for _ in range(20):
+        load = stack_load(rng, walls=1)
+        sizes = load.sizes * rng.uniform(0.9, 1, load.sizes.shape)
+        physics.reset(Load(load.positions, sizes, load.packages, load.walls))
+        bodies.append(pybullet.getNumBodies(physicsClientId=physics._world._client))
+        assert bodies[-1] < 2 * len(load)
+    physics.lift(int(np.argmax(load.positions[:, 2])))
     physics.close()
+
+
+def test_boxes_of_the_papers_sizes_are_kept(small_load):
+    """A new world would cost more than to move the boxes, and change lifts by their history."""
+    physics, rng = FullPhysics(), np.random.default_rng(0)
+    physics.reset(stack_load(rng))
+    world = physics._world
+    for _ in range(5):
+        physics.reset(stack_load(rng))
+    assert physics._world is world
     physics.close()
-    calls = [*calls_of(physics), lambda: physics.reset(load)]
-    if kind == "local":
-        calls.append(lambda: physics.simulate(situation))
-    for call in calls:
-        with pytest.raises(RuntimeError, match="the physics is closed; make a new one"):
-            call()
-
-
-def test_a_table_is_needed():
-    with pytest.raises(TypeError, match="table is 3; expected a LiftTable or None"):
-        TablePhysics(3)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_reset_takes_a_load_only(make, boxes, kind):
-    physics = make(kind, boxes((1.2, 0.2)))
-    with pytest.raises(TypeError, match="load is 'walls'; expected an unload.Load"):
-        physics.reset("walls")
-    assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)  # unchanged
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("mujoco",), "physics is 'mujoco'; expected one of 'local', 'full', 'table'"),
-        (("full", "forget"), "after_pick is 'forget'; expected one of 'restore'"),
-        (("local", "keep"), "after_pick is 'keep'; expected 'restore' for physics='local'"),
-        (("table", "restore_failure"), "expected 'restore' for physics='table'"),
-    ],
-)
-def test_make_physics_refuses(arguments, message):
-    with pytest.raises(ValueError, match=message):
-        make_physics(*arguments)
 
 
 @pytest.mark.parametrize("seconds", [-1.0, float("nan")])

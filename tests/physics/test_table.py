@@ -1,109 +1,111 @@
-"""The memory of lifts."""
+"""Local physics with a memory."""
 
-import json
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
 
-import numpy as np
-import pybullet
 import pytest
 
 from unload import task
-from unload.physics.bullet import SETTINGS, World
-from unload.physics.full import LIFTS, LocalPhysics
-from unload.physics.situation import Surroundings
-from unload.physics.table import HELD_DOWN, LiftTable
-from unload.support import files
+from unload.load.substacks import stack_load
+from unload.physics import table
+from unload.physics.bullet import World
+from unload.physics.lift_table import LiftTable
+from unload.physics.local import LocalPhysics
+from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics
 
 
 @pytest.fixture(scope="module")
-def situations(full_load):
-    """Situations of a full container with at most two boxes on top, and others."""
-    surroundings = Surroundings(full_load, np.ones(len(full_load), dtype=bool))
-    return [surroundings.situation(item) for item in range(0, len(full_load), 7)]
-
-
-def test_table_gives_what_local_physics_gives(situations):
-    local, table = LocalPhysics(), LiftTable()
+def known(situations):
+    """Situations with at most two boxes on top, and what ``LocalPhysics`` answers alone."""
+    local = LocalPhysics()
     light = [each for each in situations if each.on_top < HELD_DOWN]
-    assert len(light) > 20
-    for situation in light:
-        distance = local.simulate(situation)
-        assert table.lift(situation) == distance  # filled
-        assert table.lift(situation) == distance  # looked up
-    assert 0 < len(table) <= len(light)
+    yield [(situation, local.simulate(situation)) for situation in light]
     local.close()
 
 
-def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
-    table = LiftTable()
-    one, *others = (each for each in situations if each.on_top < HELD_DOWN)
+def test_table_equals_local_exactly(make, rng):
+    load = stack_load(rng, walls=2)
+    local, table = make("local", load), make("table", load)
+    for item in rng.permutation(len(load)):
+        distance = local.lift(item)
+        if local.surroundings.situation(item).on_top < HELD_DOWN:
+            assert table.lift(item) == table.lift(item) == distance
+        else:  # not asked, because never lifted
+            assert table.lift(item) == 0 and distance < 0.02
+        if distance >= task.LIFT_THRESHOLD:
+            local.remove(item)
+            table.remove(item)
+    assert (~local.present).sum() > 20
 
-    def interrupted(world, body):
-        raise KeyboardInterrupt
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(World, "pull", interrupted)
-        table.lift(one)
-    fresh = LiftTable()
-    for situation in (one, *others):
-        assert table.lift(situation) == fresh.lift(situation)
-
-
-def test_a_closed_table_lifts_again(situations):
-    table = LiftTable()
-    table.close()  # nothing to free
-    one, other, *_ = (each for each in situations if each.on_top < HELD_DOWN)
-    distance = table.lift(one)
-    world = table._world
-    table.close()
-    with pytest.raises(pybullet.error):
-        world.pose(0)
-    assert table.lift(one) == distance
-    assert table.lift(other) == LiftTable().lift(other)
+def test_a_situation_is_simulated_once(known, monkeypatch):
+    first, second, fresh = TablePhysics(), TablePhysics(), TablePhysics()
+    second.table = first.table
+    assert [first.simulate(situation) for situation, _ in known] == [d for _, d in known]
+    monkeypatch.setattr(World, "pull", lambda *_: pytest.fail("asked PyBullet again"))
+    for physics in (first, second):
+        assert [physics.simulate(situation) for situation, _ in known] == [d for _, d in known]
+    assert len(known) > 20 and 0 < len(first.table) <= len(known)
+    with pytest.raises(pytest.fail.Exception):
+        fresh.simulate(known[0][0])
+    assert len(fresh.table) == 0
+    for physics in (first, second, fresh):
+        physics.close()
 
 
 def test_boxes_under_three_others_are_held_down_in_local_physics_too(situations):
-    local, table = LocalPhysics(), LiftTable()
+    local, physics = LocalPhysics(), TablePhysics()
     heavy = [each for each in situations if each.on_top >= HELD_DOWN][::3]
     assert len(heavy) > 15
     for situation in heavy:
-        assert table.lift(situation) == 0
+        assert physics.simulate(situation) == 0
         assert local.simulate(situation) < task.LIFT_THRESHOLD
-    assert len(table) == 0
+    assert len(physics.table) == 0
     local.close()
+    physics.close()
 
 
-def test_saved_table_answers_the_same_without_lifting(situations, tmp_path, monkeypatch):
-    table = LiftTable()
-    distances = [table.lift(each) for each in situations[:20]]
-    table.save(tmp_path / "lifts.npz")
-    read = LiftTable.load(tmp_path / "lifts.npz")
-    monkeypatch.setattr("unload.physics.table.lift", None)
-    assert [read.lift(each) for each in situations[:20]] == distances
-    read.save(tmp_path / "again.npz")
-    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "lifts.npz").read_bytes()
+def test_threads_that_share_a_table_get_the_right_answers(known, rng):
+    """Each thread has a physics, hence a world, of its own."""
+    shared, together = LiftTable(), Barrier(4)
+    orders = [rng.permutation(len(known)) for _ in range(4)]
+
+    def work(order) -> list[float]:
+        physics = TablePhysics(shared)
+        together.wait()
+        answers = {number: physics.simulate(known[number][0]) for number in order.tolist()}
+        physics.close()
+        return [answers[number] for number in range(len(known))]
+
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(work, orders))
+    assert answers == [[distance for _, distance in known]] * 4
+    assert [shared.find(situation) for situation, _ in known] == answers[0]
 
 
-def test_table_of_another_physics_is_refused(situations, tmp_path):
-    table = LiftTable()
-    table.lift(situations[0])
-    table.save(tmp_path / "lifts.npz")
-    arrays = files.read_arrays(tmp_path / "lifts.npz")
-    arrays["settings"] = np.array(json.dumps(SETTINGS | {"friction": 0.7}))
-    files.write_arrays(tmp_path / "other.npz", arrays)
-    with pytest.raises(ValueError, match="friction is 0.7 there and 0.5 here"):
-        LiftTable.load(tmp_path / "other.npz")
+def test_threads_that_ask_first_share_one_table(monkeypatch):
+    read, together = LiftTable.load, Barrier(4)
+    loads = []
+    monkeypatch.setattr(LiftTable, "load", lambda path: loads.append(path) or read(path))
+    table._read_once.cache_clear()
+
+    def ask(number: int) -> LiftTable:
+        together.wait()
+        return table.shared_table()
+
+    with ThreadPoolExecutor(4) as pool:
+        assert len(set(pool.map(ask, range(4)))) == 1
+    assert loads == [LIFTS_FILE]
 
 
-def test_damaged_and_foreign_files_are_refused(tmp_path):
-    (tmp_path / "damaged.npz").write_bytes(b"no zip file")
-    with pytest.raises(ValueError, match="damaged.npz"):
-        LiftTable.load(tmp_path / "damaged.npz")
-    files.write_arrays(tmp_path / "foreign.npz", {"x": np.zeros(3)})
-    with pytest.raises(ValueError, match="expected a lift table"):
-        LiftTable.load(tmp_path / "foreign.npz")
-    with pytest.raises(FileNotFoundError):
-        LiftTable.load(tmp_path / "missing.npz")
+def test_shipped_table_fits_this_physics(known):
+    shipped = LiftTable.load(LIFTS_FILE)
+    assert len(shipped) > 1000
+    found = [(shipped.find(situation), distance) for situation, distance in known]
+    assert sum(distance is not None for distance, _ in found) > 20
+    assert all(distance in (None, answer) for distance, answer in found)
 
 
-def test_shipped_table_fits_this_physics():
-    assert len(LiftTable.load(LIFTS)) > 1000
+def test_a_table_is_needed():
+    with pytest.raises(TypeError, match="table is 3; expected a LiftTable or None"):
+        TablePhysics(3)

@@ -1,0 +1,8 @@
+"""The three physics, and the appendix's distances."""
+
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics
+
+KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
+ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg

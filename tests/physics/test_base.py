@@ -1,0 +1,161 @@
+"""What all three physics have in common."""
+
+from collections.abc import Callable
+from threading import Thread
+
+import numpy as np
+import pytest
+
+from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES
+from unload.load.substacks import stack_load
+from unload.physics.base import Physics
+from unload.physics.full import FullPhysics
+from unload.physics.situation import Surroundings
+
+
+def lifts(physics: Physics, items) -> list[float]:
+    return [physics.lift(int(item)) for item in items]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_free_box_is_lifted_as_far_as_the_appendix_says(make, boxes, kind):
+    physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
+    assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_two_stacked_boxes_move_as_far_as_the_appendix_says(make, boxes, kind):
+    physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
+    assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.002)
+    assert physics.lift(1) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_free_boxes_of_a_neat_wall_do_not_jam(make, small_load, kind):
+    """They would, mostly, if the boxes had no gap between them."""
+    physics = make(kind, small_load)
+    around = Surroundings(small_load, physics.present)
+    free = [item for item in range(len(small_load)) if not around.on_top(item)]
+    assert len(free) >= 8
+    assert lifts(physics, free[:8]) == pytest.approx([ONE_BOX] * 8, rel=0.02)
+
+
+@pytest.mark.parametrize("scale", [0.8, 1.2])
+@pytest.mark.parametrize("kind", KINDS)
+def test_boxes_of_another_scale_lift_alike(make, rng, kind, scale):
+    load = stack_load(rng, walls=1, scale=scale)
+    physics = make(kind, load)
+    around = Surroundings(load, physics.present)
+    on_top = np.array([len(around.on_top(item)) for item in range(len(load))])
+    assert lifts(physics, np.flatnonzero(on_top == 0)[:3]) == pytest.approx([ONE_BOX] * 3, rel=0.05)
+    assert max(lifts(physics, np.flatnonzero(on_top > 2)[:3])) < 0.02
+
+
+def test_removing_a_box_frees_the_one_below(make, boxes):
+    for kind in KINDS:
+        physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
+        physics.remove(1)
+        assert physics.present.tolist() == [True, False]
+        assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+def test_interleaved_containers_answer_as_separate_ones(make, rng):
+    loads = [stack_load(rng, walls=1) for _ in range(2)]
+    items = (0, 30, 60)
+    for kind in ("local", "full"):
+        separate = [lifts(make(kind, load), items) for load in loads]
+        first, second = (make(kind, load) for load in loads)
+        together = [(first.lift(item), second.lift(item)) for item in items]
+        assert list(zip(*separate)) == together
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_threads_may_share_a_physics(make, boxes, kind):
+    load = boxes(*[(0.3 + 0.45 * column, 0.2) for column in range(5)])
+    known = lifts(make(kind, load), range(5))
+    shared, answers = make(kind, load), {}
+
+    def work(number: int) -> None:
+        answers[number] = lifts(shared, range(5))
+
+    threads = [Thread(target=work, args=(number,)) for number in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for number in range(3):
+        assert answers[number] == pytest.approx(known, abs=0.002 if kind == "full" else 0)
+
+
+# --- bad input ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("call", ["lift", "remove"])
+@pytest.mark.parametrize(
+    ("item", "error", "message"),
+    [
+        (1, ValueError, "item 1 has been removed"),
+        (2, ValueError, "item is 2; expected an integer >= 0 and <= 1"),
+        (-1, ValueError, "item is -1"),
+        (0.0, TypeError, "item is 0.0"),
+        (True, TypeError, "item is True"),
+    ],
+)
+def test_bad_items_are_refused(make, boxes, kind, call, item, error, message):
+    physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
+    physics.remove(1)
+    with pytest.raises(error, match=message):
+        getattr(physics, call)(item)
+    assert physics.present.tolist() == [True, False]
+
+
+def calls_of(physics: Physics) -> list[Callable]:
+    calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
+    if isinstance(physics, FullPhysics):
+        calls.append(lambda: physics.settle(0.1))
+    return calls
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_calls_out_of_order_are_refused(boxes, kind):
+    physics, load = KINDS[kind](), boxes((1.2, 0.2))
+    for call in calls_of(physics):
+        with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
+            call()
+    physics.reset(load)
+    if kind == "local":
+        situation = physics.surroundings.situation(0)
+    physics.close()
+    physics.close()
+    calls = [*calls_of(physics), lambda: physics.reset(load)]
+    if kind == "local":
+        calls.append(lambda: physics.simulate(situation))
+    for call in calls:
+        with pytest.raises(RuntimeError, match="the physics is closed; make a new one"):
+            call()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_reset_takes_a_load_only(make, boxes, kind):
+    physics = make(kind, boxes((1.2, 0.2)))
+    with pytest.raises(TypeError, match="load is 'walls'; expected an unload.Load"):
+        physics.reset("walls")
+    assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)  # unchanged
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_interrupted_reset_needs_another_one(make, boxes, kind, monkeypatch):
+    physics, load = make(kind, boxes((1.2, 0.2))), boxes((1.2, 0.2), (1.2, 0.6))
+
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr("unload.physics.bullet.World.add_box", interrupted)
+        patch.setattr("unload.physics.local.Surroundings", interrupted)
+        physics.reset(load)
+    with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
+        physics.lift(0)
+    physics.reset(load)
+    assert physics.lift(0) == make(kind, load).lift(0)
