@@ -5,8 +5,9 @@ Boxes are given by their lower and upper corners, ``low`` and ``high``, (n, 3) f
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
+
+from unload.support.compiled import compiled
 
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
@@ -68,7 +69,7 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
     return Contacts(*_lists(found, len(low)))
 
 
-@numba.njit(cache=True)
+@compiled
 def _find(low, high, order, ends):
     """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
@@ -111,7 +112,7 @@ def _find(low, high, order, ends):
     return found[:count], 0, 0
 
 
-@numba.njit(cache=True)
+@compiled
 def _columns(corners, order):
     """x, y and z of corners in this order."""
     x, y, z = np.empty(len(order)), np.empty(len(order)), np.empty(len(order))
@@ -120,7 +121,7 @@ def _columns(corners, order):
     return x, y, z
 
 
-@numba.njit(cache=True)
+@compiled
 def _lists(found, count):
     """``starts`` and ``boxes`` of ``Contacts``."""
     starts = np.zeros((3, count + 1), np.int32)

@@ -11,12 +11,12 @@ a policy fares elsewhere, and make a simulation of all boxes affordable.
 
 from functools import cache
 
-import numba
 import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
 from unload.support import checks
+from unload.support.compiled import compiled
 
 CELLS_WIDE = 36
 ROWS_HIGH = 10  # cells of height per row of substacks
@@ -123,7 +123,7 @@ def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
     return counts, cells
 
 
-@numba.njit(cache=True)
+@compiled
 def _cells(variants, counts, cells):
     """Items of (walls, rows, columns) variants, (n, 4) int64: wall, package, left and lower edge.
 
@@ -185,7 +185,7 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     return Load(positions, sizes, cells[:, 1], cells[:, 0])
 
 
-@numba.njit(cache=True)
+@compiled
 def _boxes(cells, packages, depth, cell):
     """Centres and edge lengths of items in m, both (n, 3) float64.
 

@@ -8,12 +8,12 @@ import json
 from pathlib import Path
 from threading import Lock
 
-import numba
 import numpy as np
 
 from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Situation
 from unload.support import checks, files
+from unload.support.compiled import compiled
 
 EMPTY = np.uint64(0)  # digest of a free slot
 FEWEST_SLOTS = 1024
@@ -147,14 +147,14 @@ def _digest(situation: Situation) -> np.uint64:
     return np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
 
 
-@numba.njit(cache=True)
+@compiled
 def absorb(digest, word):
     """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
     digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
     return digest ^ (digest >> np.uint64(29))
 
 
-@numba.njit(cache=True)
+@compiled
 def digest_of(words):
     """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
     digest = np.uint64(len(words))
@@ -163,7 +163,7 @@ def digest_of(words):
     return max(digest, np.uint64(1))
 
 
-@numba.njit(cache=True)
+@compiled
 def slot_of(digests, digest):
     """The slot of a digest, or the free one where it belongs."""
     last = np.uint64(len(digests) - 1)
@@ -173,7 +173,7 @@ def slot_of(digests, digest):
     return slot
 
 
-@numba.njit(cache=True)
+@compiled
 def _fill(digests, micrometres, new_digests, new_micrometres):
     """Put entries into free slots."""
     for entry in range(len(new_digests)):

@@ -6,8 +6,9 @@ paper's network. This is its rule in one compiled pass; readers learn from the o
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
+
+from unload.support.compiled import compiled
 
 BETAS, EPSILON = (0.9, 0.999), 1e-8  # PyTorch's defaults
 
@@ -48,7 +49,7 @@ class Adam:
         self.moments[:] = arrays["moments"]
 
 
-@numba.njit(cache=True)
+@compiled
 def _step(weights, gradients, moments, learning_rate, correction, correction2):
     mean, square = moments
     i = 0

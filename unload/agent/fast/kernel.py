@@ -4,11 +4,12 @@ Features are handled in blocks of ``WIDTH``, whose numbers lie in one flat array
 chunks of ``CHUNK``, which several threads share.
 """
 
-import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
+
+from unload.support.compiled import compiled
 
 CHUNK = 32  # samples whose gradients are summed in single precision
 WIDTH = 64  # features handled together: loops of constant length become vector instructions
@@ -72,7 +73,7 @@ def prefetch(typing_context, numbers, place):
     return types.void(numbers, types.int64), build
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def add_chunks(
     counter, rows, observations, actions, targets, beta, weight, bias, score, score_bias, partial
 ):
@@ -128,7 +129,7 @@ def add_chunks(
         chunk = following
 
 
-@numba.njit(cache=True)
+@compiled
 def _look_up(rows, shape, actions, targets, picked, wanted):
     """Copy the actions and targets of a chunk, so that the memory is asked for all at once."""
     count, items = shape
@@ -140,7 +141,7 @@ def _look_up(rows, shape, actions, targets, picked, wanted):
         picked[number], wanted[number] = actions[row], targets[row]
 
 
-@numba.njit(cache=True)
+@compiled
 def sum_chunks(partial):
     """The sum of the rows, in double precision."""
     total = np.zeros(partial.shape[1])
@@ -149,7 +150,7 @@ def sum_chunks(partial):
     return total
 
 
-@numba.njit(cache=True)
+@compiled
 def _blocks(weight, bias, score):
     """The weights in blocks of ``WIDTH`` features; zeros where there are no more features."""
     count = -(-len(bias) // WIDTH)
@@ -166,7 +167,7 @@ def _blocks(weight, bias, score):
     return blocks
 
 
-@numba.njit(cache=True)
+@compiled
 def _largest(observations, rows):
     """The largest magnitude; not finite if one of the inputs is not.
 
@@ -182,7 +183,7 @@ def _largest(observations, rows):
     return np.int32(largest).view(np.float32)
 
 
-@numba.njit(cache=True)
+@compiled
 def _start_chunk(largest, precision, block):
     block[GRADIENT:] = 0
     for f in range(WIDTH):
@@ -191,7 +192,7 @@ def _start_chunk(largest, precision, block):
         block[SLACK + f] = scale * precision + np.float32(1e-30)
 
 
-@numba.njit(cache=True)
+@compiled
 def _copy(inputs, x):
     """Copy one sample and repeat its last item until ``x`` is full."""
     for i in range(len(inputs)):
@@ -200,7 +201,7 @@ def _copy(inputs, x):
         x[i] = x[i - 3]
 
 
-@numba.njit(cache=True)
+@compiled
 def _reduce_items(x, items, mask, later, block):
     """Read all items: sums of the active ones, keys of the two lowest and the two highest.
 
@@ -248,24 +249,24 @@ def _reduce_items(x, items, mask, later, block):
             block[MEAN + 3 * WIDTH + f] -= active
 
 
-@numba.njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _value(a, b, c, d, x, y, z):
     """A feature before the ReLU."""
     return fma(a, x, fma(b, y, fma(c, z, d)))
 
 
-@numba.njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _active(value):
     return ONE if value > ZERO else ZERO
 
 
-@numba.njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _add(block, place, a0, a1, a2, a3, x0, x1, x2, x3):
     """Add the inputs of the active ones of four items."""
     block[place] = fma(a3, x3, fma(a2, x2, fma(a1, x1, fma(a0, x0, block[place]))))
 
 
-@numba.njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _key(value, item, mask):
     """The value's bits, the lowest of them replaced by the item's number: an int32.
 
@@ -276,7 +277,7 @@ def _key(value, item, mask):
     return np.int32(np.int32(np.float32(value).view(np.int32) & ~mask) | item)
 
 
-@numba.njit(cache=True)
+@compiled
 def _find_extremes(x, items, mask, n, block):
     """The inputs of the lowest and of the highest item for the block's ``n`` features."""
     keys = block.view(np.int32)
@@ -291,7 +292,7 @@ def _find_extremes(x, items, mask, n, block):
             _decide(x, items, 1.0, f, HIGHEST + f, block)
 
 
-@numba.njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _put(inputs, active, place, block):
     """Set four inputs; zeros if the ReLU is closed."""
     block[place] = inputs[0] if active else ZERO
@@ -300,7 +301,7 @@ def _put(inputs, active, place, block):
     block[place + 3 * WIDTH] = ONE if active else ZERO
 
 
-@numba.njit(cache=True)
+@compiled
 def _decide(x, items, sign, f, place, block):
     """Set the inputs of one feature's highest (sign 1) or lowest (-1) item by double precision.
 
@@ -319,7 +320,7 @@ def _decide(x, items, sign, f, place, block):
     _put(mean, sign * best > 0, place, block)
 
 
-@numba.njit(cache=True)
+@compiled
 def _forward(chosen, items, block):
     """Set the inputs of the chosen item, and all features; their part of the value before tanh."""
     x, y, z, share = chosen[0], chosen[1], chosen[2], ONE / np.float32(items)
@@ -342,7 +343,7 @@ def _forward(chosen, items, block):
     return block[PARTS]
 
 
-@numba.njit(cache=True, forceinline=True)
+@compiled(forceinline=True)
 def _feature(inputs, kind, f, block):
     """Set one feature, weights · inputs; its part of the value before tanh."""
     place = inputs + f
@@ -354,7 +355,7 @@ def _feature(inputs, kind, f, block):
     return block[SCORE + kind * WIDTH + f] * feature
 
 
-@numba.njit(cache=True)
+@compiled
 def _backward(slope, block):
     """Add one sample's gradients; ``slope`` is the loss's by the value before tanh."""
     for f in range(WIDTH):
@@ -371,7 +372,7 @@ def _backward(slope, block):
             block[row] = fma(slope, block[FEATURE + kind * WIDTH + f], block[row])
 
 
-@numba.njit(cache=True)
+@compiled
 def best_items(observations, allowed, weight, bias, score, actions):
     """The item of the highest own score; the first one if several have it."""
     x = np.empty((3, observations.shape[1]), np.float32)

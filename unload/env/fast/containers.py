@@ -8,7 +8,6 @@ one in that order, as long as there is one. Here a pick touches these 128 at mos
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from unload import task
@@ -17,6 +16,7 @@ from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
 from unload.physics.lift_table import EMPTY, absorb, slot_of
 from unload.physics.situation import RESOLUTION
 from unload.physics.table import HELD_DOWN
+from unload.support.compiled import compiled
 
 CONTAINER_WIDTH = float(task.CONTAINER[1])
 N_VISIBLE = task.N_VISIBLE
@@ -78,7 +78,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     )
 
 
-@numba.njit(cache=True)
+@compiled
 def start(containers, env, equalize, average, tolerance):
     """Set up all that depends on the geometry, contacts and order of a fresh load."""
     rows = min(containers.left[env], N_VISIBLE)
@@ -94,7 +94,7 @@ def start(containers, env, equalize, average, tolerance):
     show(containers, env, rows, equalize, average, tolerance)
 
 
-@numba.njit(cache=True)
+@compiled
 def show(containers, env, rows, equalize, average, tolerance):
     """Write the observation and the mask of a container that has changed."""
     containers.masks[env] = 1
@@ -106,7 +106,7 @@ def show(containers, env, rows, equalize, average, tolerance):
     )  # fmt: skip
 
 
-@numba.njit(cache=True)
+@compiled
 def look_up(containers, actions, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
@@ -133,7 +133,7 @@ def look_up(containers, actions, digests, micrometres):
     return items, distances
 
 
-@numba.njit(cache=True)
+@compiled
 def pick(containers, actions, distances, equalize, average, tolerance):
     """Unload the items that moved far enough; the rewards, (E,) float64.
 
@@ -175,7 +175,7 @@ def pick(containers, actions, distances, equalize, average, tolerance):
     return rewards
 
 
-@numba.njit(cache=True)
+@compiled
 def situation_digest(containers, env, item, members):
     """The digest of ``Surroundings.situation(item)``; ``EMPTY`` if it is held down.
 
@@ -227,12 +227,12 @@ def situation_digest(containers, env, item, members):
     return max(digest, np.uint64(1))
 
 
-@numba.njit(cache=True)
+@compiled
 def _micrometres(length):
     return np.int32(np.rint(length / RESOLUTION))
 
 
-@numba.njit(cache=True)
+@compiled
 def _holds(members, end, box):
     for i in range(end):
         if members[i] == box:
@@ -240,7 +240,7 @@ def _holds(members, end, box):
     return False
 
 
-@numba.njit(cache=True)
+@compiled
 def _insert(members, first, end, box):
     """Put a box into its place among the sorted ``members[first:end]``; the new end."""
     place = end

@@ -7,11 +7,11 @@ has the smaller rank, as in a stable sort. Where fewer than 128 items are left, 
 first ones of the arrays.
 """
 
-import numba
 import numpy as np
 
 from unload import task
 from unload.env.observation import PADDING
+from unload.support.compiled import compiled
 
 # The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
 # odd. An item that is alone gets 0.
@@ -21,7 +21,7 @@ for _items in range(2, task.N_VISIBLE + 1):
     LEVELS[_items, : 2 * _last + 1] = (np.arange(2 * _last + 1) - _last) / _last
 
 
-@numba.njit(cache=True)
+@compiled
 def rank(values, ranks):
     """The rank of each item: how many are smaller, or equal and before it.
 
@@ -36,7 +36,7 @@ def rank(values, ranks):
             ranks[i] += np.int32((value < values[i]) | ((value == values[i]) & (j < i)))
 
 
-@numba.njit(cache=True)
+@compiled
 def replace(values, ranks, row, value):
     """Take the item in ``row`` out, move the later ones up, and add one at the end."""
     left, last = ranks[row], len(values) - 1
@@ -51,7 +51,7 @@ def replace(values, ranks, row, value):
     ranks[last] = smaller
 
 
-@numba.njit(cache=True)
+@compiled
 def remove(values, ranks, row):
     """Take the item in ``row`` out and move the later ones up; the last place is void then."""
     left, last = ranks[row], len(values) - 1
@@ -61,7 +61,7 @@ def remove(values, ranks, row):
         ranks[i] -= np.int32(ranks[i] > left)
 
 
-@numba.njit(cache=True)
+@compiled
 def twice_shared_ranks(values, ranks, tolerance, twice):
     """Twice the mean rank of each run of sorted values at most ``tolerance`` apart.
 
@@ -81,7 +81,7 @@ def twice_shared_ranks(values, ranks, tolerance, twice):
             first = r + 1
 
 
-@numba.njit(cache=True)
+@compiled
 def features(values, ranks, equalize, average, tolerance, observation, items=task.N_VISIBLE):
     """Write an observation: the values themselves, or equalized; then padding.
 
@@ -111,7 +111,7 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
             observation[i, axis] = levels[twice[i]]
 
 
-@numba.njit(cache=True)
+@compiled
 def nearest_first(distances, seen, flags, equalize, average, tolerance, observations, rows):
     """Observations of items that are not yet sorted by distance.
 
