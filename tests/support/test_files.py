@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import zipfile
+from contextlib import contextmanager
 from io import BytesIO
 
 import numpy as np
@@ -83,22 +84,25 @@ def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tm
     assert path.read_text() == "new" and leftover.read_bytes() == b"half of the n"
 
 
-@pytest.fixture
+@contextmanager
 def full_disk():
-    """A limit on the size of files: writing beyond it is an OSError, as on a full disk."""
+    """Limit the size of files to 1000 bytes: writing beyond is an OSError, as on a full disk."""
     resource = pytest.importorskip("resource", reason="Windows has no limit on file sizes")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)  # pytest's own output may be a file
 
 
-def test_a_full_disk_is_an_error_that_names_the_file(tmp_path, full_disk):
+def test_a_full_disk_is_an_error_that_names_the_file(tmp_path):
     for path, write, content in (
         (tmp_path / "long.txt", files.write_text, "x" * 10_000),
         (tmp_path / "large.npz", files.write_arrays, {"a": np.ones(10_000)}),
     ):
-        with pytest.raises(OSError, match=f"cannot write this file: .*'{path}'$"):
+        message = f"cannot write this file: .*'{path}'$"
+        with pytest.raises(OSError, match=message), full_disk():
             write(path, content)
     assert not list(tmp_path.iterdir())
 
