@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test lab notebooks paper bench clean
+.PHONY: help figures test quick lint lab notebooks paper bench clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
@@ -12,8 +12,16 @@ help:  ## this list
 figures: $(VENV)/ready  ## run every notebook at reduced counts and write figures/ (sets all up first)
 	$(BIN)/python notebooks/run.py
 
-test: $(VENV)/ready  ## run the tests
+test: $(VENV)/ready  ## run all tests
 	$(BIN)/python -m pytest
+
+quick: $(VENV)/ready  ## run the tests of the rooms, without slow ones, experiments, figures and notebooks
+	$(BIN)/python -m pytest -m "not slow" --ignore tests/reproduce --ignore tests/test_notebooks.py \
+	--ignore tests/test_benchmarks.py
+
+lint: $(VENV)/ready  ## check style and format with ruff, notebooks included
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
 
 lab: $(VENV)/ready  ## open the notebooks in JupyterLab
 	$(BIN)/jupyter lab --notebook-dir=notebooks

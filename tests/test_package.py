@@ -1,50 +1,156 @@
-"""The shape of the package: what imports what."""
+"""The shape of the package: the order of its rooms, and where each library is imported."""
 
 import ast
 import re
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-import unload
-from unload.support import files
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "unload"
+README = (ROOT / "README.md").read_text()
 
-FILES = sorted(Path(unload.__file__).parent.rglob("*.py"))
+# The files and folders of unload/ that may import a library; "" stands for all.
+LIBRARIES = {
+    "gymnasium": ("__init__.py", "env/", "agent/", "reproduce/"),
+    "joblib": ("agent/sweep.py", "reproduce/"),
+    "llvmlite": ("agent/fast/kernel.py", "support/compiled.py"),
+    "matplotlib": ("reproduce/figures/",),
+    "numba": ("support/compiled.py", "load/", "physics/", "env/", "agent/fast/"),
+    "numpy": ("",),
+    "pandas": ("agent/", "reproduce/"),
+    "plotly": ("load/view.py",),
+    "pybullet": ("physics/bullet.py",),
+    "safetensors": ("agent/weights.py",),
+    "scipy": ("reproduce/",),
+    "torch": ("network/", "agent/", "reproduce/"),
+    "tqdm": ("agent/", "reproduce/"),
+}
+# Modules that have no test file of their own, and why.
+UNTESTED = {
+    "task.py": "constants of the paper, used by the tests of all rooms",
+}
 
 
-def imported(path):
-    """Full names of the modules that a file imports."""
+def module_name(path: Path) -> str:
+    """Full name of the module or package in a file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts).removesuffix(".__init__")
+
+
+MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imported(path: Path) -> Iterator[str]:
+    """Full names of what a file imports: modules, and what it takes from modules."""
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{path} has a relative import"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def importers(library):
-    return {
-        path.stem for path in FILES if any(name.split(".")[0] == library for name in imported(path))
+def needs(path: Path) -> set[str]:
+    """The package's modules that a file imports, without itself."""
+    ours = (name for name in imported(path) if name.split(".")[0] == "unload")
+    modules = {name if name in MODULES else name.rpartition(".")[0] for name in ours}
+    return modules - {module_name(path)}
+
+
+def libraries(path: Path) -> set[str]:
+    """The libraries of others that a file imports."""
+    return {name.split(".")[0] for name in imported(path)} - sys.stdlib_module_names - {"unload"}
+
+
+def room(module: str) -> str:
+    """The file or folder of unload/ that holds a module; "" for unload itself."""
+    return ".".join(module.split(".")[1:2])
+
+
+def levels(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Sort a graph's nodes so that each needs only those of earlier levels."""
+    left, sorted_levels = dict(graph), []
+    while left:
+        level = sorted(node for node, wanted in left.items() if not wanted & left.keys())
+        assert level, f"imports run in a circle among {sorted(left)}"
+        sorted_levels.append(level)
+        for node in level:
+            del left[node]
+    return sorted_levels
+
+
+def room_graph() -> dict[str, set[str]]:
+    """The rooms that each room imports."""
+    graph = {room(module): set() for module in MODULES if room(module)}
+    for module, path in MODULES.items():
+        if room(module):
+            graph[room(module)] |= {room(needed) for needed in needs(path)} - {room(module)}
+    return graph
+
+
+def test_rooms_are_in_the_order_that_the_readme_gives():
+    ordered = levels(room_graph())
+    assert len(ordered) <= 7
+    sentence = " < ".join(", ".join(f"`{name}`" for name in level) for level in ordered)
+    assert f"imports run one way: {sentence}" in README.replace("\n", " "), sentence
+
+
+def test_no_module_imports_itself_through_others():
+    levels({module: needs(path) for module, path in MODULES.items()})
+
+
+def test_only_the_top_imports_the_top():
+    graph = room_graph()
+    users = {name: {user for user, needed in graph.items() if name in needed} for name in graph}
+    assert not users["reproduce"]
+    assert users.get("heap", set()) <= {"reproduce"}
+    assert not needs(PACKAGE / "__init__.py") & {"unload.reproduce", "unload.heap"}
+
+
+def test_the_package_has_few_rooms():
+    assert len({path.name for path in PACKAGE.iterdir()} - {"__init__.py", "__pycache__"}) <= 9
+
+
+def test_each_room_names_its_files():
+    """Its ``__init__.py`` holds a docstring, which gives the order to read them in, and no code."""
+    for path in PACKAGE.rglob("*/__init__.py"):
+        tree = ast.parse(path.read_text())
+        assert len(tree.body) == 1 and ast.get_docstring(tree), f"{path} is not a docstring"
+        named = set(re.findall(r"``(\w+)``", ast.get_docstring(tree)))
+        files = {each.stem for each in path.parent.glob("*.py")} - {"__init__"}
+        assert files <= named, f"{path} does not name {sorted(files - named)}"
+
+
+def test_the_readme_has_a_row_for_each_room():
+    rows = [line.split("`")[1] for line in README.splitlines() if line.startswith("| `unload/")]
+    rooms = [name for level in levels(room_graph()) for name in level]
+    assert [row.strip("/").removeprefix("unload/").removesuffix(".py") for row in rows] == rooms
+
+
+def test_each_library_is_imported_in_its_places_only():
+    used = set()
+    for path in MODULES.values():
+        place = path.relative_to(PACKAGE).as_posix()
+        for library in libraries(path):
+            allowed = [start for start in LIBRARIES[library] if place.startswith(start)]
+            assert allowed, f"{place} imports {library}; expected in {LIBRARIES[library]}"
+            used |= {(library, start) for start in allowed}
+    assert used == {(library, start) for library, starts in LIBRARIES.items() for start in starts}
+
+
+def test_each_module_has_its_test_file():
+    modules = {path.relative_to(PACKAGE) for path in MODULES.values() if path.name != "__init__.py"}
+    without = {
+        place.as_posix()
+        for place in modules
+        if not (ROOT / "tests" / place.parent / f"test_{place.stem.strip('_')}.py").exists()
     }
-
-
-def test_each_library_has_its_rooms():
-    assert importers("pybullet") == {"bullet"}
-    assert importers("plotly") == {"view"}
-    assert importers("torch") == {
-        "agent", "architectures", "fused", "mixed_picks", "network", "offline", "sweep", "train"
-    }  # fmt: skip
-    in_figures = {path.stem for path in FILES if path.parent.name == "figures"}
-    assert importers("matplotlib") <= in_figures
-
-
-def test_imports_run_one_way():
-    """In the order that the README gives: a module imports only those after it."""
-    modules = {path.stem: path for path in FILES if path.parent.name == "unload"}
-    del modules["__init__"]
-    (line,) = (
-        line for line in (files.ROOT / "README.md").read_text().splitlines()
-        if line.startswith("| `unload/` |")
-    )  # fmt: skip
-    _, *order = re.findall(r"`(\w+)/?`", line)
-    assert sorted(order) == sorted([*modules, "figures"])
-    for place, name in enumerate(order[1:], 1):
-        needs = {part for target in imported(modules[name]) for part in target.split(".")}
-        assert not needs & set(order[:place]), name
+    assert without == set(UNTESTED)
+    for path in (ROOT / "tests").glob("*/**/test_*.py"):
+        place = path.relative_to(ROOT / "tests").parent
+        names = {
+            f"{path.stem.removeprefix('test_')}.py",
+            f"__{path.stem.removeprefix('test_')}__.py",
+        }
+        assert {place / name for name in names} & modules, f"{path} has no module"

@@ -1,0 +1,79 @@
+"""The libraries: named in pyproject.toml, pinned in environment.txt, and imported somewhere."""
+
+import ast
+import json
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from importlib.metadata import packages_distributions, version
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+OWN = {"benchmarks", "notebooks", "tests", "unload"}
+# Named, but imported by no statement, and what for.
+RUN_ONLY = {
+    "dask": "joblib's backend for a cluster",
+    "ipykernel": "runs the notebooks",
+    "jupyterlab": "make lab",
+    "ruff": "make lint",
+}
+
+
+def normal(name: str) -> str:
+    """A distribution's name as indexes compare it."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def pinned() -> dict[str, str]:
+    """Versions by name, as environment.txt gives them."""
+    lines = (ROOT / "environment.txt").read_text().splitlines()
+    return dict(line.split("==") for line in lines if line and not line.startswith("#"))
+
+
+def sources(folder: str) -> Iterator[str]:
+    """The Python code of a folder: its modules, and the code cells of its notebooks."""
+    for path in (ROOT / folder).rglob("*.py"):
+        yield path.read_text()
+    for path in (ROOT / folder).rglob("*.ipynb"):
+        for cell in json.loads(path.read_text())["cells"]:
+            if cell["cell_type"] == "code":
+                lines = "".join(cell["source"]).splitlines()
+                yield "\n".join(line for line in lines if not line.startswith(("%", "!")))
+
+
+def distributions(folder: str) -> set[str]:
+    """The distributions that a folder's code imports from."""
+    names = set()
+    for source in sources(folder):
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add(node.module.split(".")[0])
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
+                names.add(node.args[0].value.split(".")[0])
+    found = packages_distributions()
+    beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
+    names -= sys.stdlib_module_names | OWN | (beside - found.keys())
+    return {normal(found[name][0]) for name in names}
+
+
+def test_each_library_is_named_once_and_pinned():
+    extras = [name for extra in PROJECT["optional-dependencies"].values() for name in extra]
+    named = [*PROJECT["dependencies"], *extras]
+    assert all(name == normal(name) for name in named), "pyproject.toml holds names only"
+    assert sorted(named) == sorted(pinned())
+
+
+def test_what_is_installed_is_what_is_pinned():
+    """PyTorch's version may have a suffix that names its build, such as +cpu."""
+    assert {name: version(name).split("+")[0] for name in pinned()} == pinned()
+
+
+def test_what_is_imported_is_named():
+    assert distributions("unload") <= set(PROJECT["dependencies"])
+    others = distributions("tests") | distributions("benchmarks") | distributions("notebooks")
+    assert others <= set(pinned())
+    assert distributions("unload") | others | set(RUN_ONLY) == set(pinned())
