@@ -6,7 +6,6 @@ import pytest
 from unload import task
 from unload.env import observation
 from unload.env.container import ContainerEnv
-from unload.load.boxes import Load
 from unload.load.contacts import ABOVE, BELOW, BESIDE
 from unload.load.substacks import (
     CELL,
@@ -26,17 +25,6 @@ from unload.load.substacks import (
 )
 
 FIELDS = ("positions", "sizes", "packages", "walls")
-
-
-def one_box(**changes) -> Load:
-    """A load of one valid box, with some fields replaced."""
-    fields = {
-        "positions": np.array([[3.5, 1.25, 0.5]]),
-        "sizes": np.ones((1, 3)),
-        "packages": np.array([0]),
-        "walls": np.array([0]),
-    }
-    return Load(**(fields | changes))
 
 
 @pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
@@ -196,67 +184,7 @@ def test_the_front_is_picked_as_the_whole_load(full_load):
         assert (seen == also_seen).all() and reward == same_reward
 
 
-# --- a load -------------------------------------------------------------------------
-
-
-def test_a_load_cannot_be_changed(full_load):
-    for name in FIELDS:
-        with pytest.raises(ValueError, match="read-only"):
-            getattr(full_load, name)[0] = 0
-
-
-def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
-    positions = np.array([[3.5, 1.25, 0.5]])
-    load = one_box(positions=positions)
-    positions[:] = 0
-    assert load.positions.tolist() == [[3.5, 1.25, 0.5]]
-
-
-def test_loads_are_compared_by_identity():
-    first, second = one_box(), one_box()
-    assert first == first and first != second and len({first, second}) == 2
-
-
-def test_touching_boxes_are_accepted(boxes):
-    assert len(boxes((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))) == 3
-
-
-@pytest.mark.parametrize(
-    ("changes", "error", "message"),
-    [
-        ({"positions": np.zeros((0, 3))}, ValueError, "positions is empty"),
-        ({"positions": np.zeros((1, 2))}, ValueError, r"positions has shape \(1, 2\)"),
-        ({"positions": [[1], [1, 2]]}, ValueError, "positions has rows of different lengths"),
-        ({"positions": [[np.nan, 1, 1]]}, ValueError, "positions holds nan"),
-        ({"positions": [["a", "b", "c"]]}, TypeError, "positions has dtype"),
-        ({"positions": [[6.6, 1.25, 0.5]]}, ValueError, "box 0 reaches from"),
-        ({"positions": [[3.5, 1.25, 0.4]]}, ValueError, "box 0 reaches from"),
-        ({"positions": [[3.5, 1.25, 2.1]]}, ValueError, "inside the container"),
-        ({"sizes": np.ones((2, 3))}, ValueError, r"sizes has shape \(2, 3\); expected \(1, 3\)"),
-        ({"sizes": [[1, 0, 1]]}, ValueError, "sizes of box 0 are"),
-        ({"sizes": [[1, -1, 1]]}, ValueError, "expected all > 0"),
-        ({"sizes": [[1, np.inf, 1]]}, ValueError, "sizes holds inf"),
-        ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
-        ({"packages": [True]}, TypeError, "packages has dtype bool"),
-        ({"packages": [0, 1]}, ValueError, r"packages has shape \(2,\)"),
-        ({"packages": [-1]}, ValueError, "packages holds -1"),
-        ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
-        ({"walls": ["0"]}, TypeError, "walls has dtype"),
-    ],
-)
-def test_bad_loads_are_refused(changes, error, message):
-    with pytest.raises(error, match=message):
-        one_box(**changes)
-
-
-@pytest.mark.parametrize(
-    "step", [(0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3), (0.3, 0.3, 0.3), (0, 0, 0)]
-)
-def test_overlapping_boxes_are_refused(step):
-    positions = np.array([[1.0, 0.5, 0.5], [3.0, 1.0, 0.5], [3.0, 1.0, 0.5] + np.array(step)])
-    labels = np.zeros(3, dtype=int)
-    with pytest.raises(ValueError, match="boxes 1 and 2 overlap"):
-        Load(positions, np.full((3, 3), 0.4), labels, labels)
+# --- bad input ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

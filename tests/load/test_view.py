@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from unload import view
+from unload import Load, view
 
 
 def vertices(figure) -> np.ndarray:
@@ -19,6 +19,11 @@ def test_one_mesh_holds_all_boxes(full_load):
     assert corners.min(axis=1) == pytest.approx(low, abs=0.01)
     assert corners.max(axis=1) == pytest.approx(low + full_load.sizes, abs=0.01)
     assert len(figure.data[0].facecolor) == 12 * len(full_load)
+
+
+def test_a_thin_box_is_drawn_no_thicker_than_it_is():
+    load = Load([[3.5, 1.25, 0.002]], [[1.0, 1.0, 0.004]], [0], [0])
+    assert np.ptp(vertices(view(load))[:, 2]) < 0.004
 
 
 def test_triangles_are_the_faces_of_their_box(boxes):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES
+from unload.load.boxes import SMALLEST_EDGE, Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
@@ -85,6 +86,16 @@ def test_threads_may_share_a_physics(make, boxes, kind):
         thread.join()
     for number in range(3):
         assert answers[number] == pytest.approx(known, abs=0.002 if kind == "full" else 0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_smallest_boxes_of_a_load_are_simulated(make, kind):
+    """Physics takes the gap off their edges, of which something must be left."""
+    edge = SMALLEST_EDGE
+    positions = [[3.5, 1.2 + edge * column, edge * (row + 0.5)] for column, row in np.ndindex(2, 2)]
+    load = Load(positions, np.full((4, 3), edge), [0] * 4, [0] * 4)
+    physics = make(kind, load)
+    assert (np.array(lifts(physics, range(4))) >= 0).all()
 
 
 # --- bad input ----------------------------------------------------------------------

@@ -3,14 +3,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pybullet
 import pytest
 
 import unload
+from tests.physics.kinds import ONE_BOX, TWO_BOXES
 from unload import task
 from unload.physics.bullet import TIME_STEP, World
-
-# The appendix, for 20 N and 1 kg: one box and two stacked ones (m).
-ONE_BOX, TWO_BOXES = 0.46, 0.009
 
 
 @pytest.fixture(params=[True, False], ids=["maximal", "multibody"])
@@ -112,6 +111,28 @@ def test_closing_a_client_leaves_the_others(make_world):
     first.close()
     first.close()
     assert second.pull(box) == pytest.approx(ONE_BOX, rel=0.02)
+
+
+def test_a_world_to_which_nothing_refers_is_disconnected():
+    world = World()
+    client = world._client
+    world.add_box((0, 0, 0), (1, 1, 1), 0)
+    assert pybullet.isConnected(client)
+    del world
+    assert not pybullet.isConnected(client)
+
+
+def test_a_world_that_is_open_when_the_program_ends_is_silent():
+    lines = "from unload.physics.bullet import World", "world = World()", "world.cycle = world"
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True
+    )
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_shapes_are_counted_by_size(make_world):
+    world, _ = make_world(boxes=3)
+    assert world.shapes == 2  # the floor's and the cubes'
 
 
 def test_a_picture_shows_the_colour_of_a_box(make_world):

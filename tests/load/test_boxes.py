@@ -1,0 +1,153 @@
+"""A load: which boxes it accepts, and what it keeps of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.load.strategies import corners, load_of
+from unload import task
+from unload.load.boxes import SMALLEST_EDGE, Load, check_load
+from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
+
+FIELDS = ("positions", "sizes", "packages", "walls")
+
+
+def one_box(**changes) -> Load:
+    """A load of one valid box, with some fields replaced."""
+    fields = {
+        "positions": np.array([[3.5, 1.25, 0.5]]),
+        "sizes": np.ones((1, 3)),
+        "packages": np.array([0]),
+        "walls": np.array([0]),
+    }
+    return Load(**(fields | changes))
+
+
+def test_a_load_cannot_be_changed(full_load):
+    for name in FIELDS:
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(full_load, name)[0] = 0
+
+
+def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
+    positions = np.array([[3.5, 1.25, 0.5]])
+    load = one_box(positions=positions)
+    positions[:] = 0
+    assert load.positions.tolist() == [[3.5, 1.25, 0.5]]
+
+
+def test_loads_are_compared_by_identity():
+    first, second = one_box(), one_box()
+    assert first == first and first != second and len({first, second}) == 2
+
+
+def test_touching_boxes_are_accepted(boxes):
+    assert len(boxes((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))) == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"positions": np.zeros((0, 3))}, ValueError, "positions is empty"),
+        ({"positions": np.zeros((1, 2))}, ValueError, r"positions has shape \(1, 2\)"),
+        ({"positions": [[1], [1, 2]]}, ValueError, "positions has rows of different lengths"),
+        ({"positions": [[np.nan, 1, 1]]}, ValueError, "positions holds nan"),
+        ({"positions": [["a", "b", "c"]]}, TypeError, "positions has dtype"),
+        ({"positions": [[6.6, 1.25, 0.5]]}, ValueError, "box 0 reaches from"),
+        ({"positions": [[3.5, 1.25, 0.4]]}, ValueError, "box 0 reaches from"),
+        ({"positions": [[3.5, 1.25, 2.1]]}, ValueError, "inside the container"),
+        ({"sizes": np.ones((2, 3))}, ValueError, r"sizes has shape \(2, 3\); expected \(1, 3\)"),
+        ({"sizes": [[1, 0, 1]]}, ValueError, "sizes of box 0 are"),
+        ({"sizes": [[1, -1, 1]]}, ValueError, "expected >= 0.002 m"),
+        ({"sizes": [[0.0009, 1, 1]]}, ValueError, "sizes of box 0 are .* >= 0.002 m"),
+        ({"sizes": [[1, 1, 1e-7]]}, ValueError, "sizes of box 0 are"),
+        ({"sizes": [[1, np.inf, 1]]}, ValueError, "sizes holds inf"),
+        ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
+        ({"packages": [True]}, TypeError, "packages has dtype bool"),
+        ({"packages": [0, 1]}, ValueError, r"packages has shape \(2,\)"),
+        ({"packages": [-1]}, ValueError, "packages holds -1"),
+        ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
+        ({"walls": ["0"]}, TypeError, "walls has dtype"),
+    ],
+)
+def test_bad_loads_are_refused(changes, error, message):
+    with pytest.raises(error, match=message):
+        one_box(**changes)
+
+
+@pytest.mark.parametrize(
+    "step", [(0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3), (0.3, 0.3, 0.3), (0, 0, 0)]
+)
+def test_overlapping_boxes_are_refused(step):
+    positions = np.array([[1.0, 0.5, 0.5], [3.0, 1.0, 0.5], [3.0, 1.0, 0.5] + np.array(step)])
+    labels = np.zeros(3, dtype=int)
+    with pytest.raises(ValueError, match="boxes 1 and 2 overlap"):
+        Load(positions, np.full((3, 3), 0.4), labels, labels)
+
+
+@pytest.mark.parametrize("load", [None, "walls", np.zeros((3, 3))])
+def test_something_else_is_no_load(load):
+    with pytest.raises(TypeError, match="(?s)load is .*; expected an unload.Load"):
+        check_load(load)
+
+
+def test_the_smallest_edge():
+    assert len(one_box(sizes=np.full((1, 3), SMALLEST_EDGE))) == 1
+
+
+# --- properties of random loads -----------------------------------------------------
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(corners())
+def test_disjoint_boxes_are_accepted_and_those_that_touch_are_known(boxes):
+    low, high = boxes
+    load = load_of(low, high)
+    assert len(load) == len(low)
+    for one in range(len(low)):
+        for other in range(len(low)):
+            shared = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
+            over = abs(low[other, 2] - high[one, 2]) <= CONTACT_TOLERANCE
+            stands = one != other and over and (shared[:2] > CONTACT_TOLERANCE).all()
+            assert (other in load.contacts.of(ABOVE, one)) == stands
+            assert (one in load.contacts.of(BELOW, other)) == stands
+            near = abs(shared[1]) <= CONTACT_TOLERANCE
+            beside = one != other and near and (shared[[0, 2]] > CONTACT_TOLERANCE).all()
+            assert (other in load.contacts.of(BESIDE, one)) == beside
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(corners(), st.data())
+def test_a_box_that_reaches_into_another_is_refused(boxes, data):
+    low, high = boxes
+    first = data.draw(st.integers(0, len(low) - 1))
+    # A further box that reaches into this one from any side, however little.
+    reach = data.draw(st.sampled_from([2e-6, 1e-4, 0.01]))
+    axis, upwards = data.draw(st.integers(0, 2)), data.draw(st.booleans())
+    other_low, other_high = low[first].copy(), high[first].copy()
+    if upwards:
+        other_low[axis] = high[first, axis] - reach
+        other_high[axis] = min(other_low[axis] + 0.3, task.CONTAINER[axis])
+    else:
+        other_high[axis] = low[first, axis] + reach
+        other_low[axis] = max(other_high[axis] - 0.3, 0)
+    if other_high[axis] - other_low[axis] < SMALLEST_EDGE:
+        other_low, other_high = low[first], high[first]  # no room beside it: the same place
+    with pytest.raises(ValueError, match="boxes .* overlap; expected disjoint boxes"):
+        load_of(np.vstack([low, other_low]), np.vstack([high, other_high]))
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(corners(), st.data())
+def test_a_box_that_sticks_out_is_refused(boxes, data):
+    low, high = boxes
+    box = data.draw(st.integers(0, len(low) - 1))
+    step = np.zeros(3)
+    axis, far = data.draw(st.integers(0, 2)), data.draw(st.booleans())
+    step[axis] = task.CONTAINER[axis] - high[box, axis] if far else -low[box, axis]
+    step[axis] += data.draw(st.sampled_from([2e-6, 0.001, 10.0])) * (1 if far else -1)
+    low[box] += step
+    high[box] += step
+    with pytest.raises(ValueError, match="box .* reaches from .* expected it inside"):
+        load_of(low, high)
