@@ -1,4 +1,4 @@
-"""What several test modules share: loads, environments, bad values."""
+"""Fixtures that several test modules share: loads and environments."""
 
 from collections.abc import Callable, Iterator
 
@@ -6,11 +6,15 @@ import gymnasium
 import numpy as np
 import pytest
 import torch
+from hypothesis import settings
 
 import unload
 from unload.env import observation
 
 torch.set_num_threads(1)
+# The same examples every time, however slow the machine is, and none kept from run to run.
+settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+settings.load_profile("repeatable")
 
 
 @pytest.fixture
