@@ -4,6 +4,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
+from tests.env.comparing import FailingStack, assert_same
 from unload import ContainerEnv, Load, equalize, stack_load, task
 from unload.env import observation
 from unload.load.substacks import build_load
@@ -494,14 +495,6 @@ def test_nothing_works_before_reset_or_after_close(call):
         ({"physics": "full", "after_pick": "x"}, ValueError, "after_pick is 'x'; expected one of"),
         ({"physics": "table", "after_pick": "keep"}, ValueError, "expected 'restore'"),
         ({"render_mode": "human"}, ValueError, "render_mode is 'human'; .*None, 'rgb_array'"),
-        ({"ties": "coin"}, ValueError, "ties is 'coin'"),
-        ({"equalize": "yes"}, TypeError, "equalize is 'yes'; expected True or False"),
-        ({"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
-        ({"ties": np.zeros(2)}, ValueError, "ties is array"),
-        ({"max_picks": 0}, ValueError, "max_picks is 0"),
-        ({"max_picks": 1.5}, TypeError, "max_picks is 1.5"),
-        ({"position_noise": -1}, ValueError, "position_noise is -1"),
-        ({"position_noise": float("nan")}, ValueError, "position_noise is nan"),
         ({"stack": "walls"}, TypeError, "stack is 'walls'; expected a function"),
     ],
 )
@@ -538,6 +531,8 @@ def test_bad_options_leave_the_episode_as_it_was(options, error, message):
         ({"present": "all"}, TypeError, r"state\['present'\] has dtype"),
         ({"failed": np.zeros(128, bool)}, ValueError, r"state\['failed'\] has shape \(128,\)"),
         ({"blur": np.zeros((9, 3))}, ValueError, r"state\['blur'\] has shape \(9, 3\)"),
+        ({"blur": 1e300}, ValueError, r"state\['blur'\] reaches 1e\+300; expected <= 100.0 m"),
+        ({"blur": -101.0}, ValueError, r"state\['blur'\] reaches 101.0"),
         ({"counts": [501, 1]}, ValueError, r"counts'\]\[0\] is 501; .* >= 1 and <= 500"),
         ({"counts": [0, 1]}, ValueError, r"counts'\]\[0\] is 0; .* >= 1"),
         ({"counts": [9, 0]}, ValueError, r"counts'\]\[1\] is 0; .* >= 1 and <= 1"),
@@ -552,6 +547,8 @@ def test_bad_states_leave_the_episode_as_it_was(changes, error, message):
     first, _ = env.reset(seed=0)
     env.step(int(np.argmax(first[:, 2])))
     before = env.get_state()
+    if isinstance(changes.get("blur"), float):
+        changes = {"blur": np.full_like(before["blur"], changes["blur"])}
     with pytest.raises(error, match=message):
         env.set_state(before | changes)
     after = env.get_state()
@@ -565,6 +562,42 @@ def test_a_state_must_be_a_whole_dict(make_env):
         env.set_state({})
     with pytest.raises(TypeError, match="state is None; expected a dict"):
         env.set_state(None)
+
+
+@pytest.mark.parametrize("seed", [None, 5])
+def test_a_reset_whose_stack_fails_changes_nothing(seed, rng):
+    env, other = ContainerEnv("table", stack=FailingStack(2)), ContainerEnv("table")
+    for each in (env, other):
+        each.reset(seed=0)
+        each.step(0)
+    with pytest.raises(OSError, match="the stack failed"):
+        env.reset(seed=seed)
+    assert_same(env.get_state(), other.get_state())
+    assert env.np_random_seed == 0
+    for action in rng.integers(128, size=10):
+        assert_same(env.step(action), other.step(action))
+    assert_same(env.reset(), other.reset())  # the generator is as it was, too
+
+
+def test_a_first_reset_whose_stack_fails_needs_another_one():
+    env, other = ContainerEnv("table", stack=FailingStack(1)), ContainerEnv("table")
+    with pytest.raises(OSError, match="the stack failed"):
+        env.reset(seed=0)
+    with pytest.raises(ResetNeeded, match="the episode is not started; call reset first"):
+        env.step(0)
+    assert_same(env.reset(seed=0), other.reset(seed=0))
+
+
+def test_a_generator_of_another_kind_has_no_state_to_keep(make_env):
+    env = make_env().unwrapped
+    env.reset(seed=0)
+    state = env.get_state()
+    env.np_random = np.random.Generator(np.random.MT19937(0))
+    env.reset()
+    with pytest.raises(TypeError, match="the generator is .*MT19937.* expected one of numpy"):
+        env.get_state()
+    env.set_state(state)
+    assert_same(env.get_state(), state)
 
 
 def test_a_stack_of_something_else_is_refused(make_env):

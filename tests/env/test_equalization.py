@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from unload import equalize
 
@@ -86,6 +88,50 @@ def test_the_input_stays_as_it_was(rng):
     before = positions.copy()
     equalize(positions, ties="average")
     assert (positions == before).all()
+
+
+def ranks_one_by_one(values: list[float], ties: str, tolerance: float) -> list[float]:
+    """Algorithm 1 for the items of one axis, as one would do it by hand."""
+    last, result = len(values) - 1, [0.0] * len(values)
+    order = sorted(range(len(values)), key=lambda item: (values[item], item))
+    run = []
+    for place, item in enumerate(order):
+        run.append(item)
+        ends = place == last or values[order[place + 1]] - values[item] > tolerance
+        if ties == "noise" or ends:
+            shared = place - (len(run) - 1) / 2
+            for member in run:
+                result[member] = (2 * shared - last) / max(last, 1)
+            run = []
+    return result
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(
+    # Few different values, so that there are ties, and chains of them.
+    values=st.lists(
+        st.tuples(st.integers(-9, 9).map(lambda k: k / 400), st.floats(-1, 1), st.booleans()),
+        min_size=2,
+        max_size=20,
+    ),
+    ties=st.sampled_from(["noise", "average"]),
+    tolerance=st.sampled_from([0.0, 0.004, 0.005, 0.5]),
+)
+def test_it_agrees_with_a_slow_reference(values, ties, tolerance):
+    positions = np.array([row[:2] for row in values])
+    present = np.array([row[2] for row in values])
+    result = equalize(positions, ties, tolerance, present=present)
+    everything = equalize(positions, ties, tolerance)
+    for axis in range(2):
+        column = positions[:, axis].tolist()
+        assert everything[:, axis].tolist() == pytest.approx(
+            ranks_one_by_one(column, ties, tolerance), abs=1e-7
+        )
+        there = positions[present, axis].tolist()
+        assert result[present, axis].tolist() == pytest.approx(
+            ranks_one_by_one(there, ties, tolerance), abs=1e-7
+        )
+    assert (result[~present] == -1).all()
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ class Camera:
 
     def _build(self, load: Load) -> None:
         self.close()
-        self._load, self._world = load, World()
+        self._world = World()
         length, width, height = task.CONTAINER
         for position, size in (
             ((length / 2, width / 2, -0.05), (length, width, 0.1)),
@@ -64,9 +64,10 @@ class Camera:
             body = self._world.add_box(position, np.maximum(size - 0.015, size / 2), 0)
             self._world.paint(body, package_colour(package))
             self._bodies.append(body)
+        self._load = load
 
     def close(self) -> None:
         """Free the renderer; the next picture starts it again."""
         if self._world is not None:
             self._world.close()
-            self._world = None
+            self._load = self._world = None

@@ -1,0 +1,55 @@
+"""Comparison of environments, and stacks that fail."""
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+import unload
+
+CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
+
+
+def make_pair(env_id: str, num_envs: int, **kwargs):
+    """The array environment, and single ones side by side."""
+    single = {"physics": "table"} if env_id == CONTAINER else {}
+    side_by_side = gymnasium.make_vec(
+        env_id,
+        num_envs,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP},
+        **single,
+        **kwargs,
+    )
+    return gymnasium.make_vec(env_id, num_envs, **kwargs), side_by_side
+
+
+def assert_same(one, other) -> None:
+    """Equal types, keys, dtypes, shapes and bits, all the way down."""
+    assert type(one) is type(other)
+    if isinstance(one, dict):
+        assert one.keys() == other.keys()
+        for name in one:
+            assert_same(one[name], other[name])
+    elif isinstance(one, (tuple, list)) or getattr(one, "dtype", None) == np.dtype(object):
+        assert len(one) == len(other)
+        for a, b in zip(one, other):
+            assert_same(a, b)
+    elif isinstance(one, np.ndarray):
+        assert one.dtype == other.dtype and one.shape == other.shape
+        assert one.tobytes() == other.tobytes()
+    else:
+        assert one == other
+
+
+class FailingStack:
+    """``stack_load`` that raises ``OSError`` at some of its calls, counted from 1."""
+
+    def __init__(self, *failing: int, walls: int | None = None) -> None:
+        self.failing, self.walls, self.calls = failing, walls, 0
+
+    def __call__(self, rng: np.random.Generator) -> unload.Load:
+        self.calls += 1
+        load = unload.stack_load(rng, self.walls)
+        if self.calls in self.failing:
+            raise OSError("the stack failed")
+        return load

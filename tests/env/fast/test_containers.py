@@ -1,0 +1,68 @@
+"""Containers in arrays: what is compiled, against the plain code."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.load.strategies import loads
+from unload import Load, stack_load
+from unload.env.fast import containers
+from unload.physics.lift_table import EMPTY, LiftTable, digest_of
+from unload.physics.situation import Surroundings
+from unload.physics.table import HELD_DOWN
+
+
+def filled(load: Load, present: np.ndarray) -> containers.Containers:
+    """One container, whose other fields are empty, among two."""
+    starts, links = load.contacts
+    state = containers.allocate(2, len(load) + 3, len(links) + 1)
+    state.geometry[1, : len(load)] = np.hstack([load.positions, load.sizes])
+    state.starts[1, :, : len(load) + 1] = starts
+    state.links[1, : len(links)] = links
+    state.present[1, : len(load)] = present
+    return state
+
+
+def assert_digests_agree(load: Load, present: np.ndarray) -> int:
+    """Of all present items; returns how many of them are held down."""
+    around, state = Surroundings(load, present), filled(load, present)
+    members = np.empty(state.present.shape[1], np.int32)
+    held_down = 0
+    for item in np.flatnonzero(present).tolist():
+        digest = containers.situation_digest(state, 1, item, members)
+        situation = around.situation(item)
+        if situation.on_top >= HELD_DOWN:
+            assert digest == EMPTY
+            held_down += 1
+        else:
+            assert digest == digest_of(np.frombuffer(situation.key, np.int32)) != EMPTY
+    return held_down
+
+
+@settings(derandomize=True, deadline=None, max_examples=80)
+@given(load=loads(), data=st.data())
+def test_digests_of_situations_in_random_loads(load, data):
+    some = data.draw(st.lists(st.booleans(), min_size=len(load), max_size=len(load)))
+    assert_digests_agree(load, np.array(some))
+
+
+@pytest.mark.parametrize("share", [1.0, 0.7, 0.3])
+def test_digests_of_situations_in_loads_of_the_paper(rng, share):
+    load = stack_load(rng, walls=2)
+    held_down = assert_digests_agree(load, rng.random(len(load)) < share)
+    assert held_down > 3 or share < 0.5
+
+
+def test_distances_are_looked_up_or_unknown(boxes):
+    load = boxes((1.0, 0.2), (1.4, 0.2), (1.8, 0.2))
+    everywhere, table = np.ones(3, bool), LiftTable()
+    state = filled(load, everywhere)
+    state.visible[:], state.masks[:] = -1, 1
+    state.visible[1, :3] = range(3)
+    table.add(Surroundings(load, everywhere).situation(0), 0.25)
+    for row, item, distance in ((0, 0, 0.25), (1, 1, containers.UNKNOWN), (3, -1, 0), (-1, -1, 0)):
+        items, distances = containers.look_up(state, np.array([-1, row]), *table.slots)
+        assert items.tolist() == [-1, item] and distances.tolist() == [0, distance]
+    state.masks[1, 1], state.failed[1, 1] = 0, 0.1  # failed before, by so much
+    assert containers.look_up(state, np.array([-1, 1]), *table.slots)[1].tolist() == [0, 0.1]
