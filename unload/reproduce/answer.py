@@ -1,0 +1,124 @@
+"""Why 60 %? The runs of the plan in ``data/answer/PLAN.md``, each as long as the paper's.
+
+    python -m unload.reproduce answer
+
+A cell is a configuration, trained with several seeds. A finished run is published at once as
+``data/answer/<cell>/seed_<seed>.csv`` (one row per episode of all environments), its weights
+and its provenance beside it.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import pandas as pd
+
+from unload.agent.config import TrainConfig
+from unload.agent.sweep import run_sweep
+from unload.agent.training import train
+from unload.agent.weights import save_policy
+from unload.reproduce.results import COMMAND, JOBS, publish, read_table
+from unload.support import checks, files
+
+BASE = TrainConfig(batch_size=256, snapshots=20)  # log_interval: one episode of all environments
+COLUMNS = ["picks", "success_rate", "deadlocked", "loss"]
+
+
+def _both(name: str, **changes) -> dict[str, TrainConfig]:
+    """The cells of a change, without and with the mask in training."""
+    return {
+        f"{name}, {'mask' if mask else 'no mask'}": replace(BASE, mask=mask, **changes)
+        for mask in (False, True)
+    }
+
+
+# Cell → its configuration with seed 0.
+CELLS: dict[str, TrainConfig] = {
+    **_both("paper"),
+    **_both("paper, b 2048", batch_size=2048),
+    **_both("memory 2^22", replay_size=2**22),
+    **_both("memory 2^23", replay_size=2**23),
+    **_both("ties averaged", ties="average"),
+    **_both("positions", equalize=False),
+}
+SEEDS = {"paper": 10, "paper, b 2048": 8}  # of the cells of that name, 5 of the others
+OPTIONS = {
+    "--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)},
+    **JOBS,
+}
+
+
+def seeds_of(cell: str) -> range:
+    """Return the planned seeds of a cell."""
+    name, _, _ = cell.rpartition(", ")
+    return range(SEEDS.get(name, 5))
+
+
+def answer_data(
+    cells: Sequence[str] = tuple(CELLS),
+    picks: int = BASE.picks,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    progress: bool = True,
+) -> None:
+    """Train and publish the runs of some cells.
+
+    Args:
+        cells: names in ``CELLS``.
+        picks: of each run.
+        folder: of the data.
+        runs_dir: where the runs are kept.
+        n_jobs: processes, see ``run_sweep``.
+        progress: show a progress bar.
+
+    Raises:
+        ValueError: an unknown cell.
+        RuntimeError: a run failed; those that have finished are published.
+    """
+    for cell in cells:
+        checks.one_of("cells", cell, CELLS)
+    configs = {
+        f"{cell}/seed_{seed}": replace(CELLS[cell], picks=picks, seed=seed)
+        for cell in cells
+        for seed in seeds_of(cell)
+    }
+    kept = Path(runs_dir) / "answer"
+    report = run_sweep(configs, kept, n_jobs, progress=progress)
+    for name in report.index[report["error"] == ""]:
+        publish_run(name, configs[name], kept / name, Path(folder) / "answer")
+    failed = report[report["error"] != ""]
+    if len(failed):
+        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+
+
+def publish_run(name: str, config: TrainConfig, run: Path, folder: Path) -> None:
+    """Publish a finished run: its curve, weights and provenance.
+
+    Args:
+        name: ``<cell>/seed_<seed>``.
+        config: of the run.
+        run: its folder.
+        folder: of the data.
+    """
+    cell, _, file = name.rpartition("/")
+    policy, curve = train(config, run, progress=False)
+    save_policy(policy, folder / cell / f"{file}.safetensors")
+    publish(
+        folder / cell,
+        file,
+        {file: curve[COLUMNS]},
+        f"{COMMAND} answer --cells '{cell}'",
+        asdict(config),
+        config.picks < BASE.picks,
+        [files.read_json(run / "record.json")],
+        float_format="%.5g",
+    )
+
+
+def read_answer(folder: str | Path = files.DATA) -> Iterator[tuple[str, int, pd.DataFrame]]:
+    """Cell, seed and curve of each published run, in the order of ``CELLS``."""
+    for cell in CELLS:
+        for path in sorted((Path(folder) / "answer" / cell).glob("seed_*.csv")):
+            seed = int(path.stem.removeprefix("seed_"))
+            yield cell, seed, read_table(path, f"{COMMAND} answer --cells '{cell}'", COLUMNS)

@@ -1,0 +1,133 @@
+"""What the plan in ``data/answer/PLAN.md`` asks of each run, and the statistics of a cell."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from unload.support import checks
+
+END = 0.1  # share of the picks at the end of a run
+WINDOW = 500_000  # picks
+HIGH, LOW = 0.95, 0.8  # MSR that a fall begins at, and ends at
+NEAR = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
+LEVEL = 0.95  # of the intervals
+
+
+def windows(curve: pd.DataFrame) -> pd.DataFrame:
+    """Return the means of a curve over windows of half a million picks.
+
+    Args:
+        curve: ``picks`` (increasing), ``success_rate`` and ``loss``.
+    """
+    number = (curve["picks"] - 1) // WINDOW
+    return curve.groupby(number)[["success_rate", "loss"]].mean()
+
+
+def end_msr(curve: pd.DataFrame) -> float:
+    """Return the MSR while training over the last tenth of the picks."""
+    last = curve["picks"].iloc[-1]
+    return float(curve.loc[curve["picks"] > (1 - END) * last, "success_rate"].mean())
+
+
+def falls(msr: Sequence[float]) -> int:
+    """Return how often the MSR falls to 80 % or less after 95 % or more.
+
+    Args:
+        msr: of the windows.
+    """
+    count, was_high = 0, False
+    for value in msr:
+        if was_high and value <= LOW:
+            count, was_high = count + 1, False
+        was_high |= value >= HIGH
+    return count
+
+
+def resembles_fig12(curve: pd.DataFrame) -> bool:
+    """Whether the MSR rises steadily, and to about 60 %."""
+    msr = windows(curve)["success_rate"].to_numpy()
+    end = end_msr(curve)
+    drop = (np.maximum.accumulate(msr) - msr).max()
+    return bool(NEAR[0] <= end <= NEAR[1] and end >= msr[0] + 0.2 and drop <= 0.05)
+
+
+def resembles_fig11(curve: pd.DataFrame) -> bool:
+    """Whether the loss rises by a tenth from a minimum, and falls by a tenth afterwards."""
+    loss = windows(curve)["loss"].dropna().to_numpy()
+    lowest = np.minimum.accumulate(loss)
+    peaks = np.flatnonzero(loss >= 1.1 * lowest)
+    return bool(len(peaks) and loss[-1] <= 0.9 * loss[peaks].max())
+
+
+def judge(curve: pd.DataFrame) -> dict:
+    """Return the measures of one run: its end, its falls, and its likeness to the paper's."""
+    msr = windows(curve)["success_rate"]
+    figures = resembles_fig11(curve), resembles_fig12(curve)
+    return {
+        "end": end_msr(curve),
+        "highest": msr.max(),
+        "falls": falls(msr),
+        "fig11": figures[0],
+        "fig12": figures[1],
+        "both": all(figures),
+    }
+
+
+def t_interval(values: Sequence[float]) -> tuple[float, float]:
+    """Return the 95 % t interval of the mean of (n,) values; NaN for fewer than two."""
+    values = checks.finite_array("values", values, (None,))
+    if len(values) < 2:
+        return np.nan, np.nan
+    error = stats.sem(values)
+    if error == 0:
+        return values[0], values[0]
+    return tuple(map(float, stats.t.interval(LEVEL, len(values) - 1, values.mean(), error)))
+
+
+def interquartile_mean(values: Sequence[float], axis: int = -1) -> float:
+    """Return the mean without the lowest and the highest quarter."""
+    return stats.trim_mean(values, 0.25, axis=axis)
+
+
+def bca_interval(values: Sequence[float], seed: int = 0) -> tuple[float, float]:
+    """Return the 95 % BCa bootstrap interval of the interquartile mean; NaN for fewer than four."""
+    values = checks.finite_array("values", values, (None,))
+    if len(values) < 4 or np.ptp(values) == 0:
+        return np.nan, np.nan
+    result = stats.bootstrap(
+        (values,),
+        interquartile_mean,
+        confidence_level=LEVEL,
+        method="BCa",
+        rng=np.random.default_rng(seed),
+    )
+    return tuple(map(float, result.confidence_interval))
+
+
+def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
+    """Return one row per cell, with the statistics of the plan.
+
+    Args:
+        runs: cell, seed and curve of each, see ``unload.reproduce.answer.read_answer``.
+
+    Returns:
+        ``cell``, ``runs``, ``mean`` of the MSR over the last tenth with ``low`` and ``high``,
+        ``iqm`` with ``iqm_low`` and ``iqm_high``; ``lowest`` and ``highest`` run; ``fell``, the
+        runs that fall at least once; ``fig11``, ``fig12`` and ``both``, the runs like the
+        paper's.
+    """
+    judged = pd.DataFrame([{"cell": cell, **judge(curve)} for cell, _, curve in runs])
+    rows = []
+    for cell, group in judged.groupby("cell", sort=False):
+        ends = group["end"].to_numpy()
+        rows.append(
+            {"cell": cell, "runs": len(ends), "mean": ends.mean()}
+            | dict(zip(("low", "high"), t_interval(ends)))
+            | {"iqm": interquartile_mean(ends)}
+            | dict(zip(("iqm_low", "iqm_high"), bca_interval(ends)))
+            | {"lowest": ends.min(), "highest": ends.max(), "fell": int((group["falls"] > 0).sum())}
+            | {name: int(group[name].sum()) for name in ("fig11", "fig12", "both")}
+        )
+    return pd.DataFrame(rows)
