@@ -105,8 +105,9 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
         ValueError: the file is damaged or not of this kind.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        # NumPy leaves a damaged file open that it has opened itself.
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
     except FileNotFoundError:
         raise
     except Exception as error:  # zipfile, zlib, tokenize and NumPy each raise errors of their own
