@@ -1,10 +1,14 @@
 """The three physics decide alike."""
 
+from functools import partial
+
+import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
 
 from unload import policies, task
+from unload.load.substacks import front_walls, stack_load
 from unload.reproduce import agreement
 from unload.reproduce.figures.lifting import agreement_scatter
 from unload.support.provenance import read_provenance
@@ -18,7 +22,7 @@ def committed():
 def test_table_decides_as_local():
     states, frame = agreement.collect_lifts(300, seed=7)
     assert len(frame) >= 300 and len(states) == 6 * 5
-    assert set(frame["policy"]) == set(agreement.POLICIES)
+    assert set(frame["policy"]) == set(agreement.UNLOADED_BY)
     assert set(frame["picks"]) == set(agreement.STAGES)
     assert not len(agreement.disagreements(frame, "table", "local"))
     few = frame[frame["on_top"] < 3]
@@ -55,9 +59,11 @@ def test_choice_for_full_is_of_whole_states_and_all_close_lifts():
 
 
 def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
-    """Three lifts in a container of the paper's size, after 500 picks."""
-    monkeypatch.setattr(agreement, "POLICIES", {"highest": policies.highest})
-    monkeypatch.setattr(agreement, "STAGES", (500,))
+    """Three lifts in a container of two walls, after 30 picks."""
+    stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
+    monkeypatch.setattr(agreement.gymnasium, "make", partial(gymnasium.make, **stack))
+    monkeypatch.setattr(agreement, "UNLOADED_BY", {"highest": policies.highest})
+    monkeypatch.setattr(agreement, "STAGES", (30,))
     monkeypatch.setattr(agreement, "WANTED", (1, 1, 1, 0))
     folders = {"folder": tmp_path / "data", "runs_dir": tmp_path / "runs", "progress": False}
     frame = agreement.agreement_data(3, 3, seed=5, **folders)
@@ -80,7 +86,7 @@ def test_committed_lifts(committed):
     assert not committed[["table", "local"]].isna().any(axis=None)
     assert len(agreement.disagreements(committed, "table", "local")) == 0
     assert (committed["on_top"].isin((1, 2))).mean() > 0.6
-    assert set(committed["policy"]) == set(agreement.POLICIES)
+    assert set(committed["policy"]) == set(agreement.UNLOADED_BY)
     drawn, close = (committed[committed["asked_full"] == why] for why in ("drawn", "close"))
     assert len(drawn) >= 300 and len(close) > 0
     asked = committed["asked_full"] != ""
@@ -118,7 +124,7 @@ def test_impossible_counts_are_refused(tmp_path, lifts, full, message):
 
 def test_unknown_names_are_refused(committed):
     with pytest.raises(ValueError, match="policy is 'lowest'"):
-        next(agreement.play("lowest", 0))
+        next(agreement.container_states("lowest", 0))
     with pytest.raises(ValueError, match="other is 'mujoco'"):
         agreement.disagreements(committed, "local", "mujoco")
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from unload import equalize
-from unload.reproduce.random_picks import FEATURES, fit, offline_data, random_picks
+from unload.reproduce.random_picks import TRANSFORMS, fit, offline_data, random_picks
 
 
 @pytest.fixture
@@ -13,26 +13,26 @@ def observations(rng):
     return rng.uniform(-1, 1, (5, 20, 3)).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", FEATURES)
+@pytest.mark.parametrize("name", TRANSFORMS)
 def test_features_keep_shape_and_dtype_and_leave_their_input(observations, name):
     before = observations.copy()
-    seen = FEATURES[name](observations)
+    seen = TRANSFORMS[name](observations)
     assert (seen.shape, seen.dtype) == (observations.shape, np.float32)
     assert np.array_equal(observations, before)
 
 
 def test_features_are_what_their_names_say(observations):
     ranks = equalize(observations)
-    assert np.array_equal(FEATURES["positions"](observations), observations)
-    assert np.array_equal(FEATURES["noisy ranks"](observations), ranks)
-    assert np.array_equal(FEATURES["tied ranks"](observations), equalize(observations, "average"))
+    assert np.array_equal(TRANSFORMS["positions"](observations), observations)
+    assert np.array_equal(TRANSFORMS["noisy ranks"](observations), ranks)
+    assert np.array_equal(TRANSFORMS["tied ranks"](observations), equalize(observations, "average"))
     for axes, letter in (([0], "x"), ([1], "y"), ([2], "z"), ([0, 1], "x and y")):
         expected = observations.copy()
         expected[..., axes] = ranks[..., axes]
-        assert np.array_equal(FEATURES[f"noisy ranks of {letter}"](observations), expected)
-    stretched = FEATURES["stretched positions"](observations)
+        assert np.array_equal(TRANSFORMS[f"noisy ranks of {letter}"](observations), expected)
+    stretched = TRANSFORMS["stretched positions"](observations)
     assert np.allclose(stretched.min(axis=1), -1) and np.allclose(stretched.max(axis=1), 1)
-    assert np.allclose(FEATURES["centred positions"](observations).mean(axis=1), 0, atol=1e-6)
+    assert np.allclose(TRANSFORMS["centred positions"](observations).mean(axis=1), 0, atol=1e-6)
 
 
 def test_random_picks_are_those_of_their_seed():
@@ -54,9 +54,9 @@ def test_finished_fits_are_kept(tmp_path):
     for _ in range(2):
         offline_data(tmp_path, tmp_path / "runs", 1, seeds=1, **size)
     kept = list((tmp_path / "runs").rglob("*.json"))
-    assert len(kept) == len(FEATURES)
+    assert len(kept) == len(TRANSFORMS)
     table = pd.read_csv(tmp_path / "study/offline.csv")
-    assert table["features"].tolist() == list(FEATURES)
+    assert table["features"].tolist() == list(TRANSFORMS)
     assert json.loads((tmp_path / "study/offline.provenance.json").read_text())["reduced"]
 
 

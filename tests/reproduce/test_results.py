@@ -1,6 +1,104 @@
+"""Results: kept, published, read back."""
+
+import json
+from functools import partial
+
+import pandas as pd
 import pytest
 
-from unload.reproduce.results import read_table
+from unload import TrainConfig
+from unload.reproduce.results import (
+    keep_all,
+    kept,
+    measured,
+    publish,
+    read_table,
+    shared_settings,
+)
+from unload.support.provenance import read_provenance, revision
+
+
+@pytest.fixture
+def asked():
+    """``asked(value)``: computes the value; ``asked.times`` counts how often."""
+
+    def compute(value):
+        compute.times += 1
+        return value
+
+    compute.times = 0
+    return compute
+
+
+def test_a_result_is_computed_once_per_question(tmp_path, asked):
+    question = {"seed": 1, "sizes": (2, 3)}
+    first = kept(tmp_path, question, partial(asked, {"msr": 0.1 + 0.2, "counts": (1, 2)}))
+    assert first.value == {"msr": 0.1 + 0.2, "counts": [1, 2]}
+    assert first.record["revision"] == revision() and first.record["wall_time_s"] >= 0
+    same = kept(tmp_path, {"sizes": [2, 3], "seed": 1}, partial(asked, "not computed"))
+    assert same == first and asked.times == 1
+
+
+def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
+    for seed in (1, 2, 1):
+        assert kept(tmp_path, {"seed": seed}, partial(asked, seed)).value == seed
+    assert asked.times == 2  # neither replaces the other
+    one, other = tmp_path.iterdir()
+    one.write_text(other.read_text())
+    values = [kept(tmp_path, {"seed": seed}, partial(asked, seed)).value for seed in (1, 2)]
+    assert values == [1, 2] and asked.times == 3
+
+
+@pytest.mark.parametrize(("question", "value"), [({"seed": {1}}, 1), ({"seed": 1}, {1})])
+def test_what_json_cannot_hold_is_refused_and_leaves_nothing(tmp_path, question, value):
+    with pytest.raises(TypeError, match="not JSON serializable"):
+        kept(tmp_path, question, lambda: value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_damaged_answer_is_named(tmp_path):
+    kept(tmp_path, {"seed": 1}, int)
+    (path,) = tmp_path.iterdir()
+    path.write_text("{")
+    with pytest.raises(ValueError, match=f"{path.name} is not a readable JSON file"):
+        kept(tmp_path, {"seed": 1}, int)
+
+
+def test_answers_have_the_order_of_the_questions(tmp_path):
+    jobs = [({"number": number}, partial(pow, number, 2)) for number in range(5)]
+    answers = keep_all(tmp_path, jobs, 1, progress=False)
+    assert [answer.value for answer in answers] == [0, 1, 4, 9, 16]
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+def test_what_is_published_says_where_it_comes_from(tmp_path):
+    table = pd.DataFrame({"seed": [0], "msr": [1 / 3]})
+    records = [measured(int).record, measured(int).record]
+    command, settings = "make tea", {"seeds": [0]}
+    publish(tmp_path, "tea", {"a": table, "b": table}, command, settings, True, records)
+    publish(tmp_path, "more", {"c": table}, command, settings, False, records[:1], "f00", "%.12g")
+    texts = [(tmp_path / f"{name}.csv").read_text() for name in "abc"]
+    assert texts == ["seed,msr\n0,0.333333\n"] * 2 + ["seed,msr\n0,0.333333333333\n"]
+    tea, more = (read_provenance(tmp_path, name) for name in ("tea", "more"))
+    assert (tea["command"], tea["settings"], tea["reduced"]) == (command, settings, True)
+    assert (tea["runs"], more["runs"]) == (2, 1)
+    assert "fingerprint" not in tea and more["fingerprint"] == "f00"
+    assert not more["reduced"]
+
+
+def test_a_table_that_cannot_be_written_has_no_provenance(tmp_path):
+    (tmp_path / "a.csv").mkdir()
+    with pytest.raises(OSError, match="a.csv"):
+        publish(tmp_path, "tea", {"a": pd.DataFrame()}, "make tea", {}, True, [])
+    assert not (tmp_path / "tea.provenance.json").exists()
+
+
+def test_shared_settings_are_those_of_all():
+    configs = {"a": TrainConfig(seed=1), "b": TrainConfig(seed=2, mask=True)}
+    shared = shared_settings(configs)
+    assert "seed" not in shared and "mask" not in shared
+    assert shared["batch_size"] == 2048
+    assert json.loads(json.dumps(shared)) == shared
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,24 @@
+"""The study's experiments: their configurations and their data."""
+
+import json
 from collections import Counter
 from dataclasses import asdict
 
+import numpy as np
+import pandas as pd
 import pytest
 
-from unload import TrainConfig
-from unload.reproduce.study import BASE, EXPERIMENTS, FEATURES, factorial, features_of
+from unload import TrainConfig, evaluate, load_policy
+from unload.reproduce import measure, study
+from unload.reproduce.study import (
+    BASE,
+    EXPERIMENTS,
+    FEATURE_SETTINGS,
+    factorial,
+    features_of,
+    read_study,
+    study_data,
+)
 
 ALLOWED = {"seed", "picks", "batch_size", "snapshots"}
 
@@ -46,5 +60,90 @@ def test_the_recommended_agent_differs_from_the_paper_in_its_features_only():
 
 
 def test_features_have_the_name_of_their_settings():
-    for name, settings in FEATURES.items():
+    for name, settings in FEATURE_SETTINGS.items():
         assert features_of(TrainConfig(**settings)) == name
+
+
+# --- the data -----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A small experiment: one run of each reward, measured on few loads."""
+    folder = tmp_path_factory.mktemp("made")
+    base = TrainConfig(batch_size=16, n_features=4, snapshots=2, log_interval=5)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "BASE", base)
+        patch.setattr(measure, "LOADS", 3)
+        patch.setattr(measure, "SNAPSHOT_LOADS", 2)
+        for _ in range(2):  # the second time nothing is trained
+            study_data("rewards", folder, folder / "runs", 1, False, picks=64 * 60, seeds=1)
+    return folder
+
+
+def test_an_experiment_leaves_a_row_for_each_run(made):
+    rows, _ = read_study("rewards", made)
+    assert rows["run"].tolist() == list(study.rewards(seeds=1))
+    assert set(rows["features"]) == {"noisy ranks"}
+    assert rows["height_reward"].nunique() == 4
+    for name in ("msr_mask", "msr_no_mask", "deadlocked", "deadlocked_training"):
+        assert rows[name].between(0, 1).all()
+
+
+def test_a_policy_is_measured_as_evaluate_does(made):
+    rows, _ = read_study("rewards", made)
+    row = rows.set_index("run").loc["noisy ranks/height_reward 0.5/seed_0"]
+    policy = load_policy(made / "runs/study/rewards" / row.name / "policy.safetensors")
+    assert policy.equalize
+    table = evaluate(policy, 3, measure.LOADS_SEED, mask=False)
+    assert row["msr_no_mask"] == pytest.approx(table["success_rate"].mean(), rel=1e-5)
+    assert row["longest_deadlock"] == table["longest_deadlock"].max()
+
+
+def test_the_last_snapshot_is_the_trained_policy(made):
+    rows, curves = read_study("rewards", made)
+    assert curves.groupby("run")["picks"].apply(list).map(len).eq(2).all()
+    assert curves["picks"].max() == rows["picks"].max()
+    assert np.isfinite(curves[["success_rate", "deadlocked", "msr_mask"]].to_numpy()).all()
+
+
+def test_the_goal_is_reached_at_the_first_snapshot_that_reaches_it(made):
+    rows, curves = read_study("rewards", made)
+    for _, row in rows.iterrows():
+        good = curves[(curves["run"] == row["run"]) & (curves["msr_mask"] >= measure.GOAL)]
+        first = row["picks_to_goal_mask"]
+        assert np.isnan(first) if good.empty else first == good["picks"].min()
+
+
+def test_a_smaller_experiment_says_so(made):
+    provenance = json.loads((made / "study/rewards.provenance.json").read_text())
+    assert provenance["reduced"]
+    assert provenance["runs"] == len(study.rewards(seeds=1))
+    assert "rewards" in provenance["command"]
+
+
+def test_the_recommended_agent_is_kept(tmp_path, monkeypatch):
+    base = TrainConfig(num_envs=4, n_features=4, snapshots=1)
+    monkeypatch.setattr(study, "BASE", base)
+    monkeypatch.setattr(measure, "LOADS", 1)
+    monkeypatch.setattr(measure, "SNAPSHOT_LOADS", 1)
+    study_data("recommended", tmp_path, tmp_path / "runs", 1, False, picks=2400, seeds=1)
+    policy = load_policy(tmp_path / "policies/recommended.safetensors")
+    assert not policy.equalize
+
+
+def test_what_is_missing_or_unknown_is_refused_by_name(tmp_path):
+    with pytest.raises(
+        FileNotFoundError, match=r"factorial.csv is missing.*--experiments factorial"
+    ):
+        read_study("factorial", tmp_path)
+    with pytest.raises(ValueError, match="experiment"):
+        read_study("nothing", tmp_path)
+    with pytest.raises(ValueError, match="experiment"):
+        study_data("nothing", tmp_path, tmp_path)
+
+
+def test_curves_are_of_the_experiment(made):
+    text = (made / "study/rewards_curves.csv").read_text()
+    assert set(pd.read_csv(made / "study/rewards_curves.csv")["run"]) == set(study.rewards(seeds=1))
+    assert "wall_time" not in text  # nothing that would differ in a second run

@@ -1,10 +1,13 @@
-"""The paper's hyperparameter grid: names, curves, summary."""
+"""The paper's hyperparameter grid: names, curves, summary, data."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 
 from unload.reproduce import tuning
+from unload.reproduce.figures import tuning as figures
+from unload.support.provenance import read_provenance
 
 
 def test_grid_is_the_papers():
@@ -90,3 +93,48 @@ def test_a_run_without_an_update_has_no_losses():
     summary = tuning.run_summary(np.full(3, 0.5), np.full(3, np.nan))
     assert summary["final_msr"] == 0.5
     assert all(np.isnan(summary[name]) for name in tuning.LOSSES)
+
+
+def test_tuning_data(tmp_path):
+    place = {"folder": tmp_path / "data", "runs_dir": tmp_path / "runs", "progress": False}
+    tuning.tuning_data([1e-2], [8], 2, 5, n_jobs=1, **place)
+    data = tmp_path / "data"
+    names = {path.relative_to(data).as_posix() for path in data.rglob("*.csv")}
+    for folder in ("dummy_sim_with_hist_equal", "dummy_sim_without_hist_equal"):
+        for kind in ("hitrate", "loss"):
+            for run in (0, 1):
+                assert f"{folder}/{kind}_curve_bz_8_lr_0.01_agent_{run}.csv" in names
+    summary = pd.read_csv(tmp_path / "data" / "tuning_summary.csv")
+    assert summary["equalize"].tolist() == [False, True]
+    assert summary["runs"].tolist() == [2, 2]
+    provenance = read_provenance(tmp_path / "data", "tuning")
+    assert provenance["reduced"]
+    assert provenance["settings"]["steps"] == 5
+    assert provenance["settings"]["config"]["batch_size"] == 8
+    assert provenance["runs"] == 4
+    assert provenance["command"] == (
+        "python -m unload.reproduce tuning --learning-rates 0.01 --batch-sizes 8 --runs 2 --steps 5"
+    )
+    # Fewer runs leave no curves of the others behind.
+    tuning.tuning_data([1e-2], [8], 1, 5, n_jobs=1, **place)
+    assert len(list((tmp_path / "data").glob("dummy_sim_*/*.csv"))) == 4
+
+
+def test_figures_of_few_runs_say_so(tmp_path):
+    tuning.tuning_data(
+        [1e-3], [64, 256, 1024, 2048], 1, 3, tmp_path, tmp_path / "runs", 1, progress=False
+    )
+    for draw in (figures.fig09_batch_size, figures.fig10_loss):
+        assert draw(tmp_path).get_supxlabel() == "reduced run: 3 steps, 1 runs"
+    with pytest.raises(FileNotFoundError, match="lr_0.1_agent"):
+        figures.fig08_learning_rate(tmp_path)
+    plt.close("all")
+
+
+def test_failed_runs_are_named(tmp_path):
+    run = tmp_path / "runs/tuning/5_steps/dummy_sim_with_hist_equal/bz_8_lr_0.01_agent_0"
+    run.parent.mkdir(parents=True)
+    run.write_text("no folder")
+    with pytest.raises(RuntimeError, match="dummy_sim_with_hist_equal/bz_8_lr_0.01_agent_0"):
+        tuning.tuning_data([1e-2], [8], 1, 5, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
+    assert not (tmp_path / "tuning_summary.csv").exists()

@@ -9,9 +9,8 @@ those of a few states, drawn without looking at any answer, and all that are clo
 which ``local`` finds a distance near the threshold.
 """
 
-import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
@@ -19,19 +18,19 @@ from typing import NamedTuple
 import gymnasium
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
-from tqdm import tqdm
 
 from unload import task
 from unload.agent import policies
 from unload.load.boxes import Load
 from unload.physics.bullet import SETTINGS
-from unload.physics.full import FullPhysics, LocalPhysics, TablePhysics, shared_table
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics, shared_table
+from unload.reproduce.results import COMMAND, JOBS, keep_all, measured, publish
 from unload.support import checks, files
-from unload.support.provenance import run_record, write_provenance
 
 NAME = "lift_agreement"
-LIFTS, FULL = 5000, 300  # compared in table and local, and drawn for full
+LIFT_COUNT, FULL_COUNT = 5000, 300  # compared in table and local, and drawn for full
 FRESH = 1_000_000  # seed of the first container; no other data uses it or the next ones
 STAGES = (0, 100, 200, 300, 400, 500)  # picks after which items are lifted
 WANTED = (2, 4, 4, 2)  # lifts per state with 0, 1, 2, and 3 or more boxes on top
@@ -49,9 +48,8 @@ DTYPES = {
     "local": "float64",
     "full": "float64",
 }
-
-
-POLICIES = {
+OPTIONS = JOBS
+UNLOADED_BY = {
     "random": policies.random,
     "nearest": policies.nearest,
     "highest": policies.highest,
@@ -63,7 +61,7 @@ class State(NamedTuple):
     """A container on its way to be unloaded.
 
     Attributes:
-        policy, seed, picks: how it got there, see ``play``.
+        policy, seed, picks: how it got there, see ``container_states``.
         load: what it was filled with.
         present: (n,) bool, the items that are left.
         visible: (128,) int64, the items that can be picked.
@@ -78,8 +76,8 @@ class State(NamedTuple):
 
 
 def agreement_data(
-    lifts: int = LIFTS,
-    full: int = FULL,
+    lifts: int = LIFT_COUNT,
+    full: int = FULL_COUNT,
     seed: int = FRESH,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
@@ -106,41 +104,36 @@ def agreement_data(
         TypeError, ValueError: a number is not as described.
     """
     checks.integer("full", full, 0, checks.integer("lifts", lifts, 1))
-    start = time.monotonic()
-    states, frame = collect_lifts(lifts, seed)
+    (states, frame), record = measured(partial(collect_lifts, lifts, seed))
     frame["asked_full"] = choose_for_full(frame, full, np.random.default_rng(seed))
-    frame["full"] = np.nan
-    seconds = time.monotonic() - start
-
     asked = frame[frame["asked_full"] != ""]
-    answers = Parallel(n_jobs, return_as="generator")(
-        delayed(full_distance)(states[number], item, Path(runs_dir) / "agreement")
-        for number, item in zip(asked["state"], asked["item"])
-    )
-    bar = tqdm(asked.index, unit="lift", disable=not progress, ncols=100, file=sys.stdout)
-    for row, (distance, took) in zip(bar, answers):
-        frame.loc[row, "full"] = distance
-        seconds += took
-
-    text = frame[list(DTYPES)].to_csv(index=False, float_format="%.6f")
-    files.write_text(Path(folder) / f"{NAME}.csv", text)
+    jobs = [full_job(states[number], item) for number, item in zip(asked["state"], asked["item"])]
+    answers = keep_all(Path(runs_dir) / "agreement", jobs, n_jobs, progress)
+    frame["full"] = pd.Series([answer.value for answer in answers], asked.index, "float64")
     settings = {
         "lifts": len(frame),
         "situations": int(frame["situation"].nunique()),
         "in full, drawn": int((frame["asked_full"] == "drawn").sum()),
         "in full, close": int((frame["asked_full"] == "close").sum()),
         "first seed": seed,
-        "policies": list(POLICIES),
+        "policies": list(UNLOADED_BY),
         "stages (picks)": STAGES,
     }
-    reduced = lifts < LIFTS or full < FULL
-    command = "python -m unload.reproduce agreement"
-    write_provenance(folder, NAME, command, settings, reduced, run_record(seconds))
+    publish(
+        folder,
+        NAME,
+        {NAME: frame[list(DTYPES)]},
+        f"{COMMAND} agreement",
+        settings,
+        lifts < LIFT_COUNT or full < FULL_COUNT,
+        [record, *(answer.record for answer in answers)],
+        float_format="%.6f",
+    )
     return read_agreement(folder)
 
 
 def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """What ``agreement_data`` wrote, one row per lift.
+    """The table that ``agreement_data`` wrote, one row per lift.
 
     Returns:
         ``policy``, ``seed`` and ``picks`` name the state of the container; ``item`` is the
@@ -165,9 +158,9 @@ def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
     return known[lifted[one] != lifted[other]]
 
 
-def play(policy: str, seed: int) -> Iterator[State]:
+def container_states(policy: str, seed: int) -> Iterator[State]:
     """The states of one container at each of ``STAGES``, unloaded with ``table``."""
-    checks.one_of("policy", policy, POLICIES)
+    checks.one_of("policy", policy, UNLOADED_BY)
     env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
     rng = np.random.default_rng([seed, 1])  # not what draws the load
     observation, info = env.reset(seed=seed)
@@ -176,7 +169,7 @@ def play(policy: str, seed: int) -> Iterator[State]:
             present, visible = env.physics.present.copy(), env.visible.copy()
             yield State(policy, seed, picks, env.physics.load, present, visible)
         if picks < max(STAGES):
-            chosen = POLICIES[policy](observation[None], info["action_mask"][None], rng)
+            chosen = UNLOADED_BY[policy](observation[None], info["action_mask"][None], rng)
             observation, _, _, _, info = env.step(chosen[0])
     env.close()
 
@@ -184,7 +177,7 @@ def play(policy: str, seed: int) -> Iterator[State]:
 def collect_lifts(lifts: int, seed: int) -> tuple[list[State], pd.DataFrame]:
     """At least so many lifts, asked of ``table`` and ``local``.
 
-    Containers take turns in ``POLICIES``, with the seeds ``seed``, ``seed + 1``, …
+    Containers take turns in ``UNLOADED_BY``, with the seeds ``seed``, ``seed + 1``, …
 
     Returns:
         The states, and the columns of ``read_agreement`` without those of ``full`` but
@@ -193,10 +186,10 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[State], pd.DataFrame]:
     states, rows, numbers = [], [], {}
     table, local = TablePhysics(shared_table()), LocalPhysics()
     rng = np.random.default_rng([seed, 2])
-    names = list(POLICIES)
+    names = list(UNLOADED_BY)
     while len(rows) < lifts:
         container = len(states) // len(STAGES)
-        for state in play(names[container % len(names)], seed + container):
+        for state in container_states(names[container % len(names)], seed + container):
             for physics in (table, local):
                 physics.reset(state.load)
                 for item in np.flatnonzero(~state.present):
@@ -236,8 +229,8 @@ def choose_for_full(frame: pd.DataFrame, count: int, rng: np.random.Generator) -
     return chosen
 
 
-def full_distance(state: State, item: int, folder: Path) -> tuple[float, float]:
-    """How far ``full`` moves an item, in m, and the seconds it took; kept in ``folder``.
+def full_job(state: State, item: int) -> tuple[dict, Callable[[], float]]:
+    """What ``full`` is asked about an item, and the lift that answers it, see ``keep_all``.
 
     The item is lifted in a world of its own, in which all boxes left in the container are
     simulated. In a world that has seen other lifts, the answer depends on them (by a
@@ -248,16 +241,14 @@ def full_distance(state: State, item: int, folder: Path) -> tuple[float, float]:
         load.positions[present], load.sizes[present], load.packages[present], load.walls[present]
     )
     boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
-    question = {"settings": SETTINGS, "boxes": boxes, "item": item}
-    path = folder / f"{state.policy}_{state.seed}_{state.picks}_{item}.json"
-    kept = files.read_json(path) if path.exists() else {}
-    if kept.get("question") == question:
-        return kept["distance"], kept["seconds"]
-    start = time.monotonic()
+    box = int(np.searchsorted(present, item))
+    return {"settings": SETTINGS, "boxes": boxes, "item": box}, partial(full_distance, left, box)
+
+
+def full_distance(load: Load, item: int) -> float:
+    """How far ``full`` moves an item of a load that has seen no other lift, in m."""
     physics = FullPhysics()
-    physics.reset(left)
-    distance = physics.lift(int(np.searchsorted(present, item)))
+    physics.reset(load)
+    distance = physics.lift(item)
     physics.close()
-    seconds = time.monotonic() - start
-    files.write_json(path, {"question": question, "distance": distance, "seconds": seconds})
-    return distance, seconds
+    return distance

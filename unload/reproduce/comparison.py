@@ -1,19 +1,30 @@
-"""Picking policies compared where the lift table reaches."""
+"""Picking policies compared where the lift table reaches.
 
-import time
+    python -m unload.reproduce comparison
+
+Rules and learned policies unload the same containers: in the conditions of the training, with
+blurred positions, and with boxes of other sizes.
+"""
+
 from collections.abc import Sequence
 from functools import partial
+from hashlib import blake2b
 from pathlib import Path
 
 import pandas as pd
 from joblib import Parallel, delayed
 
+from unload.agent import policies
 from unload.agent.evaluation import Policy, evaluate
+from unload.agent.weights import load_policy
 from unload.load.substacks import stack_load
-from unload.reproduce.players import LEARNED, POLICIES, find_policy, policy_digest
+from unload.reproduce.results import COMMAND, JOBS, measured, publish
 from unload.support import checks, files
-from unload.support.provenance import joined, run_record, write_provenance
 
+SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
+# Trainings of the paper's configuration end in two ways: one of each is compared.
+LEARNED = ("paper", "paper_seed_2", "recommended")
+COMPARED = (*SIMPLE, *LEARNED)
 LOADS, SEED = 100, 3000  # fresh containers for each policy and condition
 CONDITIONS = {
     "500 picks": {},
@@ -24,10 +35,14 @@ CONDITIONS = {
     "boxes × 0.8": {"stack": partial(stack_load, scale=0.8)},
     "boxes × 1.2": {"stack": partial(stack_load, scale=1.2)},
 }
+OPTIONS = {
+    "--policies": {"dest": "names", "nargs": "+", "choices": COMPARED, "default": COMPARED},
+    **JOBS,
+}
 
 
 def comparison_data(
-    names: Sequence[str] = POLICIES,
+    names: Sequence[str] = COMPARED,
     loads: int = LOADS,
     folder: str | Path = files.DATA,
     n_jobs: int = -1,
@@ -35,7 +50,7 @@ def comparison_data(
     """Let policies unload the same containers under each condition: ``comparison.csv``.
 
     One row per policy, condition and container, with the columns of ``compare``. The learned
-    policies play twice, told which items have failed and not.
+    policies are compared twice, with and without the mask.
 
     Args:
         names: of the policies.
@@ -50,36 +65,69 @@ def comparison_data(
     checks.integer("loads", loads, 1)
     players = {name: find_policy(name, folder) for name in names}
     jobs = [
-        delayed(compare)(name, players[name], mask, condition, loads)
+        delayed(measured)(partial(compare, name, players[name], mask, condition, loads))
         for condition in CONDITIONS
         for name in players
         for mask in ((True, False) if name in LEARNED else (True,))
     ]
     results = Parallel(n_jobs)(jobs)
-    table = pd.concat([rows for rows, _ in results])
-    text = table.to_csv(index=False, float_format="%.6g")
-    files.write_text(Path(folder) / "comparison.csv", text)
     weights = {name: policy_digest(name, folder) for name in names}
-    settings = {"policies": weights, "loads": loads, "seed": SEED}
-    reduced = loads < LOADS or set(names) < set(POLICIES)
-    record = joined(record for _, record in results)
-    command = f"python -m unload.reproduce comparison --policies {' '.join(names)}"
-    write_provenance(folder, "comparison", command, settings, reduced, record)
+    publish(
+        folder,
+        "comparison",
+        {"comparison": pd.concat([result.value for result in results])},
+        f"{COMMAND} comparison --policies {' '.join(names)}",
+        {"policies": weights, "loads": loads, "seed": SEED},
+        loads < LOADS or set(names) < set(COMPARED),
+        [result.record for result in results],
+    )
 
 
-def compare(
-    name: str, policy: Policy, mask: bool, condition: str, loads: int
-) -> tuple[pd.DataFrame, dict]:
-    """What ``evaluate`` tells of a policy under a condition.
+def compare(name: str, policy: Policy, mask: bool, condition: str, loads: int) -> pd.DataFrame:
+    """The rows of ``evaluate`` for a policy under a condition.
 
     Returns:
-        Its rows with the columns ``policy``, ``mask``, ``condition`` and ``load`` before them,
-        and what ``run_record`` tells.
+        Its columns, and ``policy``, ``mask``, ``condition`` and ``load`` before them.
     """
-    start = time.monotonic()
     table = evaluate(policy, loads, SEED, mask=mask, **CONDITIONS[condition])
     for place, (column, value) in enumerate(
         {"policy": name, "mask": mask, "condition": condition, "load": range(loads)}.items()
     ):
         table.insert(place, column, value)
-    return table, run_record(time.monotonic() - start)
+    return table
+
+
+def find_policy(name: str, folder: str | Path = files.DATA) -> Policy:
+    """One of ``COMPARED`` by its name.
+
+    Raises:
+        ValueError: another name.
+        FileNotFoundError: see ``policy_file``.
+    """
+    checks.one_of("name", name, COMPARED)
+    return SIMPLE[name] if name in SIMPLE else load_policy(policy_file(name, folder))
+
+
+def policy_digest(name: str, folder: str | Path = files.DATA) -> str | None:
+    """Digest of a learned policy's file; None for a simple policy.
+
+    Raises:
+        ValueError, FileNotFoundError: as ``find_policy`` does.
+    """
+    checks.one_of("name", name, COMPARED)
+    if name in SIMPLE:
+        return None
+    return blake2b(policy_file(name, folder).read_bytes(), digest_size=16).hexdigest()
+
+
+def policy_file(name: str, folder: str | Path = files.DATA) -> Path:
+    """Where a learned policy is kept: ``folder/policies/<name>.safetensors``.
+
+    Raises:
+        FileNotFoundError: it is absent; the message names it.
+    """
+    checks.one_of("name", name, LEARNED)
+    path = Path(folder) / "policies" / f"{name}.safetensors"
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is absent; expected the policy {name!r} there")
+    return path

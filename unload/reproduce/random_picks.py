@@ -1,11 +1,13 @@
 """What can be learned from random picks alone, by what the network sees of the positions.
 
+    python -m unload.reproduce offline
+
 In training the agent's own picks decide what it learns from. Here they cannot: each network
 is fitted to the same random picks, and differs from the others in its features only.
 """
 
-import time
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -13,23 +15,26 @@ import gymnasium
 import numpy as np
 import pandas as pd
 import torch
-from joblib import Parallel, delayed
 
 from unload import task
 from unload.agent.dqn import DQN
-from unload.agent.evaluation import evaluate
+from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
 from unload.env.equalization import equalize
 from unload.network.peq import PEQNetwork
+from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
 from unload.support import checks, files
-from unload.support.provenance import joined, run_record, write_provenance
 
-STEPS = 1500  # of 64 environments: 96,000 picks
-UPDATES = 8000
+SIZE = {
+    "steps": 1500,  # of 64 environments: 96,000 picks
+    "updates": 8000,
+    "loads": 64,  # fresh containers
+}
+SEED_COUNT = 5
 BATCH_SIZE = 256
-SEEDS = 5
-LOADS, LOADS_SEED = 64, 1000
-LAST = 500  # updates whose loss is told
+LOADS_SEED = 1000
+LAST = 500  # updates at the end, whose mean loss is reported
+OPTIONS = JOBS
 
 Transform = Callable[[np.ndarray], np.ndarray]
 
@@ -56,7 +61,7 @@ def _centred(observations: np.ndarray) -> np.ndarray:
     return (observations - observations.mean(axis=-2, keepdims=True)).astype(np.float32)
 
 
-FEATURES: dict[str, Transform] = {
+TRANSFORMS: dict[str, Transform] = {  # of the observation, by the name of the features
     "positions": _ranks_of([]),
     "centred positions": _centred,
     "stretched positions": _stretched,
@@ -69,8 +74,90 @@ FEATURES: dict[str, Transform] = {
 }
 
 
+def offline_data(
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    seeds: int = SEED_COUNT,
+    progress: bool = True,
+    **size: int,
+) -> None:
+    """Fit a network to each of ``TRANSFORMS`` with several seeds: ``study/offline.csv``.
+
+    Args:
+        folder: of the data.
+        runs_dir: where finished fits are kept.
+        n_jobs: processes, as in joblib.
+        seeds: how many.
+        progress: show a progress bar.
+        **size: ``steps``, ``updates`` and ``loads`` of ``fit``, if not its own.
+    """
+    size = SIZE | size
+    settings = {"batch_size": BATCH_SIZE, "loads_seed": LOADS_SEED, **size}
+    jobs = [
+        ({"features": name, "seed": seed} | settings, partial(fit, name, seed, **size))
+        for name, seed in product(TRANSFORMS, range(checks.integer("seeds", seeds, 1)))
+    ]
+    answers = keep_all(Path(runs_dir) / "offline", jobs, n_jobs, progress)
+    publish(
+        Path(folder) / "study",
+        "offline",
+        {"offline": pd.DataFrame([answer.value for answer in answers])},
+        f"{COMMAND} offline",
+        {"seeds": seeds} | settings,
+        seeds < SEED_COUNT or any(size[name] < full for name, full in SIZE.items()),
+        [answer.record for answer in answers],
+    )
+
+
+def fit(
+    features: str,
+    seed: int,
+    steps: int = SIZE["steps"],
+    updates: int = SIZE["updates"],
+    loads: int = SIZE["loads"],
+) -> dict:
+    """Fit the paper's network to random picks, and let it unload fresh containers.
+
+    Args:
+        features: a name in ``TRANSFORMS``.
+        seed: of the picks, the weights and the batches.
+        steps: see ``random_picks``.
+        updates: of 256 picks each, with the paper's learning rate.
+        loads: fresh containers.
+
+    Returns:
+        ``features``, ``seed``; ``loss``, the mean of the last 500 updates; ``msr_mask`` and
+        ``msr_no_mask``, with and without the mask; ``deadlocked``, the share of picks in
+        deadlocks without it.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    checks.one_of("features", features, TRANSFORMS)
+    checks.integer("updates", updates, 1)
+    picks = random_picks(steps, seed)
+    picks["observations"] = TRANSFORMS[features](picks["observations"])
+    rng = np.random.default_rng(seed)
+    agent = DQN(PEQNetwork(generator=torch.Generator().manual_seed(seed)))
+    losses = [
+        agent.update(picks, rng.integers(len(picks["actions"]), size=BATCH_SIZE))
+        for _ in range(updates)
+    ]
+    policy = greedy(agent.network, features)
+    masked, unmasked = (evaluate(policy, loads, LOADS_SEED, mask=mask) for mask in (True, False))
+    return {
+        "features": features,
+        "seed": seed,
+        "loss": float(np.mean(losses[-LAST:])),
+        "msr_mask": masked["success_rate"].mean(),
+        "msr_no_mask": unmasked["success_rate"].mean(),
+        "deadlocked": unmasked["deadlocked"].mean(),
+    }
+
+
 def random_picks(steps: int, seed: int) -> dict[str, np.ndarray]:
-    """Random picks in 64 containers, not told what failed.
+    """Random picks in 64 containers, without the mask.
 
     Args:
         steps: of all environments.
@@ -98,96 +185,10 @@ def random_picks(steps: int, seed: int) -> dict[str, np.ndarray]:
     }
 
 
-def fit(
-    features: str, seed: int, steps: int = STEPS, updates: int = UPDATES, loads: int = LOADS
-) -> dict:
-    """Fit the paper's network to random picks, and let it unload fresh containers.
-
-    Args:
-        features: a name in ``FEATURES``.
-        seed: of the picks, the weights and the batches.
-        steps: see ``random_picks``.
-        updates: of 256 picks each, with the paper's learning rate.
-        loads: fresh containers.
-
-    Returns:
-        ``features``, ``seed``; ``loss``, the mean of the last 500 updates; ``msr_mask`` and
-        ``msr_no_mask``, told which items failed or not; ``deadlocked``, the share of picks in
-        deadlocks if not.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
-    """
-    checks.one_of("features", features, FEATURES)
-    checks.integer("updates", updates, 1)
-    transform, picks = FEATURES[features], random_picks(steps, seed)
-    picks["observations"] = transform(picks["observations"])
-    rng = np.random.default_rng(seed)
-    agent = DQN(PEQNetwork(generator=torch.Generator().manual_seed(seed)))
-    losses = [
-        agent.update(picks, rng.integers(len(picks["actions"]), size=BATCH_SIZE))
-        for _ in range(updates)
-    ]
+def greedy(network: torch.nn.Module, features: str) -> Policy:
+    """The greedy policy of a network; ``features``, a name in ``TRANSFORMS``, is what it sees."""
 
     def policy(observations, masks, rng):
-        return greedy_actions(agent.network, transform(observations), masks)
+        return greedy_actions(network, TRANSFORMS[features](observations), masks)
 
-    told, not_told = (evaluate(policy, loads, LOADS_SEED, mask=mask) for mask in (True, False))
-    return {
-        "features": features,
-        "seed": seed,
-        "loss": float(np.mean(losses[-LAST:])),
-        "msr_mask": told["success_rate"].mean(),
-        "msr_no_mask": not_told["success_rate"].mean(),
-        "deadlocked": not_told["deadlocked"].mean(),
-    }
-
-
-def offline_data(
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = -1,
-    seeds: int = SEEDS,
-    **size: int,
-) -> None:
-    """Fit all ``FEATURES`` with several seeds: ``study/offline.csv``, one row per fit.
-
-    Args:
-        folder: of the data.
-        runs_dir: where finished fits are kept.
-        n_jobs: processes, as in joblib.
-        seeds: how many.
-        **size: ``steps``, ``updates`` and ``loads`` of ``fit``, if not its own.
-    """
-    full = {"steps": STEPS, "updates": UPDATES, "loads": LOADS}
-    size = full | size
-    kept = Path(runs_dir) / "offline" / "_".join(f"{value}_{name}" for name, value in size.items())
-    jobs = [
-        delayed(_kept)(features, seed, kept, size)
-        for features, seed in product(FEATURES, range(checks.integer("seeds", seeds, 1)))
-    ]
-    results = Parallel(n_jobs)(jobs)
-    table = pd.DataFrame([result["row"] for result in results])
-    folder = Path(folder) / "study"
-    files.write_text(folder / "offline.csv", table.to_csv(index=False, float_format="%.6g"))
-    settings = {"seeds": seeds, "batch_size": BATCH_SIZE, "loads_seed": LOADS_SEED, **size}
-    reduced = seeds < SEEDS or any(size[name] < full[name] for name in full)
-    record = joined(result["record"] for result in results)
-    write_provenance(
-        folder, "offline", "python -m unload.reproduce offline", settings, reduced, record
-    )
-
-
-def _kept(features: str, seed: int, folder: Path, size: dict[str, int]) -> dict:
-    """The row and record of a fit, from its file if it has been made before."""
-    path = folder / f"{features}_{seed}.json"
-    if not path.exists():
-        threads = torch.get_num_threads()
-        torch.set_num_threads(1)  # the fits share the cores among themselves
-        start = time.monotonic()
-        try:
-            row = fit(features, seed, **size)
-        finally:
-            torch.set_num_threads(threads)
-        files.write_json(path, {"row": row, "record": run_record(time.monotonic() - start)})
-    return files.read_json(path)
+    return policy

@@ -1,11 +1,144 @@
-"""Tables of results, read back."""
+"""One way to keep a result, to publish it, and to read it back.
 
-from collections.abc import Sequence
+A result that took long is kept in ``runs/`` under the question that it answers; a published
+one is a table in ``data/`` with its provenance beside it.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict
+from hashlib import blake2b
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import pandas as pd
+from joblib import Parallel, delayed
+from tqdm import tqdm
 
-from unload.support import checks
+from unload.agent.config import TrainConfig
+from unload.support import checks, files
+from unload.support.provenance import joined, run_record, write_provenance
+
+COMMAND = "python -m unload.reproduce"
+# The command-line option of every experiment that uses several processes.
+JOBS = {
+    "--jobs": {
+        "dest": "n_jobs", "type": int, "default": -1, "help": "processes; one per core if -1"
+    }
+}  # fmt: skip
+
+
+class Result(NamedTuple):
+    """A computed value and what ``run_record`` says of the computation."""
+
+    value: Any
+    record: dict
+
+
+def measured(compute: Callable[[], Any]) -> Result:
+    """Compute a value, with its ``run_record``."""
+    start = time.monotonic()
+    value = compute()
+    return Result(value, run_record(time.monotonic() - start))
+
+
+def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Result:
+    """The answer to a question, computed once and kept in ``folder``.
+
+    Args:
+        folder: of the answers, each a JSON file that is named by a digest of its question.
+        question: all that the answer depends on, as JSON can hold it: an answer to another
+            question is not taken.
+        compute: gives the answer, a value that JSON can hold.
+
+    Returns:
+        The answer and its record, the same whether it was kept or has just been computed.
+
+    Raises:
+        TypeError: JSON cannot hold the question or the answer.
+        ValueError: a kept file is damaged; the message names it.
+    """
+    question = json.loads(json.dumps(question, sort_keys=True))
+    digest = blake2b(json.dumps(question).encode(), digest_size=8).hexdigest()
+    path = Path(folder) / f"{digest}.json"
+    stored = files.read_json(path) if path.exists() else {}
+    if stored.get("question") != question:
+        value, record = measured(compute)
+        files.write_json(path, {"question": question, "value": value, "record": record})
+        stored = files.read_json(path)
+    return Result(stored["value"], stored["record"])
+
+
+def keep_all(
+    folder: str | Path,
+    jobs: Sequence[tuple[dict, Callable[[], Any]]],
+    n_jobs: int,
+    progress: bool = True,
+) -> list[Result]:
+    """``kept`` for several questions, each with what computes its answer, side by side.
+
+    Args:
+        folder: of the answers.
+        jobs: pairs of ``question`` and ``compute``.
+        n_jobs: processes, as in joblib.
+        progress: show a progress bar.
+    """
+    answers = Parallel(n_jobs, return_as="generator")(
+        delayed(kept)(folder, question, compute) for question, compute in jobs
+    )
+    bar = {"total": len(jobs), "unit": "result", "disable": not progress, "ncols": 100}
+    return list(tqdm(answers, file=sys.stdout, **bar))
+
+
+def shared_settings(configs: Mapping[str, TrainConfig]) -> dict:
+    """The fields in which all configurations agree, and their value."""
+    first, *others = (asdict(config) for config in configs.values())
+    return {
+        name: value
+        for name, value in first.items()
+        if all(other[name] == value for other in others)
+    }
+
+
+def publish(
+    folder: str | Path,
+    name: str,
+    tables: Mapping[str, pd.DataFrame],
+    command: str,
+    settings: dict,
+    reduced: bool,
+    records: Iterable[dict],
+    fingerprint: str | None = None,
+    float_format: str = "%.6g",
+) -> None:
+    """Write tables of results and, last, their provenance.
+
+    Args:
+        folder: of ``<table>.csv`` and ``<name>.provenance.json``.
+        name: of the data.
+        tables: by name.
+        command: what computes them again.
+        settings: configuration and seeds.
+        reduced: whether the run is smaller than the one that ``data/`` holds.
+        records: of the runs, see ``unload.support.provenance.run_record``.
+        fingerprint: of the training that the results rest on, see ``training_fingerprint``;
+            None if they rest on none, or on one that is not known.
+        float_format: of the tables.
+    """
+    folder = Path(folder)
+    for table_name, table in tables.items():
+        write_table(folder / f"{table_name}.csv", table, float_format)
+    record = joined(records)
+    if fingerprint is not None:
+        record["fingerprint"] = fingerprint
+    write_provenance(folder, name, command, settings, reduced, record)
+
+
+def write_table(path: str | Path, table: pd.DataFrame, float_format: str = "%.6g") -> None:
+    """Write a table as CSV, without its index, in one atomic step."""
+    files.write_text(path, table.to_csv(index=False, float_format=float_format))
 
 
 def read_table(

@@ -8,15 +8,12 @@ and a box on which nothing lies may be jammed between its neighbours. ``"table"`
 the lift table, in whose loads only the picked box moves: what drift costs is seen beside it.
 """
 
-import sys
-import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
-from tqdm import tqdm
 
 from unload.agent.evaluation import Policy, success_rate
 from unload.env.container import ContainerEnv
@@ -24,19 +21,21 @@ from unload.load.boxes import Load
 from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
 from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Surroundings
-from unload.reproduce.players import POLICIES, find_policy, policy_digest
+from unload.reproduce import comparison
+from unload.reproduce.comparison import COMPARED, find_policy, policy_digest
+from unload.reproduce.results import COMMAND, keep_all, publish
 from unload.support import checks, files
-from unload.support.provenance import joined, run_record, write_provenance
 
 NAME = "robustness"
 EPISODES, PICKS = 10, 100
 SEED = 2000  # of the loads; no other data uses it
 AFTER_PICK = ("table", "keep", "restore")
 RESTORED = ("recommended",)  # for the others every lift would be the table's
+OPTIONS = comparison.OPTIONS
 
 
 def robustness_data(
-    names: Sequence[str] = POLICIES,
+    names: Sequence[str] = COMPARED,
     episodes: int = EPISODES,
     picks: int = PICKS,
     folder: str | Path = files.DATA,
@@ -69,38 +68,25 @@ def robustness_data(
     """
     checks.integer("episodes", episodes, 1)
     checks.integer("picks", picks, 1, PICKS)
+    players = {name: find_policy(name, folder) for name in names}
     weights = {name: policy_digest(name, folder) for name in names}
     seeds = np.random.SeedSequence(SEED).generate_state(episodes).tolist()
-    jobs = [
+    containers = [
         {"policy": name, "after_pick": after_pick, "episode": episode}
         for after_pick in AFTER_PICK
-        for name in weights
+        for name in players
         if after_pick != "restore" or name in RESTORED
         for episode in range(episodes)
     ]
-    results = Parallel(n_jobs, return_as="generator")(
-        delayed(_kept)(
-            {
-                **job,
-                "weights": weights[job["policy"]],
-                "seed": seeds[job["episode"]],
-                "picks": picks,
-                "walls": FRONT_WALLS,
-                "settings": SETTINGS,
-            },
-            folder,
-            Path(runs_dir) / NAME,
-        )
-        for job in jobs
-    )
-    bar = tqdm(jobs, unit="episode", disable=not progress, ncols=100, file=sys.stdout)
-    rows, records = [], []
-    for job, (row, record) in zip(bar, results):
-        rows.append(job | row)
-        records.append(record)
-    frame = pd.DataFrame(rows)
-    text = frame.to_csv(index=False, float_format="%.6g")
-    files.write_text(Path(folder) / f"{NAME}.csv", text)
+    jobs = []
+    for container in containers:
+        name, after_pick, episode = container.values()
+        size = {"seed": seeds[episode], "picks": picks, "walls": FRONT_WALLS}
+        question = container | size | {"weights": weights[name], "settings": SETTINGS}
+        compute = partial(play, players[name], after_pick, seeds[episode], picks, stack=front_load)
+        jobs.append((question, compute))
+    answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
+    frame = pd.DataFrame([one | answer.value for one, answer in zip(containers, answers)])
     settings = {
         "policies": weights,
         "after_pick": AFTER_PICK,
@@ -109,9 +95,15 @@ def robustness_data(
         "seed": SEED,
         "front walls": FRONT_WALLS,
     }
-    reduced = episodes < EPISODES or picks < PICKS or set(weights) < set(POLICIES)
-    command = f"python -m unload.reproduce {NAME} --policies {' '.join(weights)}"
-    write_provenance(folder, NAME, command, settings, reduced, joined(records))
+    publish(
+        folder,
+        NAME,
+        {NAME: frame},
+        f"{COMMAND} {NAME} --policies {' '.join(weights)}",
+        settings,
+        episodes < EPISODES or picks < PICKS or set(weights) < set(COMPARED),
+        [answer.record for answer in answers],
+    )
     return frame
 
 
@@ -131,7 +123,7 @@ def play(
             ``"table"`` for the lift table.
         seed: of the load and of the policy's random numbers.
         picks: how many.
-        mask: whether the policy is told which items failed since the last success.
+        mask: whether items that failed since the last success are masked.
         stack: makes the load, see ``ContainerEnv``.
 
     Returns:
@@ -188,18 +180,3 @@ def play(
 def front_load(rng: np.random.Generator) -> Load:
     """The front walls of a random load."""
     return front_walls(stack_load(rng))
-
-
-def _kept(question: dict, data: str | Path, folder: Path) -> tuple[dict[str, float], dict]:
-    """What ``play`` returns and its ``run_record``; kept in ``folder``."""
-    name, after_pick = question["policy"], question["after_pick"]
-    path = folder / f"{name}_{after_pick}_{question['episode']}.json"
-    kept = files.read_json(path) if path.exists() else {}
-    if kept.get("question") == question:
-        return kept["row"], kept["record"]
-    start = time.monotonic()
-    policy = find_policy(name, data)
-    row = play(policy, after_pick, question["seed"], question["picks"], stack=front_load)
-    record = run_record(time.monotonic() - start)
-    files.write_json(path, {"question": question, "row": row, "record": record})
-    return row, record

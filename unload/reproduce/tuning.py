@@ -1,4 +1,7 @@
-"""The hyperparameter grid of Sec. IV-A: its runs, their names, their curves and summary."""
+"""The hyperparameter grid of Sec. IV-A, for Figs. 8–10: its runs, curves and summary.
+
+Made by ``python -m unload.reproduce tuning``.
+"""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,17 +11,85 @@ import pandas as pd
 
 from unload import task
 from unload.agent.config import TrainConfig
+from unload.agent.sweep import run_all
+from unload.agent.training import train
+from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings
 from unload.support import checks, files
 
 LEARNING_RATES = (1e-1, 1e-2, 1e-3)
 BATCH_SIZES = (64, 256, 1024, 2048)
-RUNS = 10
+RUN_COUNT = 10  # of each configuration
 STEPS = 3000  # K, one pick in each of 64 environments and one update per step
 
 WINDOW = 25  # steps of the running means
 FINAL = 100  # steps at the end of a run that its final values are means of
 SOLVED = 0.99  # MSR
 LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
+
+OPTIONS = {
+    "--learning-rates": {"type": float, "nargs": "+", "default": LEARNING_RATES},
+    "--batch-sizes": {"type": int, "nargs": "+", "default": BATCH_SIZES},
+    "--runs": {"type": int, "default": RUN_COUNT, "help": "per configuration"},
+    "--steps": {"type": int, "default": STEPS, "help": "of a run"},
+    **JOBS,
+}
+
+
+def tuning_data(
+    learning_rates: Sequence[float] = LEARNING_RATES,
+    batch_sizes: Sequence[int] = BATCH_SIZES,
+    runs: int = RUN_COUNT,
+    steps: int = STEPS,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    progress: bool = True,
+) -> None:
+    """Train every configuration with and without feature engineering; write their curves.
+
+    The curves are those of ``export_curves``; ``tuning_summary.csv`` that of
+    ``tuning_summary``.
+
+    Args:
+        learning_rates: μ.
+        batch_sizes: b.
+        runs: per configuration.
+        steps: K.
+        folder: of the data.
+        runs_dir: where the runs are kept.
+        n_jobs: processes, see ``run_sweep``.
+        progress: show a progress bar.
+
+    Raises:
+        RuntimeError: a run failed; the message says which and why.
+    """
+    folder, kept = Path(folder), Path(runs_dir) / f"tuning/{steps}_steps"
+    configs = tuning_grid(learning_rates, batch_sizes, runs, steps=steps)
+    records = run_all(configs, kept, n_jobs, progress)
+    curves = {name: train(config, kept / name).curve for name, config in configs.items()}
+    for old in folder.glob("dummy_sim_*/*_curve_*.csv"):
+        old.unlink()  # it may be of a run that is not among these
+    for name, curve in curves.items():
+        export_curves(name, curve, folder)
+    settings = {
+        "learning_rates": list(learning_rates),
+        "batch_sizes": list(batch_sizes),
+        "runs": runs,
+        "steps": steps,
+        "equalize": [True, False],
+        "config": shared_settings(configs),
+    }
+    complete = set(LEARNING_RATES) <= set(learning_rates) and set(BATCH_SIZES) <= set(batch_sizes)
+    publish(
+        folder,
+        "tuning",
+        {"tuning_summary": tuning_summary(configs, curves)},
+        f"{COMMAND} tuning --learning-rates {' '.join(map(str, learning_rates))} "
+        f"--batch-sizes {' '.join(map(str, batch_sizes))} --runs {runs} --steps {steps}",
+        settings,
+        steps < STEPS or runs < RUN_COUNT or not complete,
+        records,
+    )
 
 
 def tuning_config(
@@ -55,7 +126,7 @@ def tuning_config(
 def tuning_grid(
     learning_rates: Sequence[float] = LEARNING_RATES,
     batch_sizes: Sequence[int] = BATCH_SIZES,
-    runs: int = RUNS,
+    runs: int = RUN_COUNT,
     equalize: Sequence[bool] = (True, False),
     steps: int = STEPS,
 ) -> dict[str, TrainConfig]:
@@ -95,7 +166,7 @@ def export_curves(name: str, curve: pd.DataFrame, folder: str | Path) -> None:
 
     Args:
         name: of the run in ``tuning_grid``.
-        curve: what ``unload.train`` left.
+        curve: of ``unload.train``.
         folder: of the data.
     """
     place = Path(folder) / name
@@ -112,7 +183,7 @@ def running_mean(values: np.ndarray) -> np.ndarray:
 
 
 def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
-    """What became of a tuning run.
+    """How a tuning run ended, and its loss on the way.
 
     Args:
         success_rate: (steps,) MSR at each step.
@@ -148,7 +219,7 @@ def _loss_summary(loss: np.ndarray) -> dict[str, float]:
 def tuning_summary(
     configs: dict[str, TrainConfig], curves: dict[str, pd.DataFrame]
 ) -> pd.DataFrame:
-    """One row per configuration: means over its runs of what ``run_summary`` tells.
+    """One row per configuration: means over its runs of ``run_summary``.
 
     Columns: ``equalize``, ``batch_size``, ``learning_rate``, ``runs``; ``final_msr`` and its
     standard deviation, lowest and highest value; ``solved``, the number of runs that end at

@@ -1,24 +1,14 @@
 """The policies compared: table and figure."""
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 
 from unload.reproduce import comparison, robustness
 from unload.reproduce.figures import comparison as figures
-from unload.reproduce.figures.style import save
 from unload.reproduce.intervals import bootstrap_interval
 
-matplotlib.use("Agg")
 RATES = [0.5, 0.25, 0.75]
-
-
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
 
 
 def write(folder, missing=None):
@@ -84,13 +74,13 @@ def test_nearly_perfect_is_not_called_perfect(tmp_path):
 
 def test_only_what_should_be_there_is_missed(tmp_path):
     write(tmp_path, missing=("nearest", True, "σ 5 cm"))
-    write_full(tmp_path, [policy for policy in figures.POLICIES if policy != "paper"])
+    write_full(tmp_path, [policy for policy in comparison.COMPARED if policy != "paper"])
     assert figures.not_played(tmp_path) == ["paper: full, kept", "nearest: σ 5 cm"]
     write_full(tmp_path, ["paper"])  # restored, only the recommended agent plays
     assert "recommended: full, restored" in figures.not_played(tmp_path)
     assert "random: full, restored" not in figures.not_played(tmp_path)
     write(tmp_path)
-    write_full(tmp_path, figures.POLICIES)
+    write_full(tmp_path, comparison.COMPARED)
     assert figures.not_played(tmp_path) == []
 
 
@@ -108,7 +98,7 @@ def test_figure_draws_the_means_of_every_condition(tmp_path, full):
         return {line.get_ydata()[0]: line.get_xdata()[0] for line in marked}
 
     assert list(dots("complete").values()) == [0.5] * 7 + [1, 1]
-    assert dots("full, kept") == {list(figures.POLICIES).index(each): 0.9 for each in full}
+    assert dots("full, kept") == {list(comparison.COMPARED).index(each): 0.9 for each in full}
     note = panels["full, kept"].get_title("right")
     assert note == ("2 containers" if full else "")
 
@@ -122,13 +112,9 @@ def test_containers_are_counted(tmp_path):
     assert figures.comparison_msr(tmp_path).axes[0].get_title("right") == "1–3 containers"
 
 
-def test_figure_is_saved_as_the_same_bytes(tmp_path):
+def test_figure_is_saved_as_the_same_bytes(tmp_path, saved_twice):
     write(tmp_path)
-    for folder in ("a", "b"):
-        save(figures.comparison_msr(tmp_path), "comparison", tmp_path / folder)
-    for suffix in ("png", "pdf"):
-        first, second = (tmp_path / folder / f"comparison.{suffix}" for folder in "ab")
-        assert first.read_bytes() == second.read_bytes()
+    saved_twice(lambda: figures.comparison_msr(tmp_path))
 
 
 @pytest.mark.parametrize(

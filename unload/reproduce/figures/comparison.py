@@ -8,16 +8,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from unload.reproduce.comparison import COMPARED, LEARNED
 from unload.reproduce.figures.style import styled
 from unload.reproduce.intervals import with_intervals
-from unload.reproduce.players import LEARNED, POLICIES
 from unload.reproduce.results import read_table
 from unload.reproduce.robustness import RESTORED
 from unload.support import files
 
 KEY = ["policy", "mask", "condition"]
-# Conditions from left to right and top to bottom; those of ``unload.comparison`` and, with
-# every box simulated, those of ``unload.robustness``.
+# Conditions from left to right and top to bottom; those of ``reproduce.comparison`` and, with
+# every box simulated, those of ``reproduce.robustness``.
 FULL = {"restore": "full, restored", "keep": "full, kept"}
 CONDITIONS = (
     "500 picks", *FULL.values(),
@@ -28,7 +28,7 @@ COLUMNS = 3
 # Who plays, by policy and mask: the rules with it only.
 ROWS = {
     (policy, mask): policy if mask else f"{policy}, no mask"
-    for policy in POLICIES
+    for policy in COMPARED
     for mask in ((True, False) if policy in LEARNED else (True,))
 }
 COLOURS = {

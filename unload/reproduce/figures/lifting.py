@@ -80,7 +80,7 @@ def agreement_scatter(frame: pd.DataFrame) -> Figure:
     """How far the same boxes move in ``table`` and ``local``, and in ``full`` and ``local``.
 
     Args:
-        frame: see ``unload.agreement.read_agreement``; the columns ``on_top``, ``table``,
+        frame: see ``unload.reproduce.agreement.read_agreement``; the columns ``on_top``, ``table``,
             ``local`` and ``full`` are used.
 
     Raises:

@@ -12,13 +12,11 @@ from matplotlib.ticker import EngFormatter, PercentFormatter
 
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.intervals import bootstrap_interval, with_intervals
-from unload.reproduce.judge import read_study
-from unload.reproduce.results import read_table
-from unload.reproduce.study import FEATURES
+from unload.reproduce.results import COMMAND, read_table
+from unload.reproduce.study import FEATURE_SETTINGS, read_study
 from unload.support import checks, files
 from unload.support.provenance import read_provenance
 
-COMMAND = "python -m unload.reproduce"
 CELL = ["features", "mask", "epsilon_final"]
 APPLIED = {"msr_mask": ("C0", "o", "told what failed"), "msr_no_mask": ("C1", "s", "not told")}
 PAPER_MSR = 0.6  # at the end of its Fig. 12
@@ -96,29 +94,6 @@ def offline_msr(folder: str | Path = files.DATA) -> Figure:
     return _one_panel(list(cells), list(cells.values()))
 
 
-def factorial_table(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """The cells of the factorial study with means and intervals over the seeds.
-
-    Returns:
-        One row per cell: ``features``, ``mask``, ``epsilon_final``, ``runs``; for
-        ``msr_mask``, ``msr_no_mask``, ``deadlocked``, ``msr_training`` and
-        ``deadlocked_overall`` the mean, ``_low`` and ``_high``; ``longest_deadlock`` of any
-        run; ``reached``, how many runs come to 99 % without the mask, and ``picks_to_goal``,
-        the median of those that do.
-
-    Raises:
-        FileNotFoundError: see ``read_study``.
-    """
-    rows, _ = read_study("factorial", folder)
-    measures = ["msr_mask", "msr_no_mask", "deadlocked", "msr_training", "deadlocked_overall"]
-    table = with_intervals(rows, CELL, measures)
-    groups = rows.groupby(CELL, sort=False)
-    table["longest_deadlock"] = groups["longest_deadlock"].max().to_numpy()
-    table["reached"] = groups["picks_to_goal_no_mask"].count().to_numpy()
-    table["picks_to_goal"] = groups["picks_to_goal_no_mask"].median().to_numpy()
-    return table
-
-
 @styled
 def factorial_msr(folder: str | Path = files.DATA) -> Figure:
     """MSR of each cell's trained policies: mean, 95 % interval, and every seed.
@@ -130,8 +105,10 @@ def factorial_msr(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: see ``read_study``.
     """
     rows, _ = read_study("factorial", folder)
-    figure, panels = plt.subplots(len(FEATURES), 1, figsize=(6.4, 5.2), sharex=True, sharey=True)
-    for axes, features in zip(panels, FEATURES):
+    figure, panels = plt.subplots(
+        len(FEATURE_SETTINGS), 1, figsize=(6.4, 5.2), sharex=True, sharey=True
+    )
+    for axes, features in zip(panels, FEATURE_SETTINGS):
         group = rows[rows["features"] == features]
         cells = list(group.groupby(["mask", "epsilon_final"], sort=False))
         names = [
@@ -156,7 +133,7 @@ def varied_msr(
     """MSR of the policies of an experiment that varies one setting at a time.
 
     Args:
-        experiment: a name in ``unload.study.EXPERIMENTS``, or several to be shown as one.
+        experiment: a name in ``unload.reproduce.study.EXPERIMENTS``, or several to be shown as one.
         field: the settings that are varied; a row is named by those that differ from the
             first row's.
         folder: of the data.
@@ -184,7 +161,7 @@ def varied_msr(
 
 @styled
 def factorial_curves(folder: str | Path = files.DATA) -> Figure:
-    """What each cell's policy achieves, not told what failed, as training goes on.
+    """MSR of each cell's policy without the mask over the picks of the training.
 
     Mean over the seeds and 95 % interval; the exploring agent itself is not shown.
 
@@ -195,8 +172,8 @@ def factorial_curves(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: see ``read_study``.
     """
     _, curves = read_study("factorial", folder)
-    figure, panels = plt.subplots(1, len(FEATURES), figsize=(7.6, 2.8), sharey=True)
-    for axes, features in zip(panels, FEATURES):
+    figure, panels = plt.subplots(1, len(FEATURE_SETTINGS), figsize=(7.6, 2.8), sharey=True)
+    for axes, features in zip(panels, FEATURE_SETTINGS):
         group = curves[curves["features"] == features]
         for (mask, floor), cell in group.groupby(["mask", "epsilon_final"], sort=False):
             label = f"{'mask' if mask else 'no mask'}, {floor:.0%} random"

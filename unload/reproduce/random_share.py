@@ -1,7 +1,7 @@
-"""What is learned where some picks are random and the others the agent's own, or a teacher's.
+"""What is learned where a constant share of the picks is random.
 
-``unload.offline`` fits a network to random picks that it has no part in. Here the network
-shapes the containers that it learns in, by a constant share of the picks.
+``random_picks.fit`` fits a network to random picks that it has no part in. Here the network
+shapes the containers that it learns in, by the picks that are not random; or a teacher does.
 """
 
 from typing import NamedTuple
@@ -17,14 +17,14 @@ from unload.agent.greedy import greedy_actions
 from unload.agent.policies import random
 from unload.agent.replay import ReplayBuffer
 from unload.network.peq import PEQNetwork
-from unload.reproduce.random_picks import FEATURES
+from unload.reproduce.random_picks import TRANSFORMS, greedy
 from unload.support import checks
 
 REMEMBER = ("all", "random")
 
 
 class Learned(NamedTuple):
-    """What ``learn`` leaves.
+    """Result of ``learn``.
 
     Attributes:
         policy: greedy, by the network's values.
@@ -50,12 +50,12 @@ def learn(
     """Train as the paper does, but with a constant share of random picks.
 
     Args:
-        features: a name in ``unload.offline.FEATURES``.
+        features: a name in ``random_picks.TRANSFORMS``.
         epsilon: the share of random picks.
         seed: of the loads, the picks, the batches and the weights.
         picks: over all 64 containers, a multiple of 64; one update per 64 of them.
         batch_size: b.
-        mask: whether items that failed since the last success are left out.
+        mask: whether items that failed since the last success are masked.
         remember: ``"all"`` picks, or the ``"random"`` ones only.
         network: what to train, and what is changed; the paper's with random weights if None.
         teacher: makes the picks that are not random; the network itself if None.
@@ -63,21 +63,17 @@ def learn(
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
-    checks.one_of("features", features, FEATURES)
+    checks.one_of("features", features, TRANSFORMS)
     checks.real("epsilon", epsilon, 0, 1)
     checks.integer("picks", picks, task.NUM_ENVS)
     checks.integer("batch_size", batch_size, 1)
     checks.boolean("mask", mask)
     checks.one_of("remember", remember, REMEMBER)
-    transform, rows = FEATURES[features], np.arange(task.NUM_ENVS)
+    transform, rows = TRANSFORMS[features], np.arange(task.NUM_ENVS)
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
     if network is None:
         network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
     agent = DQN(network)
-
-    def policy(observations, masks, rng):
-        return greedy_actions(network, transform(observations), masks)
-
     envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS)
     observed, infos = envs.reset(seed=int(rng.integers(2**31)))
     replay, probes = ReplayBuffer(picks, task.N_VISIBLE), []
@@ -95,4 +91,4 @@ def learn(
         agent.update(replay.sample(batch_size, rng))
         probes.append(np.column_stack([seen[rows, actions], rewards > 0])[explores])
     envs.close()
-    return Learned(policy, np.concatenate(probes[len(probes) // 3 :]))
+    return Learned(greedy(network, features), np.concatenate(probes[len(probes) // 3 :]))

@@ -1,11 +1,11 @@
-"""Trainings in which some picks are random and the others are not."""
+"""Training in which a constant share of the picks is random."""
 
 import numpy as np
 import pytest
 
 from unload import PEQNetwork, evaluate, policies
 from unload.agent.replay import ReplayBuffer
-from unload.reproduce.mixed_picks import learn
+from unload.reproduce.random_share import learn
 
 SMALL = {"features": "positions", "epsilon": 0.5, "seed": 0, "picks": 1280, "batch_size": 32}
 
@@ -35,7 +35,7 @@ def test_a_teacher_picks_and_the_network_learns():
     network = PEQNetwork(4)
     before = network.extractor.weight.detach().clone()
     learned = learn(**SMALL, network=network, teacher=teacher)
-    assert len(asked) == 20 and all(asked)  # nothing is told without the mask
+    assert len(asked) == 20 and all(asked)  # nothing is masked
     assert not network.extractor.weight.equal(before)
     observations = np.random.default_rng(0).uniform(-1, 1, (3, 128, 3)).astype(np.float32)
     chosen = learned.policy(observations, np.ones((3, 128), bool), None)

@@ -1,0 +1,59 @@
+"""The paper's training in the container: its data."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload import task
+from unload.agent.weights import load_policy
+from unload.reproduce import training
+from unload.reproduce.figures import training as figures
+from unload.support.provenance import read_provenance
+
+
+def test_training_data(tmp_path, monkeypatch):
+    """In episodes of 50 picks."""
+    monkeypatch.setattr(training, "EVALUATION", {"episodes": 2, "seed": 1})
+    monkeypatch.setattr(training, "LOG_INTERVAL", 10)
+    monkeypatch.setattr(task, "MAX_PICKS", 50)
+    picks, seeds = 64 * 100, (3, 5)
+    data = tmp_path / "data"
+    training.training_data(picks, seeds, data, tmp_path / "runs", n_jobs=1, progress=False)
+    for name in ("loss_function_agent", "total_rew_function_agent"):
+        for suffix in ("", "_seed_5"):
+            table = pd.read_csv(data / f"{name}{suffix}.csv")
+            assert list(table.columns) == ["Wall time", "Step", "Value"]
+            assert table["Step"].iloc[-1] == picks
+    assert table["Value"].between(-50, 50).all()
+    for suffix in ("", "_seed_5"):
+        stored = load_policy(data / "policies" / f"paper{suffix}.safetensors")
+        trained = load_policy(
+            tmp_path / f"runs/training/{picks}_picks/seed_{5 if suffix else 3}/policy.safetensors"
+        )
+        weights = [policy.network.state_dict() for policy in (stored, trained)]
+        assert all(weights[0][name].equal(weights[1][name]) for name in weights[1])
+    summary = pd.read_csv(data / "training_summary.csv")
+    assert summary["seed"].tolist() == [3, 5]
+    rates = summary.filter(regex="^msr_(start|end|best|mask|no_mask)$")
+    assert rates.shape == (2, 5)
+    assert ((rates >= 0) & (rates <= 1)).all(axis=None)
+    assert (summary["msr_best"] >= summary[["msr_start", "msr_end"]].max(axis=1)).all()
+    curves = pd.read_csv(data / "training_curves.csv")
+    assert curves["picks"].tolist() == [3200, 6400] * 2
+    reward = pd.read_csv(data / "total_rew_function_agent.csv")["Value"]
+    assert np.allclose((reward / 50 + 1) / 2, curves["success_rate"][:2], atol=1e-5)
+    provenance = read_provenance(data, "training")
+    assert provenance["reduced"]
+    assert provenance["settings"]["picks"] == picks
+    assert provenance["command"].endswith("training --picks 6400 --seeds 3 5")
+    for draw, label in ((figures.fig11_loss, "loss"), (figures.fig12_reward, "mean")):
+        (axes,) = draw(data).axes
+        assert len(axes.lines) == 2
+        assert label in axes.get_ylabel()
+    plt.close("all")
+
+
+def test_training_shorter_than_an_episode_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="picks is 6400"):
+        training.training_data(6400, folder=tmp_path)
