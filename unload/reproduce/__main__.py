@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from unload.reproduce import (
     agreement,
+    answer,
     comparison,
     lifts,
     observation,
@@ -26,6 +27,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "tuning": ("Figs. 8–10", tuning.tuning_data, tuning.OPTIONS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
     "study": ("why 60 %: the controlled experiments", study.studies_data, study.OPTIONS),
+    "answer": ("why 60 %: the runs of the plan", answer.answer_data, answer.OPTIONS),
     "offline": (
         "what random picks alone teach", random_picks.offline_data, random_picks.OPTIONS
     ),
