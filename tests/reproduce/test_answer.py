@@ -17,20 +17,20 @@ def published(tmp_path_factory):
         patch.setattr(answer, "SEEDS", {"paper": 1})
         for _ in range(2):  # the second time, nothing is trained
             answer.answer_data(
-                ["paper, mask"], PICKS, folder, folder / "runs", n_jobs=1, progress=False
+                ["paper_mask"], PICKS, folder, folder / "runs", n_jobs=1, progress=False
             )
     return folder
 
 
 def test_a_run_is_published_with_its_weights_and_provenance(published):
-    place = published / "answer" / "paper, mask"
+    place = published / "answer" / "paper_mask"
     assert {path.name for path in place.iterdir()} == {
         "seed_0.csv", "seed_0.safetensors", "seed_0.provenance.json"
     }  # fmt: skip
     provenance = read_provenance(place, "seed_0")
     assert provenance["reduced"] and provenance["settings"]["mask"]
     assert provenance["settings"]["picks"] == PICKS and provenance["runs"] == 1
-    assert "--cells 'paper, mask'" in provenance["command"]
+    assert "--cells paper_mask" in provenance["command"]
     assert load_policy(place / "seed_0.safetensors").equalize
     curve = pd.read_csv(place / "seed_0.csv")
     assert curve["picks"].tolist() == [32_000, 64_000]
@@ -39,7 +39,7 @@ def test_a_run_is_published_with_its_weights_and_provenance(published):
 
 def test_published_runs_are_read_back(published):
     ((cell, seed, curve),) = answer.read_answer(published)
-    assert (cell, seed, list(curve.columns)) == ("paper, mask", 0, answer.COLUMNS)
+    assert (cell, seed, list(curve.columns)) == ("paper_mask", 0, answer.COLUMNS)
 
 
 def test_the_cells_are_those_of_the_plan():
@@ -47,14 +47,14 @@ def test_the_cells_are_those_of_the_plan():
     assert "| 256 | on | | 0–9 |" in plan and "| 2048 | off | | 0–7 |" in plan
     for cell, config in answer.CELLS.items():
         assert config.picks == 20_000_000
-        assert config.mask == cell.endswith(", mask")
+        assert config.mask == (not cell.endswith("_no_mask"))
         assert config.batch_size == (2048 if "2048" in cell else 256)
-    assert len(answer.seeds_of("paper, no mask")) == 10
-    assert len(answer.seeds_of("paper, b 2048, mask")) == 8
-    assert len(answer.seeds_of("memory 2^23, mask")) == 5
+    assert len(answer.seeds_of("paper_no_mask")) == 10
+    assert len(answer.seeds_of("paper_b2048_mask")) == 8
+    assert len(answer.seeds_of("memory_23_mask")) == 5
 
 
 def test_unknown_cells_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="cells is 'tea'; expected one of 'paper, no mask'"):
+    with pytest.raises(ValueError, match="cells is 'tea'; expected one of 'paper_no_mask'"):
         answer.answer_data(["tea"], folder=tmp_path, runs_dir=tmp_path)
     assert not list(tmp_path.iterdir())

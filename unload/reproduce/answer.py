@@ -27,7 +27,7 @@ COLUMNS = ["picks", "success_rate", "deadlocked", "loss"]
 def _both(name: str, **changes) -> dict[str, TrainConfig]:
     """The cells of a change, without and with the mask in training."""
     return {
-        f"{name}, {'mask' if mask else 'no mask'}": replace(BASE, mask=mask, **changes)
+        f"{name}_{'mask' if mask else 'no_mask'}": replace(BASE, mask=mask, **changes)
         for mask in (False, True)
     }
 
@@ -35,13 +35,14 @@ def _both(name: str, **changes) -> dict[str, TrainConfig]:
 # Cell → its configuration with seed 0.
 CELLS: dict[str, TrainConfig] = {
     **_both("paper"),
-    **_both("paper, b 2048", batch_size=2048),
-    **_both("memory 2^22", replay_size=2**22),
-    **_both("memory 2^23", replay_size=2**23),
-    **_both("ties averaged", ties="average"),
+    **_both("paper_b2048", batch_size=2048),
+    **_both("memory_22", replay_size=2**22),
+    **_both("memory_23", replay_size=2**23),
+    **_both("ties_averaged", ties="average"),
     **_both("positions", equalize=False),
 }
-SEEDS = {"paper": 10, "paper, b 2048": 8}  # of the cells of that name, 5 of the others
+# Planned seeds of a cell; of those that are not listed, 5.
+SEEDS = {"paper": 10, "paper_b2048": 8}
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)},
     **JOBS,
@@ -50,8 +51,7 @@ OPTIONS = {
 
 def seeds_of(cell: str) -> range:
     """Return the planned seeds of a cell."""
-    name, _, _ = cell.rpartition(", ")
-    return range(SEEDS.get(name, 5))
+    return range(SEEDS.get(cell.removesuffix("_mask").removesuffix("_no"), 5))
 
 
 def answer_data(
@@ -108,7 +108,7 @@ def publish_run(name: str, config: TrainConfig, run: Path, folder: Path) -> None
         folder / cell,
         file,
         {file: curve[COLUMNS]},
-        f"{COMMAND} answer --cells '{cell}'",
+        f"{COMMAND} answer --cells {cell}",
         asdict(config),
         config.picks < BASE.picks,
         [files.read_json(run / "record.json")],
@@ -121,4 +121,4 @@ def read_answer(folder: str | Path = files.DATA) -> Iterator[tuple[str, int, pd.
     for cell in CELLS:
         for path in sorted((Path(folder) / "answer" / cell).glob("seed_*.csv")):
             seed = int(path.stem.removeprefix("seed_"))
-            yield cell, seed, read_table(path, f"{COMMAND} answer --cells '{cell}'", COLUMNS)
+            yield cell, seed, read_table(path, f"{COMMAND} answer --cells {cell}", COLUMNS)
