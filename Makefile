@@ -15,9 +15,11 @@ figures: $(VENV)/ready  ## run every notebook at reduced counts and write figure
 test: $(VENV)/ready  ## run all tests
 	$(BIN)/python -m pytest
 
-quick: $(VENV)/ready  ## run the tests of the rooms, without slow ones, experiments, figures and notebooks
-	$(BIN)/python -m pytest -m "not slow" --ignore tests/reproduce --ignore tests/test_notebooks.py \
-	--ignore tests/test_benchmarks.py
+# Left out: tests marked slow; those that compile anew, kill runs or simulate every box, by name;
+# experiments, figures, notebooks and benchmarks.
+quick: $(VENV)/ready  ## run most tests of the rooms in a minute or so (the Makefile says what it leaves out)
+	$(BIN)/python -m pytest -m "not slow" -k "not (compiled or killed or full)" \
+	--ignore tests/reproduce --ignore tests/test_notebooks.py --ignore tests/test_benchmarks.py
 
 lint: $(VENV)/ready  ## check style and format with ruff, notebooks included
 	$(BIN)/ruff check

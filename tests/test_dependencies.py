@@ -6,11 +6,13 @@ import re
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"benchmarks", "notebooks", "tests", "unload"}
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
@@ -43,6 +45,7 @@ def sources(folder: str) -> Iterator[str]:
                 yield "\n".join(line for line in lines if not line.startswith(("%", "!")))
 
 
+@cache
 def distributions(folder: str) -> set[str]:
     """The distributions that a folder's code imports from."""
     names = set()
@@ -54,10 +57,9 @@ def distributions(folder: str) -> set[str]:
                 names.add(node.module.split(".")[0])
             elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
                 names.add(node.args[0].value.split(".")[0])
-    found = packages_distributions()
     beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
-    names -= sys.stdlib_module_names | OWN | (beside - found.keys())
-    return {normal(found[name][0]) for name in names}
+    names -= sys.stdlib_module_names | OWN | (beside - DISTRIBUTIONS.keys())
+    return {normal(DISTRIBUTIONS[name][0]) for name in names}
 
 
 def test_each_library_is_named_once_and_pinned():
