@@ -13,7 +13,7 @@ README = (ROOT / "README.md").read_text()
 
 # The files and folders of unload/ that may import a library; "" stands for all.
 LIBRARIES = {
-    "gymnasium": ("__init__.py", "env/", "agent/", "reproduce/"),
+    "gymnasium": ("__init__.py", "env/", "agent/", "heap/", "reproduce/"),
     "joblib": ("agent/sweep.py", "reproduce/"),
     "llvmlite": ("agent/fast/kernel.py", "support/compiled.py"),
     "matplotlib": ("reproduce/figures/",),
@@ -23,8 +23,8 @@ LIBRARIES = {
     "plotly": ("load/view.py",),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("agent/weights.py",),
-    "scipy": ("heap/",),
-    "torch": ("network/", "agent/", "reproduce/"),
+    "scipy": ("heap/", "reproduce/"),
+    "torch": ("network/", "agent/", "heap/", "reproduce/"),
     "tqdm": ("agent/", "reproduce/"),
 }
 # Modules that have no test file of their own, and the file in tests/ that covers them.
