@@ -7,7 +7,7 @@ from gymnasium.utils import seeding
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingEnv, all_or_reset
+from unload.env.base import AllOrReset, PickingEnv
 from unload.env.observation import POSITION_NOISE
 from unload.env.render import Camera
 from unload.load.boxes import Load, check_load
@@ -141,7 +141,7 @@ class ContainerEnv(PickingEnv):
             load = options["load"] if "load" in options else self.stack(rng)
             check_load(load)
             blur = observation.drift(len(load), self.position_noise, rng)
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._np_random, self._np_random_seed = rng, number
             self._fill(load, blur)
             self._look()
@@ -153,7 +153,7 @@ class ContainerEnv(PickingEnv):
         item = int(self.visible[self._row(action)])
         distance = self.physics.lift(item) if item >= 0 else 0.0
         success = distance >= task.LIFT_THRESHOLD
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._picks += 1
             if success:
                 self.physics.remove(item)
@@ -233,7 +233,7 @@ class ContainerEnv(PickingEnv):
         picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
         unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
         random_state.check_text("state['rng']", state["rng"])
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._set_rng_state(state["rng"])
             self._fill(load, blur)
             for item in np.flatnonzero(~present).tolist():

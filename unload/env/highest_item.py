@@ -4,7 +4,7 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingEnv, all_or_reset
+from unload.env.base import AllOrReset, PickingEnv
 from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 from unload.support import checks, random_state
@@ -84,7 +84,7 @@ class HighestItemEnv(PickingEnv):
         if options:
             raise ValueError(f"options is {options!r}; expected none")
         super().reset(seed=seed)
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._picks, self._state = 0, "running"
             return self._draw(), self._info()
 
@@ -92,7 +92,7 @@ class HighestItemEnv(PickingEnv):
         """Choose row ``action`` of the observation."""
         self._check_running()
         reward = 1.0 if self._highest[self._row(action)] else -1.0
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._picks += 1
             truncated = self._picks == self.max_picks
             if truncated:
@@ -126,7 +126,7 @@ class HighestItemEnv(PickingEnv):
         picks = checks.integer("state['picks']", picks, 0, self.max_picks)
         highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
         random_state.check_text("state['rng']", state["rng"])
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._set_rng_state(state["rng"])
             self._picks, self._highest = picks, highest
             self._state = "finished" if picks == self.max_picks else "running"

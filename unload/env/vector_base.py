@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from unload import task
-from unload.env.base import all_or_reset, check_settings
+from unload.env.base import AllOrReset, check_settings
 from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import POSITION_NOISE
 from unload.support import checks, random_state
@@ -113,7 +113,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
                 f"actions holds {actions.min()} to {actions.max()}; "
                 f"expected 0 to {task.N_VISIBLE - 1}"
             )
-        with all_or_reset(self):
+        with AllOrReset(self):
             return self._advance(actions)
 
     def _advance(self, actions: np.ndarray):
@@ -198,7 +198,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         for rng, text in zip(rngs, texts):
             random_state.set_text(text, rng)
         observations, infos = self._restart(rngs)
-        with all_or_reset(self):
+        with AllOrReset(self):
             self._picks -= (actions < 0).sum(axis=0)
             for row in actions:
                 observations, _, _, _, infos = self._advance(row)
@@ -217,7 +217,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         starts = [random_state.to_text(rng) for rng in rngs]
         with random_state.kept_on_error(rngs):
             drawn = self._draw(rngs)
-        with all_or_reset(self):
+        with AllOrReset(self):
             for env, start in zip(envs, starts):
                 self._starts[env] = start
             self._picks[envs] = 0
