@@ -22,7 +22,7 @@ LIBRARIES = {
     "pandas": ("agent/", "reproduce/"),
     "plotly": ("load/view.py",),
     "pybullet": ("physics/bullet.py",),
-    "safetensors": ("agent/weights.py",),
+    "safetensors": ("agent/weights.py", "heap/learning.py"),
     "scipy": ("heap/", "reproduce/"),
     "torch": ("network/", "agent/", "heap/", "reproduce/"),
     "tqdm": ("agent/", "reproduce/"),
