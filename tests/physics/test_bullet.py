@@ -130,6 +130,62 @@ def test_a_world_that_is_open_when_the_program_ends_is_silent():
     assert (done.stdout, done.stderr) == ("", "")
 
 
+@pytest.mark.parametrize("speed", [0.5, 1.0])
+def test_a_free_box_is_dragged_at_its_speed_and_stops(make_world, speed):
+    world, (box,) = make_world()
+    start = world.pose(box)[0][0]
+    moved = world.drag(box, speed, force=60, distance=0.7, seconds=0.4)
+    assert moved == pytest.approx(0.4 * speed, abs=0.02)
+    assert moved == world.pose(box)[0][0] - start
+    world.step(0.5)
+    assert world.pose(box)[0][0] - start == pytest.approx(moved, abs=0.002)
+    assert world.speed(box) < 0.01
+
+
+def test_a_drag_ends_after_its_distance(make_world):
+    world, (box,) = make_world()
+    assert world.drag(box, 1, force=60, distance=0.3, seconds=5) == pytest.approx(0.3, abs=0.01)
+
+
+def test_a_drag_weaker_than_friction_moves_nothing(make_world):
+    """Friction of 0.5 on both sides holds 0.25 of the weight."""
+    world, (box,) = make_world()
+    assert world.drag(box, 1, force=0.2 * task.GRAVITY, distance=1, seconds=0.5) < 0.002
+    assert world.drag(box, 1, force=0.3 * task.GRAVITY, distance=1, seconds=0.5) > 0.05
+
+
+def test_a_box_can_be_turned_and_have_its_own_friction(make_world):
+    world, _ = make_world()
+    turn = (0.0, 0.0, np.sin(0.3), np.cos(0.3))
+    box = world.add_box((2, 0, 0.15), (0.3, 0.3, 0.3), 1.0, turn, friction=0.0)
+    assert world.pose(box)[1] == pytest.approx(turn)
+    assert world.drag(box, 1, force=0.05 * task.GRAVITY, distance=1, seconds=0.5) > 0.05
+
+
+def test_a_cleared_world_is_as_good_as_new(make_world):
+    def fall(world: World) -> tuple:
+        world.add_box((0, 0, -0.5), (9, 9, 1), 0)
+        box = world.add_box((0, 0, 1), (0.3, 0.4, 0.5), 1.0, (0.5, 0.1, 0.7, 0.5))
+        world.step(1.0)
+        return world.pose(box)
+
+    used, _ = make_world(boxes=3)
+    used.step(0.5)
+    used.clear()
+    fresh, _ = make_world(boxes=0)
+    fresh.clear()
+    assert fall(used) == fall(fresh)
+    assert used.shapes == 2
+
+
+def test_a_scan_gives_the_distance_and_the_body_of_each_pixel(make_world):
+    world, (box,) = make_world()
+    depth, bodies = world.scan((0, -2.15, 0.15), (0, 0, 0.15), 41, 31, angle=40)
+    assert depth.shape == bodies.shape == (31, 41)
+    assert bodies[15, 20] == box and depth[15, 20] == pytest.approx(2.0, abs=0.01)
+    assert bodies[0, 0] == -1 and bodies[30, 20] == 0, "the sky, and the floor"
+
+
 def test_shapes_are_counted_by_size(make_world):
     world, _ = make_world(boxes=3)
     assert world.shapes == 2  # the floor's and the cubes'
@@ -178,7 +234,11 @@ def test_bad_times_and_forces_are_refused(make_world):
     for call, message in (
         (lambda: World(0), "time_step is 0"),
         (lambda: World(float("nan")), "time_step is nan"),
+        (lambda: World(iterations=0), "iterations is 0"),
         (lambda: world.step(-1), "seconds is -1"),
+        (lambda: world.drag(box, -1, 1, 1, 1), "speed is -1"),
+        (lambda: world.drag(box, 1, float("inf"), 1, 1), "force is inf"),
+        (lambda: world.add_box((0, 0, 3), (1, 1, 1), 1, friction=-1), "friction is -1"),
         (lambda: world.pull(box, seconds=-1), "seconds is -1"),
         (lambda: world.pull(box, float("nan")), "force is nan"),
         (lambda: world.pull(box, -5), "force is -5"),

@@ -54,6 +54,11 @@ SETTINGS = {
 }
 
 
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
+NEAR, FAR = 0.1, 50.0  # m, what a camera sees
+ITERATIONS = 50
+
+
 def slim(size: np.ndarray) -> np.ndarray:
     """A box's edges in m with half the gap taken off each of its sides in x and y."""
     return size - np.array([GAP, GAP, 0.0])
@@ -71,31 +76,57 @@ class World:
         time_step: s per ``stepSimulation``.
         maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
             2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
+        iterations: of the contact solver per time step; 50 is PyBullet's default.
 
     Raises:
-        TypeError, ValueError: ``time_step`` is no number from 1e-6 to 1.
+        TypeError, ValueError: ``time_step`` is no number from 1e-6 to 1, or ``iterations`` no
+            integer from 1 to 1000.
     """
 
-    def __init__(self, time_step: float = TIME_STEP, maximal_coordinates: bool = True) -> None:
+    def __init__(
+        self,
+        time_step: float = TIME_STEP,
+        maximal_coordinates: bool = True,
+        iterations: int = ITERATIONS,
+    ) -> None:
         self.time_step = checks.real("time_step", time_step, 1e-6, 1)
+        self._iterations = checks.integer("iterations", iterations, 1, 1000)
         self._maximal = maximal_coordinates
-        self._shapes: dict[tuple[float, ...], int] = {}
         self._client = pybullet.connect(pybullet.DIRECT)
         self._disconnect = weakref.finalize(self, pybullet.disconnect, self._client)
+        self._set_up()
+
+    def _set_up(self) -> None:
+        self._shapes: dict[tuple[float, ...], int] = {}
         pybullet.setGravity(0, 0, -task.GRAVITY, physicsClientId=self._client)
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=time_step,
+            fixedTimeStep=self.time_step,
+            numSolverIterations=self._iterations,
             deterministicOverlappingPairs=1,
             physicsClientId=self._client,
         )
 
-    def add_box(self, position: Sequence[float], size: Sequence[float], mass: float) -> int:
+    def clear(self) -> None:
+        """Take everything out; the next bodies behave, to the bit, as in a new world."""
+        pybullet.resetSimulation(physicsClientId=self._client)
+        self._set_up()
+
+    def add_box(
+        self,
+        position: Sequence[float],
+        size: Sequence[float],
+        mass: float,
+        orientation: Sequence[float] = UPRIGHT,
+        friction: float = FRICTION,
+    ) -> int:
         """Create a box and return its body number; mass 0 makes it immovable.
 
         Args:
             position: (3,) centre in m.
             size: (3,) edge lengths in m.
             mass: kg.
+            orientation: (4,) quaternion x, y, z, w.
+            friction: of its surface; Bullet multiplies it with the other body's.
 
         Raises:
             TypeError: an argument does not hold numbers.
@@ -109,13 +140,14 @@ class World:
             checks.real("mass", mass, 0),
             self._shape(tuple(size)),
             basePosition=position,
+            baseOrientation=checks.finite_array("orientation", orientation, (4,)).tolist(),
             useMaximalCoordinates=self._maximal,
             physicsClientId=self._client,
         )
         pybullet.changeDynamics(
             body,
             -1,
-            lateralFriction=FRICTION,
+            lateralFriction=checks.real("friction", friction, 0),
             linearDamping=DAMPING,
             angularDamping=DAMPING,
             physicsClientId=self._client,
@@ -140,7 +172,7 @@ class World:
         """Take a body out of the world; its number is not given again."""
         pybullet.removeBody(body, physicsClientId=self._client)
 
-    def place(self, body: int, position, orientation=(0.0, 0.0, 0.0, 1.0)) -> None:
+    def place(self, body: int, position, orientation=UPRIGHT) -> None:
         """Put a body at rest at ``position`` (m) with ``orientation`` (quaternion x, y, z, w)."""
         # This call also sets the velocities to zero.
         pybullet.resetBasePositionAndOrientation(
@@ -150,6 +182,11 @@ class World:
     def pose(self, body: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Position (m) and orientation (quaternion x, y, z, w) of a body."""
         return pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
+
+    def speed(self, body: int) -> float:
+        """Speed of a body's centre, m/s."""
+        velocity = pybullet.getBaseVelocity(body, physicsClientId=self._client)[0]
+        return float(np.linalg.norm(velocity))
 
     def step(self, seconds: float) -> None:
         """Let time pass, rounded to whole time steps.
@@ -194,15 +231,79 @@ class World:
             pybullet.stepSimulation(physicsClientId=self._client)
         return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
 
+    def drag(self, body: int, speed: float, force: float, distance: float, seconds: float) -> float:
+        """Drag a body along x by its centre of mass, and stop it in that direction.
+
+        Args:
+            body: which one.
+            speed: m/s that a controller holds, as far as the force allows.
+            force: most of it, N, in either direction.
+            distance: m after which the drag ends.
+            seconds: after which it ends in any case, rounded to whole time steps.
+
+        Returns:
+            How far the body moved along x, in m.
+
+        Raises:
+            TypeError, ValueError: a number is not finite or < 0.
+        """
+        for name, value in (("speed", speed), ("force", force), ("distance", distance)):
+            checks.real(name, value, 0)
+        mass = pybullet.getDynamicsInfo(body, -1, physicsClientId=self._client)[0]
+        start = self.pose(body)[0][0]
+        for _ in range(self._steps(seconds)):
+            position = self.pose(body)[0]
+            if position[0] - start >= distance:
+                break
+            # What would bring the body to its speed within this step, if nothing resisted.
+            velocity = pybullet.getBaseVelocity(body, physicsClientId=self._client)[0][0]
+            wanted = mass * (speed - velocity) / self.time_step
+            pybullet.applyExternalForce(
+                body,
+                -1,
+                (min(max(wanted, -force), force), 0, 0),
+                position,
+                pybullet.WORLD_FRAME,
+                physicsClientId=self._client,
+            )
+            pybullet.stepSimulation(physicsClientId=self._client)
+        moved = self.pose(body)[0][0] - start
+        linear, angular = pybullet.getBaseVelocity(body, physicsClientId=self._client)
+        pybullet.resetBaseVelocity(body, (0, *linear[1:]), angular, physicsClientId=self._client)
+        return moved
+
     def paint(self, body: int, colour: tuple[float, float, float]) -> None:
         """Give a body a colour, RGB in [0, 1]."""
         pybullet.changeVisualShape(body, -1, rgbaColor=(*colour, 1), physicsClientId=self._client)
 
     def picture(self, eye, target, width: int, height: int) -> np.ndarray:
         """(height, width, 3) uint8, the world seen from ``eye`` towards ``target`` (m)."""
+        pixels = self._photograph(eye, target, width, height, 30)[2]
+        return np.reshape(pixels, (height, width, 4))[:, :, :3].astype(np.uint8)
+
+    def scan(
+        self, eye, target, width: int, height: int, angle: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What a depth camera at ``eye`` (m) sees towards ``target`` (m).
+
+        Args:
+            eye, target: (3,) m.
+            width, height: pixels.
+            angle: of view from the lower to the upper edge, degrees.
+
+        Returns:
+            ``depth`` (height, width) float64, m along the optical axis, and ``bodies``
+            (height, width) int64, the body in each pixel, -1 where there is none.
+        """
+        _, _, _, depth, bodies = self._photograph(eye, target, width, height, angle)
+        depth = np.reshape(depth, (height, width)).astype(np.float64)
+        depth = FAR * NEAR / (FAR - (FAR - NEAR) * depth)  # from that of a perspective lens
+        return depth, np.reshape(bodies, (height, width)).astype(np.int64)
+
+    def _photograph(self, eye, target, width: int, height: int, angle: float) -> tuple:
         view = pybullet.computeViewMatrix(eye, target, (0, 0, 1))
-        lens = pybullet.computeProjectionMatrixFOV(30, width / height, 0.1, 50)
-        pixels = pybullet.getCameraImage(
+        lens = pybullet.computeProjectionMatrixFOV(angle, width / height, NEAR, FAR)
+        return pybullet.getCameraImage(
             width,
             height,
             view,
@@ -211,8 +312,7 @@ class World:
             shadow=0,
             renderer=pybullet.ER_TINY_RENDERER,
             physicsClientId=self._client,
-        )[2]
-        return np.reshape(pixels, (height, width, 4))[:, :, :3].astype(np.uint8)
+        )
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""
