@@ -30,7 +30,7 @@ class TrainConfig:
     beta: float = 1.0  # Sec. III-G
     # h of Sec. V-A: a failed pick is learned from as -1 + h (z + 1) / 2, z as observed.
     height_reward: float = 0.0
-    # Sec. III-G; the others, in unload.architectures, take padded rows for items in training.
+    # Sec. III-G; the others, in unload.network.variants, take padded rows for items in training.
     network: str = "peq"
     n_features: int = 64  # * n
     equalize: bool = True  # Sec. III-F

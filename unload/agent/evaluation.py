@@ -78,11 +78,11 @@ def evaluate(
         TypeError, ValueError: an argument is not as described, or ``policy`` returns
             something other than one row of the observation.
     """
-    checks.integer("episodes", episodes, 1)
-    checks.integer("seed", seed, 0)
-    checks.boolean("mask", mask)
+    episodes = checks.integer("episodes", episodes, 1)
+    seed = checks.integer("seed", seed, 0)
+    mask = checks.boolean("mask", mask)
     if max_picks is not None:
-        checks.integer("max_picks", max_picks, 1)
+        max_picks = checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
     for name in env_kwargs:

@@ -40,8 +40,8 @@ class ReplayBuffer:
     """
 
     def __init__(self, size: int, items: int, next_state: bool = False) -> None:
-        self.size = checks.integer("size", size, 1)
-        checks.integer("items", items, 1)
+        self.size = size = checks.integer("size", size, 1)
+        items = checks.integer("items", items, 1)
         checks.boolean("next_state", next_state)
         self.total = 0
         kinds = {
