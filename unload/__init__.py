@@ -52,3 +52,4 @@ gymnasium.register(
     entry_point="unload.env.highest_item:HighestItemEnv",
     vector_entry_point="unload.env.vector:HighestItemVectorEnv",
 )
+gymnasium.register(id="unload/Heap-v0", entry_point="unload.heap.env:HeapEnv")

@@ -1,0 +1,185 @@
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AsyncVectorEnv
+
+from unload.heap.boxes import Heap
+from unload.heap.env import HeapEnv
+from unload.heap.observation import COLUMNS, ROWS
+
+
+def trace(env: HeapEnv, seed: int, picks: int = 4) -> list:
+    """Everything that an episode of the foremost allowed boxes gives."""
+    observation, info = env.reset(seed=seed)
+    seen = [observation.tobytes()]
+    for _ in range(picks):
+        row = int(info["action_mask"].argmax())
+        observation, reward, terminated, truncated, info = env.step(row)
+        seen.append((observation.tobytes(), reward, terminated, truncated, info["moved"]))
+        if terminated or truncated:
+            break
+    return seen
+
+
+@pytest.mark.filterwarnings("ignore:.*render modes")
+def test_gymnasium_finds_nothing_wrong(make_heap_env):
+    check_env(make_heap_env(), skip_render_check=True)
+
+
+def test_is_registered(pile):
+    env = gymnasium.make("unload/Heap-v0", heaps=[pile], physics="near")
+    assert isinstance(env.unwrapped, HeapEnv)
+    env.close()
+
+
+def test_the_same_seed_gives_the_same_bits(make_heap_env, pile, cubes):
+    heaps = [pile, cubes((5, 1, 0), (5, 1, 1), (5.5, 1.5, 0))]
+    first, second = make_heap_env(heaps=heaps), make_heap_env(heaps=heaps)
+    assert trace(first, 3) == trace(second, 3)
+    assert trace(first, 3) == trace(second, 3), "whatever was played before"
+
+
+def test_reward_is_boxes_less_weighted_falls(make_heap_env):
+    env = make_heap_env(falls_weight=0.25)
+    _, info = env.reset(seed=0)
+    left, rewards = info["left"], []
+    for _ in range(5):
+        _, reward, terminated, _, info = env.step(int(np.flatnonzero(info["action_mask"])[-1]))
+        assert reward == info["unloaded"] - 0.25 * info["falls"]
+        assert info["left"] == left - info["unloaded"] == len(env.heap)
+        left = info["left"]
+        rewards.append(reward)
+        if terminated:
+            break
+    assert max(rewards) > 0
+
+
+def test_observation_rows_are_the_visible_boxes_from_the_door(make_heap_env):
+    env = make_heap_env()
+    observation, info = env.reset(seed=0)
+    count = int(info["item_mask"].sum())
+    assert observation.shape == (ROWS, len(COLUMNS)) and 0 < count < len(env.heap) + 1
+    assert (np.diff(observation[:count, 0]) >= 0).all()
+    assert not observation[count:].any() and (env.visible[count:] == -1).all()
+    heights = env.heap.positions[env.visible[:count], 2]
+    assert observation[:count, 2] == pytest.approx(heights)
+
+
+def test_a_box_that_did_not_come_is_masked_until_something_is_unloaded(make_heap_env, cubes):
+    """Boxes of 80 kg are too heavy for the rake; their own failure masks them."""
+    env = make_heap_env(heaps=[cubes((5, 0.5, 0), (5.6, 1.5, 0), (6.2, 0.7, 0))], mass=80.0)
+    _, info = env.reset(seed=0)
+    assert info["action_mask"].sum() == info["item_mask"].sum() == 3
+    for tried in (0, 1):
+        _, reward, _, _, info = env.step(tried)
+        assert reward == 0 and not info["came"]
+        assert not info["action_mask"][: tried + 1].any()
+    _, _, _, _, info = env.step(2)
+    assert info["action_mask"].sum() == 3, "all have failed: all are allowed again"
+
+
+def test_a_row_without_a_box_is_a_failed_pick(make_heap_env):
+    env = make_heap_env()
+    observation, _ = env.reset(seed=0)
+    after, reward, terminated, truncated, info = env.step(ROWS - 1)
+    assert (after == observation).all() and reward == 0 and not terminated and not truncated
+    assert info["box"] == -1 and info["moved"] == 0
+
+
+def test_the_last_box_terminates_and_max_picks_truncates(make_heap_env, cubes):
+    env = make_heap_env(heaps=[cubes((5, 1, 0))])
+    env.reset(seed=0)
+    observation, reward, terminated, truncated, info = env.step(0)
+    assert (reward, terminated, truncated, info["left"]) == (1, True, False, 0)
+    assert not observation.any() and not info["action_mask"].any()
+    with pytest.raises(ResetNeeded, match="finished"):
+        env.step(0)
+    env = make_heap_env(max_picks=2)
+    env.reset(seed=0)
+    assert [env.step(0)[3] for _ in range(2)] == [False, True]
+
+
+def test_a_state_goes_on_to_the_bit(make_heap_env):
+    env, other = make_heap_env(), make_heap_env()
+    env.reset(seed=5)
+    env.step(0)
+    state = env.get_state()
+    other.set_state(state)
+    for _ in range(3):
+        row = int(env.action_masks().argmax())
+        mine, theirs = env.step(row), other.step(row)
+        assert mine[0].tobytes() == theirs[0].tobytes() and mine[1:4] == theirs[1:4]
+    assert env.get_state()["positions"].tobytes() == other.get_state()["positions"].tobytes()
+    assert env.np_random.random() == other.np_random.random()
+
+
+def test_camera_observations_have_the_same_boxes(make_heap_env):
+    truth, camera = make_heap_env(), make_heap_env(observation="camera")
+    true, _ = truth.reset(seed=0)
+    seen, info = camera.reset(seed=0)
+    assert set(truth.visible) == set(camera.visible)
+    count = int(info["item_mask"].sum())
+    assert (seen[:count, 3:6] <= true[:count, 3:6].max() + 0.05).all(), "hidden parts are not known"
+    assert not np.array_equal(seen, true)
+
+
+def test_asynchronous_environments_play_as_single_ones(make_heap_env, pile):
+    def make() -> HeapEnv:
+        return HeapEnv(heaps=[pile], physics="coarse")
+
+    envs = AsyncVectorEnv([make, make])
+    observations, _ = envs.reset(seed=[1, 2])
+    after, rewards, *_ = envs.step(np.array([0, 1]))
+    envs.close()
+    single = make_heap_env()
+    for number, seed in enumerate((1, 2)):
+        first, _ = single.reset(seed=seed)
+        second, reward, *_ = single.step(number)
+        assert first.tobytes() == observations[number].tobytes()
+        assert second.tobytes() == after[number].tobytes() and reward == rewards[number]
+
+
+def test_bad_input_is_refused(make_heap_env, pile):
+    for change, message in (
+        ({"physics": "full"}, "physics is 'full'"),
+        ({"observation": "x-ray"}, "observation is 'x-ray'; expected one of 'truth', 'camera'"),
+        ({"falls_weight": -1}, "falls_weight is -1"),
+        ({"max_picks": 0}, "max_picks is 0"),
+        ({"heaps": []}, "heaps is empty"),
+        ({"heaps": [pile.only(np.array([], int))]}, "heaps holds a heap without boxes"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            make_heap_env(**change)
+    with pytest.raises(TypeError, match="heaps holds 3; expected a Heap"):
+        make_heap_env(heaps=[3])
+    env = make_heap_env()
+    with pytest.raises(ResetNeeded, match="not started"):
+        env.step(0)
+    with pytest.raises(ValueError, match="one of 'heap'"):
+        env.reset(options={"load": pile})
+    env.reset(seed=0)
+    before = env.get_state()
+    for action in (-1, ROWS):
+        with pytest.raises(ValueError, match=f"action is {action}"):
+            env.step(action)
+    with pytest.raises(TypeError, match="action is 0.5"):
+        env.step(0.5)
+    for name, value in (("failed", np.zeros(3, bool)), ("counts", np.array([99]))):
+        with pytest.raises(ValueError, match=name):
+            env.set_state(before | {name: value})
+    after = env.get_state()
+    assert all(np.array_equal(before[name], after[name]) for name in before)
+    env.close()
+    env.close()
+    with pytest.raises(ClosedEnvironmentError):
+        env.reset()
+
+
+def test_a_heap_can_be_given(make_heap_env, cubes):
+    env = make_heap_env()
+    heap = cubes((5, 1, 0), (6, 1, 0))
+    _, info = env.reset(options={"heap": heap})
+    assert env.heap is heap and info["left"] == 2
+    assert isinstance(env.heap, Heap)

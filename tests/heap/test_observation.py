@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from unload.heap.camera import Camera, Scan
+from unload.heap.observation import (
+    COLUMN,
+    COLUMNS,
+    ROWS,
+    SeenBoxes,
+    camera_boxes,
+    features,
+    true_boxes,
+)
+
+
+@pytest.fixture(scope="module")
+def camera():
+    made = Camera()
+    yield made
+    made.close()
+
+
+def column(rows: np.ndarray, name: str) -> np.ndarray:
+    return rows[rows.any(axis=1), COLUMN[name]]
+
+
+def test_features_of_upright_cubes(camera, cubes):
+    heap = cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (6.0, 2.0, 0))
+    seen = true_boxes(heap, camera.scan(heap))
+    assert sorted(seen.numbers.tolist()) == [0, 1, 2] and seen.numbers[0] == 2
+    rows = features(seen)
+    assert rows.shape == (ROWS, len(COLUMNS)) and rows.dtype == np.float32
+    order = np.argsort(seen.numbers)
+    assert column(rows, "behind")[order] == pytest.approx([1.2, 1.2, 0.2])
+    assert column(rows, "y")[order] == pytest.approx([-0.25, -0.25, 0.75])
+    assert column(rows, "z")[order] == pytest.approx([0.2, 0.6, 0.2])
+    for name in ("extent_x", "extent_y", "extent_z", "longest", "middle", "shortest"):
+        assert column(rows, name) == pytest.approx([0.4, 0.4, 0.4])
+    assert column(rows, "tilt") == pytest.approx([0, 0, 0], abs=1e-6)
+    assert column(rows, "clear_above")[order] == pytest.approx([0, 1, 1], abs=1e-6)
+    assert column(rows, "clear_in_front")[order] == pytest.approx([1, 1, 1], abs=1e-6)
+    assert (column(rows, "pixels") * 1000 >= 4).all()
+
+
+def test_a_box_half_in_front_covers_half(camera, cubes):
+    heap = cubes((5.0, 1.0, 0), (5.5, 1.2, 0))
+    seen = true_boxes(heap, camera.scan(heap))
+    rows = features(seen)
+    assert column(rows, "clear_in_front")[np.argsort(seen.numbers)] == pytest.approx([0.5, 1])
+
+
+def test_features_do_not_change_where_the_heap_stands(camera, pile):
+    """They are told from the foremost face, so that a heap that recedes looks alike."""
+    seen = true_boxes(pile, camera.scan(pile))
+    moved = SeenBoxes(
+        seen.numbers, seen.centres + (0.5, 0, 0), seen.extents, seen.edges, seen.tilts, seen.pixels
+    )
+    assert features(moved) == pytest.approx(features(seen), abs=1e-6)
+
+
+def test_the_camera_knows_the_part_that_shows(camera, pile):
+    scan = camera.scan(pile)
+    true, seen = true_boxes(pile, scan), camera_boxes(pile, scan)
+    assert sorted(seen.numbers) == sorted(true.numbers)
+    order = [seen.numbers.tolist().index(box) for box in true.numbers.tolist()]
+    assert (seen.extents[order] <= true.extents + 0.05).all()
+    assert np.abs(seen.centres[order] - true.centres).max() < 0.4
+    front = seen.centres[:, 0] + seen.extents[:, 0] / 2
+    assert front.max() == pytest.approx(pile.front(), abs=0.05)
+
+
+def test_without_any_visible_box_all_are_seen(cubes):
+    heap = cubes((5, 1, 0), (6, 1, 0))
+    blind = Scan(np.zeros(2, int), np.zeros((0, 3)), np.zeros(0, int))
+    for look in (true_boxes, camera_boxes):
+        assert look(heap, blind).numbers.tolist() == [1, 0]
+    half_blind = Scan(np.array([1, 0]), np.zeros((1, 3)), np.zeros(1, int))
+    assert camera_boxes(heap, half_blind).numbers.tolist() == [1, 0]
+
+
+def test_only_the_foremost_boxes_get_a_row():
+    count = ROWS + 10
+    centres = np.column_stack([np.linspace(4, 7, count), np.ones(count), np.ones(count)])
+    blocks = np.full((count, 3), 0.1)
+    seen = SeenBoxes(
+        np.arange(count), centres, blocks, blocks, np.zeros(count), np.full(count, 9)
+    ).ordered()
+    assert seen.numbers.tolist() == list(range(count - 1, 9, -1))

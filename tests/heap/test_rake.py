@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from unload.heap.rake import CAME, FALL, PHYSICS, REACH, near_boxes
+
+
+@pytest.mark.parametrize("physics", PHYSICS)
+def test_a_free_box_comes_alone(cubes, make_rake, physics):
+    outcome = make_rake(physics).pick(cubes((5, 1, 0)), 0)
+    assert outcome.came and outcome.moved == pytest.approx(REACH, abs=0.02)
+    assert outcome.unloaded.tolist() == [True] and len(outcome.heap) == 0
+
+
+def test_boxes_before_the_dragged_one_are_pushed_over_the_edge(cubes, make_rake):
+    row = cubes((4.5, 1, 0), (4.91, 1, 0), (5.32, 1, 0), (5.32, 2, 0))
+    outcome = make_rake().pick(row, 0)
+    assert outcome.unloaded.tolist() == [True, True, True, False]
+    assert outcome.left.tolist() == [3]
+    assert outcome.heap.positions[0] == pytest.approx(row.positions[3], abs=0.005)
+
+
+def test_a_box_too_far_behind_pushes_none_over_the_edge(cubes, make_rake):
+    row = cubes((4.5, 1, 0), (6, 1, 0), (6.5, 2, 0))
+    assert make_rake().pick(row, 0).unloaded.tolist() == [True, False, False]
+
+
+def test_too_heavy_a_row_does_not_come(cubes, make_rake):
+    row = cubes(*((4.3 + 0.405 * k, 1, level) for k in range(5) for level in range(4)))
+    outcome = make_rake(friction=1.0, mass=3.0).pick(row, 0)
+    assert not outcome.came and outcome.moved < CAME
+    assert not outcome.unloaded[0]
+
+
+def test_a_box_that_loses_its_support_falls_but_the_dragged_one_does_not_count(cubes, make_rake):
+    tower = cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (4.55, 1, 0))
+    high = make_rake().pick(tower, 2)
+    assert high.came and not high.fallen.any(), "the dragged box dropped by 0.8 m"
+    middle = make_rake(friction=0.05).pick(tower, 0)
+    drop = tower.positions[:, 2] - EDGE_ON_FLOOR
+    assert (drop[middle.fallen] > FALL - 0.05).all()
+
+
+EDGE_ON_FLOOR = 0.2  # m, height of the centre of a cube that lies on the floor
+
+
+def test_nothing_is_unloaded_from_a_heap_that_only_creeps(cubes, make_rake):
+    """A failed pick: a force too small moves nothing, and nothing counts."""
+    heap = cubes((5, 1, 0), (6, 1, 0))
+    outcome = make_rake(friction=3.0, mass=20.0).pick(heap, 0)
+    assert not outcome.came and not outcome.unloaded.any() and len(outcome.heap) == 2
+
+
+@pytest.mark.parametrize("physics", PHYSICS)
+def test_a_pick_depends_on_nothing_but_the_heap(pile, make_rake, physics):
+    used, fresh = make_rake(physics), make_rake(physics)
+    first = used.pick(pile, 3)
+    used.pick(pile.only(np.arange(5)), 1)
+    for other in (used.pick(pile, 3), fresh.pick(pile, 3)):
+        assert other.heap.positions.tobytes() == first.heap.positions.tobytes()
+        assert other.heap.orientations.tobytes() == first.heap.orientations.tobytes()
+        assert other.unloaded.tolist() == first.unloaded.tolist()
+
+
+def test_near_boxes_are_those_around_the_drag(cubes):
+    heap = cubes((5, 1, 0), (5.9, 1, 0), (4.25, 1, 0), (5, 1.45, 0), (6.65, 1, 0), (4.25, 2.3, 0))
+    moving, fixed = near_boxes(heap, 0)
+    assert moving.tolist() == [True, True, True, True, True, False]
+    assert not (moving & fixed).any()
+
+
+def test_near_leaves_far_boxes_exactly_where_they_are(cubes, make_rake):
+    heap = cubes((6, 0.3, 0), (4.3, 2.2, 0), (4.3, 2.2, 1))
+    outcome = make_rake("near").pick(heap, 0)
+    assert outcome.heap.positions.tolist() == heap.positions[1:].tolist()
+
+
+def test_bad_input_is_refused(cubes, make_rake):
+    heap = cubes((5, 1, 0))
+    with pytest.raises(ValueError, match="physics is 'full'; expected one of 'whole'"):
+        make_rake("full")
+    with pytest.raises(ValueError, match="friction is -1"):
+        make_rake(friction=-1)
+    with pytest.raises(ValueError, match="mass is 0"):
+        make_rake(mass=0)
+    with pytest.raises(ValueError, match="box is 1; expected an integer >= 0 and <= 0"):
+        make_rake().pick(heap, 1)
+    with pytest.raises(TypeError, match="heap is 'heap'"):
+        make_rake().pick("heap", 0)

@@ -1,0 +1,96 @@
+"""Turned boxes in a heap: their state, and the geometry that everything else reads from it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from unload import task
+from unload.load.substacks import CELL, DEPTH, PACKAGES
+from unload.support import checks
+
+REAR = 4.0  # m, x of the wall behind the heap: the last 3 m of the container are played
+DOOR = float(task.CONTAINER[0])  # m, x of the entrance
+WIDTH = float(task.CONTAINER[1])  # m, y of the right side wall; the left one stands at 0
+
+
+@dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
+class Heap:
+    """Boxes at rest, in any orientation.
+
+    This is all that is known of a heap, so that a pick is a function of it: each begins with
+    all boxes at rest.
+
+    Attributes:
+        positions: (n, 3) float64, centres in m.
+        orientations: (n, 4) float64, quaternions x, y, z, w of length 1.
+        sizes: (n, 3) float64, edge lengths in m along the box's own axes.
+        packages: (n,) int64, package number 0–12.
+
+    Raises:
+        TypeError, ValueError: a field is not as described.
+    """
+
+    positions: np.ndarray
+    orientations: np.ndarray
+    sizes: np.ndarray
+    packages: np.ndarray
+
+    def __post_init__(self) -> None:
+        positions = checks.finite_array("positions", self.positions, (None, 3))
+        count = len(positions)
+        orientations = checks.finite_array("orientations", self.orientations, (count, 4))
+        lengths = np.linalg.norm(orientations, axis=1)
+        if (np.abs(lengths - 1) > 1e-3).any():
+            wrong = int(np.abs(lengths - 1).argmax())
+            raise ValueError(
+                f"orientations of box {wrong} have length {lengths[wrong]}; expected quaternions "
+                "of length 1"
+            )
+        sizes = checks.finite_array("sizes", self.sizes, (count, 3))
+        if (sizes <= 0).any():
+            raise ValueError(f"sizes holds {sizes.min()}; expected edges > 0 m")
+        packages = checks.integer_array("packages", self.packages, (count,))
+        fields = {"positions": positions, "orientations": orientations}
+        for name, array in (fields | {"sizes": sizes, "packages": packages}).items():
+            array = array.copy()
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __repr__(self) -> str:
+        return f"Heap({len(self)} boxes)"
+
+    def only(self, boxes: np.ndarray) -> "Heap":
+        """The heap of some of the boxes, given as numbers or as (n,) bool."""
+        return Heap(
+            self.positions[boxes], self.orientations[boxes], self.sizes[boxes], self.packages[boxes]
+        )
+
+    def axes(self) -> np.ndarray:
+        """(n, 3, 3) float64: in column j, the direction of a box's own axis j."""
+        if not len(self):
+            return np.zeros((0, 3, 3))
+        return Rotation.from_quat(self.orientations).as_matrix()
+
+    def extents(self) -> np.ndarray:
+        """(n, 3) float64, m: edges of the upright block around each turned box."""
+        return (np.abs(self.axes()) @ self.sizes[:, :, None])[:, :, 0]
+
+    def tilts(self) -> np.ndarray:
+        """(n,) float64, rad: angle between the vertical and the box's axis nearest to it."""
+        return np.arccos(np.clip(np.abs(self.axes()[:, 2]).max(axis=1), 0, 1))
+
+    def front(self) -> float:
+        """x of the foremost face, m; the rear wall's if there is no box."""
+        if not len(self):
+            return REAR
+        return float((self.positions[:, 0] + self.extents()[:, 0] / 2).max())
+
+
+def package_sizes(packages: np.ndarray, scale: float = 1.0) -> np.ndarray:
+    """(n, 3) float64, m: depth, width and height of packages as in the neat loads."""
+    edges = np.column_stack([np.full(len(packages), DEPTH), PACKAGES[packages] * CELL])
+    return edges * scale

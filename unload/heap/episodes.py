@@ -1,0 +1,153 @@
+"""Episodes: one played, recorded for learning, and the policies that only recording needs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from unload.heap.boxes import Heap
+from unload.heap.env import HeapEnv
+from unload.heap.learning import Picks
+from unload.heap.observation import COLUMNS, ROWS
+from unload.heap.rake import Rake
+from unload.heap.rules import FAMILY_COLUMNS, best, linear, random
+from unload.support import checks
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """What happened in an episode of t picks.
+
+    Attributes:
+        observations: (t + 1, 96, 13) float32, the last one after the last pick.
+        masks: (t + 1, 96) bool, what could be picked; all False once the heap is empty.
+        actions: (t,) int64, dragged rows.
+        boxes: (t,) int64, dragged boxes, by their numbers in the heap before each pick.
+        unloaded, falls: (t,) int64, of each pick.
+        moved: (t,) float64, m, how far the dragged box came.
+        heaps: t + 1 heaps, before each pick and after the last; () if not kept.
+    """
+
+    observations: np.ndarray
+    masks: np.ndarray
+    actions: np.ndarray
+    boxes: np.ndarray
+    unloaded: np.ndarray
+    falls: np.ndarray
+    moved: np.ndarray
+    heaps: tuple[Heap, ...] = ()
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays to store, without the rows that never hold a box."""
+        rows = max(int(self.masks.any(axis=0).nonzero()[0].max(initial=0)) + 1, 1)
+        rows = max(rows, int(self.observations.any(axis=(0, 2)).nonzero()[0].max(initial=0)) + 1)
+        stored = {name: getattr(self, name) for name in _STORED}
+        return stored | {
+            "observations": self.observations[:, :rows],
+            "masks": self.masks[:, :rows],
+        }
+
+
+_STORED = "actions", "boxes", "unloaded", "falls", "moved"
+
+
+def episode_from(arrays: dict[str, np.ndarray]) -> Episode:
+    """The episode of which ``Episode.arrays`` were stored."""
+    count, rows = arrays["masks"].shape
+    observations = np.zeros((count, ROWS, len(COLUMNS)), np.float32)
+    observations[:, :rows] = arrays["observations"]
+    masks = np.zeros((count, ROWS), bool)
+    masks[:, :rows] = arrays["masks"]
+    return Episode(observations, masks, *(arrays[name] for name in _STORED))
+
+
+def picks_of(episode: Episode) -> Picks:
+    """The picks of an episode, as ``fit`` needs them."""
+    return Picks(
+        episode.observations[:-1],
+        episode.actions,
+        episode.unloaded.astype(np.float32),
+        episode.falls.astype(np.float32),
+        episode.observations[1:],
+        episode.masks[1:],
+    )
+
+
+def play(
+    env: HeapEnv, policy: Callable, heap: Heap, seed: int, keep_heaps: bool = False
+) -> Episode:
+    """Let a policy play a heap until the episode ends.
+
+    Args:
+        env: in which it plays.
+        policy: see ``unload.heap.rules``.
+        heap: to begin with.
+        seed: of the policy's random numbers.
+        keep_heaps: whether the episode holds the heap before and after every pick.
+    """
+    rng = np.random.default_rng(checks.integer("seed", seed, 0))
+    observation, info = env.reset(options={"heap": heap})
+    observations, masks, heaps = [observation], [info["action_mask"]], [env.heap]
+    picks, ended = [], False
+    while not ended:
+        (action,) = policy(observations[-1][None], masks[-1][None], rng)
+        observation, _, terminated, truncated, info = env.step(int(action))
+        ended = terminated or truncated
+        picks.append((action, *(info[name] for name in ("box", "unloaded", "falls", "moved"))))
+        observations.append(observation)
+        masks.append(info["action_mask"])
+        heaps.append(env.heap)
+    columns = [np.array(column) for column in zip(*picks)]
+    return Episode(
+        np.array(observations),
+        np.array(masks, bool),
+        *columns,
+        tuple(heaps) if keep_heaps else (),
+    )
+
+
+def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Callable:
+    """A policy to record: half of its picks are random, because every box must be tried.
+
+    Args:
+        rng: draws its favourite.
+        favourite: policy of the other half; a linear rule with normally distributed weights
+            of the family's columns if None, a new one for each call of this function.
+    """
+    if favourite is None:
+        favourite = best(linear({name: rng.normal() for name in FAMILY_COLUMNS}))
+
+    def policy(observations, masks, rng):
+        chosen = random if rng.random() < 0.5 else favourite
+        return chosen(observations, masks, rng)
+
+    return policy
+
+
+class Oracle:
+    """Policy that tries every allowed box of an environment's heap, and picks the best.
+
+    It looks one pick ahead, so that it is the ceiling of γ = 0 in the physics that it asks,
+    and no rule or network may know what it knows.
+
+    Args:
+        env: whose heap it is.
+        falls_weight: λ of what it maximizes, boxes - λ falls.
+        physics: that it asks, see ``Rake``; other than the environment's, it may err.
+    """
+
+    def __init__(self, env: HeapEnv, falls_weight: float, physics: str = "near") -> None:
+        self.env = env
+        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+        self._rake = Rake(physics)
+
+    def __call__(self, observations, masks, rng: np.random.Generator) -> np.ndarray:
+        values = np.full(ROWS, -np.inf)
+        for row in np.flatnonzero(masks[0]).tolist():
+            outcome = self._rake.pick(self.env.heap, int(self.env.visible[row]))
+            values[row] = outcome.unloaded.sum() - self.falls_weight * outcome.fallen.sum()
+        return np.array([values.argmax()])
+
+    def close(self) -> None:
+        """Disconnect its client; may be called again."""
+        self._rake.close()

@@ -1,0 +1,248 @@
+"""Learning from recorded picks: regression, or fitted Q iteration where γ > 0."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors.torch import load_file, save
+from torch import nn
+
+from unload.heap.network import HeapNetwork
+from unload.heap.observation import COLUMN
+from unload.heap.rules import check_batch
+from unload.support import checks, files
+
+BATCH = 256
+LEARNING_RATE = 1e-3
+WEIGHT_DECAY = 1e-4
+AT_ONCE = 32  # observations of which all rows are asked for: their pairs take 40 MB
+
+
+@dataclass(frozen=True, eq=False)
+class Picks:
+    """Recorded picks.
+
+    Attributes:
+        observations: (n, 96, 13) float32, before the pick.
+        actions: (n,) int64, the row that was dragged.
+        unloaded, falls: (n,) float32.
+        next_observations: (n, 96, 13) float32, after it.
+        next_masks: (n, 96) bool, what could be picked next; all False at an episode's end by
+            termination.
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    unloaded: np.ndarray
+    falls: np.ndarray
+    next_observations: np.ndarray
+    next_masks: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+
+def joined(picks: Sequence[Picks]) -> Picks:
+    """All picks as one."""
+    names = Picks.__dataclass_fields__
+    return Picks(*(np.concatenate([getattr(each, name) for each in picks]) for name in names))
+
+
+def holds_box(observations: torch.Tensor) -> torch.Tensor:
+    """(..., 96) bool, the rows of an observation that hold a box: its edges are not 0."""
+    return observations[..., COLUMN["longest"]] > 0
+
+
+def without_empty_rows(observations: torch.Tensor) -> torch.Tensor:
+    """Observations up to the last row that holds a box in any: pairs of rows are many."""
+    used = holds_box(observations).any(dim=0).nonzero()
+    return observations[..., : int(used.max()) + 1 if len(used) else 1, :]
+
+
+def fit(
+    picks: Picks,
+    seed: int,
+    kind: str = "pairs",
+    gamma: float = 0.0,
+    falls_weight: float = 1.0,
+    epochs: int = 20,
+    rounds: int = 4,
+) -> HeapNetwork:
+    """Learn what dragging a box brings.
+
+    Counts are learned by the Poisson likelihood, the probability of a fall by its own. Each
+    batch is mirrored at the middle of the container with probability 0.5, because the physics
+    is the same. With γ > 0, ``rounds`` of fitted Q iteration follow: both counts are then the
+    discounted sums over the picks to come, of which each is the one with the highest
+    boxes - λ falls by the network of the round before.
+
+    Args:
+        picks: the data.
+        seed: of weights and batches.
+        kind: of the network, see ``HeapNetwork``.
+        gamma: discount in [0, 1).
+        falls_weight: λ, of the picks to come; without effect if γ = 0.
+        epochs: through the data, in the first round and in all the others together.
+        rounds: of Q iteration.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    checks.real("gamma", gamma, 0, 0.999)
+    checks.real("falls_weight", falls_weight, 0)
+    checks.integer("epochs", epochs, 1)
+    if not len(picks):
+        raise ValueError("picks is empty; expected at least one")
+    generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
+    network = HeapNetwork(kind, generator=generator)
+    data = [
+        torch.from_numpy(array)
+        for array in (picks.observations, picks.actions, picks.unloaded, picks.falls)
+    ]
+    fell = (data[3] > 0).float()
+    _descend(network, (*data, fell), epochs, generator)
+    for _ in range(rounds if gamma else 0):
+        boxes, falls = _to_come(network, picks, falls_weight)
+        targets = data[2] + gamma * boxes, data[3] + gamma * falls
+        _descend(network, (*data[:2], *targets, fell), max(1, epochs // rounds), generator)
+    return network.eval()
+
+
+def _descend(
+    network: HeapNetwork, data: tuple[torch.Tensor, ...], epochs: int, generator: torch.Generator
+) -> None:
+    """Fit a network to observations, actions, boxes, falls and whether anything fell."""
+    steps = epochs * -(-len(data[0]) // BATCH)
+    adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
+    for rows in _batches(len(data[0]), epochs, generator):
+        observations, actions, boxes, falls, fell = (each[rows] for each in data)
+        if torch.rand((), generator=generator) < 0.5:
+            observations = mirrored(observations)
+        observations = without_empty_rows(observations)
+        expected = network(observations, holds_box(observations), actions)
+        loss = (
+            _poisson(expected.boxes[:, 0], boxes)
+            + _poisson(expected.falls[:, 0], falls)
+            + nn.functional.binary_cross_entropy_with_logits(expected.fall_logits[:, 0], fell)
+        )
+        adam.zero_grad()
+        loss.backward()
+        adam.step()
+        schedule.step()
+
+
+def _batches(count: int, epochs: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
+    for _ in range(epochs):
+        yield from torch.randperm(count, generator=generator).split(BATCH)
+
+
+def _poisson(mean: torch.Tensor, count: torch.Tensor) -> torch.Tensor:
+    return nn.functional.poisson_nll_loss(mean, count, log_input=False)
+
+
+def mirrored(observations: torch.Tensor) -> torch.Tensor:
+    """Observations of the heap as a mirror along the container's middle shows it."""
+    signs = torch.ones(observations.shape[-1])
+    signs[COLUMN["y"]] = -1
+    return observations * signs
+
+
+@torch.no_grad()
+def _to_come(
+    network: HeapNetwork, picks: Picks, falls_weight: float
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Boxes and falls that the picks after each recorded one will bring, (n,) each."""
+    parts = []
+    for start in range(0, len(picks), AT_ONCE):
+        rows = slice(start, start + AT_ONCE)
+        observations = without_empty_rows(torch.from_numpy(picks.next_observations[rows]))
+        allowed = torch.from_numpy(picks.next_masks[rows])[:, : observations.shape[1]]
+        expected = network(observations, holds_box(observations))
+        value = expected.boxes - falls_weight * expected.falls
+        row = value.masked_fill(~allowed, -torch.inf).argmax(dim=1, keepdim=True)
+        go_on = allowed.any(dim=1, keepdim=True)
+        parts.append([(each.gather(1, row) * go_on)[:, 0] for each in expected[:2]])
+    return tuple(torch.cat(part) for part in zip(*parts))
+
+
+class Learned:
+    """Policy that picks the allowed box with the highest boxes - λ falls.
+
+    Args:
+        networks: their answers are averaged.
+        falls_weight: λ.
+        by_probability: weigh the probability of a fall instead of the number of falls.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+
+    def __init__(
+        self,
+        networks: Sequence[HeapNetwork],
+        falls_weight: float = 1.0,
+        by_probability: bool = False,
+    ) -> None:
+        if not networks:
+            raise ValueError("networks is empty; expected at least one HeapNetwork")
+        self.networks = list(networks)
+        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+        self.by_probability = checks.boolean("by_probability", by_probability)
+
+    def __call__(
+        self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        observations, allowed = check_batch(observations, masks)
+        boxes, falls, probability = self.expected(observations)
+        value = boxes - self.falls_weight * (probability if self.by_probability else falls)
+        return np.where(allowed, value, -np.inf).argmax(axis=1)
+
+    @torch.no_grad()
+    def expected(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Expected boxes and falls and the probability of a fall, (batch, 96) float32 each.
+
+        Rows without a box mean nothing.
+        """
+        whole = np.zeros((3, *np.shape(observations)[:2]), np.float32)
+        for start in range(0, len(observations), AT_ONCE):
+            chunk = np.asarray(observations[start : start + AT_ONCE], np.float32)
+            rows = without_empty_rows(torch.from_numpy(chunk))
+            answers = [network(rows, holds_box(rows)) for network in self.networks]
+            boxes, falls, logits = (torch.stack(part) for part in zip(*answers))
+            parts = torch.stack([boxes, falls, logits.sigmoid()]).mean(dim=1)
+            whole[:, start : start + AT_ONCE, : rows.shape[1]] = parts.numpy()
+        return tuple(whole)
+
+
+def save_network(network: HeapNetwork, path: str | Path) -> None:
+    """Write a network's weights as ``.safetensors``, in one atomic step."""
+    files.write_atomically(path, lambda file: file.write(save(network.state_dict())))
+
+
+def load_network(path: str | Path) -> HeapNetwork:
+    """Read what ``save_network`` wrote.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it holds something else.
+    """
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{path} is missing")
+    try:
+        weights = load_file(path)
+        n_features = weights["own.weight"].shape[0]
+        kind = _kind(weights, n_features)
+        network = HeapNetwork(kind, n_features)
+        network.load_state_dict(weights)
+    except Exception as error:
+        raise ValueError(f"{path} holds no HeapNetwork: {error}") from error
+    return network.eval()
+
+
+def _kind(weights: dict[str, torch.Tensor], n_features: int) -> str:
+    """The kind of network that weights belong to, by what its hidden layer reads."""
+    context = weights["hidden.weight"].shape[1] // n_features - 1
+    return {0: "own", 1: "pooled", 2: "pairs"}[context]

@@ -1,0 +1,180 @@
+"""The bulk pick: a rake drags one box towards the door, and others come with it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from unload import task
+from unload.heap.boxes import DOOR, REAR, WIDTH, Heap
+from unload.physics.bullet import FRICTION, World
+from unload.support import checks
+
+SPEED = 1.0  # m/s, a slow conveyor's
+FORCE = 60.0  # N: six boxes' weight, enough for several boxes, too little for half of the heap
+REACH = 0.7  # m: the longest edge of a box, so that the box is past the place that it held
+TIME = 1.0  # s, 1.4 times what the reach takes at full speed
+CAME = 0.9 * REACH  # m: moved as far, a box is held by the rake and counts as unloaded
+REST = 0.5  # s: free fall from 1.2 m
+RESTS = 4  # at most, as long as boxes are unloaded or move
+STILL = 0.2  # m/s; a toppling box is faster, a creeping one slower
+FALL = 0.5  # m: a box that drops deeper may be damaged
+NEAR = 0.6  # m around the drag, within which ``near`` lets boxes move
+SUPPORT = 0.05  # m around those, within which it keeps boxes as obstacles
+# Name → time step in s, solver iterations, whether boxes far from the drag are left out.
+PHYSICS = {
+    "whole": (1 / 240, 50, False),
+    "coarse": (1 / 120, 20, False),
+    "near": (1 / 120, 20, True),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a pick has done.
+
+    Attributes:
+        heap: what is left.
+        left: (m,) int64, the numbers that its boxes had before.
+        unloaded: (n,) bool, of the boxes before.
+        fallen: (n,) bool, others than the dragged one that dropped by more than ``FALL``.
+        moved: m, how far the dragged box came along x.
+        came: whether that was at least ``CAME``.
+    """
+
+    heap: Heap
+    left: np.ndarray
+    unloaded: np.ndarray
+    fallen: np.ndarray
+    moved: float
+    came: bool
+
+
+def add_walls(world: World, friction: float = FRICTION) -> None:
+    """Add floor, rear wall and both side walls, each 1 m thick and reaching beyond the door."""
+    middle = (REAR + DOOR) / 2
+    for position, size in (
+        ((middle, WIDTH / 2, -0.5), (40, 40, 1)),
+        ((REAR - 0.5, WIDTH / 2, 5), (1, WIDTH + 2, 10)),
+        ((middle, -0.5, 5), (12, 1, 10)),
+        ((middle, WIDTH + 0.5, 5), (12, 1, 10)),
+    ):
+        world.add_box(position, size, 0, friction=friction)
+
+
+def near_boxes(heap: Heap, box: int) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes that may move when ``box`` is dragged, and their fixed neighbours, by distance.
+
+    Returns:
+        Two (n,) bool: less than ``NEAR`` from the block that the dragged box passes through,
+        and of the others those within ``SUPPORT`` of one of these.
+    """
+    half = heap.extents() / 2
+    low, high = heap.positions - half, heap.positions + half
+    reach = high[box] + (REACH, 0, 0)
+    gap = np.maximum(np.maximum(low - reach, low[box] - high), 0)
+    moving = (gap**2).sum(axis=1) < NEAR**2
+    touching = (low[:, None] < high[moving] + SUPPORT) & (high[:, None] > low[moving] - SUPPORT)
+    return moving, touching.all(axis=2).any(axis=1) & ~moving
+
+
+class Rake:
+    """Picks boxes of heaps in one PyBullet client.
+
+    A pick drags a box towards the door: ``SPEED``, at most ``FORCE``, until it has moved by
+    ``REACH`` or ``TIME`` is over. After ``REST``, the boxes whose centre is beyond the edge of
+    the conveyor are unloaded; it stands where the foremost face of the heap was before the
+    pick. (At the foremost centre, boxes that creep by millimetres would count.) So is the
+    dragged box, if it came. Since that takes supports away, and boxes may still be toppling,
+    this is repeated until nothing is unloaded and nothing is faster than ``STILL``, at most
+    ``RESTS`` times, so that what falls counts for the pick that has caused it.
+
+    Every pick builds the world anew from the heap, so that it depends on nothing else, to the
+    bit: not on earlier picks, of which PyBullet would remember contacts.
+
+    Args:
+        physics: ``"whole"``, all boxes at PyBullet's default of 240 Hz and 50 iterations of
+            the solver; ``"coarse"``, all boxes at 120 Hz and 20 iterations; ``"near"``, as
+            coarse, but only boxes near the drag can move.
+        friction: of boxes, floor and walls; Bullet multiplies the two of a contact.
+        mass: kg, of each box.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+
+    def __init__(
+        self, physics: str = "whole", friction: float = FRICTION, mass: float = task.MASS
+    ) -> None:
+        checks.one_of("physics", physics, PHYSICS)
+        self.physics = physics
+        self.friction = checks.real("friction", friction, 0, 10)
+        self.mass = checks.real("mass", mass, 0.01, 1000)
+        time_step, iterations, self._near = PHYSICS[physics]
+        self._world = World(time_step, iterations=iterations)
+
+    def pick(self, heap: Heap, box: int) -> Outcome:
+        """Drag one box and see what comes.
+
+        Raises:
+            TypeError, ValueError: ``heap`` is no ``Heap``, or ``box`` none of its boxes.
+        """
+        if not isinstance(heap, Heap):
+            raise TypeError(f"heap is {heap!r}; expected a Heap")
+        box = checks.integer("box", box, 0, len(heap) - 1)
+        world, edge = self._world, heap.front()
+        bodies = self._build(heap, box)
+        moved = world.drag(bodies[box], SPEED, FORCE, REACH, TIME)
+        came = moved >= CAME
+        unloaded = np.zeros(len(heap), bool)
+        last = _Poses(heap)
+        for _ in range(RESTS):
+            world.step(REST)
+            last.read(world, bodies)
+            gone = last.positions[:, 0] > edge
+            gone[box] |= came
+            gone &= ~unloaded
+            if not gone.any() and max(map(world.speed, bodies.values()), default=0) < STILL:
+                break
+            unloaded |= gone
+            for number in np.flatnonzero(gone).tolist():
+                world.remove(bodies.pop(number))
+        fallen = heap.positions[:, 2] - last.positions[:, 2] > FALL
+        fallen[box] = False
+        left = np.flatnonzero(~unloaded)
+        after = Heap(last.positions, last.orientations, heap.sizes, heap.packages).only(left)
+        return Outcome(after, left, unloaded, fallen, float(moved), bool(came))
+
+    def _build(self, heap: Heap, box: int) -> dict[int, int]:
+        """Fill the world; return the bodies of the boxes that can move, by box number."""
+        self._world.clear()
+        add_walls(self._world, self.friction)
+        moving, fixed = np.ones(len(heap), bool), np.zeros(len(heap), bool)
+        if self._near:
+            moving, fixed = near_boxes(heap, box)
+        bodies = {}
+        for number in np.flatnonzero(moving | fixed).tolist():
+            body = self._world.add_box(
+                heap.positions[number],
+                heap.sizes[number],
+                self.mass if moving[number] else 0,
+                heap.orientations[number],
+                self.friction,
+            )
+            if moving[number]:
+                bodies[number] = body
+        return bodies
+
+    def close(self) -> None:
+        """Disconnect the client; may be called again."""
+        self._world.close()
+
+
+class _Poses:
+    """Where the boxes of a heap were last seen."""
+
+    def __init__(self, heap: Heap) -> None:
+        self.positions, self.orientations = heap.positions.copy(), heap.orientations.copy()
+
+    def read(self, world: World, bodies: dict[int, int]) -> None:
+        for number, body in bodies.items():
+            self.positions[number], self.orientations[number] = world.pose(body)
