@@ -1,0 +1,185 @@
+"""Picks from heaps recorded, and networks learned from them.
+
+    python -m unload.reproduce heap-picks --round 0
+    python -m unload.reproduce heap-learn --round 0
+    python -m unload.reproduce heap-picks --round 1
+    python -m unload.reproduce heap-learn --round 1
+
+Round 0 explores around random linear rules, round 1 around the networks of round 0. Each
+episode and each network is a file in ``runs/heap``: a command that was stopped goes on, and
+heaps and seeds make an episode the same wherever and in whatever order it is computed.
+"""
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import torch
+from joblib import Parallel, delayed
+from tqdm import tqdm
+
+from unload.heap.env import MAX_PICKS, HeapEnv
+from unload.heap.episodes import episode_from, exploring, picks_of, play
+from unload.heap.learning import Learned, Picks, fit, joined, load_network, save_network
+from unload.heap.network import KINDS
+from unload.reproduce.heap import NAME, SEEDS
+from unload.reproduce.results import COMMAND, JOBS
+from unload.support import checks, files
+
+PICKS = 50_000  # of both rounds
+PHYSICS = "coarse"
+ROUNDS = 2
+SEEDS_LEARNED = 5
+GAMMAS = 0.0, 0.5, 0.8
+# What is learned: kind of network and γ; the recommended one first.
+VARIANTS = (("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0))
+WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
+ROUND = {"--round": {"dest": "round_number", "type": int, "default": 0, "help": "0 or 1"}}
+
+
+def record_picks(
+    picks: int = PICKS // ROUNDS,
+    round_number: int = 0,
+    physics: str = PHYSICS,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = 1,
+    progress: bool = True,
+) -> None:
+    """Record exploring episodes on the training heaps, each as ``runs/heap/picks/…npz``.
+
+    Args:
+        picks: in this round; episodes that are there count.
+        round_number: 0, or 1 if networks of round 0 are there.
+        physics: see ``Rake``.
+        runs_dir: where episodes and networks are.
+        n_jobs: processes, as in joblib.
+        progress: show a progress bar.
+
+    Raises:
+        FileNotFoundError: there are no networks to explore around.
+    """
+    checks.integer("round_number", round_number, 0, ROUNDS - 1)
+    episodes = -(-checks.integer("picks", picks, 1) // MAX_PICKS)
+    folder = Path(runs_dir) / NAME
+    known = network_paths(round_number - 1, *VARIANTS[0], runs_dir) if round_number else []
+    path = folder / "picks" / f"round{round_number}"
+    missing = [n for n in range(episodes) if not (path / f"{n:05}.npz").exists()]
+    done = Parallel(n_jobs, return_as="generator")(
+        delayed(_record)(path / f"{number:05}.npz", number, round_number, physics, known)
+        for number in missing
+    )
+    list(tqdm(done, total=len(missing), unit="episode", disable=not progress, ncols=100))
+
+
+def _record(path: Path, number: int, round_number: int, physics: str, known: list[Path]) -> None:
+    """Play one exploring episode and store it."""
+    torch.set_num_threads(1)
+    rng = np.random.default_rng([SEEDS["train"], round_number, number])
+    favourite = None
+    if known:
+        weight = float(rng.choice(WEIGHTS))
+        favourite = Learned([load_network(known[number % len(known)])], weight)
+    env = HeapEnv("train", physics=physics)
+    try:
+        heap = env.heaps[number % len(env.heaps)]
+        episode = play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
+    finally:
+        env.close()
+    files.write_arrays(path, episode.arrays())
+
+
+def read_picks(runs_dir: str | Path = files.RUNS, rounds: Iterable[int] = range(ROUNDS)) -> Picks:
+    """All recorded picks of some rounds.
+
+    Raises:
+        FileNotFoundError: there are none.
+    """
+    folder = Path(runs_dir) / NAME / "picks"
+    paths = [path for each in rounds for path in sorted((folder / f"round{each}").glob("*.npz"))]
+    if not paths:
+        raise FileNotFoundError(f"{folder} holds no picks; {COMMAND} heap-picks records them")
+    return joined([picks_of(episode_from(files.read_arrays(path))) for path in paths])
+
+
+def network_path(
+    round_number: int, kind: str, gamma: float, seed: int, runs_dir: str | Path = files.RUNS
+) -> Path:
+    """Where a learned network is kept."""
+    name = f"round{round_number}_{kind}_gamma{gamma:g}_seed{seed}.safetensors"
+    return Path(runs_dir) / NAME / "networks" / name
+
+
+def network_paths(
+    round_number: int, kind: str, gamma: float, runs_dir: str | Path = files.RUNS
+) -> list[Path]:
+    """The networks of all seeds that are there, at least one.
+
+    Raises:
+        FileNotFoundError: there is none.
+    """
+    pattern = network_path(round_number, kind, gamma, 0, runs_dir)
+    found = sorted(pattern.parent.glob(pattern.name.replace("seed0", "seed*")))
+    if not found:
+        raise FileNotFoundError(
+            f"{pattern} is missing; {COMMAND} heap-learn --round {round_number} makes it"
+        )
+    return found
+
+
+def learn(
+    round_number: int = ROUNDS - 1,
+    seeds: int = SEEDS_LEARNED,
+    variants: Sequence[tuple[str, float]] | None = None,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = 1,
+    epochs: int = 20,
+) -> list[Path]:
+    """Learn networks from the picks of a round and of those before it.
+
+    Args:
+        round_number: 0 or 1; after round 0, only the recommended variant is needed.
+        seeds: networks of each variant.
+        variants: pairs of ``HeapNetwork`` kind and γ; of the round if None.
+        runs_dir: where picks and networks are.
+        n_jobs: processes, as in joblib.
+        epochs: see ``fit``.
+    """
+    checks.integer("round_number", round_number, 0, ROUNDS - 1)
+    if variants is None:
+        variants = VARIANTS if round_number == ROUNDS - 1 else VARIANTS[:1]
+    for kind, gamma in variants:
+        checks.one_of("kind", kind, KINDS)
+        checks.real("gamma", gamma, 0, 0.999)
+    jobs = [
+        (network_path(round_number, kind, gamma, seed, runs_dir), kind, gamma, seed)
+        for seed, (kind, gamma) in product(range(checks.integer("seeds", seeds, 1)), variants)
+    ]
+    rounds = range(round_number + 1)
+    Parallel(n_jobs)(
+        delayed(_learn)(*job, runs_dir, rounds, epochs) for job in jobs if not job[0].exists()
+    )
+    return [job[0] for job in jobs]
+
+
+def _learn(
+    path: Path, kind: str, gamma: float, seed: int, runs_dir: Path, rounds: range, epochs: int
+) -> None:
+    torch.set_num_threads(1)
+    picks = read_picks(runs_dir, rounds)
+    save_network(fit(picks, seed, kind, gamma, epochs=epochs), path)
+
+
+def weights_digest(paths: Iterable[Path]) -> str:
+    """Digest of networks' files, which names them in kept results."""
+    whole = hashlib.blake2b(digest_size=8)
+    for path in paths:
+        whole.update(Path(path).read_bytes())
+    return whole.hexdigest()
+
+
+PARTS = {
+    "heap-picks": ("picks from heaps, recorded", record_picks, ROUND | JOBS),
+    "heap-learn": ("networks learned from these picks", learn, ROUND | JOBS),
+}
