@@ -140,6 +140,6 @@ class FullPhysics(Physics):
         return np.array([position for position, _ in self._poses])
 
 
-# For those who have not moved on to ``local`` and ``table`` yet.
+# For ``benchmarks/lifts.py``, which still imports them from here.
 from unload.physics.local import LocalPhysics  # noqa: E402, F401
-from unload.physics.table import TablePhysics, shared_table  # noqa: E402, F401
+from unload.physics.table import TablePhysics  # noqa: E402, F401

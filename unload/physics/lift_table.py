@@ -86,9 +86,6 @@ class LiftTable:
         _fill(*slots, digests, micrometres)
         self.slots, self._count = slots, len(digests)
 
-    def close(self) -> None:
-        """Nothing; for those who still close a table, which had a simulator once."""
-
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.entries()
