@@ -81,6 +81,21 @@ def test_gradients_on_equalized_observations(batch, ties, seed):
     check(network(64, seed), batch)
 
 
+@pytest.mark.parametrize("bias", [3.0, -3.0])
+@pytest.mark.parametrize("items", [5, ITEMS])
+def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
+    batch = {
+        "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=BATCH),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
+    }
+    net = network(70)
+    with torch.no_grad():
+        net.extractor.bias[:] = bias
+        net.scorer.weight /= 10  # so that tanh does not saturate
+    check(net, batch)
+
+
 @pytest.mark.parametrize("scale", [0.1, 3.0])
 def test_gradients_of_quiet_and_of_saturated_networks(batch, scale):
     net = network(64)

@@ -1,6 +1,6 @@
-"""The compiled loops of ``unload.fused``.
+"""The compiled loops of ``fused``.
 
-Features are handled in blocks of ``WIDTH``, whose numbers lie in one flat array; samples in
+Features are handled in blocks of ``BLOCK``, whose numbers lie in one flat array; samples in
 chunks of ``CHUNK``, which several threads share.
 """
 
@@ -12,11 +12,12 @@ from numba.extending import intrinsic
 from unload.support.compiled import compiled
 
 CHUNK = 32  # samples whose gradients are summed in single precision
-WIDTH = 64  # features handled together: loops of constant length become vector instructions
+BLOCK = 64  # features handled together: loops of constant length become vector instructions
+LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# What is kept of WIDTH features: rows of WIDTH numbers in one flat array, and where they start.
+# What is kept of BLOCK features: rows of BLOCK numbers in one flat array, and where they start.
 ROWS = 42
-STARTS = range(0, ROWS * WIDTH, WIDTH)
+STARTS = range(0, ROWS * BLOCK, BLOCK)
 WX, WY, WZ, BIAS = STARTS[:4]  # of the extractor
 LOW, LOW2, HIGH, HIGH2 = STARTS[4:8]  # keys of the two lowest and the two highest values
 MEAN, OWN, LOWEST, HIGHEST = STARTS[8:24:4]  # the four inputs each
@@ -26,6 +27,7 @@ FEATURE = STARTS[29]  # 4 rows: these features
 PARTS = STARTS[33]  # of the value before tanh
 GRADIENT = STARTS[34]  # 8 rows: of the extractor's weights and bias, of the scorer's weights
 
+FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
 ZERO, ONE = np.float32(0), np.float32(1)
 
 
@@ -56,7 +58,7 @@ def next_number(typing_context, counter):
 
 @intrinsic
 def prefetch(typing_context, numbers, place):
-    """Have ``numbers[place]``, float32 in one axis, fetched from memory without waiting for it.
+    """Have the float32 at ``place`` in the memory of ``numbers`` fetched without waiting for it.
 
     There need not be such a place.
     """
@@ -73,6 +75,27 @@ def prefetch(typing_context, numbers, place):
     return types.void(numbers, types.int64), build
 
 
+@intrinsic
+def long_vectors(typing_context):
+    """Compile the calling function for the longest vectors, and as if no two of its arrays overlap.
+
+    By itself the compiler takes half of AVX-512's length, because the first processors that had
+    it slowed down at its full length. And as long as an array that is written might overlap
+    another one, the compiler neither keeps sums in registers nor reads ahead. No array that the
+    calling function is given may do so.
+    """
+
+    def build(context, builder, signature, arguments):
+        # A set; its own ``add`` takes the names of attributes only, not those with a value.
+        set.add(builder.function.attributes, '"prefer-vector-width"="512"')
+        for argument in context.call_conv.get_arguments(builder.function):
+            if isinstance(argument.type, ir.PointerType):
+                argument.add_attribute("noalias")
+        return context.get_dummy_value()
+
+    return types.void(), build
+
+
 @compiled(nogil=True)
 def add_chunks(
     counter, rows, observations, actions, targets, beta, weight, bias, score, score_bias, partial
@@ -82,10 +105,14 @@ def add_chunks(
     Several threads may call this with the same ``counter``, and share the chunks.
     """
     n, items = len(bias), observations.shape[1]
-    x = np.empty((-(-items // 4) * 4, 3), np.float32)  # one sample's items, filled up to fours
+    samples = observations.reshape(len(observations), 3 * items)
+    x = np.empty(-(-items // 4) * 12, np.float32)  # one sample's inputs, filled up to fours
+    fours = x.reshape(-1, 12)  # the same, four items in each row
+    numbers = np.arange(4 * len(fours)).astype(np.int32).reshape(-1, 4)
     bits = 0  # of an item's number
-    while len(x) > 1 << bits:
+    while numbers.size > 1 << bits:
         bits += 1
+    mask = np.int32((1 << bits) - 1)
     # The relative error of a key: three roundings of the value, and the bits that it lacks.
     precision = np.float32(2.0**-21 + 2.0 ** (bits - 23))
     blocks = _blocks(weight, bias, score)
@@ -96,18 +123,18 @@ def add_chunks(
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
         coming = rows[following * CHUNK : (following + 1) * CHUNK]
         _look_up(chosen, observations.shape[:2], actions, targets, picked, wanted)
-        largest = _largest(observations, chosen)
+        largest = _largest(samples, chosen)
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
         sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias[0]  # NaN if not finite
         for number, row in enumerate(chosen):
-            later = observations[coming[number] if number < len(coming) else row].reshape(-1)
-            _copy(observations[row].reshape(-1), x.reshape(-1))
+            later = coming[number] if number < len(coming) else row
+            _copy(samples[row], x)
             logit = np.float64(score_bias[0])  # double: 1 - tanh² loses its digits near 1
             for b in range(len(blocks)):
-                _reduce_items(x, items, np.int32((1 << bits) - 1), later, blocks[b])
-                _find_extremes(x, items, (1 << bits) - 1, min(WIDTH, n - b * WIDTH), blocks[b])
-                logit += _forward(x[picked[number]], items, blocks[b])
+                _reduce_items(fours, numbers, items, mask, samples, later, blocks[b])
+                _find_extremes(x, items, mask, blocks[b])
+                logit += _forward(x, picked[number], items, blocks[b])
             value = np.tanh(logit)
             error = value - wanted[number]
             if abs(error) < beta:
@@ -120,11 +147,11 @@ def add_chunks(
             for b in range(len(blocks)):
                 _backward(np.float32(slope), blocks[b])
         for f in range(n):
-            block, place = blocks[f // WIDTH], f % WIDTH
+            block, place = blocks[f // BLOCK], f % BLOCK
             for axis in range(3):
-                partial[chunk, 3 * f + axis] = block[GRADIENT + axis * WIDTH + place]
+                partial[chunk, 3 * f + axis] = block[GRADIENT + axis * BLOCK + place]
             for row in range(3, 8):
-                partial[chunk, row * n + f] = block[GRADIENT + row * WIDTH + place]
+                partial[chunk, row * n + f] = block[GRADIENT + row * BLOCK + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
         chunk = following
 
@@ -152,23 +179,27 @@ def sum_chunks(partial):
 
 @compiled
 def _blocks(weight, bias, score):
-    """The weights in blocks of ``WIDTH`` features; zeros where there are no more features."""
-    count = -(-len(bias) // WIDTH)
-    memory = np.zeros(count * ROWS * WIDTH + 16, np.float32)
+    """The weights in blocks of ``BLOCK`` features.
+
+    Where there are no more features, a bias of -1 keeps the ReLU closed.
+    """
+    count = -(-len(bias) // BLOCK)
+    memory = np.zeros(count * ROWS * BLOCK + 16, np.float32)
     start = (-memory.ctypes.data // 4) % 16  # of a cache line, which a vector fills
-    blocks = memory[start : start + count * ROWS * WIDTH].reshape(count, ROWS * WIDTH)
+    blocks = memory[start : start + count * ROWS * BLOCK].reshape(count, ROWS * BLOCK)
+    blocks[:, BIAS:LOW] = -1
     for f in range(len(bias)):
-        block, place = blocks[f // WIDTH], f % WIDTH
+        block, place = blocks[f // BLOCK], f % BLOCK
         for axis in range(3):
-            block[WX + axis * WIDTH + place] = weight[f, axis]
+            block[WX + axis * BLOCK + place] = weight[f, axis]
         block[BIAS + place] = bias[f]
         for kind in range(4):
-            block[SCORE + kind * WIDTH + place] = score[kind, f]
+            block[SCORE + kind * BLOCK + place] = score[kind, f]
     return blocks
 
 
 @compiled
-def _largest(observations, rows):
+def _largest(samples, rows):
     """The largest magnitude; not finite if one of the inputs is not.
 
     Read as integers, the bits of positive numbers are in the order of the numbers; those of
@@ -176,17 +207,16 @@ def _largest(observations, rows):
     """
     largest = np.int32(0)
     for row in rows:
-        bits = observations[row].reshape(-1).view(np.int32)
-        for i in range(len(bits)):
-            magnitude = np.int32(bits[i] & 0x7FFFFFFF)
+        for i in range(samples.shape[1]):
+            magnitude = np.int32(_bits(samples[row, i]) & 0x7FFFFFFF)
             largest = magnitude if magnitude > largest else largest
-    return np.int32(largest).view(np.float32)
+    return _number(largest)
 
 
 @compiled
 def _start_chunk(largest, precision, block):
     block[GRADIENT:] = 0
-    for f in range(WIDTH):
+    for f in range(BLOCK):
         scale = abs(block[WX + f]) + abs(block[WY + f]) + abs(block[WZ + f])
         scale = scale * largest + abs(block[BIAS + f])  # no value is larger
         block[SLACK + f] = scale * precision + np.float32(1e-30)
@@ -202,51 +232,74 @@ def _copy(inputs, x):
 
 
 @compiled
-def _reduce_items(x, items, mask, later, block):
+def _reduce_items(x, numbers, items, mask, samples, later, block):
     """Read all items: sums of the active ones, keys of the two lowest and the two highest.
 
-    Nearly all of the time is spent here. Four items at a time, so that the sums need not be
-    fetched and put back for each; no branches, so that ``WIDTH`` features go side by side.
-    Meanwhile the memory may send the inputs of a sample to come.
+    Most of the time is spent here. Four items at a time, because to sort four keys and merge
+    them takes fewer steps than to merge each; no branches, so that ``LANES`` features go side by
+    side. Meanwhile the memory may send the inputs of a sample to come.
+
+    Args:
+        x: (fours, 12), the inputs of four items in each row.
+        numbers: (fours, 4), the items' numbers; to compute them here would take longer.
+        samples, later: the row of ``samples`` to fetch.
     """
-    keys = block.view(np.int32)
-    keys[LOW:HIGH] = 0x7FFFFFFF
-    keys[HIGH:MEAN] = -0x80000000
-    block[MEAN:OWN] = 0
-    for i in range(0, len(x), 4):
-        prefetch(later, 3 * i)
-        x0, x1, x2, x3 = x[i, 0], x[i + 1, 0], x[i + 2, 0], x[i + 3, 0]
-        y0, y1, y2, y3 = x[i, 1], x[i + 1, 1], x[i + 2, 1], x[i + 3, 1]
-        z0, z1, z2, z3 = x[i, 2], x[i + 1, 2], x[i + 2, 2], x[i + 3, 2]
-        i0, i1, i2, i3 = np.int32(i), np.int32(i + 1), np.int32(i + 2), np.int32(i + 3)
-        for f in range(WIDTH):
+    long_vectors()
+    for f in range(BLOCK):
+        block[LOW + f] = block[LOW2 + f] = _number(0x7FFFFFFF)
+        block[HIGH + f] = block[HIGH2 + f] = _number(-0x80000000)
+        for axis in range(4):
+            block[MEAN + axis * BLOCK + f] = ZERO
+    for first in range(0, BLOCK, LANES):
+        for i in range(len(x)):
+            prefetch(samples, later * samples.shape[1] + 12 * i)
+            x0, x1, x2, x3 = x[i, 0], x[i, 3], x[i, 6], x[i, 9]
+            y0, y1, y2, y3 = x[i, 1], x[i, 4], x[i, 7], x[i, 10]
+            z0, z1, z2, z3 = x[i, 2], x[i, 5], x[i, 8], x[i, 11]
+            i0, i1, i2, i3 = numbers[i, 0], numbers[i, 1], numbers[i, 2], numbers[i, 3]
+            for f in range(first, first + LANES):
+                a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
+                v0, v1 = _value(a, b, c, d, x0, y0, z0), _value(a, b, c, d, x1, y1, z1)
+                v2, v3 = _value(a, b, c, d, x2, y2, z2), _value(a, b, c, d, x3, y3, z3)
+                a0, a1, a2, a3 = _active(v0), _active(v1), _active(v2), _active(v3)
+                _add(block, MEAN + f, a0, a1, a2, a3, x0, x1, x2, x3)
+                _add(block, MEAN + BLOCK + f, a0, a1, a2, a3, y0, y1, y2, y3)
+                _add(block, MEAN + 2 * BLOCK + f, a0, a1, a2, a3, z0, z1, z2, z3)
+                block[MEAN + 3 * BLOCK + f] += (a0 + a1) + (a2 + a3)
+                k0, k1 = _key(v0, i0, mask), _key(v1, i1, mask)
+                k2, k3 = _key(v2, i2, mask), _key(v3, i3, mask)
+                # Sort the four keys: low ≤ low2, high2 ≤ high.
+                k0, k1, k2, k3 = min(k0, k1), max(k0, k1), min(k2, k3), max(k2, k3)
+                low, high = min(k0, k2), max(k1, k3)
+                k0, k1 = max(k0, k2), min(k1, k3)
+                low2, high2 = min(k0, k1), max(k0, k1)
+                # Merge them with those so far.
+                lowest, highest = _bits(block[LOW + f]), _bits(block[HIGH + f])
+                low2 = min(min(_bits(block[LOW2 + f]), low2), max(lowest, low))
+                high2 = max(max(_bits(block[HIGH2 + f]), high2), min(highest, high))
+                block[LOW + f], block[LOW2 + f] = _number(min(lowest, low)), _number(low2)
+                block[HIGH + f], block[HIGH2 + f] = _number(max(highest, high)), _number(high2)
+    x3, y3, z3 = x[-1, 9], x[-1, 10], x[-1, 11]
+    for _ in range(items, numbers.size):  # repeated items do not count
+        for f in range(BLOCK):
             a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
-            v0, v1 = _value(a, b, c, d, x0, y0, z0), _value(a, b, c, d, x1, y1, z1)
-            v2, v3 = _value(a, b, c, d, x2, y2, z2), _value(a, b, c, d, x3, y3, z3)
-            a0, a1, a2, a3 = _active(v0), _active(v1), _active(v2), _active(v3)
-            _add(block, MEAN + f, a0, a1, a2, a3, x0, x1, x2, x3)
-            _add(block, MEAN + WIDTH + f, a0, a1, a2, a3, y0, y1, y2, y3)
-            _add(block, MEAN + 2 * WIDTH + f, a0, a1, a2, a3, z0, z1, z2, z3)
-            block[MEAN + 3 * WIDTH + f] += (a0 + a1) + (a2 + a3)
-            k0, k1 = _key(v0, i0, mask), _key(v1, i1, mask)
-            k2, k3 = _key(v2, i2, mask), _key(v3, i3, mask)
-            # Sort the four keys: low ≤ low2, high2 ≤ high. Then merge them with those so far.
-            k0, k1, k2, k3 = min(k0, k1), max(k0, k1), min(k2, k3), max(k2, k3)
-            low, high = min(k0, k2), max(k1, k3)
-            k0, k1 = max(k0, k2), min(k1, k3)
-            low2, high2 = min(k0, k1), max(k0, k1)
-            keys[LOW2 + f] = min(min(keys[LOW2 + f], low2), max(keys[LOW + f], low))
-            keys[LOW + f] = min(keys[LOW + f], low)
-            keys[HIGH2 + f] = max(max(keys[HIGH2 + f], high2), min(keys[HIGH + f], high))
-            keys[HIGH + f] = max(keys[HIGH + f], high)
-    for i in range(items, len(x)):  # repeated items do not count
-        for f in range(WIDTH):
-            a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
-            active = _active(_value(a, b, c, d, x[i, 0], x[i, 1], x[i, 2]))
-            block[MEAN + f] -= active * x[i, 0]
-            block[MEAN + WIDTH + f] -= active * x[i, 1]
-            block[MEAN + 2 * WIDTH + f] -= active * x[i, 2]
-            block[MEAN + 3 * WIDTH + f] -= active
+            active = _active(_value(a, b, c, d, x3, y3, z3))
+            block[MEAN + f] -= active * x3
+            block[MEAN + BLOCK + f] -= active * y3
+            block[MEAN + 2 * BLOCK + f] -= active * z3
+            block[MEAN + 3 * BLOCK + f] -= active
+
+
+@compiled(forceinline=True)
+def _bits(number):
+    """The bits of a float32 as an int32."""
+    return np.float32(number).view(np.int32)
+
+
+@compiled(forceinline=True)
+def _number(bits):
+    """The float32 that has these bits."""
+    return np.int32(bits).view(np.float32)
 
 
 @compiled(forceinline=True)
@@ -274,31 +327,57 @@ def _key(value, item, mask):
     negative values, in reverse order. So the lowest of all keys tells what the ReLU needs: the
     lowest value if all are positive, else the negative value nearest to zero.
     """
-    return np.int32(np.int32(np.float32(value).view(np.int32) & ~mask) | item)
+    return np.int32(np.int32(_bits(value) & ~mask) | item)
 
 
 @compiled
-def _find_extremes(x, items, mask, n, block):
-    """The inputs of the lowest and of the highest item for the block's ``n`` features."""
-    keys = block.view(np.int32)
-    for f in range(n):
-        low, high, slack = block[LOW + f], block[HIGH + f], block[SLACK + f]
-        _put(x[keys[LOW + f] & mask], low > 0, LOWEST + f, block)
-        _put(x[keys[HIGH + f] & mask], high > 0, HIGHEST + f, block)
-        some_negative, all_negative = low < -slack, high < 0 and low < -slack
-        if not (some_negative or (low > slack and block[LOW2 + f] - low > slack)):
-            _decide(x, items, -1.0, f, LOWEST + f, block)
-        if not (all_negative or (high > slack and high - block[HIGH2 + f] > slack)):
-            _decide(x, items, 1.0, f, HIGHEST + f, block)
+def _find_extremes(x, items, mask, block):
+    """The inputs of the lowest and of the highest item for the block's features."""
+    long_vectors()
+    unsure = 0
+    for f in range(BLOCK):
+        low, high = block[LOW + f], block[HIGH + f]
+        _put(_inputs(x, low, mask), low > ZERO, LOWEST + f, block)
+        _put(_inputs(x, high, mask), high > ZERO, HIGHEST + f, block)
+        unsure += not (_lowest_is_sure(f, block) & _highest_is_sure(f, block))
+    if unsure:  # rare, so that the loop above need not branch
+        for f in range(BLOCK):
+            if not _lowest_is_sure(f, block):
+                _decide(x, items, -1.0, f, LOWEST + f, block)
+            if not _highest_is_sure(f, block):
+                _decide(x, items, 1.0, f, HIGHEST + f, block)
+
+
+@compiled(forceinline=True)
+def _inputs(x, key, mask):
+    """The inputs of the item whose number is in the key."""
+    # Unsigned: so it is not counted from the end. Of few bits: so one instruction fetches more.
+    place = 3 * np.uint64(_bits(key) & mask & FRACTION)
+    return x[place], x[place + np.uint64(1)], x[place + np.uint64(2)]
+
+
+@compiled(forceinline=True)
+def _lowest_is_sure(f, block):
+    """Some item is negative, or the lowest is positive and clearly below all others."""
+    low, low2, slack = block[LOW + f], block[LOW2 + f], block[SLACK + f]
+    return (low < -slack) | ((low > slack) & (low2 - low > slack))
+
+
+@compiled(forceinline=True)
+def _highest_is_sure(f, block):
+    """All items are negative, or the highest is positive and clearly above all others."""
+    low, high, slack = block[LOW + f], block[HIGH + f], block[SLACK + f]
+    negative = (high < ZERO) & (low < -slack)
+    return negative | ((high > slack) & (high - block[HIGH2 + f] > slack))
 
 
 @compiled(forceinline=True)
 def _put(inputs, active, place, block):
     """Set four inputs; zeros if the ReLU is closed."""
     block[place] = inputs[0] if active else ZERO
-    block[place + WIDTH] = inputs[1] if active else ZERO
-    block[place + 2 * WIDTH] = inputs[2] if active else ZERO
-    block[place + 3 * WIDTH] = ONE if active else ZERO
+    block[place + BLOCK] = inputs[1] if active else ZERO
+    block[place + 2 * BLOCK] = inputs[2] if active else ZERO
+    block[place + 3 * BLOCK] = ONE if active else ZERO
 
 
 @compiled
@@ -310,32 +389,34 @@ def _decide(x, items, sign, f, place, block):
     a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
     best, count, px, py, pz = -np.inf, 1, 0.0, 0.0, 0.0
     for i in range(items):
-        value = sign * (np.float64(a) * x[i, 0] + np.float64(b) * x[i, 1])
-        value += sign * (np.float64(c) * x[i, 2] + d)
+        value = sign * (np.float64(a) * x[3 * i] + np.float64(b) * x[3 * i + 1])
+        value += sign * (np.float64(c) * x[3 * i + 2] + d)
         if value > best:
-            best, count, px, py, pz = value, 1, x[i, 0], x[i, 1], x[i, 2]
+            best, count, px, py, pz = value, 1, x[3 * i], x[3 * i + 1], x[3 * i + 2]
         elif value == best:
-            count, px, py, pz = count + 1, px + x[i, 0], py + x[i, 1], pz + x[i, 2]
+            count, px, py, pz = count + 1, px + x[3 * i], py + x[3 * i + 1], pz + x[3 * i + 2]
     mean = np.float32(px / count), np.float32(py / count), np.float32(pz / count)
     _put(mean, sign * best > 0, place, block)
 
 
 @compiled
-def _forward(chosen, items, block):
+def _forward(inputs, item, items, block):
     """Set the inputs of the chosen item, and all features; their part of the value before tanh."""
-    x, y, z, share = chosen[0], chosen[1], chosen[2], ONE / np.float32(items)
-    for f in range(WIDTH):
+    long_vectors()
+    x, y, z = inputs[3 * item], inputs[3 * item + 1], inputs[3 * item + 2]
+    share = ONE / np.float32(items)
+    for f in range(BLOCK):
         own = np.float64(block[WX + f]) * x + np.float64(block[WY + f]) * y
         own += np.float64(block[WZ + f]) * z + block[BIAS + f]
         _put((x, y, z), own > 0, OWN + f, block)
         block[MEAN + f] *= share
-        block[MEAN + WIDTH + f] *= share
-        block[MEAN + 2 * WIDTH + f] *= share
-        block[MEAN + 3 * WIDTH + f] *= share
-    for f in range(WIDTH):
+        block[MEAN + BLOCK + f] *= share
+        block[MEAN + 2 * BLOCK + f] *= share
+        block[MEAN + 3 * BLOCK + f] *= share
+    for f in range(BLOCK):
         part = _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
         block[PARTS + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
-    half = WIDTH // 2
+    half = BLOCK // 2
     while half:  # in an order that needs few steps one after the other
         for f in range(half):
             block[PARTS + f] += block[PARTS + half + f]
@@ -347,29 +428,30 @@ def _forward(chosen, items, block):
 def _feature(inputs, kind, f, block):
     """Set one feature, weights · inputs; its part of the value before tanh."""
     place = inputs + f
-    feature = block[BIAS + f] * block[place + 3 * WIDTH]
-    feature = fma(block[WZ + f], block[place + 2 * WIDTH], feature)
-    feature = fma(block[WY + f], block[place + WIDTH], feature)
+    feature = block[BIAS + f] * block[place + 3 * BLOCK]
+    feature = fma(block[WZ + f], block[place + 2 * BLOCK], feature)
+    feature = fma(block[WY + f], block[place + BLOCK], feature)
     feature = fma(block[WX + f], block[place], feature)
-    block[FEATURE + kind * WIDTH + f] = feature
-    return block[SCORE + kind * WIDTH + f] * feature
+    block[FEATURE + kind * BLOCK + f] = feature
+    return block[SCORE + kind * BLOCK + f] * feature
 
 
 @compiled
 def _backward(slope, block):
     """Add one sample's gradients; ``slope`` is the loss's by the value before tanh."""
-    for f in range(WIDTH):
-        own, low = slope * block[SCORE + f], slope * block[SCORE + WIDTH + f]
-        high, mean = slope * block[SCORE + 2 * WIDTH + f], slope * block[SCORE + 3 * WIDTH + f]
+    long_vectors()
+    for f in range(BLOCK):
+        own, low = slope * block[SCORE + f], slope * block[SCORE + BLOCK + f]
+        high, mean = slope * block[SCORE + 2 * BLOCK + f], slope * block[SCORE + 3 * BLOCK + f]
         for axis in range(4):
-            row = axis * WIDTH + f
+            row = axis * BLOCK + f
             gradient = fma(own, block[OWN + row], block[GRADIENT + row])
             gradient = fma(low, block[LOWEST + row], gradient)
             gradient = fma(high, block[HIGHEST + row], gradient)
             block[GRADIENT + row] = fma(mean, block[MEAN + row], gradient)
         for kind in range(4):
-            row = GRADIENT + (4 + kind) * WIDTH + f
-            block[row] = fma(slope, block[FEATURE + kind * WIDTH + f], block[row])
+            row = GRADIENT + (4 + kind) * BLOCK + f
+            block[row] = fma(slope, block[FEATURE + kind * BLOCK + f], block[row])
 
 
 @compiled
