@@ -11,6 +11,7 @@ from unload.reproduce.comparison import (
     compare,
     comparison_data,
     find_policy,
+    policies_fingerprint,
     policy_digest,
 )
 from unload.support import files
@@ -62,6 +63,19 @@ def test_every_simple_policy_has_its_name():
     for name in ("random", "nearest", "highest"):
         assert find_policy(name) is getattr(policies, name)
     assert len(COMPARED) == 6 and len(CONDITIONS) == 7
+
+
+def test_fingerprint_is_that_of_the_training_of_the_policies(tmp_path):
+    def write(name, **content):
+        files.write_json(tmp_path / f"{name}.provenance.json", content)
+
+    assert policies_fingerprint(["random", "highest"], tmp_path) is None
+    assert policies_fingerprint(["paper"], tmp_path) is None
+    write("training", fingerprint="one")
+    assert policies_fingerprint(["random", "paper", "paper_seed_2"], tmp_path) == "one"
+    for recommended, shared in ((None, None), ("other", None), ("one", "one")):
+        write("study/recommended", **({"fingerprint": recommended} if recommended else {}))
+        assert policies_fingerprint(COMPARED, tmp_path) == shared
 
 
 @pytest.mark.parametrize("name", ["comparison", "robustness"])

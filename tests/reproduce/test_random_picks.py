@@ -5,7 +5,9 @@ import pandas as pd
 import pytest
 
 from unload import equalize
-from unload.reproduce.random_picks import TRANSFORMS, fit, offline_data, random_picks
+from unload.reproduce import random_picks
+from unload.reproduce.fingerprint import training_fingerprint
+from unload.reproduce.random_picks import TRANSFORMS, fit, offline_data
 
 
 @pytest.fixture
@@ -36,7 +38,7 @@ def test_features_are_what_their_names_say(observations):
 
 
 def test_random_picks_are_those_of_their_seed():
-    first, same, other = (random_picks(3, seed) for seed in (1, 1, 2))
+    first, same, other = (random_picks.random_picks(3, seed) for seed in (1, 1, 2))
     assert first["observations"].shape == (192, 128, 3)
     assert set(np.unique(first["rewards"])) <= {-1, 1}
     assert all(np.array_equal(first[name], same[name]) for name in first)
@@ -49,15 +51,21 @@ def test_positions_teach_the_height_within_a_few_updates():
     assert row == fit("positions", 0, steps=40, updates=800, loads=2)
 
 
-def test_finished_fits_are_kept(tmp_path):
+def test_finished_fits_are_kept(tmp_path, monkeypatch):
     size = {"steps": 2, "updates": 3, "loads": 1}
     for _ in range(2):
-        offline_data(tmp_path, tmp_path / "runs", 1, seeds=1, **size)
+        offline_data(tmp_path, tmp_path / "runs", 1, seeds=1, progress=False, **size)
     kept = list((tmp_path / "runs").rglob("*.json"))
     assert len(kept) == len(TRANSFORMS)
     table = pd.read_csv(tmp_path / "study/offline.csv")
     assert table["features"].tolist() == list(TRANSFORMS)
-    assert json.loads((tmp_path / "study/offline.provenance.json").read_text())["reduced"]
+    provenance = json.loads((tmp_path / "study/offline.provenance.json").read_text())
+    assert provenance["reduced"] and provenance["fingerprint"] == training_fingerprint()
+    # Fits of code that trains otherwise are not taken.
+    monkeypatch.setattr(random_picks, "training_fingerprint", lambda: "another")
+    monkeypatch.setattr(random_picks, "fit", lambda features, seed, **size: {"features": "anew"})
+    offline_data(tmp_path, tmp_path / "runs", 1, seeds=1, progress=False, **size)
+    assert set(pd.read_csv(tmp_path / "study/offline.csv")["features"]) == {"anew"}
 
 
 def test_unknown_features_are_refused():

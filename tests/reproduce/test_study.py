@@ -10,6 +10,7 @@ import pytest
 
 from unload import TrainConfig, evaluate, load_policy
 from unload.reproduce import measure, study
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.study import (
     BASE,
     EXPERIMENTS,
@@ -93,7 +94,8 @@ def test_an_experiment_leaves_a_row_for_each_run(made):
 def test_a_policy_is_measured_as_evaluate_does(made):
     rows, _ = read_study("rewards", made)
     row = rows.set_index("run").loc["noisy ranks/height_reward 0.5/seed_0"]
-    policy = load_policy(made / "runs/study/rewards" / row.name / "policy.safetensors")
+    kept = made / "runs/study/rewards" / training_fingerprint()
+    policy = load_policy(kept / row.name / "policy.safetensors")
     assert policy.equalize
     table = evaluate(policy, 3, measure.LOADS_SEED, mask=False)
     assert row["msr_no_mask"] == pytest.approx(table["success_rate"].mean(), rel=1e-5)
@@ -120,6 +122,7 @@ def test_a_smaller_experiment_says_so(made):
     assert provenance["reduced"]
     assert provenance["runs"] == len(study.rewards(seeds=1))
     assert "rewards" in provenance["command"]
+    assert provenance["fingerprint"] == training_fingerprint()
 
 
 def test_the_recommended_agent_is_kept(tmp_path, monkeypatch):

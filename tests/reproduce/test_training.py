@@ -9,6 +9,7 @@ from unload import task
 from unload.agent.weights import load_policy
 from unload.reproduce import training
 from unload.reproduce.figures import training as figures
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.support.provenance import read_provenance
 
 
@@ -19,6 +20,7 @@ def test_training_data(tmp_path, monkeypatch):
     monkeypatch.setattr(task, "MAX_PICKS", 50)
     picks, seeds = 64 * 100, (3, 5)
     data = tmp_path / "data"
+    runs = tmp_path / f"runs/training/{training_fingerprint()}/{picks}_picks"
     training.training_data(picks, seeds, data, tmp_path / "runs", n_jobs=1, progress=False)
     for name in ("loss_function_agent", "total_rew_function_agent"):
         for suffix in ("", "_seed_5"):
@@ -28,9 +30,7 @@ def test_training_data(tmp_path, monkeypatch):
     assert table["Value"].between(-50, 50).all()
     for suffix in ("", "_seed_5"):
         stored = load_policy(data / "policies" / f"paper{suffix}.safetensors")
-        trained = load_policy(
-            tmp_path / f"runs/training/{picks}_picks/seed_{5 if suffix else 3}/policy.safetensors"
-        )
+        trained = load_policy(runs / f"seed_{5 if suffix else 3}/policy.safetensors")
         weights = [policy.network.state_dict() for policy in (stored, trained)]
         assert all(weights[0][name].equal(weights[1][name]) for name in weights[1])
     summary = pd.read_csv(data / "training_summary.csv")
@@ -46,6 +46,7 @@ def test_training_data(tmp_path, monkeypatch):
     provenance = read_provenance(data, "training")
     assert provenance["reduced"]
     assert provenance["settings"]["picks"] == picks
+    assert provenance["fingerprint"] == training_fingerprint()
     assert provenance["command"].endswith("training --picks 6400 --seeds 3 5")
     for draw, label in ((figures.fig11_loss, "loss"), (figures.fig12_reward, "mean")):
         (axes,) = draw(data).axes

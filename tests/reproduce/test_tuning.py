@@ -7,6 +7,7 @@ import pytest
 
 from unload.reproduce import tuning
 from unload.reproduce.figures import tuning as figures
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.support.provenance import read_provenance
 
 
@@ -112,6 +113,7 @@ def test_tuning_data(tmp_path):
     assert provenance["settings"]["steps"] == 5
     assert provenance["settings"]["config"]["batch_size"] == 8
     assert provenance["runs"] == 4
+    assert provenance["fingerprint"] == training_fingerprint()
     assert provenance["command"] == (
         "python -m unload.reproduce tuning --learning-rates 0.01 --batch-sizes 8 --runs 2 --steps 5"
     )
@@ -132,7 +134,8 @@ def test_figures_of_few_runs_say_so(tmp_path):
 
 
 def test_failed_runs_are_named(tmp_path):
-    run = tmp_path / "runs/tuning/5_steps/dummy_sim_with_hist_equal/bz_8_lr_0.01_agent_0"
+    runs = tmp_path / f"runs/tuning/{training_fingerprint()}/5_steps"
+    run = runs / "dummy_sim_with_hist_equal/bz_8_lr_0.01_agent_0"
     run.parent.mkdir(parents=True)
     run.write_text("no folder")
     with pytest.raises(RuntimeError, match="dummy_sim_with_hist_equal/bz_8_lr_0.01_agent_0"):

@@ -17,6 +17,7 @@ from unload.agent.config import TrainConfig
 from unload.agent.sweep import run_sweep
 from unload.agent.training import train
 from unload.agent.weights import save_policy
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, read_table
 from unload.support import checks, files
 
@@ -112,7 +113,8 @@ def publish_run(name: str, config: TrainConfig, run: Path, folder: Path) -> None
         asdict(config),
         config.picks < BASE.picks,
         [files.read_json(run / "record.json")],
-        float_format="%.5g",
+        training_fingerprint(),
+        "%.5g",
     )
 
 

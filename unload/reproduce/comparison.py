@@ -20,10 +20,12 @@ from unload.agent.weights import load_policy
 from unload.load.substacks import stack_load
 from unload.reproduce.results import COMMAND, JOBS, measured, publish
 from unload.support import checks, files
+from unload.support.provenance import read_provenance
 
 SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
-# Trainings of the paper's configuration end in two ways: one of each is compared.
-LEARNED = ("paper", "paper_seed_2", "recommended")
+# Learned policy → the data that it was trained with. Trainings of the paper's configuration
+# end in two ways: one of each is compared.
+LEARNED = {"paper": "training", "paper_seed_2": "training", "recommended": "study/recommended"}
 COMPARED = (*SIMPLE, *LEARNED)
 LOADS, SEED = 100, 3000  # fresh containers for each policy and condition
 CONDITIONS = {
@@ -80,6 +82,7 @@ def comparison_data(
         {"policies": weights, "loads": loads, "seed": SEED},
         loads < LOADS or set(names) < set(COMPARED),
         [result.record for result in results],
+        policies_fingerprint(names, folder),
     )
 
 
@@ -118,6 +121,22 @@ def policy_digest(name: str, folder: str | Path = files.DATA) -> str | None:
     if name in SIMPLE:
         return None
     return blake2b(policy_file(name, folder).read_bytes(), digest_size=16).hexdigest()
+
+
+def policies_fingerprint(names: Sequence[str], folder: str | Path = files.DATA) -> str | None:
+    """The fingerprint of the training that learned policies come from.
+
+    Returns:
+        None if no policy is learned, or if any training's fingerprint is absent or differs.
+    """
+    fingerprints = set()
+    for name in LEARNED.keys() & set(names):
+        try:
+            provenance = read_provenance(folder, LEARNED[name])
+        except FileNotFoundError:
+            return None
+        fingerprints.add(provenance.get("fingerprint"))
+    return fingerprints.pop() if len(fingerprints) == 1 else None
 
 
 def policy_file(name: str, folder: str | Path = files.DATA) -> Path:

@@ -22,6 +22,7 @@ from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
 from unload.env.equalization import equalize
 from unload.network.peq import PEQNetwork
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
 from unload.support import checks, files
 
@@ -94,8 +95,10 @@ def offline_data(
     """
     size = SIZE | size
     settings = {"batch_size": BATCH_SIZE, "loads_seed": LOADS_SEED, **size}
+    fingerprint = training_fingerprint()
+    question = settings | {"fingerprint": fingerprint}
     jobs = [
-        ({"features": name, "seed": seed} | settings, partial(fit, name, seed, **size))
+        ({"features": name, "seed": seed} | question, partial(fit, name, seed, **size))
         for name, seed in product(TRANSFORMS, range(checks.integer("seeds", seeds, 1)))
     ]
     answers = keep_all(Path(runs_dir) / "offline", jobs, n_jobs, progress)
@@ -107,6 +110,7 @@ def offline_data(
         {"seeds": seeds} | settings,
         seeds < SEED_COUNT or any(size[name] < full for name, full in SIZE.items()),
         [answer.record for answer in answers],
+        fingerprint,
     )
 
 

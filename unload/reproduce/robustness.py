@@ -22,7 +22,7 @@ from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
 from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Surroundings
 from unload.reproduce import comparison
-from unload.reproduce.comparison import COMPARED, find_policy, policy_digest
+from unload.reproduce.comparison import COMPARED, find_policy, policies_fingerprint, policy_digest
 from unload.reproduce.results import COMMAND, keep_all, publish
 from unload.support import checks, files
 
@@ -103,6 +103,7 @@ def robustness_data(
         settings,
         episodes < EPISODES or picks < PICKS or set(weights) < set(COMPARED),
         [answer.record for answer in answers],
+        policies_fingerprint(names, folder),
     )
     return frame
 

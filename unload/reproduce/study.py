@@ -20,6 +20,7 @@ from unload.agent.config import TrainConfig
 from unload.agent.sweep import run_all
 from unload.agent.weights import load_policy, save_policy
 from unload.reproduce import measure
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, read_table
 from unload.support import checks, files
 
@@ -150,7 +151,7 @@ def study_data(
     Args:
         experiment: a name in ``EXPERIMENTS``.
         folder: of the data.
-        runs_dir: where the runs are kept.
+        runs_dir: where the runs are kept, apart from those of code that trained otherwise.
         n_jobs: processes, see ``run_sweep``.
         progress: show a progress bar.
         **size: ``picks`` and ``seeds`` of the experiment, if not its own.
@@ -161,7 +162,8 @@ def study_data(
     """
     checks.one_of("experiment", experiment, EXPERIMENTS)
     configs = EXPERIMENTS[experiment](**size)
-    kept, folder = Path(runs_dir) / "study" / experiment, Path(folder)
+    fingerprint = training_fingerprint(config.network for config in configs.values())
+    kept, folder = Path(runs_dir) / "study" / experiment / fingerprint, Path(folder)
     records = run_all(configs, kept, n_jobs, progress)
     measured = Parallel(n_jobs)(
         delayed(measure.measure_run)(config, kept / name) for name, config in configs.items()
@@ -187,6 +189,7 @@ def study_data(
         settings | size,
         bool(size),
         records,
+        fingerprint,
     )
 
 

@@ -14,6 +14,7 @@ from unload.agent.evaluation import evaluate
 from unload.agent.sweep import run_all
 from unload.agent.training import TrainResult, train
 from unload.agent.weights import save_policy
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings, write_table
 from unload.support import checks, files
 
@@ -50,7 +51,7 @@ def training_data(
         picks: K, at least one episode of all environments.
         seeds: of the runs; the first one is the paper's line in the figures.
         folder: of the data.
-        runs_dir: where the runs are kept.
+        runs_dir: where the runs are kept, apart from those of code that trained otherwise.
         n_jobs: processes, see ``run_sweep``.
         progress: show a progress bar.
 
@@ -59,7 +60,8 @@ def training_data(
         RuntimeError: a run failed; the message says which and why.
     """
     checks.integer("picks", picks, task.NUM_ENVS * task.MAX_PICKS)
-    folder, kept = Path(folder), Path(runs_dir) / f"training/{picks}_picks"
+    fingerprint = training_fingerprint()
+    folder, kept = Path(folder), Path(runs_dir) / f"training/{fingerprint}/{picks}_picks"
     configs = {
         f"seed_{seed}": TrainConfig(picks=picks, seed=seed, log_interval=LOG_INTERVAL)
         for seed in seeds
@@ -89,7 +91,8 @@ def training_data(
         "config": shared_settings(configs),
     }
     command = f"{COMMAND} training --picks {picks} --seeds {' '.join(map(str, seeds))}"
-    publish(folder, "training", tables, command, settings, picks < PAPER_PICKS, records)
+    reduced = picks < PAPER_PICKS
+    publish(folder, "training", tables, command, settings, reduced, records, fingerprint)
 
 
 def training_summary(result: TrainResult) -> dict[str, float]:

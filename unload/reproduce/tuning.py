@@ -13,6 +13,7 @@ from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.sweep import run_all
 from unload.agent.training import train
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings
 from unload.support import checks, files
 
@@ -56,14 +57,15 @@ def tuning_data(
         runs: per configuration.
         steps: K.
         folder: of the data.
-        runs_dir: where the runs are kept.
+        runs_dir: where the runs are kept, apart from those of code that trained otherwise.
         n_jobs: processes, see ``run_sweep``.
         progress: show a progress bar.
 
     Raises:
         RuntimeError: a run failed; the message says which and why.
     """
-    folder, kept = Path(folder), Path(runs_dir) / f"tuning/{steps}_steps"
+    fingerprint = training_fingerprint()
+    folder, kept = Path(folder), Path(runs_dir) / f"tuning/{fingerprint}/{steps}_steps"
     configs = tuning_grid(learning_rates, batch_sizes, runs, steps=steps)
     records = run_all(configs, kept, n_jobs, progress)
     curves = {name: train(config, kept / name).curve for name, config in configs.items()}
@@ -89,6 +91,7 @@ def tuning_data(
         settings,
         steps < STEPS or runs < RUN_COUNT or not complete,
         records,
+        fingerprint,
     )
 
 
