@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import TrainConfig, evaluate, load_policy
+from unload import TrainConfig, load_policy
 from unload.reproduce import measure, study
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.study import (
@@ -91,30 +91,11 @@ def test_an_experiment_leaves_a_row_for_each_run(made):
         assert rows[name].between(0, 1).all()
 
 
-def test_a_policy_is_measured_as_evaluate_does(made):
-    rows, _ = read_study("rewards", made)
-    row = rows.set_index("run").loc["noisy ranks/height_reward 0.5/seed_0"]
-    kept = made / "runs/study/rewards" / training_fingerprint()
-    policy = load_policy(kept / row.name / "policy.safetensors")
-    assert policy.equalize
-    table = evaluate(policy, 3, measure.LOADS_SEED, mask=False)
-    assert row["msr_no_mask"] == pytest.approx(table["success_rate"].mean(), rel=1e-5)
-    assert row["longest_deadlock"] == table["longest_deadlock"].max()
-
-
-def test_the_last_snapshot_is_the_trained_policy(made):
+def test_curves_have_a_point_for_each_snapshot(made):
     rows, curves = read_study("rewards", made)
     assert curves.groupby("run")["picks"].apply(list).map(len).eq(2).all()
     assert curves["picks"].max() == rows["picks"].max()
     assert np.isfinite(curves[["success_rate", "deadlocked", "msr_mask"]].to_numpy()).all()
-
-
-def test_the_goal_is_reached_at_the_first_snapshot_that_reaches_it(made):
-    rows, curves = read_study("rewards", made)
-    for _, row in rows.iterrows():
-        good = curves[(curves["run"] == row["run"]) & (curves["msr_mask"] >= measure.GOAL)]
-        first = row["picks_to_goal_mask"]
-        assert np.isnan(first) if good.empty else first == good["picks"].min()
 
 
 def test_a_smaller_experiment_says_so(made):

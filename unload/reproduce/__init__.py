@@ -1,0 +1,9 @@
+"""The experiments of the reproduction, one file each, and how their results are kept.
+
+Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the paper's own);
+``measure``, ``study``, ``random_picks``, ``random_share``, ``answer`` and ``verdict`` (why 60 %);
+``comparison`` and ``robustness`` (policies compared); ``lifts`` and ``agreement`` (the physics);
+``heap``, ``heap_learning`` and ``heap_table`` (the unordered load). ``fingerprint`` says whether
+the code still trains as it did, ``intervals`` how sure a mean is. ``__main__`` is the command
+line, and ``figures`` draws.
+"""
