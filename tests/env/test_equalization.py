@@ -21,7 +21,7 @@ def test_table_one():
 
 
 def test_it_is_the_rank_and_not_the_sort_order():
-    """Table I's permutation is its own inverse; this cycle of three tells the two apart."""
+    """Table I's permutation is its own inverse; this cycle of three is not."""
     values = (0.3, 0.1, 0.2)
     assert np.argsort(values).tolist() == [1, 2, 0]
     assert equalized(*values) == [1, -1, 0]

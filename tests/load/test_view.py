@@ -55,7 +55,7 @@ def test_packages_have_a_colour_and_a_line_in_the_legend(small_load):
     assert len(set(colours)) == len(names)
 
 
-def test_groups_are_told_apart_and_the_later_one_wins(small_load):
+def test_groups_differ_in_colour_and_the_later_one_wins(small_load):
     figure = view(small_load, groups={"visible": [0, 1, 2], "tried": [2, 3]})
     colours = np.array(figure.data[0].facecolor)[::12]
     assert colours[0] == colours[1] and colours[2] == colours[3]

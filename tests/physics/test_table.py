@@ -16,7 +16,7 @@ from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics
 
 @pytest.fixture(scope="module")
 def known(situations):
-    """Situations with at most two boxes on top, and what ``LocalPhysics`` answers alone."""
+    """Situations with at most two boxes on top, and their distances in ``LocalPhysics``."""
     local = LocalPhysics()
     light = [each for each in situations if each.on_top < HELD_DOWN]
     yield [(situation, local.simulate(situation)) for situation in light]
@@ -30,7 +30,7 @@ def test_table_equals_local_exactly(make, rng):
         distance = local.lift(item)
         if local.surroundings.situation(item).on_top < HELD_DOWN:
             assert table.lift(item) == table.lift(item) == distance
-        else:  # not asked, because never lifted
+        else:  # not simulated, because never lifted
             assert table.lift(item) == 0 and distance < 0.02
         if distance >= task.LIFT_THRESHOLD:
             local.remove(item)
@@ -42,7 +42,7 @@ def test_a_situation_is_simulated_once(known, monkeypatch):
     first, second, fresh = TablePhysics(), TablePhysics(), TablePhysics()
     second.table = first.table
     assert [first.simulate(situation) for situation, _ in known] == [d for _, d in known]
-    monkeypatch.setattr(World, "pull", lambda *_: pytest.fail("asked PyBullet again"))
+    monkeypatch.setattr(World, "pull", lambda *_: pytest.fail("simulated again"))
     for physics in (first, second):
         assert [physics.simulate(situation) for situation, _ in known] == [d for _, d in known]
     assert len(known) > 20 and 0 < len(first.table) <= len(known)

@@ -50,9 +50,9 @@ class ContainerEnv(PickingEnv):
     | 2 | z | floor | ceiling |
 
     Once fewer than 128 boxes are left, they come first, and each row after them holds -1 in
-    all columns, equalized or not. ``info["item_mask"]`` tells these rows; so does
-    ``unload.observation.holds_item``, if the observation is not equalized. Ranks are those
-    among the boxes that are there.
+    all columns, equalized or not. ``info["item_mask"]`` is 0 in these rows; so is
+    ``unload.env.observation.holds_item``, if the observation is not equalized. Ranks are
+    those among the boxes that are there.
 
     ## Rewards
     +1 if the item was unloaded, -1 if not.
@@ -71,8 +71,8 @@ class ContainerEnv(PickingEnv):
 
     - ``action_mask``: (128,) int8, 0 for rows that failed since the last successful pick,
       and for rows without a box;
-    - ``item_mask``: (128,) int8, 0 for rows without a box only: for learners that are not
-      told which rows failed;
+    - ``item_mask``: (128,) int8, 0 for rows without a box only: for learning without the
+      mask of failed rows;
     - ``unloaded``: int, items unloaded in this episode;
 
     and ``step`` also
@@ -81,15 +81,15 @@ class ContainerEnv(PickingEnv):
     - ``distance``: float, how far it moved in m.
 
     Args:
-        physics: who answers a lift: ``"local"`` (the situation of the chosen box),
-            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered, and 0
-            without asking PyBullet if three or more boxes rest on the chosen one).
+        physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
+            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered, and nothing
+            if three or more boxes rest on the chosen one: it moves by 0 m).
         after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
-        position_noise: standard deviation of the blur in m; 0 also switches off the
-            1 mm down. It applies where the boxes stay where they were put; ``"full"``
+        position_noise: standard deviation of the blur in m, at most 10; 0 also switches off
+            the 1 mm down. It applies where the boxes stay where they were put; ``"full"``
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
         stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``.
@@ -100,8 +100,8 @@ class ContainerEnv(PickingEnv):
 
     Raises:
         TypeError, ValueError: an argument, an action or a load is not as described.
-        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step``
-            after the end of an episode.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, ``step`` after
+            the end of an episode, or any of them after an error in the middle of a call.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 

@@ -25,7 +25,7 @@ def equalize(
 
     Args:
         positions: (..., items, axes) float, at least two items.
-        ties: what becomes of items at the same height (or depth, or width).
+        ties: ranks of items at the same height (or depth, or width).
             ``"noise"``: each has a rank of its own, as in the paper, where the
             simulator's inaccuracy decides among them; exactly equal values are ranked
             in the order of the items. ``"average"``: items whose sorted neighbours

@@ -55,14 +55,14 @@ class HighestItemEnv(PickingEnv):
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: length of an episode.
-        position_noise: standard deviation of the blur in m; 0 also switches off the
-            1 mm down.
+        position_noise: standard deviation of the blur in m, at most 10; 0 also switches off
+            the 1 mm down.
         render_mode: None; there is nothing to draw.
 
     Raises:
         TypeError, ValueError: an argument or an action is not as described.
-        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step``
-            after the end of an episode.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, ``step`` after
+            the end of an episode, or any of them after an error in the middle of a call.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 

@@ -1,4 +1,4 @@
-"""What the agent sees: the items nearest to the entrance, scaled (Sec. III-B).
+"""The agent's observation: the items nearest to the entrance, scaled (Sec. III-B).
 
 The last items of a container fill the first rows of the observation only. The rows after
 them hold ``PADDING`` on all three axes: the corner of the container, where no item's centre
@@ -88,7 +88,7 @@ def holds_item(observations: np.ndarray) -> np.ndarray:
     """Which rows hold an item and not padding.
 
     Args:
-        observations: (..., items, 3) float, scaled positions. Equalized ones do not tell:
+        observations: (..., items, 3) float, scaled positions. Equalized ones do not show it:
             an item that is last on every axis has the ranks of padding.
 
     Returns:

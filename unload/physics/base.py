@@ -1,7 +1,7 @@
-"""The interface of the three ways to ask PyBullet whether an item can be lifted.
+"""The interface of the three physics, which lift items with PyBullet.
 
 All have ``reset(load)``, ``lift(item)``, ``remove(item)``, ``positions()`` and ``close()``.
-``lift`` answers how far the item moved; it is unloaded if that is at least
+``lift`` returns how far the item moved; it is unloaded if that is at least
 ``task.LIFT_THRESHOLD``.
 """
 
@@ -16,7 +16,7 @@ from unload.support import checks
 
 
 class Physics(ABC):
-    """A container that answers lifts.
+    """A container whose items can be lifted.
 
     Threads may share one physics: its methods wait for each other.
 
@@ -51,7 +51,7 @@ class Physics(ABC):
             self.present = np.ones(len(load), dtype=bool)
             try:
                 self._reset()
-            except BaseException:  # interrupted: a half-filled container must not answer
+            except BaseException:  # interrupted: nothing may be lifted in a half-filled container
                 self.load = None
                 self._stop()
                 raise

@@ -1,6 +1,6 @@
 """A memory of lifts: how far the box of a situation moved.
 
-A lift depends on its situation alone, so PyBullet needs to be asked once for each. The
+A lift depends on its situation alone, so PyBullet needs to simulate each situation once. The
 table is only as good as the physics that filled it: a file of another physics is refused.
 """
 

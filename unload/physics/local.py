@@ -8,7 +8,7 @@ from unload.physics.bullet import World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
 # A world keeps the shape of every box size that it has met, 3.4 kB each, and cannot free
-# one. At this number it is replaced by a new one, which gives the same answers.
+# one. At this number it is replaced by a new one, which gives the same distances.
 MOST_SHAPES = 10_000
 
 

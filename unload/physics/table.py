@@ -16,7 +16,7 @@ _reading = Lock()
 class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
-    A box with three or more others on it is held down, and PyBullet is not asked. Such
+    A box with three or more others on it is held down, without a simulation. Such
     situations hardly ever repeat, and of 7,374 distinct ones PyBullet moved no box by the
     0.2 m of a success: one by 0.132 m, all but four by less than 4 mm.
 
