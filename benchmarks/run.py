@@ -28,8 +28,8 @@ from benchmarks.profile_step import step_profile
 from benchmarks.training import training_rates
 from benchmarks.updates import update_times
 from unload.reproduce.figures.speed import FOLDER, three_digits
-from unload.support import files
-from unload.support.provenance import run_record, write_provenance
+from unload.reproduce.results import publish
+from unload.support.provenance import run_record
 
 COMMAND = "python benchmarks/run.py"
 
@@ -97,11 +97,9 @@ def main() -> None:
     show(tables)
     if options.quick:
         return
-    for name, table in tables.items():
-        files.write_text(FOLDER / f"{name}.csv", table.to_csv(index=False, float_format="%.6g"))
     settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
     record = run_record(time.monotonic() - start)
-    write_provenance(FOLDER, "benchmarks", COMMAND, settings, False, record)
+    publish(FOLDER, "benchmarks", tables, COMMAND, settings, False, [record])
 
 
 if __name__ == "__main__":
