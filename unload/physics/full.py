@@ -7,13 +7,12 @@ import numpy as np
 
 from unload import task
 from unload.physics.base import Physics
-from unload.physics.bullet import TIME_STEP, World, slim
+from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
 from unload.physics.situation import RESOLUTION
 from unload.support import checks
 
 AFTER_PICK = ("restore", "restore_failure", "keep")
 DEPOT = -100.0  # m, height of the floor far below on which spare boxes wait
-UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # quaternion x, y, z, w
 
 
 class FullPhysics(Physics):

@@ -31,9 +31,8 @@ class LocalPhysics(Physics):
         """
         with self._lock:
             self._check_open()
-            if self._world is not None and self._world.shapes >= MOST_SHAPES:
+            if self._world is None or self._world.shapes >= MOST_SHAPES:
                 self._stop()
-            if self._world is None:
                 self._world = World()
             return lift(self._world, situation)
 
