@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from benchmarks.timing import best_times
+from unload.agent.fast.kernel import long_vectors
 
 CHAIN = 32  # operations on a number once it is loaded
 
@@ -11,6 +12,7 @@ CHAIN = 32  # operations on a number once it is loaded
 @numba.njit(fastmath={"contract", "nsz"})
 def _multiply_and_add(numbers, results):
     """For each number, half as many multiply-adds as ``CHAIN``, and as many additions."""
+    long_vectors()
     for i in range(len(numbers)):
         x = numbers[i]
         product, total = x, x
