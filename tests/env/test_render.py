@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from unload import Load
 from unload.env.render import Camera
 from unload.load.substacks import build_load
 
@@ -43,6 +44,13 @@ def test_boxes_are_drawn_where_they_are(camera, boxes):
     assert (camera.picture(moved, present) == drifted).all()
     with pytest.raises(ValueError, match="positions has shape"):
         camera.picture(load, present, np.zeros((2, 3)))
+
+
+def test_thin_boxes_are_drawn_too(camera):
+    """Boxes are drawn 15 mm smaller, but not smaller than nothing."""
+    load = Load([[3.5, 1.25, 0.5]], [[1.0, 0.01, 1.0]], [0], [0])
+    shown, empty = (camera.picture(load, np.full(1, present)) for present in (True, False))
+    assert (shown != empty).any()
 
 
 def test_an_item_may_come_back(camera, small_load):
