@@ -1,16 +1,14 @@
 """Picks from heaps recorded, and networks learned from them.
 
-    python -m unload.reproduce heap-picks --round 0
-    python -m unload.reproduce heap-learn --round 0
-    python -m unload.reproduce heap-picks --round 1
-    python -m unload.reproduce heap-learn --round 1
+    python -m unload.reproduce heap-learning
 
-Round 0 explores around random linear rules, round 1 around the networks of round 0. Each
-episode and each network is a file in ``runs/heap``: a command that was stopped goes on, and
-heaps and seeds make an episode the same wherever and in whatever order it is computed.
+Two rounds: the first explores around random linear rules, the second around the networks that
+were learned from the first. Each episode and each network is a file in ``runs/heap``: a command
+that was stopped goes on, and seeds make an episode the same in whatever order it is computed.
 """
 
 import hashlib
+import time
 from collections.abc import Iterable, Sequence
 from itertools import product
 from pathlib import Path
@@ -24,19 +22,59 @@ from unload.heap.env import MAX_PICKS, HeapEnv
 from unload.heap.episodes import episode_from, exploring, picks_of, play
 from unload.heap.learning import Learned, Picks, fit, joined, load_network, save_network
 from unload.heap.network import KINDS
+from unload.heap.rake import PHYSICS as PHYSICS_KINDS
 from unload.reproduce.heap import NAME, SEEDS
 from unload.reproduce.results import COMMAND, JOBS
 from unload.support import checks, files
+from unload.support.provenance import run_record, write_provenance
 
 PICKS = 50_000  # of both rounds
 PHYSICS = "coarse"
 ROUNDS = 2
 SEEDS_LEARNED = 5
-GAMMAS = 0.0, 0.5, 0.8
+EPOCHS = 20
 # What is learned: kind of network and γ; the recommended one first.
 VARIANTS = (("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0))
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
-ROUND = {"--round": {"dest": "round_number", "type": int, "default": 0, "help": "0 or 1"}}
+OPTIONS = JOBS | {
+    "--picks": {"type": int, "default": PICKS, "help": "picks to record, in all rounds"},
+    "--rounds": {"type": int, "default": ROUNDS, "help": "of recording and learning"},
+    "--physics": {"default": PHYSICS, "choices": PHYSICS_KINDS, "help": "that records"},
+}
+
+
+def learning_data(
+    picks: int = PICKS,
+    rounds: int = ROUNDS,
+    physics: str = PHYSICS,
+    seeds: int = SEEDS_LEARNED,
+    epochs: int = EPOCHS,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = 1,
+    progress: bool = True,
+) -> None:
+    """Record and learn in all rounds; write ``heap/networks`` and their provenance.
+
+    ``heap/networks`` are the recommended variant's networks of the last round, one per seed.
+    """
+    start = time.monotonic()
+    for round_number in range(checks.integer("rounds", rounds, 1, ROUNDS)):
+        record_picks(picks // rounds, round_number, physics, runs_dir, n_jobs, progress)
+        variants = VARIANTS if round_number == rounds - 1 else VARIANTS[:1]
+        learn(round_number, seeds, variants, runs_dir, n_jobs, epochs)
+    paths = network_paths(rounds - 1, *VARIANTS[0], runs_dir)
+    for seed, path in enumerate(paths):
+        target = Path(folder) / NAME / "networks" / f"seed{seed}.safetensors"
+        save_network(load_network(path), target)
+    write_provenance(
+        Path(folder) / NAME,
+        "networks",
+        f"{COMMAND} heap-learning --picks {picks} --rounds {rounds} --physics {physics}",
+        {"picks": picks, "physics": physics, "rounds": rounds, "seeds": seeds, "epochs": epochs},
+        picks < PICKS or rounds < ROUNDS or physics != PHYSICS or seeds < SEEDS_LEARNED,
+        run_record(time.monotonic() - start),
+    )
 
 
 def record_picks(
@@ -99,7 +137,7 @@ def read_picks(runs_dir: str | Path = files.RUNS, rounds: Iterable[int] = range(
     folder = Path(runs_dir) / NAME / "picks"
     paths = [path for each in rounds for path in sorted((folder / f"round{each}").glob("*.npz"))]
     if not paths:
-        raise FileNotFoundError(f"{folder} holds no picks; {COMMAND} heap-picks records them")
+        raise FileNotFoundError(f"{folder} holds no picks; {COMMAND} heap-learning records them")
     return joined([picks_of(episode_from(files.read_arrays(path))) for path in paths])
 
 
@@ -122,33 +160,29 @@ def network_paths(
     pattern = network_path(round_number, kind, gamma, 0, runs_dir)
     found = sorted(pattern.parent.glob(pattern.name.replace("seed0", "seed*")))
     if not found:
-        raise FileNotFoundError(
-            f"{pattern} is missing; {COMMAND} heap-learn --round {round_number} makes it"
-        )
+        raise FileNotFoundError(f"{pattern} is missing; {COMMAND} heap-learning makes it")
     return found
 
 
 def learn(
     round_number: int = ROUNDS - 1,
     seeds: int = SEEDS_LEARNED,
-    variants: Sequence[tuple[str, float]] | None = None,
+    variants: Sequence[tuple[str, float]] = VARIANTS,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
-    epochs: int = 20,
+    epochs: int = EPOCHS,
 ) -> list[Path]:
     """Learn networks from the picks of a round and of those before it.
 
     Args:
-        round_number: 0 or 1; after round 0, only the recommended variant is needed.
+        round_number: 0 or 1; to record the next round, the recommended variant is enough.
         seeds: networks of each variant.
-        variants: pairs of ``HeapNetwork`` kind and γ; of the round if None.
+        variants: pairs of ``HeapNetwork`` kind and γ.
         runs_dir: where picks and networks are.
         n_jobs: processes, as in joblib.
         epochs: see ``fit``.
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
-    if variants is None:
-        variants = VARIANTS if round_number == ROUNDS - 1 else VARIANTS[:1]
     for kind, gamma in variants:
         checks.one_of("kind", kind, KINDS)
         checks.real("gamma", gamma, 0, 0.999)
@@ -179,7 +213,4 @@ def weights_digest(paths: Iterable[Path]) -> str:
     return whole.hexdigest()
 
 
-PARTS = {
-    "heap-picks": ("picks from heaps, recorded", record_picks, ROUND | JOBS),
-    "heap-learn": ("networks learned from these picks", learn, ROUND | JOBS),
-}
+PARTS = {"heap-learning": ("picks from heaps, and networks learned", learning_data, OPTIONS)}

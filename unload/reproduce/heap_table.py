@@ -18,6 +18,7 @@ import torch
 from unload.heap.env import MAX_PICKS, HeapEnv
 from unload.heap.episodes import Oracle, play
 from unload.heap.learning import Learned, load_network
+from unload.heap.rake import PHYSICS as PHYSICS_KINDS
 from unload.heap.rules import RULES, best, family, linear
 from unload.reproduce.heap import HEAPS, NAME
 from unload.reproduce.heap_learning import (
@@ -74,7 +75,7 @@ def rules_data(
     frame = pd.DataFrame(rows)
     settings = {"heaps": heaps, "split": "train", "physics": RULE_PHYSICS, "picks": MAX_PICKS}
     records = [answer.record for answer in answers]
-    command, reduced = f"{COMMAND} heap-rules", heaps < RULE_HEAPS
+    command, reduced = f"{COMMAND} heap-rules --heaps {heaps}", heaps < RULE_HEAPS
     publish(Path(folder) / NAME, "rules", {"rules": frame}, command, settings, reduced, records)
     return frame
 
@@ -168,7 +169,7 @@ def table_data(
     conditions: Sequence[str] = tuple(CONDITIONS),
     weights: Sequence[float] = WEIGHTS,
     variants: Sequence[tuple[str, float]] = VARIANTS,
-    round_number: int = ROUNDS - 1,
+    rounds: int = ROUNDS,
     oracle: bool = True,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
@@ -190,7 +191,7 @@ def table_data(
     cells = []
     for weight in dict.fromkeys((SHOWN_WEIGHT, *weights)):
         shown = weight == SHOWN_WEIGHT
-        chosen = players(rules, weight, variants, round_number, runs_dir, oracle)
+        chosen = players(rules, weight, variants, rounds - 1, runs_dir, oracle)
         for condition in conditions if shown else conditions[:1]:
             for name, player in chosen.items():
                 varies = "rule" not in player and " seed " not in name
@@ -223,16 +224,20 @@ def table_data(
         "heaps": heaps,
         "physics": physics,
         "picks": MAX_PICKS,
-        "round": round_number,
+        "rounds": rounds,
         "conditions": {name: CONDITIONS[name] for name in conditions},
         "best rules": {str(weight): best_rule(rules, weight) for weight in weights},
     }
-    reduced = heaps < HEAPS["test"] or physics != PHYSICS or tuple(conditions) != tuple(CONDITIONS)
+    reduced = (
+        heaps < HEAPS["test"]
+        or rounds < ROUNDS
+        or physics != PHYSICS
+        or tuple(conditions) != tuple(CONDITIONS)
+    )
     records = [answer.record for answer in answers]
     tables = {"episodes": episodes, "table": table}
-    publish(
-        Path(folder) / NAME, "table", tables, f"{COMMAND} heap-table", settings, reduced, records
-    )
+    command = f"{COMMAND} heap-table --heaps {heaps} --physics {physics} --rounds {rounds}"
+    publish(Path(folder) / NAME, "table", tables, command, settings, reduced, records)
     return table
 
 
@@ -286,7 +291,15 @@ def ratio_interval(
     return float(values.mean() / reference.mean()), float(low), float(high)
 
 
+def _options(heaps: int) -> dict:
+    return JOBS | {"--heaps": {"type": int, "default": heaps, "help": "heaps to play"}}
+
+
+TABLE_OPTIONS = _options(HEAPS["test"]) | {
+    "--physics": {"default": PHYSICS, "choices": PHYSICS_KINDS, "help": "that judges"},
+    "--rounds": {"type": int, "default": ROUNDS, "help": "of heap-learning that were made"},
+}
 PARTS = {
-    "heap-rules": ("the family of rules on training heaps", rules_data, JOBS),
-    "heap-table": ("all policies on unseen heaps", table_data, JOBS),
+    "heap-rules": ("the family of rules on training heaps", rules_data, _options(RULE_HEAPS)),
+    "heap-table": ("all policies on unseen heaps", table_data, TABLE_OPTIONS),
 }
