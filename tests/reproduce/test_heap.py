@@ -59,7 +59,7 @@ def test_agreement_asks_every_physics_the_same_picks(tmp_path):
 
 def test_camera_errors_are_those_of_hidden_parts(tmp_path, monkeypatch):
     monkeypatch.setattr(heap, "stored_heaps", lambda split: stored_heaps(split)[:2])
-    frame = heap.camera_data(tmp_path)
+    frame = heap.camera_data("test", tmp_path, tmp_path, progress=False)
     assert set(frame["heap"]) == {0, 1}
     share = len(frame) / frame.groupby("heap")["boxes"].first().sum()
     assert 0.3 < share < 0.8, "some boxes are hidden, not most of them"

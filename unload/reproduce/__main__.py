@@ -7,6 +7,9 @@ from unload.reproduce import (
     agreement,
     answer,
     comparison,
+    heap,
+    heap_learning,
+    heap_table,
     lifts,
     observation,
     random_picks,
@@ -37,6 +40,9 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "robustness": (
         "policies with every box simulated", robustness.robustness_data, robustness.OPTIONS
     ),
+    **heap.PARTS,
+    **heap_learning.PARTS,
+    **heap_table.PARTS,
 }  # fmt: skip
 
 
@@ -47,7 +53,7 @@ def paper(n_jobs: int) -> None:
 
 
 ALL = {"paper": ("all of them", paper, JOBS)}
-LISTED = "\n".join(f"    {COMMAND} {name:<13} {text}" for name, (text, *_) in (PARTS | ALL).items())
+LISTED = "\n".join(f"    {COMMAND} {name:<15} {text}" for name, (text, *_) in (PARTS | ALL).items())
 DESCRIPTION = f"""\
 The data behind the paper's figures, computed and kept in ``data/`` with its provenance.
 

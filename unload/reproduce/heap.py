@@ -22,7 +22,7 @@ from unload.heap.generate import BOXES, settled_heap, write_heaps
 from unload.heap.observation import camera_boxes, true_boxes
 from unload.heap.rake import PHYSICS, Rake
 from unload.heap.rules import random
-from unload.reproduce.results import COMMAND, JOBS, keep_all, measured, publish
+from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
 from unload.support import checks, files
 from unload.support.provenance import joined, write_provenance
 
@@ -135,7 +135,13 @@ def _agreement(number: int) -> dict[str, dict]:
     return rows
 
 
-def camera_data(folder: str | Path = files.DATA, split: str = "test") -> pd.DataFrame:
+def camera_data(
+    split: str = "test",
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = 1,
+    progress: bool = True,
+) -> pd.DataFrame:
     """What the camera makes of the stored heaps; write ``heap/camera.csv`` and provenance.
 
     Returns:
@@ -143,32 +149,36 @@ def camera_data(folder: str | Path = files.DATA, split: str = "test") -> pd.Data
         ``centre_error`` (m, length), ``extent_error`` (m, mean over the axes, < 0 where too
         small) and ``tilt_error`` (rad).
     """
-    result = measured(lambda: _camera_rows(split))
-    frame = pd.DataFrame(result.value)
-    settings = {"split": split, "heaps": int(frame["heap"].nunique())}
+    heaps = range(len(stored_heaps(split)))
+    jobs = [({"camera": [split, number]}, partial(_camera_rows, split, number)) for number in heaps]
+    answers = keep_all(Path(runs_dir) / NAME / "camera", jobs, n_jobs, progress)
+    frame = pd.DataFrame([row for answer in answers for row in answer.value])
+    settings = {"split": split, "heaps": len(heaps)}
+    records = [answer.record for answer in answers]
     place, command = Path(folder) / NAME, f"{COMMAND} heap-camera"
-    publish(place, "camera", {"camera": frame}, command, settings, False, [result.record])
+    publish(place, "camera", {"camera": frame}, command, settings, False, records)
     return frame
 
 
-def _camera_rows(split: str) -> list[dict]:
-    camera, rows = Camera(), []
-    for number, heap in enumerate(stored_heaps(split)):
-        scan = camera.scan(heap)
-        true, seen = true_boxes(heap, scan), camera_boxes(heap, scan)
-        order = [seen.numbers.tolist().index(box) for box in true.numbers.tolist()]
-        centre = np.linalg.norm(seen.centres[order] - true.centres, axis=1)
-        extent = (seen.extents[order] - true.extents).mean(axis=1)
-        tilt = np.abs(seen.tilts[order] - true.tilts)
-        for values in zip(true.pixels, centre, extent, tilt):
-            names = "pixels", "centre_error", "extent_error", "tilt_error"
-            rows.append({"heap": number, "boxes": len(heap)} | dict(zip(names, values)))
+def _camera_rows(split: str, number: int) -> list[dict]:
+    """Errors of every visible box of one heap."""
+    heap, camera = stored_heaps(split)[number], Camera()
+    scan = camera.scan(heap)
     camera.close()
-    return rows
+    true, seen = true_boxes(heap, scan), camera_boxes(heap, scan)
+    order = [seen.numbers.tolist().index(box) for box in true.numbers.tolist()]
+    columns = {
+        "pixels": true.pixels,
+        "centre_error": np.linalg.norm(seen.centres[order] - true.centres, axis=1),
+        "extent_error": (seen.extents[order] - true.extents).mean(axis=1),
+        "tilt_error": np.abs(seen.tilts[order] - true.tilts),
+    }
+    rows = zip(*(values.tolist() for values in columns.values()))
+    return [{"heap": number, "boxes": len(heap)} | dict(zip(columns, row)) for row in rows]
 
 
 PARTS = {
     "heaps": ("heaps for the bulk pick", heaps_data, JOBS),
     "heap-agreement": ("its three physics on the same picks", agreement_data, JOBS),
-    "heap-camera": ("what the camera makes of heaps", camera_data, {}),
+    "heap-camera": ("what the camera makes of heaps", camera_data, JOBS),
 }
