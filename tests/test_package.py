@@ -31,7 +31,6 @@ LIBRARIES = {
 COVERED_BY = {
     "agent/fast/kernel.py": "agent/fast/test_fused.py",  # its loops
     "agent/fast/learner.py": "agent/test_learner.py",  # beside the plain one
-    "env/fast/containers.py": "env/test_vector.py",  # its loops
 }
 
 
