@@ -6,7 +6,10 @@ import numpy as np
 
 import unload
 from benchmarks.timing import best_times
-from unload.physics.full import FullPhysics, LocalPhysics, Physics, TablePhysics
+from unload.physics.base import Physics
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics
 
 
 def lift_rates(load: unload.Load, full: int = 2, others: int = 100, rounds: int = 2) -> dict:

@@ -48,7 +48,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         check_stack(stack)
         self.stack = stack
         self._physics = TablePhysics(shared_table())
-        self._loads: list[Load | None] = [None] * self.num_envs
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
@@ -90,7 +89,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         """Fill one container."""
         starts, links = load.contacts
         self._make_room(len(load), len(links))
-        self._loads[env] = load
         state, count = self._containers, len(load)
         positions = load.positions + blur
         state.geometry[env, :count, :3] = load.positions
@@ -127,8 +125,11 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _lift(self, env: int, item: int) -> float:
         """Lift an item whose situation the table does not know; return the distance in m."""
-        load = self._loads[env]
-        present = self._containers.present[env, : len(load)]
+        # The load is built again, because to keep those of all containers makes resets slower.
+        count = np.flatnonzero(self._containers.present[env])[-1] + 1
+        boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
+        load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
+        present = self._containers.present[env, :count]
         return self._physics.simulate(Surroundings(load, present).situation(item))
 
     def _emptied(self) -> np.ndarray:

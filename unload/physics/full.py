@@ -137,8 +137,3 @@ class FullPhysics(Physics):
 
     def _positions(self) -> np.ndarray:
         return np.array([position for position, _ in self._poses])
-
-
-# For ``benchmarks/lifts.py``, which still imports them from here.
-from unload.physics.local import LocalPhysics  # noqa: E402, F401
-from unload.physics.table import TablePhysics  # noqa: E402, F401
