@@ -7,6 +7,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 from unload.heap.boxes import Heap
 from unload.heap.env import HeapEnv
+from unload.heap.generate import SPLITS
 from unload.heap.observation import COLUMNS, ROWS
 
 
@@ -32,6 +33,16 @@ def test_is_registered(pile):
     env = gymnasium.make("unload/Heap-v0", heaps=[pile], physics="near")
     assert isinstance(env.unwrapped, HeapEnv)
     env.close()
+
+
+def test_the_stored_heaps_can_be_played():
+    envs = [gymnasium.make("unload/Heap-v0", split=split, physics="near") for split in SPLITS]
+    assert [len(env.unwrapped.heaps) for env in envs] == [70, 30]
+    observation, info = envs[1].reset(seed=0)
+    assert observation in envs[1].observation_space and 30 < info["item_mask"].sum() < 90
+    assert any(envs[1].unwrapped.heap is heap for heap in envs[1].unwrapped.heaps)
+    for env in envs:
+        env.close()
 
 
 def test_the_same_seed_gives_the_same_bits(make_heap_env, pile, cubes):
