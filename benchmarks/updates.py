@@ -30,13 +30,15 @@ def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) 
         "rewards": rng.choice(np.array([-1, 1], np.float32), batch_size),
     }
 
-    def update(fused: bool, threads: int, chunk: int = learner.CHUNK) -> Callable[[], float]:
+    def update(
+        fused: bool, threads: int, chunk: int = learner.ROWS_PER_PASS
+    ) -> Callable[[], float]:
         network = unload.PEQNetwork(n_features, torch.Generator().manual_seed(0))
         agent = unload.DQN(network, fused_update=fused)
 
         def call() -> float:
             torch.set_num_threads(threads)
-            with mock.patch.object(learner, "CHUNK", chunk):
+            with mock.patch.object(learner, "ROWS_PER_PASS", rows):
                 return agent.update(batch)
 
         return call
@@ -44,7 +46,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) 
     times = best_times(
         {
             "PyTorch, whole batch": update(False, 1, batch_size),
-            f"PyTorch, chunks of {learner.CHUNK}": update(False, 1),
+            f"PyTorch, chunks of {learner.ROWS_PER_PASS}": update(False, 1),
             "fused": update(True, 1),
             "fused, 2 threads": update(True, 2),
         },

@@ -245,3 +245,16 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
     (tmp_path / "checkpoint.npz.0123.partial").write_bytes(b"half")
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert not list(tmp_path.glob("*.partial"))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("config", "{"), ("config", "[]"), ("config", "3"), ("format", [4, 4]), ("rollout.start", 9)],
+)
+def test_a_checkpoint_with_another_content_is_refused_by_name(tmp_path, name, value):
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 20)
+    path = tmp_path / "checkpoint.npz"
+    files.write_arrays(path, files.read_arrays(path) | {name: np.array(value)})
+    with pytest.raises(ValueError, match=f"checkpoint.npz|{tmp_path.name}"):
+        train(config, tmp_path, progress=False)

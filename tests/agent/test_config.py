@@ -80,3 +80,9 @@ def test_numpy_flags_and_strings_make_the_same_configuration():
     same = TrainConfig(mask=True, equalize=False, ties="average")
     assert json.dumps(asdict(config)) == json.dumps(asdict(same))
     assert type(config.mask) is bool and type(config.ties) is str
+
+
+@pytest.mark.parametrize("field", ["picks", "n_features", "num_envs", "replay_size"])
+def test_runs_that_fit_into_no_memory_are_refused_by_name(field):
+    with pytest.raises(ValueError, match=f"^{field} is .*; expected an integer >= 1 and <= "):
+        TrainConfig(**{field: 64 * 10**14})

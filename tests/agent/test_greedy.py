@@ -3,7 +3,8 @@ import pytest
 import torch
 
 from unload import Greedy, PEQNetwork, equalize
-from unload.agent.greedy import greedy_actions, highest_values
+from unload.agent.greedy import greedy_actions
+from unload.agent.learner import highest_values
 from unload.network.variants import NETWORKS
 
 
@@ -48,3 +49,14 @@ def test_weights_that_are_not_finite_choose_nothing(observations, name):
     for choose in (greedy_actions, highest_values):
         with pytest.raises(FloatingPointError, match="row 0 has no allowed action of a finite"):
             choose(network, observations, allowed)
+
+
+@pytest.mark.parametrize("value", [torch.nan, torch.inf])
+@pytest.mark.parametrize("layer", ["extractor", "scorer"])
+def test_one_weight_that_is_not_finite_is_enough(observations, value, layer):
+    """The compiled choice once took row 0, or passed over the items that it spoiled."""
+    network = peq()
+    with torch.no_grad():
+        getattr(network, layer).weight[0, 0] = value
+    with pytest.raises(FloatingPointError, match="has no allowed action of a finite value"):
+        greedy_actions(network, observations, np.ones(observations.shape[:2], bool))

@@ -5,10 +5,10 @@ from torch.nn.functional import smooth_l1_loss
 
 from unload import DQN, PEQNetwork
 from unload.agent.fast.learner import FusedLearner
-from unload.agent.learner import CHUNK, PlainLearner
+from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.network.variants import NETWORKS
 
-SIZE, ITEMS = CHUNK + 30, 9  # more than one chunk
+SIZE, ITEMS = ROWS_PER_PASS + 30, 9  # more than one chunk
 
 
 def batch_of(rng: np.random.Generator) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -53,7 +53,7 @@ def test_learners_have_one_interface(rng, kind):
 
 def test_plain_means_plain_everywhere(rng, monkeypatch):
     """Without the fused update, nothing of it is called, neither to learn nor to choose."""
-    for name in ("start", "greedy_actions"):
+    for name in ("start_gradients", "best_actions"):
         monkeypatch.setattr(
             f"unload.agent.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain")
         )

@@ -126,3 +126,28 @@ def test_bad_sizes_are_refused(size, items, name):
 def test_a_memory_that_does_not_fit_is_refused_by_name(size):
     with pytest.raises(MemoryError, match=f"size is {size}; its arrays do not fit into memory"):
         ReplayBuffer(size, 128)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"rewards": np.array([1e39, 1.0])}, "rewards holds inf"),
+        ({"actions": np.array([0, 5])}, "actions holds 0 to 5; expected 0 to 4"),
+        ({"next_masks": np.zeros((2, 5), bool)}, "next_masks is all zero in row 0"),
+    ],
+)
+def test_what_would_spoil_learning_is_refused_where_it_enters(rng, change, message):
+    replay = ReplayBuffer(10, 5, next_state=True)
+    batch = {
+        "observations": rng.uniform(-1, 1, (2, 5, 3)),
+        "actions": np.array([0, 4]),
+        "rewards": np.array([1.0, -1.0]),
+        "next_observations": rng.uniform(-1, 1, (2, 5, 3)),
+        "next_masks": np.ones((2, 5), bool),
+        "terminations": np.array([False, False]),
+    }
+    with pytest.raises(ValueError, match=message):
+        replay.add(**batch | change)
+    assert len(replay) == 0
+    replay.add(**batch)
+    assert len(replay) == 2

@@ -233,3 +233,11 @@ def test_progress_may_go_to_a_file(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
     with pytest.raises(TypeError, match="progress is 3; expected True, False or a text file"):
         train(TrainConfig(**CONTAINER), tmp_path / "run", progress=3)
+
+
+def test_infinite_weights_are_not_kept_as_a_snapshot(tmp_path):
+    config = TrainConfig(**CONTAINER, learning_rate=1e39, snapshots=50)
+    with pytest.raises(FloatingPointError, match="^after .* picks"):
+        train(config, tmp_path, progress=False)
+    for path in (tmp_path / "snapshots").iterdir():
+        load_policy(path)

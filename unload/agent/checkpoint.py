@@ -1,4 +1,4 @@
-"""A training run on disk: its checkpoint while it goes on, and what it leaves."""
+"""The folder of a training run: checkpoint, policy, curve and configuration."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -18,11 +18,12 @@ from unload.agent.weights import load_policy, save_policy
 from unload.support import checks, files
 
 FORMAT = 4  # of the checkpoints
-PARTS = ("agent", "curve", "rollout")
+# Of a ``Training``: what has a state besides the generator.
+STATEFUL = ("agent", "curve", "rollout")
 
 
 class TrainResult(NamedTuple):
-    """What a training run leaves.
+    """Policy and learning curve of a finished run.
 
     Attributes:
         policy: the trained network, as a greedy policy.
@@ -47,6 +48,7 @@ class RunFolder:
         checkpoint: the file from which a run that was stopped goes on.
 
     Raises:
+        TypeError: ``run_dir`` is no path.
         ValueError: ``run_dir`` is empty or a file.
         OSError: it cannot be made.
     """
@@ -55,7 +57,7 @@ class RunFolder:
         if not isinstance(run_dir, (str, Path)):
             raise TypeError(f"run_dir is {run_dir!r}; expected the path of a folder")
         self.path = Path(run_dir)
-        if str(run_dir) in ("", "."):
+        if self.path == Path():
             raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
         if self.path.exists() and not self.path.is_dir():
             raise ValueError(f"run_dir is {str(run_dir)!r}, a file; expected a folder")
@@ -74,7 +76,7 @@ class RunFolder:
         What a killed process has left half written there is removed.
         """
         with files.locked(self.path):
-            for leftover in self.path.glob("*.partial"):
+            for leftover in self.path.rglob("*.partial"):
                 leftover.unlink()
             yield
 
@@ -87,7 +89,7 @@ class RunFolder:
         """Write a checkpoint of a ``Training``."""
         arrays = {
             f"{part}.{name}": array
-            for part in PARTS
+            for part in STATEFUL
             for name, array in getattr(run, part).state().items()
         }
         arrays |= {
@@ -110,13 +112,17 @@ class RunFolder:
             return
         stored = files.read_arrays(self.checkpoint)
         checks.entries(str(self.checkpoint), stored, ("config",))
-        if stored.get("format") != FORMAT:
+        if not np.array_equal(stored.get("format"), FORMAT):
             raise ValueError(
                 f"{self.checkpoint} was written by another version of unload; expected format "
                 f"{FORMAT}. Remove it to start anew, or go on with that version"
             )
-        self._check_same(json.loads(str(stored["config"])), run.config)
-        parts: dict[str, dict[str, np.ndarray]] = {part: {} for part in PARTS}
+        try:
+            config = dict(json.loads(str(stored["config"])))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{self.checkpoint} holds no configuration: {error}") from error
+        self._check_same(config, run.config)
+        parts: dict[str, dict[str, np.ndarray]] = {part: {} for part in STATEFUL}
         for name, array in stored.items():
             part, _, rest = name.partition(".")
             if part in parts:
@@ -133,7 +139,7 @@ class RunFolder:
                 yield picks
         except KeyError as error:
             raise ValueError(f"{self.checkpoint} has no array {error}; it is damaged") from error
-        except (TypeError, ValueError, RuntimeError) as error:
+        except (IndexError, OverflowError, TypeError, ValueError, RuntimeError) as error:
             raise ValueError(f"{self.checkpoint}: {error}") from error
 
     def save_snapshot(self, run) -> None:
@@ -166,7 +172,8 @@ class RunFolder:
             ValueError: a file is damaged, or the run is of another configuration or stack.
         """
         stored = files.read_json(self._config)
-        marks = stored.get("marks", {})
+        marks = stored.get("marks")
+        marks = marks if isinstance(marks, dict) else {}
         self._check_same({name: stored[name] for name in stored if name != "marks"}, config)
         if marks.pop(self._config.name, None) != _digest(stored):
             raise ValueError(f"{self._config} was changed or damaged")

@@ -8,6 +8,17 @@ from unload.env.equalization import TIES
 from unload.network.variants import HEADS, NETWORKS
 from unload.support import checks
 
+# Largest integers: above, arrays of the run would not fit into any memory of today.
+MOST = {
+    "picks": 10**11,
+    "num_envs": 2**16,
+    "max_picks": 10**9,
+    "batch_size": 2**24,
+    "replay_size": 10**11,
+    "n_features": 2**14,
+    "target_update_interval": 10**11,
+    "log_interval": 10**9,
+}
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
 
@@ -50,11 +61,8 @@ class TrainConfig:
             self._set(name, str(getattr(self, name)))
         for name in ("equalize", "mask"):
             self._set(name, checks.boolean(name, getattr(self, name)))
-        for name in (
-            "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
-            "target_update_interval", "log_interval",
-        ):  # fmt: skip
-            self._set(name, checks.integer(name, getattr(self, name), 1))
+        for name, most in MOST.items():
+            self._set(name, checks.integer(name, getattr(self, name), 1, most))
         for name in ("seed", "gradient_steps", "snapshots"):
             self._set(name, checks.integer(name, getattr(self, name), 0))
         for name in (

@@ -16,6 +16,7 @@ from unload.support import checks
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
 # Arguments of ``ContainerEnv`` that ``evaluate`` passes on.
 ENV_KWARGS = ("after_pick", "equalize", "position_noise", "stack", "ties")
+MOST_EPISODES = 10**6
 # Failed picks in a row after which an episode without a limit is given up.
 GIVE_UP = 10 * task.N_VISIBLE
 
@@ -60,10 +61,10 @@ def evaluate(
             the number of episodes.
         physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
             one after the other.
-        mask: whether the policy is told which items failed since the last success. Which
-            rows hold an item it is told in any case.
-        max_picks: most picks per episode; fewer if the container is empty before, or if all
-            items have failed and the policy is told so. With None it is unloaded completely,
+        mask: whether the policy's masks exclude items that failed since the last success.
+            Rows without an item are always excluded.
+        max_picks: most picks per episode; fewer if the container is empty before, or if the
+            mask excludes all items. With None it is unloaded completely,
             however many picks that takes; only an episode in which 1280 picks in a row fail
             is given up.
         **env_kwargs: ``after_pick``, ``equalize``, ``position_noise``, ``stack`` and ``ties`` of
@@ -78,7 +79,7 @@ def evaluate(
         TypeError, ValueError: an argument is not as described, or ``policy`` returns
             something other than one row of the observation.
     """
-    episodes = checks.integer("episodes", episodes, 1)
+    episodes = checks.integer("episodes", episodes, 1, MOST_EPISODES)
     seed = checks.integer("seed", seed, 0)
     mask = checks.boolean("mask", mask)
     if max_picks is not None:

@@ -4,6 +4,7 @@ import numpy as np
 import torch
 
 from unload.agent.fast import fused
+from unload.agent.learner import highest_values
 from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
@@ -15,43 +16,6 @@ def check_network(network: object) -> torch.nn.Module:
     if not isinstance(network, torch.nn.Module):
         raise TypeError(f"network is {network!r}; expected a torch.nn.Module")
     return network
-
-
-@torch.no_grad()
-def highest_values(
-    network: torch.nn.Module,
-    observations: np.ndarray,
-    allowed: np.ndarray,
-    present: np.ndarray | None = None,
-) -> np.ndarray:
-    """Return the allowed action of the highest value, in plain PyTorch.
-
-    Args:
-        network: (batch, items, 3) → (batch, items) action values.
-        observations: (batch, items, 3) float32.
-        allowed: (batch, items) bool, at least one per row.
-        present: (batch, items) bool, the rows that hold an item; all if None.
-
-    Returns:
-        (batch,) int64.
-
-    Raises:
-        FloatingPointError: a row has no allowed action, or an allowed action's value is not
-            finite.
-    """
-    arguments = [torch.from_numpy(observations)]
-    if present is not None and not present.all():  # other modules need not know of padding
-        arguments.append(torch.from_numpy(present))
-    values = network(*arguments).masked_fill(torch.from_numpy(~allowed), -torch.inf)
-    actions = values.argmax(dim=1)  # NaN counts as the highest
-    finite = values.gather(1, actions[:, None]).isfinite()
-    if not finite.all():
-        row = int(finite.int().argmin())
-        raise FloatingPointError(
-            f"row {row} has no allowed action of a finite value; "
-            "expected finite observations and weights"
-        )
-    return actions.numpy()
 
 
 def greedy_actions(
@@ -78,7 +42,7 @@ def greedy_actions(
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
     if fused.applies(network):  # an item's own features decide: padded rows do not matter
-        return fused.greedy_actions(fused.weights_of(network), observations, allowed)
+        return fused.best_actions(fused.weights_of(network), observations, allowed)
     return highest_values(network, observations, allowed, present)
 
 

@@ -11,7 +11,7 @@ def deferred_interrupts() -> Iterator[list[int]]:
     """Note the first Ctrl-C instead of raising; the second one stops at once.
 
     Yields:
-        The signals received so far. Whoever reads them there stops at a convenient place.
+        The signals received so far. The caller polls them and stops at a safe point.
 
     Raises:
         KeyboardInterrupt: at the second Ctrl-C, or at the end if nobody has stopped since the

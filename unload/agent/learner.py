@@ -10,10 +10,8 @@ import numpy as np
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from unload.agent.greedy import highest_values
-
 # Rows of a batch per backward pass, because what a pass stores then stays in the cache.
-CHUNK = 64
+ROWS_PER_PASS = 64
 
 
 class PlainLearner:
@@ -56,8 +54,8 @@ class PlainLearner:
     ) -> float:
         self.optimizer.zero_grad()
         total = 0.0
-        for start in range(0, len(targets), CHUNK):
-            rows = slice(start, start + CHUNK)
+        for start in range(0, len(targets), ROWS_PER_PASS):
+            rows = slice(start, start + ROWS_PER_PASS)
             values = self.network(observations[rows])
             chosen = values.gather(1, actions[rows, None]).squeeze(1)
             loss = smooth_l1_loss(chosen, targets[rows], reduction="sum", beta=self.beta)
@@ -83,3 +81,40 @@ class PlainLearner:
             number, _, key = name.partition(".")
             moments.setdefault(int(number), {})[key] = torch.from_numpy(np.array(array))
         self.optimizer.load_state_dict({**self.optimizer.state_dict(), "state": moments})
+
+
+@torch.no_grad()
+def highest_values(
+    network: torch.nn.Module,
+    observations: np.ndarray,
+    allowed: np.ndarray,
+    present: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return the allowed action of the highest value, in plain PyTorch.
+
+    Args:
+        network: (batch, items, 3) → (batch, items) action values.
+        observations: (batch, items, 3) float32.
+        allowed: (batch, items) bool, at least one per row.
+        present: (batch, items) bool, the rows that hold an item; all if None.
+
+    Returns:
+        (batch,) int64.
+
+    Raises:
+        FloatingPointError: a row has no allowed action, or an allowed action's value is not
+            finite.
+    """
+    arguments = [torch.from_numpy(observations)]
+    if present is not None and not present.all():  # other modules need not know of padding
+        arguments.append(torch.from_numpy(present))
+    values = network(*arguments).masked_fill(torch.from_numpy(~allowed), -torch.inf)
+    actions = values.argmax(dim=1)  # NaN counts as the highest
+    finite = values.gather(1, actions[:, None]).isfinite()
+    if not finite.all():
+        row = int(finite.int().argmin())
+        raise FloatingPointError(
+            f"row {row} has no allowed action of a finite value; "
+            "expected finite observations and weights"
+        )
+    return actions.numpy()

@@ -9,11 +9,13 @@ CHECKS = {"f": checks.finite_array, "i": checks.integer_array, "b": checks.flag_
 
 
 def _checked(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
-    """``values``, if they may be written into an array of this ``dtype``."""
+    """Return ``values`` converted to ``dtype``; raise unless they fit."""
     if isinstance(values, np.ndarray) and (values.dtype, values.shape) == (dtype, shape):
         if dtype.kind != "f" or np.isfinite(values).all():
             return values  # nothing to convert
-    return CHECKS[dtype.kind](name, values, shape)
+    values = CHECKS[dtype.kind](name, values, shape)
+    with np.errstate(over="ignore"):  # what is too large for ``dtype`` is refused as infinite
+        return CHECKS[dtype.kind](name, values.astype(dtype), shape).astype(dtype)
 
 
 class ReplayBuffer:
@@ -82,6 +84,19 @@ class ReplayBuffer:
             name: _checked(name, batch[name], (count, *array.shape[1:]), array.dtype)
             for name, array in self.arrays.items()
         }
+        items = self.arrays["observations"].shape[1]
+        if count and not 0 <= checked["actions"].min() <= checked["actions"].max() < items:
+            actions = checked["actions"]
+            raise ValueError(
+                f"actions holds {actions.min()} to {actions.max()}; expected 0 to {items - 1}"
+            )
+        if "next_masks" in checked:
+            hopeless = ~checked["next_masks"].any(axis=1) & ~checked["terminations"]
+            if hopeless.any():
+                raise ValueError(
+                    f"next_masks is all zero in row {int(np.argmax(hopeless))}, which is not "
+                    "terminal; expected at least one allowed action"
+                )
         start = self.total % self.size
         slots = slice(start, start + count)
         if start + count > self.size:  # round the end

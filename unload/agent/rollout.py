@@ -116,11 +116,14 @@ class Rollout:
             What ``pick`` returns to be remembered, for each repeated step.
 
         Raises:
-            ValueError: the picks lead to other observations than they did.
+            ValueError: the picks are more than the run's, or lead to other observations.
         """
         prefix = "envs."
         envs = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
-        self.steps = int(arrays["start"])
+        start, most = int(arrays["start"]), len(self._actions) - len(arrays["actions"])
+        if start % self._config.max_picks or not 0 <= start <= most:
+            raise ValueError(f"start is {start}; expected the first step of an episode")
+        self.steps = start
         self._starts = deque([(self.steps, envs)])
         self._see(*self.envs.set_state(envs))
         for actions in arrays["actions"].astype(np.int64):
@@ -152,7 +155,7 @@ def _make_envs(
 def _next_states(
     observations: np.ndarray, terminations: np.ndarray, infos: dict[str, np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """What followed each pick; at an episode's end its last observation, not the reset's."""
+    """Next observations, masks and terminations; at an episode's end the last, not the reset's."""
     observations, masks = observations.copy(), infos["action_mask"].astype(bool)
     for env in np.flatnonzero(infos.get("_final_obs", [])):
         observations[env] = infos["final_obs"][env]

@@ -33,8 +33,8 @@ def run_sweep(
 
     A run that fails, or whose process dies, is reported and does not stop the others. Each
     run uses one thread, shows its own progress in ``log.txt`` in its folder, and leaves
-    ``record.json`` there: what ``unload.provenance.run_record`` tells, ``process``, and
-    ``resumed``, whether all that is of the last part of a run that had been stopped.
+    ``record.json`` there: the entries of ``unload.support.provenance.run_record``, ``process``,
+    and ``resumed``, true if they describe only the last part of a run that had been stopped.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -65,8 +65,7 @@ def run_sweep(
     checks.one_of("backend", backend, BACKENDS)
     folders = {name: Path(folder) / name for name in configs}
     for place in folders.values():
-        if _mark(place).exists():  # of a sweep that was stopped
-            _mark(place).unlink()
+        _mark(place).unlink(missing_ok=True)  # of a sweep that was stopped
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
     with bar, parallel_config(backend=backend, n_jobs=n_jobs):
@@ -84,7 +83,7 @@ def run_sweep(
 def run_all(
     configs: Mapping[str, TrainConfig], folder: str | Path, n_jobs: int, progress: bool
 ) -> list[dict]:
-    """``run_sweep``, insisting on every run; their records.
+    """Run ``run_sweep`` and return the runs' records.
 
     Raises:
         RuntimeError: a run failed; the message says which and why.
@@ -149,7 +148,7 @@ def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         mark.write_text(f"{attempts}{os.getpid()}\n")
-        resumed = (folder / "checkpoint.npz").exists()
+        resumed = (folder / "checkpoint.npz").exists() or (folder / "config.json").exists()
         with open(folder / "log.txt", "a") as log, one_thread():
             train(config, folder, progress=log)
         if not (folder / "record.json").exists():

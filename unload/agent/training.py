@@ -158,19 +158,22 @@ def _go(run: Training, folder: RunFolder, progress: bool | TextIO, interrupts: l
         stop_if_interrupted(picks)
     saved = time.monotonic()
     steps, snapshots = config.picks // config.num_envs, config.snapshots
+    kept = rollout.steps * snapshots // steps
     with _progress_bar(rollout.picks, config.picks, progress) as bar:
         while not rollout.finished:
             try:
                 run.step()
                 due = interrupts or time.monotonic() - saved > config.checkpoint_interval
-                if due or rollout.finished:
+                snapshot = rollout.steps * snapshots // steps > kept
+                if due or snapshot or rollout.finished:
                     run.agent.check_finite()
             except FloatingPointError as error:
                 raise FloatingPointError(
                     f"after {rollout.picks} picks: {error}; the last checkpoint before is kept"
                 ) from error
-            if rollout.steps * snapshots // steps > (rollout.steps - 1) * snapshots // steps:
+            if snapshot:
                 folder.save_snapshot(run)
+                kept = rollout.steps * snapshots // steps
             if due:
                 folder.save(run)
                 saved = time.monotonic()

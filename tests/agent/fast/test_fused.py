@@ -197,9 +197,9 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
 
 def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
     net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
-    finish = fused.start(fused.weights_of(net), *batch.values())
+    finish = fused.start_gradients(fused.weights_of(net), *batch.values())
     everything = np.ones(batch["observations"].shape[:2], bool)
-    fused.greedy_actions(fused.weights_of(net), batch["observations"], everything)
+    fused.best_actions(fused.weights_of(net), batch["observations"], everything)
     total = finish()
     assert fused.loss_and_gradients(net, *batch.values()) == total[-1]
     flat = np.concatenate([parameter.grad.numpy().ravel() for parameter in net.parameters()])
@@ -227,7 +227,7 @@ def test_choice_is_that_of_the_network(batch, rng):
     allowed = rng.random((BATCH, ITEMS)) < 0.3
     values = net(torch.from_numpy(batch["observations"]))
     expected = values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
-    actions = fused.greedy_actions(fused.weights_of(net), batch["observations"], allowed)
+    actions = fused.best_actions(fused.weights_of(net), batch["observations"], allowed)
     assert np.mean(actions == expected) > 0.99  # tanh may round two scores to one value
     rows = np.arange(BATCH)
     best = values.detach().numpy()
@@ -294,7 +294,7 @@ def test_choice_among_nothing_finite_is_refused():
     observations = np.full((2, ITEMS, 3), np.nan, np.float32)
     with pytest.raises(FloatingPointError, match="no allowed action of a finite value"):
         weights = fused.weights_of(network(4))
-        fused.greedy_actions(weights, observations, np.ones((2, ITEMS), bool))
+        fused.best_actions(weights, observations, np.ones((2, ITEMS), bool))
 
 
 class Subclass(PEQNetwork):

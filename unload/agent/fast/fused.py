@@ -48,7 +48,7 @@ class Weights(NamedTuple):
 
 
 def applies(network: torch.nn.Module) -> bool:
-    """The rule: a ``PEQNetwork`` itself (no subclass), in float32 on the CPU."""
+    """Return whether the fused update applies: a ``PEQNetwork`` (no subclass), float32, CPU."""
     return type(network) is PEQNetwork and all(
         p.device.type == "cpu" and p.dtype == torch.float32 for p in _parameters(network)
     )
@@ -89,7 +89,7 @@ def loss_and_gradients(
         ValueError: an array's shape or dtype is another, or an action or row is out of range.
         FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
     """
-    total = start(weights_of(network), observations, actions, targets, beta, rows)()
+    total = start_gradients(weights_of(network), observations, actions, targets, beta, rows)()
     gradients = torch.from_numpy(total[:-1].astype(np.float32))
     parameters = _parameters(network)
     parts = gradients.split([parameter.numel() for parameter in parameters])
@@ -98,7 +98,7 @@ def loss_and_gradients(
     return float(total[-1])
 
 
-def start(
+def start_gradients(
     weights: Weights,
     observations: np.ndarray,
     actions: np.ndarray,
@@ -153,7 +153,7 @@ def _helpers(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor()
 
 
-def greedy_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """The allowed action of the highest value.
 
     The global features add the same to every item's score and tanh keeps the order, so
@@ -203,6 +203,6 @@ def _check(observations: np.ndarray) -> tuple[int, int]:
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.nn.Parameter, ...]:
-    """In their order; ``network.parameters()`` would take ten times as long to find them."""
+    """Parameters in the order of ``Weights``; ``network.parameters()`` takes ten times as long."""
     extractor, scorer = network.extractor, network.scorer
     return extractor.weight, extractor.bias, scorer.weight, scorer.bias

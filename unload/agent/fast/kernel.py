@@ -456,7 +456,10 @@ def _backward(slope, block):
 
 @compiled
 def best_items(observations, allowed, weight, bias, score, actions):
-    """The item of the highest own score; the first one if several have it."""
+    """Write the item of the highest own score, the first one if several have it, to ``actions``.
+
+    Where an allowed item's score is not finite, the action becomes -1.
+    """
     x = np.empty((3, observations.shape[1]), np.float32)
     scores = np.empty(observations.shape[1], np.float32)
     for sample in range(len(actions)):
@@ -471,5 +474,10 @@ def best_items(observations, allowed, weight, bias, score, actions):
                 scores[i] = fma(s, ZERO if value < ZERO else value, scores[i])
         best = -np.inf
         for i in range(len(scores)):
-            if allowed[sample, i] and scores[i] > best:
+            if not allowed[sample, i]:
+                continue
+            if not np.isfinite(scores[i]):
+                actions[sample] = -1
+                break
+            if scores[i] > best:
                 best, actions[sample] = scores[i], i

@@ -21,13 +21,13 @@ class FusedLearner:
         self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-        return fused.greedy_actions(self.weights, observations, allowed)
+        return fused.best_actions(self.weights, observations, allowed)
 
     def start(
         self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
     ) -> Callable[[], float]:
         """See ``PlainLearner``; weights and arrays must stay as they are until the call."""
-        gradients = fused.start(
+        gradients = fused.start_gradients(
             self.weights, batch["observations"], batch["actions"], targets, self.beta, rows
         )
 
