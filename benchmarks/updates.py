@@ -30,9 +30,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) 
         "rewards": rng.choice(np.array([-1, 1], np.float32), batch_size),
     }
 
-    def update(
-        fused: bool, threads: int, chunk: int = learner.ROWS_PER_PASS
-    ) -> Callable[[], float]:
+    def update(fused: bool, threads: int, rows: int = learner.ROWS_PER_PASS) -> Callable:
         network = unload.PEQNetwork(n_features, torch.Generator().manual_seed(0))
         agent = unload.DQN(network, fused_update=fused)
 
