@@ -16,7 +16,7 @@ def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     train(CONFIG, folder, progress=False)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(measure, "LOADS", 3)
+        patch.setattr(measure, "POLICY_LOADS", 3)
         patch.setattr(measure, "SNAPSHOT_LOADS", 2)
         return folder, *measure_run(CONFIG, folder)
 
@@ -55,7 +55,7 @@ def test_a_snapshot_has_the_means_of_the_training_since_the_last_one(measured):
 def test_the_goal_is_reached_at_the_first_snapshot_that_reaches_it(measured, monkeypatch, goal):
     folder, *_ = measured
     monkeypatch.setattr(measure, "GOAL", goal)
-    monkeypatch.setattr(measure, "LOADS", 1)
+    monkeypatch.setattr(measure, "POLICY_LOADS", 1)
     monkeypatch.setattr(measure, "SNAPSHOT_LOADS", 1)
     row, curve = measure_run(CONFIG, folder)
     for name in ("mask", "no_mask"):

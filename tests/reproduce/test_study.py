@@ -75,7 +75,7 @@ def made(tmp_path_factory):
     base = TrainConfig(batch_size=16, n_features=4, snapshots=2, log_interval=5)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "BASE", base)
-        patch.setattr(measure, "LOADS", 3)
+        patch.setattr(measure, "POLICY_LOADS", 3)
         patch.setattr(measure, "SNAPSHOT_LOADS", 2)
         for _ in range(2):  # the second time nothing is trained
             study_data("rewards", folder, folder / "runs", 1, False, picks=64 * 60, seeds=1)
@@ -109,7 +109,7 @@ def test_a_smaller_experiment_says_so(made):
 def test_the_recommended_agent_is_kept(tmp_path, monkeypatch):
     base = TrainConfig(num_envs=4, n_features=4, snapshots=1)
     monkeypatch.setattr(study, "BASE", base)
-    monkeypatch.setattr(measure, "LOADS", 1)
+    monkeypatch.setattr(measure, "POLICY_LOADS", 1)
     monkeypatch.setattr(measure, "SNAPSHOT_LOADS", 1)
     study_data("recommended", tmp_path, tmp_path / "runs", 1, False, picks=2400, seeds=1)
     policy = load_policy(tmp_path / "policies/recommended.safetensors")

@@ -27,7 +27,7 @@ SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": pol
 # end in two ways: one of each is compared.
 LEARNED = {"paper": "training", "paper_seed_2": "training", "recommended": "study/recommended"}
 COMPARED = (*SIMPLE, *LEARNED)
-LOADS, SEED = 100, 3000  # fresh containers for each policy and condition
+COMPARISON_LOADS, SEED = 100, 3000  # fresh containers for each policy and condition
 CONDITIONS = {
     "500 picks": {},
     "complete": {"max_picks": None},
@@ -45,7 +45,7 @@ OPTIONS = {
 
 def comparison_data(
     names: Sequence[str] = COMPARED,
-    loads: int = LOADS,
+    loads: int = COMPARISON_LOADS,
     folder: str | Path = files.DATA,
     n_jobs: int = -1,
 ) -> None:
@@ -65,11 +65,11 @@ def comparison_data(
         ValueError: an unknown policy.
     """
     checks.integer("loads", loads, 1)
-    players = {name: find_policy(name, folder) for name in names}
+    policies_by_name = {name: find_policy(name, folder) for name in names}
     jobs = [
-        delayed(measured)(partial(compare, name, players[name], mask, condition, loads))
+        delayed(measured)(partial(compare, name, policies_by_name[name], mask, condition, loads))
         for condition in CONDITIONS
-        for name in players
+        for name in policies_by_name
         for mask in ((True, False) if name in LEARNED else (True,))
     ]
     results = Parallel(n_jobs)(jobs)
@@ -80,7 +80,7 @@ def comparison_data(
         {"comparison": pd.concat([result.value for result in results])},
         f"{COMMAND} comparison --policies {' '.join(names)}",
         {"policies": weights, "loads": loads, "seed": SEED},
-        loads < LOADS or set(names) < set(COMPARED),
+        loads < COMPARISON_LOADS or set(names) < set(COMPARED),
         [result.record for result in results],
         policies_fingerprint(names, folder),
     )

@@ -1,4 +1,4 @@
-"""How a finished training run did: its policy on fresh loads, and its snapshots on the way."""
+"""Evaluation of a finished run and of its snapshots."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -11,7 +11,7 @@ from unload.agent.evaluation import evaluate
 from unload.agent.greedy import Greedy
 from unload.agent.weights import load_policy
 
-LOADS = 200  # fresh containers for a trained policy
+POLICY_LOADS = 200  # fresh containers for a trained policy
 SNAPSHOT_LOADS = 32  # fresh containers for a snapshot
 LOADS_SEED = 1000
 GOAL = 0.99  # MSR
@@ -37,7 +37,7 @@ def measure_run(config: TrainConfig, folder: str | Path) -> tuple[dict, pd.DataF
     training = pd.read_csv(folder / "curve.csv")
     curve = _curve(training, sorted((folder / "snapshots").glob("*.safetensors")))
     policy = load_policy(folder / "policy.safetensors")
-    masked, unmasked = (_unload(policy, LOADS, mask) for mask in (True, False))
+    masked, unmasked = (_unload(policy, POLICY_LOADS, mask) for mask in (True, False))
     end = training[training["picks"] > 0.9 * config.picks]
     row = {
         **asdict(config),

@@ -1,4 +1,4 @@
-"""How policies fare where the lift table does not reach: with every box simulated.
+"""Policies compared with every box simulated.
 
     python -m unload.reproduce robustness
 
@@ -29,7 +29,7 @@ from unload.support import checks, files
 NAME = "robustness"
 EPISODES, PICKS = 10, 100
 SEED = 2000  # of the loads; no other data uses it
-AFTER_PICK = ("table", "keep", "restore")
+LIFTED_BY = ("table", "keep", "restore")
 RESTORED = ("recommended",)  # for the others every lift would be the table's
 OPTIONS = comparison.OPTIONS
 
@@ -68,13 +68,13 @@ def robustness_data(
     """
     checks.integer("episodes", episodes, 1)
     checks.integer("picks", picks, 1, PICKS)
-    players = {name: find_policy(name, folder) for name in names}
+    policies_by_name = {name: find_policy(name, folder) for name in names}
     weights = {name: policy_digest(name, folder) for name in names}
     seeds = np.random.SeedSequence(SEED).generate_state(episodes).tolist()
     containers = [
         {"policy": name, "after_pick": after_pick, "episode": episode}
-        for after_pick in AFTER_PICK
-        for name in players
+        for after_pick in LIFTED_BY
+        for name in policies_by_name
         if after_pick != "restore" or name in RESTORED
         for episode in range(episodes)
     ]
@@ -83,13 +83,15 @@ def robustness_data(
         name, after_pick, episode = container.values()
         size = {"seed": seeds[episode], "picks": picks, "walls": FRONT_WALLS}
         question = container | size | {"weights": weights[name], "settings": SETTINGS}
-        compute = partial(play, players[name], after_pick, seeds[episode], picks, stack=front_load)
+        compute = partial(
+            play, policies_by_name[name], after_pick, seeds[episode], picks, stack=front_load
+        )
         jobs.append((question, compute))
     answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
     frame = pd.DataFrame([one | answer.value for one, answer in zip(containers, answers)])
     settings = {
         "policies": weights,
-        "after_pick": AFTER_PICK,
+        "after_pick": LIFTED_BY,
         "episodes": episodes,
         "picks": picks,
         "seed": SEED,
@@ -138,7 +140,7 @@ def play(
         TypeError, ValueError: an argument is not as described, or the load does not hold
             more items than ``picks``.
     """
-    checks.one_of("after_pick", after_pick, AFTER_PICK)
+    checks.one_of("after_pick", after_pick, LIFTED_BY)
     checks.boolean("mask", mask)
     rng = np.random.default_rng([checks.integer("seed", seed, 0)])
     rewards, deadlocked, free = [], [], []

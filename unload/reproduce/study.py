@@ -177,7 +177,7 @@ def study_data(
         best = load_policy(kept / next(iter(configs)) / "policy.safetensors")
         save_policy(best, folder / "policies" / "recommended.safetensors")
     settings = {
-        "loads": measure.LOADS,
+        "loads": measure.POLICY_LOADS,
         "loads_seed": measure.LOADS_SEED,
         "snapshot_loads": measure.SNAPSHOT_LOADS,
     }

@@ -22,7 +22,7 @@ BATCH_SIZES = (64, 256, 1024, 2048)
 RUN_COUNT = 10  # of each configuration
 STEPS = 3000  # K, one pick in each of 64 environments and one update per step
 
-WINDOW = 25  # steps of the running means
+SMOOTHING_STEPS = 25  # of the running means
 FINAL = 100  # steps at the end of a run that its final values are means of
 SOLVED = 0.99  # MSR
 LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
@@ -182,7 +182,7 @@ def export_curves(name: str, curve: pd.DataFrame, folder: str | Path) -> None:
 
 def running_mean(values: np.ndarray) -> np.ndarray:
     """Means over 25 steps around each one, fewer at the ends; NaN does not count."""
-    return pd.Series(values).rolling(WINDOW, min_periods=1, center=True).mean().to_numpy()
+    return pd.Series(values).rolling(SMOOTHING_STEPS, min_periods=1, center=True).mean().to_numpy()
 
 
 def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:

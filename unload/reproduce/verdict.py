@@ -9,9 +9,9 @@ from scipy import stats
 from unload.support import checks
 
 END = 0.1  # share of the picks at the end of a run
-WINDOW = 500_000  # picks
+WINDOW_PICKS = 500_000
 HIGH, LOW = 0.95, 0.8  # MSR that a fall begins at, and ends at
-NEAR = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
+LIKE_THE_PAPER = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
 LEVEL = 0.95  # of the intervals
 
 
@@ -21,7 +21,7 @@ def windows(curve: pd.DataFrame) -> pd.DataFrame:
     Args:
         curve: ``picks`` (increasing), ``success_rate`` and ``loss``.
     """
-    number = (curve["picks"] - 1) // WINDOW
+    number = (curve["picks"] - 1) // WINDOW_PICKS
     return curve.groupby(number)[["success_rate", "loss"]].mean()
 
 
@@ -50,7 +50,8 @@ def resembles_fig12(curve: pd.DataFrame) -> bool:
     msr = windows(curve)["success_rate"].to_numpy()
     end = end_msr(curve)
     drop = (np.maximum.accumulate(msr) - msr).max()
-    return bool(NEAR[0] <= end <= NEAR[1] and end >= msr[0] + 0.2 and drop <= 0.05)
+    low, high = LIKE_THE_PAPER
+    return bool(low <= end <= high and end >= msr[0] + 0.2 and drop <= 0.05)
 
 
 def resembles_fig11(curve: pd.DataFrame) -> bool:
@@ -61,7 +62,7 @@ def resembles_fig11(curve: pd.DataFrame) -> bool:
     return bool(len(peaks) and loss[-1] <= 0.9 * loss[peaks].max())
 
 
-def judge(curve: pd.DataFrame) -> dict:
+def run_measures(curve: pd.DataFrame) -> dict:
     """Return the measures of one run: its end, its falls, and its likeness to the paper's."""
     msr = windows(curve)["success_rate"]
     figures = resembles_fig11(curve), resembles_fig12(curve)
@@ -118,9 +119,9 @@ def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
         runs that fall at least once; ``fig11``, ``fig12`` and ``both``, the runs like the
         paper's.
     """
-    judged = pd.DataFrame([{"cell": cell, **judge(curve)} for cell, _, curve in runs])
+    measured = pd.DataFrame([{"cell": cell, **run_measures(curve)} for cell, _, curve in runs])
     rows = []
-    for cell, group in judged.groupby("cell", sort=False):
+    for cell, group in measured.groupby("cell", sort=False):
         ends = group["end"].to_numpy()
         rows.append(
             {"cell": cell, "runs": len(ends), "mean": ends.mean()}

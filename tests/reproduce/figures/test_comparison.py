@@ -27,7 +27,7 @@ def write(folder, missing=None):
 def write_full(folder, policies, episodes=2):
     rows = [
         {"policy": policy, "after_pick": after_pick, "episode": episode, "success_rate": 0.9}
-        for after_pick in robustness.AFTER_PICK
+        for after_pick in robustness.LIFTED_BY
         for policy in policies
         for episode in range(episodes)
     ]
@@ -38,7 +38,7 @@ def test_conditions_are_those_of_the_data():
     played = {*comparison.CONDITIONS, *figures.FULL.values()}
     assert len(figures.CONDITIONS) == len(played)
     assert set(figures.CONDITIONS) == played
-    assert set(figures.FULL) < set(robustness.AFTER_PICK)
+    assert set(figures.FULL) < set(robustness.LIFTED_BY)
     assert len(figures.CONDITIONS) % figures.COLUMNS == 0
 
 
