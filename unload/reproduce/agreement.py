@@ -219,7 +219,10 @@ def choose_items(state: State, local: LocalPhysics, rng: np.random.Generator) ->
 
 
 def choose_for_full(frame: pd.DataFrame, count: int, rng: np.random.Generator) -> np.ndarray:
-    """``"drawn"`` for the lifts of drawn states, ``count`` at least, ``"close"`` and empty."""
+    """Label of each lift: ``"drawn"``, ``"close"`` or empty.
+
+    All lifts of a state are drawn together, until at least ``count`` lifts are.
+    """
     close = frame["local"].between(*CLOSE) & (count > 0)
     chosen = np.where(close, "close", "").astype(object)
     for state in rng.permutation(frame["state"].max() + 1):
@@ -230,7 +233,7 @@ def choose_for_full(frame: pd.DataFrame, count: int, rng: np.random.Generator) -
 
 
 def full_job(state: State, item: int) -> tuple[dict, Callable[[], float]]:
-    """What ``full`` is asked about an item, and the lift that answers it, see ``keep_all``.
+    """Question and computation of one lift in ``full``, for ``keep_all``.
 
     The item is lifted in a world of its own, in which all boxes left in the container are
     simulated. In a world that has seen other lifts, the answer depends on them (by a

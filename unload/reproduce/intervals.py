@@ -1,4 +1,4 @@
-"""How sure a mean over seeds or containers is."""
+"""Confidence intervals of means over seeds or containers."""
 
 from collections.abc import Sequence
 

@@ -1,10 +1,10 @@
-"""The lift table: lifts that a newcomer's containers will meet.
+"""The lift table: lifts that fresh containers commonly meet.
 
     python -m unload.reproduce lifts
 
-An empty table is filled by playing with policies of very different tastes: the highest or the
-nearest item, mixed with random ones to various degrees, or the item that is farthest in some
-direction; and with random picks far longer, because these leave the most situations behind.
+An empty table is filled by playing with varied policies: the highest or the nearest item,
+mixed with random ones to various degrees, or the item that is farthest in some direction; and
+with random picks far longer, because these leave the most situations behind.
 """
 
 import sys
@@ -25,7 +25,7 @@ from unload.reproduce.results import COMMAND, kept, publish
 from unload.support import checks, files
 
 EPISODES = 12
-RANDOM_SHARE = 40  # episodes of random picks per episode of each other taste
+RANDOM_SHARE = 40  # episodes of random picks per episode of each other policy
 
 
 def lift_data(
@@ -38,7 +38,7 @@ def lift_data(
     """Write ``lifts.npz``, see ``unload.physics.lift_table.LiftTable``.
 
     Args:
-        episodes: of 64 containers for each of the 20 tastes, and ``RANDOM_SHARE`` times as
+        episodes: of 64 containers for each of the 20 policies, and ``RANDOM_SHARE`` times as
             many of random picks.
         seed: of the episodes.
         folder: of the table.
@@ -65,7 +65,7 @@ def _fill(path: Path, episodes: int, seed: int, progress: bool) -> None:
     rng = np.random.default_rng(seed)
     envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS).unwrapped
     envs.table = LiftTable()
-    jobs = list(product(range(episodes), _tastes(rng)))
+    jobs = list(product(range(episodes), _filling_policies(rng)))
     for _, policy in tqdm(jobs, unit="episode", disable=not progress, ncols=100, file=sys.stdout):
         observations, infos = envs.reset(seed=int(rng.integers(2**31)))
         for _ in range(task.MAX_PICKS):
@@ -75,7 +75,7 @@ def _fill(path: Path, episodes: int, seed: int, progress: bool) -> None:
     envs.table.save(path)
 
 
-def _tastes(rng: np.random.Generator) -> list[Callable]:
+def _filling_policies(rng: np.random.Generator) -> list[Callable]:
     """Policies that lead a container through very different states."""
     return [
         *[policies.random] * RANDOM_SHARE,

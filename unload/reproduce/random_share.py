@@ -1,4 +1,4 @@
-"""What is learned where a constant share of the picks is random.
+"""Training with a constant share of random picks.
 
 ``random_picks.fit`` fits a network to random picks that it has no part in. Here the network
 shapes the containers that it learns in, by the picks that are not random; or a teacher does.

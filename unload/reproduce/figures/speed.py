@@ -39,7 +39,7 @@ def three_digits(value: float) -> str:
 
 @styled
 def speed_ratios(folder: str | Path = FOLDER) -> Figure:
-    """How many times as fast each way of doing a thing is as the first one.
+    """Speed ratio of each implementation to the first one.
 
     Args:
         folder: of the tables.
