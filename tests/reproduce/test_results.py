@@ -64,6 +64,17 @@ def test_a_damaged_answer_is_named(tmp_path):
         kept(tmp_path, {"seed": 1}, int)
 
 
+@pytest.mark.parametrize("entry", ["value", "record"])
+def test_an_answer_without_an_entry_is_named(tmp_path, entry):
+    kept(tmp_path, {"seed": 1}, int)
+    (path,) = tmp_path.iterdir()
+    stored = json.loads(path.read_text())
+    del stored[entry]
+    path.write_text(json.dumps(stored))
+    with pytest.raises(ValueError, match=f"{path.name} has no {entry}; expected value, record"):
+        kept(tmp_path, {"seed": 1}, int)
+
+
 def test_answers_have_the_order_of_the_questions(tmp_path):
     jobs = [({"number": number}, partial(pow, number, 2)) for number in range(5)]
     answers = keep_all(tmp_path, jobs, 1, progress=False)

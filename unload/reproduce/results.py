@@ -58,7 +58,7 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
 
     Raises:
         TypeError: JSON cannot hold the question or the answer.
-        ValueError: a kept file is damaged; the message names it.
+        ValueError: a kept file is damaged or lacks an entry; the message names it.
     """
     question = json.loads(json.dumps(question, sort_keys=True))
     digest = blake2b(json.dumps(question).encode(), digest_size=8).hexdigest()
@@ -68,6 +68,7 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
         value, record = measured(compute)
         files.write_json(path, {"question": question, "value": value, "record": record})
         stored = files.read_json(path)
+    checks.entries(str(path), stored, ("value", "record"))
     return Result(stored["value"], stored["record"])
 
 
