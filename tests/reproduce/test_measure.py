@@ -1,5 +1,8 @@
 """Finished runs, measured."""
 
+import shutil
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -61,3 +64,13 @@ def test_the_goal_is_reached_at_the_first_snapshot_that_reaches_it(measured, mon
     for name in ("mask", "no_mask"):
         first = row[f"picks_to_goal_{name}"]
         assert first == curve["picks"].min() if goal == 0 else np.isnan(first)
+
+
+def test_a_damaged_run_or_another_one_is_refused(measured, tmp_path):
+    shutil.copytree(measured[0], tmp_path, dirs_exist_ok=True)
+    with pytest.raises(ValueError, match="another configuration: seed"):
+        measure_run(replace(CONFIG, seed=1), tmp_path)
+    curve = tmp_path / "curve.csv"
+    curve.write_text(curve.read_text().replace("1", "2", 1))
+    with pytest.raises(ValueError, match="curve.csv"):
+        measure_run(CONFIG, tmp_path)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import evaluate
 from unload.agent.greedy import Greedy
@@ -32,11 +33,13 @@ def measure_run(config: TrainConfig, folder: str | Path) -> tuple[dict, pd.DataF
         The curve, one row per snapshot: ``picks``; ``success_rate``, ``deadlocked`` and
         ``loss`` of the training since the last one, means over the points of the run's curve
         that lie between, NaN if none does; ``msr_mask`` and ``msr_no_mask``.
+
+    Raises:
+        FileNotFoundError: the run has not finished.
+        ValueError: a file of the run is damaged, or the run is of another configuration.
     """
-    folder = Path(folder)
-    training = pd.read_csv(folder / "curve.csv")
-    curve = _curve(training, sorted((folder / "snapshots").glob("*.safetensors")))
-    policy = load_policy(folder / "policy.safetensors")
+    policy, training = RunFolder(folder).result(config)
+    curve = _curve(training, sorted((Path(folder) / "snapshots").glob("*.safetensors")))
     masked, unmasked = (_unload(policy, POLICY_LOADS, mask) for mask in (True, False))
     end = training[training["picks"] > 0.9 * config.picks]
     row = {
