@@ -3,6 +3,7 @@ import pytest
 
 from unload import load_policy
 from unload.reproduce import answer
+from unload.reproduce.fingerprint import training_fingerprint
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -32,9 +33,34 @@ def test_a_run_is_published_with_its_weights_and_provenance(published):
     assert provenance["settings"]["picks"] == PICKS and provenance["runs"] == 1
     assert "--cells paper_mask" in provenance["command"]
     assert load_policy(place / "seed_0.safetensors").equalize
+    assert provenance["fingerprint"] == training_fingerprint()
     curve = pd.read_csv(place / "seed_0.csv")
     assert curve["picks"].tolist() == [32_000, 64_000]
     assert curve["success_rate"].between(0.2, 0.9).all()
+
+
+def test_runs_are_kept_under_the_fingerprint_of_their_training(published):
+    run = published / "runs/answer" / training_fingerprint() / "paper_mask/seed_0"
+    assert (run / "policy.safetensors").is_file()
+
+
+def test_a_run_is_published_at_its_end_and_whatever_others_do(tmp_path, monkeypatch):
+    def run_all(configs, *args, **kwargs):
+        (name,) = configs
+        published.append(sorted(path.name for path in tmp_path.rglob("answer/*/seed_?.csv")))
+        if name.endswith("seed_1"):
+            raise RuntimeError(f"runs failed:\n{name} broke")
+        return train_all(configs, *args, **kwargs)
+
+    published, train_all = [], answer.run_all
+    monkeypatch.setattr(answer, "SEEDS", {"paper": 3})
+    monkeypatch.setattr(answer, "run_all", run_all)
+    with pytest.raises(RuntimeError, match="^runs failed:\npaper_mask/seed_1 broke$"):
+        answer.answer_data(
+            ["paper_mask"], PICKS // 2, tmp_path, tmp_path / "runs", n_jobs=1, progress=False
+        )
+    assert published == [[], ["seed_0.csv"], ["seed_0.csv"]]
+    assert [seed for _, seed, _ in answer.read_answer(tmp_path)] == [0, 2]
 
 
 def test_published_runs_are_read_back(published):

@@ -2,26 +2,29 @@
 
     python -m unload.reproduce answer
 
-A cell is a configuration, trained with several seeds. A finished run is published at once as
-``data/answer/<cell>/seed_<seed>.csv`` (one row per episode of all environments), its weights
-and its provenance beside it.
+A cell is a configuration, trained with several seeds. Each run is published as soon as it has
+finished, as ``data/answer/<cell>/seed_<seed>.csv`` (one row per episode of all environments),
+its weights and its provenance beside it.
 """
 
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import pandas as pd
+from joblib import Parallel, delayed
+from tqdm import tqdm
 
+from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
-from unload.agent.sweep import run_sweep
-from unload.agent.training import train
+from unload.agent.sweep import run_all
 from unload.agent.weights import save_policy
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, read_table
+from unload.reproduce.study import BASE
 from unload.support import checks, files
 
-BASE = TrainConfig(batch_size=256, snapshots=20)  # log_interval: one episode of all environments
 COLUMNS = ["picks", "success_rate", "deadlocked", "loss"]
 
 
@@ -63,19 +66,20 @@ def answer_data(
     n_jobs: int = -1,
     progress: bool = True,
 ) -> None:
-    """Train and publish the runs of some cells.
+    """Train the runs of some cells, and publish each as soon as it has finished.
 
     Args:
         cells: names in ``CELLS``.
         picks: of each run.
         folder: of the data.
-        runs_dir: where the runs are kept.
-        n_jobs: processes, see ``run_sweep``.
+        runs_dir: where the runs are kept, apart from those of code that trained otherwise.
+        n_jobs: processes, as in joblib.
         progress: show a progress bar.
 
     Raises:
         ValueError: an unknown cell.
-        RuntimeError: a run failed; those that have finished are published.
+        RuntimeError: runs failed; the message says which and why. The others are published.
+        BrokenProcessPool: a process died. When called again, the runs under way are resumed.
     """
     for cell in cells:
         checks.one_of("cells", cell, CELLS)
@@ -84,16 +88,28 @@ def answer_data(
         for cell in cells
         for seed in seeds_of(cell)
     }
-    kept = Path(runs_dir) / "answer"
-    report = run_sweep(configs, kept, n_jobs, progress=progress)
-    for name in report.index[report["error"] == ""]:
-        publish_run(name, configs[name], kept / name, Path(folder) / "answer")
-    failed = report[report["error"] != ""]
-    if len(failed):
-        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+    fingerprint = training_fingerprint()
+    kept, folder = Path(runs_dir) / "answer" / fingerprint, Path(folder) / "answer"
+    errors = Parallel(n_jobs, return_as="generator_unordered", batch_size=1)(
+        delayed(_run)(name, config, kept, folder, fingerprint) for name, config in configs.items()
+    )
+    bar = {"total": len(configs), "unit": "run", "disable": not progress, "ncols": 100}
+    failed = [error for error in tqdm(errors, file=sys.stdout, **bar) if error]
+    if failed:
+        raise RuntimeError("\n".join(failed))
 
 
-def publish_run(name: str, config: TrainConfig, run: Path, folder: Path) -> None:
+def _run(name: str, config: TrainConfig, kept: Path, folder: Path, fingerprint: str) -> str:
+    """Train a run and publish it; what went wrong, or empty, so that the others go on."""
+    try:
+        run_all({name: config}, kept, n_jobs=1, progress=False)
+    except RuntimeError as error:
+        return str(error)
+    publish_run(name, config, kept / name, folder, fingerprint)
+    return ""
+
+
+def publish_run(name: str, config: TrainConfig, run: Path, folder: Path, fingerprint: str) -> None:
     """Publish a finished run: its curve, weights and provenance.
 
     Args:
@@ -101,9 +117,10 @@ def publish_run(name: str, config: TrainConfig, run: Path, folder: Path) -> None
         config: of the run.
         run: its folder.
         folder: of the data.
+        fingerprint: of the training that made the run, see ``training_fingerprint``.
     """
     cell, _, file = name.rpartition("/")
-    policy, curve = train(config, run, progress=False)
+    policy, curve = RunFolder(run).result(config)
     save_policy(policy, folder / cell / f"{file}.safetensors")
     publish(
         folder / cell,
@@ -113,7 +130,7 @@ def publish_run(name: str, config: TrainConfig, run: Path, folder: Path) -> None
         asdict(config),
         config.picks < BASE.picks,
         [files.read_json(run / "record.json")],
-        training_fingerprint(),
+        fingerprint,
         "%.5g",
     )
 
