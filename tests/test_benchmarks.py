@@ -13,6 +13,7 @@ import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import unload
+from benchmarks import soak
 from benchmarks.environments import container_costs, pick_rates
 from benchmarks.floors import bytes_per_second, operations_per_second
 from benchmarks.lifts import fill_rates, lift_rates
@@ -185,3 +186,10 @@ def test_the_command_measures_everything_and_keeps_nothing_when_quick():
     for part in ("lifts", "random picks", "update", "training", "containers", "profile"):
         assert part in printed
     assert path.read_bytes() == before
+
+
+def test_the_soak_prints_memory_and_files(capsys):
+    soak.main(picks=640, environments=2, resets=2)
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 5
+    assert all(" MiB" in line and " files" in line for line in lines[:-1])

@@ -7,7 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests.agent.runs import (
     CONTAINER,
@@ -258,3 +261,40 @@ def test_a_checkpoint_with_another_content_is_refused_by_name(tmp_path, name, va
     files.write_arrays(path, files.read_arrays(path) | {name: np.array(value)})
     with pytest.raises(ValueError, match=f"checkpoint.npz|{tmp_path.name}"):
         train(config, tmp_path, progress=False)
+
+
+@given(
+    changes=st.fixed_dictionaries(
+        {
+            "gamma": st.sampled_from([0.0, 0.9]),
+            "mask": st.booleans(),
+            "equalize": st.booleans(),
+            "ties": st.sampled_from(["noise", "average"]),
+            "max_picks": st.integers(1, 30),
+            "replay_size": st.integers(4, 150),
+            "log_interval": st.integers(1, 20),
+            "gradient_steps": st.integers(0, 2),
+            "seed": st.integers(0, 2**31),
+        }
+    ),
+    steps=st.integers(0, 50),
+)
+@settings(max_examples=12)
+def test_any_run_goes_on_as_if_it_had_not_been_stopped(tmp_path_factory, changes, steps):
+    config = TrainConfig(**CONTAINER | changes)
+    folder = RunFolder(tmp_path_factory.mktemp("run"))
+    with begun(config, folder.path) as run:
+        for _ in range(steps):
+            run.step()
+        folder.save(run)
+        with begun(config, folder.path) as other:
+            for each in (run, other):
+                while not each.rollout.finished:
+                    each.step()
+            assert weights_of(run) == weights_of(other)
+            tables = [each.curve.table().drop(columns="wall_time") for each in (run, other)]
+            pd.testing.assert_frame_equal(*tables, check_exact=True)
+
+
+def weights_of(run) -> bytes:
+    return b"".join(value.numpy().tobytes() for value in run.agent.network.state_dict().values())

@@ -10,6 +10,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from torch.nn.functional import smooth_l1_loss
 
 from unload.agent.dqn import DQN
@@ -370,3 +372,27 @@ def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
 def test_bad_rows_are_refused_by_name(batch, rows):
     with pytest.raises(ValueError, match="rows"):
         fused.loss_and_gradients(network(4), *batch.values(), rows=rows)
+
+
+@given(
+    shape=st.tuples(st.integers(1, 70), st.integers(1, 40)),  # batch, items
+    n_features=st.integers(1, 80),
+    scale=st.sampled_from([0.1, 1.0, 4.0]),  # of the weights
+    levels=st.sampled_from([2, 5, 1000]),  # of coordinates: few make ties
+    beta=st.floats(0.1, 2),
+    seed=st.integers(0, 2**31),
+)
+@settings(max_examples=60)
+def test_any_update_is_that_of_double_precision(shape, n_features, scale, levels, beta, seed):
+    size, items = shape
+    rng = np.random.default_rng(seed)
+    net = network(n_features, seed)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter *= scale
+    batch = {
+        "observations": (rng.integers(levels, size=(size, items, 3)) / levels).astype(np.float32),
+        "actions": rng.integers(items, size=size),
+        "rewards": rng.uniform(-1, 1, size).astype(np.float32),
+    }
+    check(net, batch, beta, tolerance=1e-4)
