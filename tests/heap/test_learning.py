@@ -47,7 +47,7 @@ def made_up_picks(rng: np.random.Generator, count: int) -> Picks:
 def learned() -> tuple[HeapNetwork, Picks]:
     """A network of made-up picks, and others that it has not seen."""
     rng = np.random.default_rng(0)
-    return fit(made_up_picks(rng, 3000), 0, epochs=40), made_up_picks(rng, 500)
+    return fit(made_up_picks(rng, 3000), 0, steps=480), made_up_picks(rng, 500)
 
 
 def answers(network: HeapNetwork, picks: Picks) -> tuple[np.ndarray, ...]:
@@ -67,13 +67,13 @@ def test_it_learns_what_neighbours_do(learned):
 
 def test_own_features_are_not_enough_for_that(learned):
     _, unseen = learned
-    own = fit(made_up_picks(np.random.default_rng(0), 3000), 0, "own", epochs=40)
+    own = fit(made_up_picks(np.random.default_rng(0), 3000), 0, "own", steps=480)
     assert np.corrcoef(answers(own, unseen)[0], unseen.unloaded)[0, 1] < 0.75
 
 
 def test_the_same_seed_gives_the_same_bits():
     picks = made_up_picks(np.random.default_rng(1), 300)
-    first, second, other = (fit(picks, seed, epochs=1).state_dict() for seed in (0, 0, 1))
+    first, second, other = (fit(picks, seed, steps=2).state_dict() for seed in (0, 0, 1))
     assert all(torch.equal(first[name], second[name]) for name in first)
     assert not torch.equal(first["heads.weight"], other["heads.weight"])
 
@@ -87,7 +87,7 @@ def test_with_gamma_the_picks_to_come_count():
     going_on = Picks(picks.observations, picks.actions, ones, none, picks.observations, masks)
     ended = Picks(picks.observations, picks.actions, ones, none, picks.observations, masks & False)
     for given, expected in ((going_on, 1 + 0.5 + 0.25 + 0.125), (ended, 1.0)):
-        network = fit(given, 0, "own", gamma=0.5, epochs=90, rounds=3)
+        network = fit(given, 0, "own", gamma=0.5, steps=180, rounds=3)
         assert answers(network, given)[0].mean() == pytest.approx(expected, abs=0.15)
 
 

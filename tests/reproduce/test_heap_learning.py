@@ -20,7 +20,7 @@ def short_episodes(monkeypatch):
 
 @pytest.mark.slow
 def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path):
-    arguments = {"picks": 12, "physics": "near", "seeds": 2, "epochs": 1, "progress": False}
+    arguments = {"picks": 12, "physics": "near", "seeds": 2, "steps": 2, "progress": False}
     heap_learning.learning_data(folder=tmp_path / "data", runs_dir=tmp_path, **arguments)
     assert len(heap_learning.read_picks(tmp_path)) == 12
     assert len(heap_learning.read_picks(tmp_path, [0])) == 6

@@ -16,6 +16,7 @@ from unload.support import checks, files
 
 BATCH = 256
 LEARNING_RATE = 1e-3
+STEPS = 4000  # 20 times through 50,000 picks; with 5,000, 300 steps are far too few
 WEIGHT_DECAY = 1e-4
 AT_ONCE = 32  # observations of which all rows are asked for: their pairs take 40 MB
 
@@ -67,7 +68,7 @@ def fit(
     kind: str = "pairs",
     gamma: float = 0.0,
     falls_weight: float = 1.0,
-    epochs: int = 20,
+    steps: int = STEPS,
     rounds: int = 4,
 ) -> HeapNetwork:
     """Learn what dragging a box brings.
@@ -84,7 +85,7 @@ def fit(
         kind: of the network, see ``HeapNetwork``.
         gamma: discount in [0, 1).
         falls_weight: λ, of the picks to come; without effect if γ = 0.
-        epochs: through the data, in the first round and in all the others together.
+        steps: of the optimizer, a batch each, in the first round and in all the others together.
         rounds: of Q iteration.
 
     Raises:
@@ -92,7 +93,7 @@ def fit(
     """
     checks.real("gamma", gamma, 0, 0.999)
     checks.real("falls_weight", falls_weight, 0)
-    checks.integer("epochs", epochs, 1)
+    checks.integer("steps", steps, 1)
     if not len(picks):
         raise ValueError("picks is empty; expected at least one")
     generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
@@ -102,22 +103,21 @@ def fit(
         for array in (picks.observations, picks.actions, picks.unloaded, picks.falls)
     ]
     fell = (data[3] > 0).float()
-    _descend(network, (*data, fell), epochs, generator)
+    _descend(network, (*data, fell), steps, generator)
     for _ in range(rounds if gamma else 0):
         boxes, falls = _to_come(network, picks, falls_weight)
         targets = data[2] + gamma * boxes, data[3] + gamma * falls
-        _descend(network, (*data[:2], *targets, fell), max(1, epochs // rounds), generator)
+        _descend(network, (*data[:2], *targets, fell), max(1, steps // rounds), generator)
     return network.eval()
 
 
 def _descend(
-    network: HeapNetwork, data: tuple[torch.Tensor, ...], epochs: int, generator: torch.Generator
+    network: HeapNetwork, data: tuple[torch.Tensor, ...], steps: int, generator: torch.Generator
 ) -> None:
     """Fit a network to observations, actions, boxes, falls and whether anything fell."""
-    steps = epochs * -(-len(data[0]) // BATCH)
     adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
-    for rows in _batches(len(data[0]), epochs, generator):
+    for rows in _batches(len(data[0]), steps, generator):
         observations, actions, boxes, falls, fell = (each[rows] for each in data)
         if torch.rand((), generator=generator) < 0.5:
             observations = mirrored(observations)
@@ -134,9 +134,12 @@ def _descend(
         schedule.step()
 
 
-def _batches(count: int, epochs: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
-    for _ in range(epochs):
-        yield from torch.randperm(count, generator=generator).split(BATCH)
+def _batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
+    """Rows of each batch: all of them in random order, again and again."""
+    while steps > 0:
+        batches = torch.randperm(count, generator=generator).split(BATCH)[:steps]
+        yield from batches
+        steps -= len(batches)
 
 
 def _poisson(mean: torch.Tensor, count: torch.Tensor) -> torch.Tensor:

@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from unload.heap.env import MAX_PICKS, HeapEnv
 from unload.heap.episodes import episode_from, exploring, picks_of, play
-from unload.heap.learning import Learned, Picks, fit, joined, load_network, save_network
+from unload.heap.learning import STEPS, Learned, Picks, fit, joined, load_network, save_network
 from unload.heap.network import KINDS
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
 from unload.reproduce.heap import NAME, SEEDS
@@ -32,7 +32,6 @@ PICKS = 50_000  # of both rounds
 PHYSICS = "coarse"
 ROUNDS = 2
 SEEDS_LEARNED = 5
-EPOCHS = 20
 # What is learned: kind of network and γ; the recommended one first.
 VARIANTS = (("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0))
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
@@ -48,7 +47,7 @@ def learning_data(
     rounds: int = ROUNDS,
     physics: str = PHYSICS,
     seeds: int = SEEDS_LEARNED,
-    epochs: int = EPOCHS,
+    steps: int = STEPS,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
@@ -62,7 +61,7 @@ def learning_data(
     for round_number in range(checks.integer("rounds", rounds, 1, ROUNDS)):
         record_picks(picks // rounds, round_number, physics, runs_dir, n_jobs, progress)
         variants = VARIANTS if round_number == rounds - 1 else VARIANTS[:1]
-        learn(round_number, seeds, variants, runs_dir, n_jobs, epochs)
+        learn(round_number, seeds, variants, runs_dir, n_jobs, steps)
     paths = network_paths(rounds - 1, *VARIANTS[0], runs_dir)
     for seed, path in enumerate(paths):
         target = Path(folder) / NAME / "networks" / f"seed{seed}.safetensors"
@@ -71,7 +70,7 @@ def learning_data(
         Path(folder) / NAME,
         "networks",
         f"{COMMAND} heap-learning --picks {picks} --rounds {rounds} --physics {physics}",
-        {"picks": picks, "physics": physics, "rounds": rounds, "seeds": seeds, "epochs": epochs},
+        {"picks": picks, "physics": physics, "rounds": rounds, "seeds": seeds, "steps": steps},
         picks < PICKS or rounds < ROUNDS or physics != PHYSICS or seeds < SEEDS_LEARNED,
         run_record(time.monotonic() - start),
     )
@@ -170,7 +169,7 @@ def learn(
     variants: Sequence[tuple[str, float]] = VARIANTS,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
-    epochs: int = EPOCHS,
+    steps: int = STEPS,
 ) -> list[Path]:
     """Learn networks from the picks of a round and of those before it.
 
@@ -180,7 +179,7 @@ def learn(
         variants: pairs of ``HeapNetwork`` kind and γ.
         runs_dir: where picks and networks are.
         n_jobs: processes, as in joblib.
-        epochs: see ``fit``.
+        steps: see ``fit``.
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
     for kind, gamma in variants:
@@ -192,17 +191,17 @@ def learn(
     ]
     rounds = range(round_number + 1)
     Parallel(n_jobs)(
-        delayed(_learn)(*job, runs_dir, rounds, epochs) for job in jobs if not job[0].exists()
+        delayed(_learn)(*job, runs_dir, rounds, steps) for job in jobs if not job[0].exists()
     )
     return [job[0] for job in jobs]
 
 
 def _learn(
-    path: Path, kind: str, gamma: float, seed: int, runs_dir: Path, rounds: range, epochs: int
+    path: Path, kind: str, gamma: float, seed: int, runs_dir: Path, rounds: range, steps: int
 ) -> None:
     torch.set_num_threads(1)
     picks = read_picks(runs_dir, rounds)
-    save_network(fit(picks, seed, kind, gamma, epochs=epochs), path)
+    save_network(fit(picks, seed, kind, gamma, steps=steps), path)
 
 
 def weights_digest(paths: Iterable[Path]) -> str:
