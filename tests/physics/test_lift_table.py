@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
+from unload.physics import lift_table
 from unload.physics.bullet import SETTINGS
 from unload.physics.lift_table import FEWEST_SLOTS, LiftTable
 from unload.physics.situation import Situation
@@ -80,6 +81,19 @@ def test_threads_find_and_add_at_the_same_time(monkeypatch):
         assert list(pool.map(work, range(4))) == [[]] * 4
     assert len(table) == 6000
     assert all(table.find(situation(number)) == number / 1000 for number in range(6000))
+
+
+def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(monkeypatch):
+    table, find_slot = LiftTable(), lift_table.slot_of
+
+    def then_filled(digests, digest):
+        slot = find_slot(digests, digest)
+        monkeypatch.undo()
+        digests[slot], table.slots[1][slot] = digest + np.uint64(1), 400_000
+        return slot
+
+    monkeypatch.setattr(lift_table, "slot_of", then_filled)
+    assert table.find(situation(0)) is None
 
 
 @pytest.mark.parametrize("distance", [-0.001, float("nan"), float("inf"), 2148.0])

@@ -44,10 +44,12 @@ class LiftTable:
         return self._count
 
     def find(self, situation: Situation) -> float | None:
-        """How far the box of a situation moves, in m; None if that is not known."""
+        """Return the distance in m that the table holds for a situation, or None."""
         digests, micrometres = self.slots
-        slot = slot_of(digests, _digest(situation))
-        return None if digests[slot] == EMPTY else int(micrometres[slot]) / 1e6
+        digest = _digest(situation)
+        slot = slot_of(digests, digest)
+        # Not "is free": another thread may have filled a free slot since, for another situation.
+        return int(micrometres[slot]) / 1e6 if digests[slot] == digest else None
 
     def add(self, situation: Situation, distance: float) -> None:
         """Remember a lift. A situation that is known keeps its distance.
