@@ -101,7 +101,8 @@ def _describe(function: Callable) -> tuple[str, list[Callable]]:
         codes += [part for part in code.co_consts if isinstance(part, CodeType)]
 
     def named(values):
-        # Among the names are those of attributes, which may be globals by chance: no harm done.
+        # Among the names are those of attributes, which may be globals by chance. Those then
+        # count as used: a change of them compiles anew, and one of no listed kind is refused.
         return [(name, content(values[name])) for name in sorted(names) if name in values]
 
     def content(value):
