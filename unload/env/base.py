@@ -30,7 +30,7 @@ def check_settings(
 
 
 class AllOrReset:
-    """A block after which ``env`` needs a reset if it raises: half of it may have been done.
+    """Context manager that requires a reset of ``env`` if its block raises.
 
     A class, because ``contextlib.contextmanager`` is three times as slow, and steps are short.
     """

@@ -69,7 +69,7 @@ def _scale(positions: np.ndarray) -> np.ndarray:
 
 
 def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
-    """How far a simulator's boxes are from where they were put, (count, 3) float64 in m."""
+    """Return random offsets of simulated boxes from their places, (count, 3) float64 in m."""
     offsets = rng.normal(0, position_noise, (count, 3))
     if position_noise:
         offsets[:, 2] -= SINK
@@ -85,7 +85,7 @@ def scaled(positions: np.ndarray) -> np.ndarray:
 
 
 def holds_item(observations: np.ndarray) -> np.ndarray:
-    """Which rows hold an item and not padding.
+    """Return the mask of the rows that hold an item.
 
     Args:
         observations: (..., items, 3) float, scaled positions. Equalized ones do not show it:

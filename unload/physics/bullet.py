@@ -55,7 +55,7 @@ SETTINGS = {
 
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
-NEAR, FAR = 0.1, 50.0  # m, what a camera sees
+NEAR_PLANE, FAR_PLANE = 0.1, 50.0  # m, what a camera sees
 ITERATIONS = 50
 
 
@@ -297,12 +297,13 @@ class World:
         """
         _, _, _, depth, bodies = self._photograph(eye, target, width, height, angle)
         depth = np.reshape(depth, (height, width)).astype(np.float64)
-        depth = FAR * NEAR / (FAR - (FAR - NEAR) * depth)  # from that of a perspective lens
+        # The buffer holds the depth of a perspective lens, from 0 to 1.
+        depth = FAR_PLANE * NEAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth)
         return depth, np.reshape(bodies, (height, width)).astype(np.int64)
 
     def _photograph(self, eye, target, width: int, height: int, angle: float) -> tuple:
         view = pybullet.computeViewMatrix(eye, target, (0, 0, 1))
-        lens = pybullet.computeProjectionMatrixFOV(angle, width / height, NEAR, FAR)
+        lens = pybullet.computeProjectionMatrixFOV(angle, width / height, NEAR_PLANE, FAR_PLANE)
         return pybullet.getCameraImage(
             width,
             height,

@@ -75,7 +75,7 @@ class Surroundings:
         return sorted(found)
 
     def situation(self, item: int) -> Situation:
-        """What decides the lift of ``item``."""
+        """Return the situation of ``item``: the boxes that decide its lift."""
         dynamic = [item, *self.on_top(item)]
         static = {
             box

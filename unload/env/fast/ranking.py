@@ -117,7 +117,8 @@ def nearest_first(distances, seen, flags, equalize, average, tolerance, observat
 
     Args:
         distances, seen, flags: (E, items) float64, (E, items, axes) float32 and (E, items)
-            bool: how far each item is, where it is seen, and something else about it.
+            bool: how far each item is, where it is seen, and a flag, such as whether it is the
+            highest.
         equalize, average, tolerance: see ``features``.
         observations, rows: (E, items, axes) float32 and (E, items) bool, filled: what is
             seen and the flags, nearest item first.
