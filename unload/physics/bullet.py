@@ -18,8 +18,13 @@ from unload.support import checks
 
 @contextmanager
 def _quiet_stderr():
-    """PyBullet's C code prints its build time while it is imported."""
-    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    """Hide what PyBullet's C code prints while it is imported: its build time."""
+    try:
+        saved = os.dup(2)
+    except OSError:  # stderr is closed: there is nothing to hide
+        yield
+        return
+    null = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(null, 2)
         yield
