@@ -85,11 +85,11 @@ def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tm
 
 
 @contextmanager
-def full_disk():
-    """Limit the size of files to 1000 bytes: writing beyond is an OSError, as on a full disk."""
+def full_disk(room=1000):
+    """Limit files to ``room`` bytes: writing beyond is an OSError, as on a full disk."""
     resource = pytest.importorskip("resource", reason="Windows has no limit on file sizes")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
     try:
         yield
     finally:
@@ -306,6 +306,17 @@ def test_without_locks_of_the_system_the_file_itself_is_the_lock(tmp_path, monke
             with pytest.raises(RuntimeError, match=message), files.locked(tmp_path):
                 pytest.fail("two blocks hold one lock")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("locks", [files.fcntl, None])
+def test_a_lock_that_does_not_fit_on_the_disk_is_named_and_removed(tmp_path, monkeypatch, locks):
+    monkeypatch.setattr(files, "fcntl", locks)
+    message = f"cannot write this file: .*'{tmp_path}/lock'$"
+    with full_disk(room=0), pytest.raises(OSError, match=message), files.locked(tmp_path):
+        pytest.fail("the block ran")
+    assert not list(tmp_path.iterdir())
+    with files.locked(tmp_path):
+        pass
 
 
 def test_a_missing_file_is_named(tmp_path):

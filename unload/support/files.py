@@ -11,8 +11,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from hashlib import blake2b, file_digest
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO, TextIO
+from typing import BinaryIO
 from uuid import uuid4
 
 import numpy as np
@@ -150,7 +151,8 @@ def locked(folder: str | Path) -> Iterator[None]:
 
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock.
-        OSError: the folder's file system has no locks; the error names the folder.
+        OSError: the folder's file system has no locks, or its disk is full; the error names the
+            folder, or the file that could not be written.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -160,12 +162,9 @@ def locked(folder: str | Path) -> Iterator[None]:
         owner = _read_owner(path)
         hint = "" if fcntl else f"; if it has ended, remove {path}"
         raise RuntimeError(f"{folder} is in use by {owner}; wait, or take another folder{hint}")
-    started = datetime.now().astimezone().isoformat(timespec="seconds")
     with file:
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n")
-        file.flush()
         try:
+            _write_owner(path, file)
             yield
         finally:
             if not fcntl:
@@ -173,15 +172,18 @@ def locked(folder: str | Path) -> Iterator[None]:
             path.unlink(missing_ok=True)  # before the lock goes, or it might be the next one's
 
 
-def _take_lock(path: Path) -> TextIO | None:
-    """The lock's file, open and owned by the caller; None if it has another owner."""
+def _take_lock(path: Path) -> FileIO | None:
+    """The lock's file, open and owned by the caller; None if it has another owner.
+
+    It is not buffered, because closing a buffered file tries again to write what failed.
+    """
     if not fcntl:
         try:
-            return open(path, "x")
+            return open(path, "xb", buffering=0)
         except FileExistsError:
             return None
     while True:
-        file = open(path, "a")
+        file = open(path, "ab", buffering=0)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -194,6 +196,18 @@ def _take_lock(path: Path) -> TextIO | None:
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):
                 return file
         file.close()  # the owner before has removed this file meanwhile: lock the one that counts
+
+
+def _write_owner(path: Path, file: FileIO) -> None:
+    """Write this process and the time into a lock's file."""
+    started = datetime.now().astimezone().isoformat(timespec="seconds")
+    owner = f"process {os.getpid()} on {socket.gethostname()} since {started}\n"
+    try:
+        file.truncate(0)
+        file.write(owner.encode())
+    except OSError as error:
+        reason = f"cannot write this file: {error.strerror or error}"
+        raise OSError(error.errno, reason, str(path)) from error
 
 
 def _read_owner(path: Path) -> str:
