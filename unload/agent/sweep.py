@@ -65,7 +65,8 @@ def run_sweep(
     checks.one_of("backend", backend, BACKENDS)
     folders = {name: Path(folder) / name for name in configs}
     for place in folders.values():
-        _mark(place).unlink(missing_ok=True)  # of a sweep that was stopped
+        if _mark(place).exists():  # of a sweep that was stopped
+            _mark(place).unlink()
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
     with bar, parallel_config(backend=backend, n_jobs=n_jobs):
