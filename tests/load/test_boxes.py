@@ -28,6 +28,9 @@ def test_a_load_cannot_be_changed(full_load):
     for name in FIELDS:
         with pytest.raises(ValueError, match="read-only"):
             getattr(full_load, name)[0] = 0
+    for array in (*full_load.contacts, full_load.contacts.of(ABOVE, 0)):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0
 
 
 def test_a_load_does_not_change_with_the_arrays_it_was_made_from():

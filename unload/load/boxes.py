@@ -53,10 +53,12 @@ class Load:
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
         low, high = positions - sizes / 2, positions + sizes / 2
         _check_inside(low, high)
-        object.__setattr__(self, "contacts", contacts(low, high))
-        for name, array in {"positions": positions, "sizes": sizes, **labels}.items():
+        touching = contacts(low, high)
+        fields = {"positions": positions, "sizes": sizes, **labels}
+        for array in (*fields.values(), *touching):
             array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        for name, value in {**fields, "contacts": touching}.items():
+            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.positions)
