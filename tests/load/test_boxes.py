@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.load.strategies import corners, load_of
 from unload import task
-from unload.load.boxes import SMALLEST_EDGE, Load, check_load
+from unload.load.boxes import SMALLEST_EDGE, Load, check_load, check_stack
 from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
 
 FIELDS = ("positions", "sizes", "packages", "walls")
@@ -93,6 +93,12 @@ def test_overlapping_boxes_are_refused(step):
 def test_something_else_is_no_load(load):
     with pytest.raises(TypeError, match="(?s)load is .*; expected an unload.Load"):
         check_load(load)
+
+
+@pytest.mark.parametrize("stack", [None, "walls", np.zeros(3)])
+def test_something_else_is_no_stack(stack):
+    with pytest.raises(TypeError, match="stack is .*; expected a function from a Generator"):
+        check_stack(stack)
 
 
 def test_the_smallest_edge():

@@ -10,19 +10,13 @@ from unload.env import observation
 from unload.env.base import AllOrReset, PickingEnv
 from unload.env.observation import POSITION_NOISE
 from unload.env.render import Camera
-from unload.load.boxes import Load, check_load
+from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.choose import make_physics
 from unload.support import checks, random_state
 
 MOST_BLUR = 100.0  # m, ten times the largest standard deviation
 LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
-
-
-def check_stack(stack: object) -> None:
-    """Raise TypeError unless ``stack`` can make a load."""
-    if not callable(stack):
-        raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
 
 
 class ContainerEnv(PickingEnv):

@@ -6,13 +6,12 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.container import check_stack
 from unload.env.fast import containers
 from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
 from unload.env.vector_base import PickingVectorEnv
-from unload.load.boxes import Load, check_load
+from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.lift_table import LiftTable
 from unload.physics.situation import Surroundings

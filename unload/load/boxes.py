@@ -82,3 +82,9 @@ def check_load(load: object) -> None:
     """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
     if not isinstance(load, Load):
         raise TypeError(f"load is {load!r}; expected an unload.Load")
+
+
+def check_stack(stack: object) -> None:
+    """Raise TypeError unless ``stack`` is callable, as what makes a load must be."""
+    if not callable(stack):
+        raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
