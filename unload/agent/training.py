@@ -20,7 +20,7 @@ from unload.agent.greedy import Greedy
 from unload.agent.interrupt import deferred_interrupts
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
-from unload.load.boxes import Load, check_load
+from unload.load.boxes import Load, check_load, check_stack
 from unload.network.variants import NETWORKS
 
 
@@ -202,8 +202,7 @@ def _check_stack(stack: Callable, config: TrainConfig) -> None:
     """Raise unless ``stack`` can make the run's loads, and the same again for a resumed run."""
     if config.env != ENVS[0]:
         raise ValueError(f"stack is given; expected None for env={config.env!r}")
-    if not callable(stack):
-        raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+    check_stack(stack)
     loads = [stack(np.random.default_rng(config.seeds()[0])) for _ in range(2)]
     for load in loads:
         check_load(load)
