@@ -3,27 +3,9 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from unload import DQN, Greedy, PEQNetwork
+from tests.agent.networks import HeightNetwork, peq, weights
+from unload import DQN, Greedy
 from unload.agent.greedy import greedy_actions
-
-
-class HeightNetwork(torch.nn.Module):
-    """Values each item by its z, times a weight."""
-
-    def __init__(self, weight: float = 1.0) -> None:
-        super().__init__()
-        self.weight = torch.nn.Parameter(torch.tensor(weight))
-
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        return observations[..., 2] * self.weight
-
-
-def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
-    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
-
-
-def weights(network: torch.nn.Module) -> list[torch.Tensor]:
-    return [parameter.detach().clone() for parameter in network.parameters()]
 
 
 def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> dict:

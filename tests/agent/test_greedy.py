@@ -2,14 +2,11 @@ import numpy as np
 import pytest
 import torch
 
-from unload import Greedy, PEQNetwork, equalize
+from tests.agent.networks import peq
+from unload import Greedy, equalize
 from unload.agent.greedy import greedy_actions
 from unload.agent.learner import highest_values
 from unload.network.variants import NETWORKS
-
-
-def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
-    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
 
 
 @pytest.fixture

@@ -7,27 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.torch import save_file
 
+from tests.agent.networks import HeightNetwork, peq, weights
 from unload import Greedy, PEQNetwork, load_policy, policies, save_policy
 from unload.network.variants import NETWORKS
-
-
-class HeightNetwork(torch.nn.Module):
-    """Values each item by its z, times a weight."""
-
-    def __init__(self, weight: float = 1.0) -> None:
-        super().__init__()
-        self.weight = torch.nn.Parameter(torch.tensor(weight))
-
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        return observations[..., 2] * self.weight
-
-
-def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
-    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
-
-
-def weights(network: torch.nn.Module) -> list[torch.Tensor]:
-    return [parameter.detach().clone() for parameter in network.parameters()]
 
 
 @pytest.fixture
