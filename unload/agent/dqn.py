@@ -10,6 +10,7 @@ from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import check_network
 from unload.agent.learner import PlainLearner
 from unload.agent.policies import any_allowed, check_batch
+from unload.agent.replay import check_next_masks
 from unload.support import checks
 
 
@@ -146,12 +147,7 @@ class DQN:
     @torch.no_grad()
     def _targets(self, batch: dict[str, np.ndarray]) -> np.ndarray:
         """r + γ max over the allowed actions of the target network, (batch,) float32."""
-        hopeless = ~batch["next_masks"].any(axis=1) & ~batch["terminations"]
-        if hopeless.any():
-            raise ValueError(
-                f"next_masks is all zero in row {int(np.argmax(hopeless))}, which is not terminal; "
-                "expected at least one allowed action"
-            )
+        check_next_masks(batch["next_masks"], batch["terminations"])
         following = torch.from_numpy(batch["next_observations"])
         values = torch.func.functional_call(self.network, self.target, (following,))
         best = values.masked_fill(torch.from_numpy(~batch["next_masks"]), -torch.inf).amax(dim=1)

@@ -18,6 +18,20 @@ def _checked(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype)
         return CHECKS[dtype.kind](name, values.astype(dtype), shape).astype(dtype)
 
 
+def check_next_masks(masks: np.ndarray, terminations: np.ndarray) -> None:
+    """Raise ValueError unless each next state that is not terminal allows an action.
+
+    Args:
+        masks, terminations: (batch, items) and (batch,) bool.
+    """
+    hopeless = ~masks.any(axis=1) & ~terminations
+    if hopeless.any():
+        raise ValueError(
+            f"next_masks is all zero in row {int(np.argmax(hopeless))}, which is not terminal; "
+            "expected at least one allowed action"
+        )
+
+
 class ReplayBuffer:
     """The last ``size`` picks, in arrays.
 
@@ -91,12 +105,7 @@ class ReplayBuffer:
                 f"actions holds {actions.min()} to {actions.max()}; expected 0 to {items - 1}"
             )
         if "next_masks" in checked:
-            hopeless = ~checked["next_masks"].any(axis=1) & ~checked["terminations"]
-            if hopeless.any():
-                raise ValueError(
-                    f"next_masks is all zero in row {int(np.argmax(hopeless))}, which is not "
-                    "terminal; expected at least one allowed action"
-                )
+            check_next_masks(checked["next_masks"], checked["terminations"])
         start = self.total % self.size
         slots = slice(start, start + count)
         if start + count > self.size:  # round the end

@@ -45,7 +45,31 @@ class AllOrReset:
             self._env._state = "broken off"
 
 
-class PickingEnv(gymnasium.Env):
+class EpisodeEnv(gymnasium.Env):
+    """Base of environments that refuse calls out of order.
+
+    Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``;
+    ``AllOrReset`` sets it to ``"broken off"``.
+    """
+
+    _state = "not started"
+
+    def _check_open(self) -> None:
+        if self._state == "closed":
+            raise ClosedEnvironmentError("the environment is closed; make a new one")
+
+    def _check_started(self) -> None:
+        self._check_open()
+        if self._state in ("not started", "broken off"):
+            raise ResetNeeded(f"the episode is {self._state}; call reset first")
+
+    def _check_running(self) -> None:
+        self._check_started()
+        if self._state == "finished":
+            raise ResetNeeded("the episode is finished; call reset first")
+
+
+class PickingEnv(EpisodeEnv):
     """Base of environments whose action picks one of the 128 observed items.
 
     Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
@@ -98,17 +122,3 @@ class PickingEnv(gymnasium.Env):
         if isinstance(action, np.ndarray) and action.ndim == 0:
             action = action.item()  # what Stable-Baselines3's predict returns
         return checks.integer("action", action, 0, task.N_VISIBLE - 1)
-
-    def _check_open(self) -> None:
-        if self._state == "closed":
-            raise ClosedEnvironmentError("the environment is closed; make a new one")
-
-    def _check_started(self) -> None:
-        self._check_open()
-        if self._state in ("not started", "broken off"):
-            raise ResetNeeded(f"the episode is {self._state}; call reset first")
-
-    def _check_running(self) -> None:
-        self._check_started()
-        if self._state == "finished":
-            raise ResetNeeded("the episode is finished; call reset first")

@@ -5,11 +5,10 @@ from functools import cache
 
 import gymnasium
 import numpy as np
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils import seeding
 
 from unload import task
-from unload.env.base import AllOrReset
+from unload.env.base import AllOrReset, EpisodeEnv
 from unload.heap import generate
 from unload.heap.boxes import Heap
 from unload.heap.camera import Camera
@@ -24,7 +23,7 @@ LARGEST = 20.0  # of the observation: twice what a box 10 m away would show
 STATE = ("positions", "orientations", "sizes", "packages", "failed", "counts", "rng")
 
 
-class HeapEnv(gymnasium.Env):
+class HeapEnv(EpisodeEnv):
     """Unload a heap by choosing, at each step, the box that a rake drags.
 
     ## Description
@@ -258,20 +257,6 @@ class HeapEnv(gymnasium.Env):
             "item_mask": (self.visible >= 0).astype(np.int8),
             "left": len(self.heap),
         }
-
-    def _check_open(self) -> None:
-        if self._state == "closed":
-            raise ClosedEnvironmentError("the environment is closed; make a new one")
-
-    def _check_started(self) -> None:
-        self._check_open()
-        if self._state in ("not started", "broken off"):
-            raise ResetNeeded(f"the episode is {self._state}; call reset first")
-
-    def _check_running(self) -> None:
-        self._check_started()
-        if self._state == "finished":
-            raise ResetNeeded("the episode is finished; call reset first")
 
 
 @cache
