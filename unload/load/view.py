@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 
 from unload import task
 from unload.load.boxes import Load, check_load
+from unload.load.colours import COLOURS, css
 from unload.load.substacks import package_colour
 from unload.support import checks
 
@@ -19,9 +20,8 @@ TRIANGLES = np.array(
     ]
 )  # fmt: skip
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
-PALE = (0.86, 0.86, 0.84)
-# Colours for groups of items, in the order in which they are given.
-GROUP_COLOURS = ((0.16, 0.47, 0.71), (0.87, 0.34, 0.22), (0.27, 0.65, 0.38), (0.58, 0.40, 0.74))
+# Of groups whose names are not in COLOURS, in the order in which they are given.
+OTHER_COLOURS = ((0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.58, 0.40, 0.74), (0.0, 0.0, 0.0))
 
 
 def view(
@@ -36,15 +36,16 @@ def view(
         load: the boxes.
         present: (n,) bool, which of them to draw; all if None.
         groups: name → item numbers, for example ``{"failed": failed}``. Each group
-            has its colour and a line in the legend; of two groups that share an item the
-            later one wins; items in no group are pale. If None, colours mean packages.
+            has a line in the legend, and its name's colour in ``COLOURS`` or one of four
+            others; of two groups that share an item the later one wins; items in no group
+            have the colour of "unseen". If None, colours mean packages.
         height: of the figure in pixels.
 
     Raises:
         TypeError: ``load`` is not a ``Load``, ``groups`` no dict, or a group does not hold
             integers.
-        ValueError: ``present`` has another shape, more than four groups, or a group
-            holds a number that is no item.
+        ValueError: ``present`` has another shape, more than four groups have names that are
+            not in ``COLOURS``, or a group holds a number that is no item.
     """
     check_load(load)
     present = np.ones(len(load), dtype=bool) if present is None else np.asarray(present)
@@ -67,7 +68,7 @@ def view(
         figure.add_trace(
             go.Scatter3d(
                 x=[None], y=[None], z=[None], mode="markers", name=name,
-                marker={"size": 8, "symbol": "square", "color": _css(colour)},
+                marker={"size": 8, "symbol": "square", "color": css(colour)},
             )
         )  # fmt: skip
     length, width, top = task.CONTAINER
@@ -88,12 +89,17 @@ def view(
 
 def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict]:
     checks.entries("groups", groups, ())
-    if len(groups) > len(GROUP_COLOURS):
-        raise ValueError(f"groups has {len(groups)} entries; expected at most {len(GROUP_COLOURS)}")
-    colours, legend = np.tile(PALE, (count, 1)), {}
-    for (name, items), colour in zip(groups.items(), GROUP_COLOURS):
+    others = [name for name in groups if name not in COLOURS]
+    if len(others) > len(OTHER_COLOURS):
+        raise ValueError(
+            f"groups has the names {others}; expected at most {len(OTHER_COLOURS)} "
+            f"besides {list(COLOURS)}"
+        )
+    named = COLOURS | dict(zip(others, OTHER_COLOURS))
+    colours, legend = np.tile(COLOURS["unseen"], (count, 1)), {}
+    for name, items in groups.items():
         items = np.asarray(items)
-        legend[name] = colour
+        legend[name] = named[name]
         if not items.size:
             continue
         if items.dtype.kind not in "iu":
@@ -102,7 +108,7 @@ def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.nda
             raise ValueError(
                 f"groups[{name!r}] holds {items.min()} to {items.max()}; expected 0 to {count - 1}"
             )
-        colours[items] = colour
+        colours[items] = named[name]
     return colours, legend
 
 
@@ -114,14 +120,10 @@ def _mesh(load: Load, items: np.ndarray, colours: np.ndarray) -> go.Mesh3d:
     return go.Mesh3d(
         **dict(zip("xyz", vertices.reshape(-1, 3).round(3).T)),
         **dict(zip("ijk", triangles.T)),
-        facecolor=np.repeat([_css(colour) for colour in colours], len(TRIANGLES)),
+        facecolor=np.repeat([css(colour) for colour in colours], len(TRIANGLES)),
         text=np.repeat(labels, len(CORNERS)),
         hoverinfo="text",
         flatshading=True,
         lighting={"ambient": 0.75, "diffuse": 0.5},
         showscale=False,
     )
-
-
-def _css(colour: tuple[float, float, float]) -> str:
-    return "rgb({:.0f},{:.0f},{:.0f})".format(*(255 * np.asarray(colour)))
