@@ -1,0 +1,155 @@
+"""Why 60 %: the runs of the plan, each of them shown."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from unload.reproduce.answer import CELLS, read_answer
+from unload.reproduce.figures.style import styled
+from unload.reproduce.verdict import WINDOW_PICKS, cell_table, end_msr, windows
+from unload.support import checks, files
+
+PAPER_MSR = 0.6  # at the end of its Fig. 12
+# Cells of the paper's configuration: the mask in training and the batch are not beyond doubt.
+PAPER_CELLS = {
+    "paper_no_mask": "without the mask, b = 256",
+    "paper_b2048_no_mask": "without the mask, b = 2048",
+    "paper_mask": "with the mask, b = 256",
+    "paper_b2048_mask": "with the mask, b = 2048",
+}
+
+
+def _chosen(cells: Mapping[str, str], folder: str | Path) -> dict[str, list]:
+    """The runs of some cells, as ``(cell, seed, curve)``; cells without any are left out."""
+    for cell in cells:
+        checks.one_of("cells", cell, CELLS)
+    runs = {cell: [] for cell in cells}
+    for run in read_answer(folder):
+        if run[0] in runs:
+            runs[run[0]].append(run)
+    return {cell: found for cell, found in runs.items() if found}
+
+
+@styled
+def cells_msr(cells: Mapping[str, str] = PAPER_CELLS, folder: str | Path = files.DATA) -> Figure:
+    """MSR while training over the last tenth of the picks: a dot for each run.
+
+    The measure is that of the paper's Fig. 12. Under the dots stands their mean with its 95 % t
+    interval, which the ends of the scale cut off.
+
+    Args:
+        cells: names in ``unload.reproduce.answer.CELLS`` → text; those without a run are left out.
+        folder: of the data.
+
+    Raises:
+        ValueError: an unknown cell.
+    """
+    runs = _chosen(cells, folder)
+    figure, axes = plt.subplots(figsize=(6.4, 0.9 + 0.48 * len(runs)))
+    names = []
+    for row, (cell, found) in enumerate(runs.items()):
+        ends = np.sort([end_msr(curve) for _, _, curve in found])
+        axes.plot(ends, np.full(len(ends), row - 0.12), "o", color="C0", alpha=0.6, markersize=5)
+        table = cell_table(found).iloc[0]
+        if len(ends) > 1:
+            interval = np.clip([table["low"], table["high"]], 0, 1)
+            axes.plot(interval, [row + 0.24] * 2, color="0.2", linewidth=1.2)
+        axes.plot(table["mean"], row + 0.24, "|", color="0.2", markersize=9, markeredgewidth=1.8)
+        names.append(f"{cells[cell]}\n{len(ends)} run{'s' * (len(ends) > 1)}")
+    axes.axvline(PAPER_MSR, color="C1", linestyle=":")
+    axes.text(PAPER_MSR, 1.02, "the paper's run", color="C1", ha="center", va="bottom",
+              transform=axes.get_xaxis_transform(), fontsize=9)  # fmt: skip
+    axes.set_yticks(range(len(names)), names, fontsize=9)
+    axes.set(
+        xlim=(0, 1.02),
+        ylim=(len(names) - 0.5, -0.5),
+        xlabel="MSR while training, last tenth of 20 million picks",
+    )
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+    axes.grid(False, axis="y")
+    return figure
+
+
+@styled
+def cell_curves(
+    cells: Mapping[str, str] = PAPER_CELLS, columns: int = 2, folder: str | Path = files.DATA
+) -> Figure:
+    """MSR while training of each run, over windows of half a million picks; a panel for each cell.
+
+    Args:
+        cells: as for ``cells_msr``.
+        columns: panels in a line.
+        folder: of the data.
+
+    Raises:
+        ValueError: an unknown cell, or no cell has a run.
+    """
+    checks.integer("columns", columns, 1)
+    runs = _chosen(cells, folder)
+    if not runs:
+        raise ValueError(f"cells is {list(cells)}, of which none has a run; expected data of one")
+    columns = min(columns, len(runs))
+    lines = -(-len(runs) // columns)
+    figure, grid = plt.subplots(
+        lines, columns, figsize=(3.8 * columns, 0.5 + 1.9 * lines), sharex=True, sharey=True,
+        squeeze=False,
+    )  # fmt: skip
+    for axes in grid.flat[len(runs) :]:
+        axes.set_visible(False)
+    for axes, (cell, found) in zip(grid.flat, runs.items()):
+        for _, seed, curve in found:
+            msr = windows(curve)["success_rate"]
+            middles = (msr.index + 0.5) * WINDOW_PICKS / 1e6
+            colour = plt.get_cmap("viridis")(seed / 10)
+            axes.plot(middles, msr, color=colour, linewidth=1, label=seed)
+        axes.axhline(PAPER_MSR, color="C1", linestyle=":")
+        axes.set_title(f"{cells[cell]} ({len(found)} runs)", fontsize=9)
+    for axes in grid[:, 0]:
+        axes.set(ylabel="MSR while training", ylim=(0, 1.02))
+        axes.yaxis.set_major_formatter(PercentFormatter(1))
+    for axes in grid[-1]:
+        axes.set_xlabel("picks (millions)")
+    return figure
+
+
+@styled
+def falls_and_replay(
+    cell: str, seeds: Sequence[int], replay: int, folder: str | Path = files.DATA
+) -> Figure:
+    """MSR while training of some runs, and the share of failures in their replay memory.
+
+    Args:
+        cell: a name in ``unload.reproduce.answer.CELLS``.
+        seeds: of the runs, one panel each.
+        replay: picks that the replay memory holds.
+        folder: of the data.
+
+    Raises:
+        ValueError: an unknown cell, or a run is not there.
+    """
+    found = {seed: curve for _, seed, curve in _chosen({cell: ""}, folder).get(cell, [])}
+    for seed in seeds:
+        checks.one_of("seeds", seed, found)
+    figure, panels = plt.subplots(
+        len(seeds), 1, figsize=(6.4, 0.6 + 1.5 * len(seeds)), sharex=True, squeeze=False
+    )
+    for axes, seed in zip(panels.flat, seeds):
+        curve = found[seed]
+        millions = curve["picks"] / 1e6
+        points = round(replay / np.diff(curve["picks"].iloc[:2])[0])
+        failures = 1 - curve["success_rate"].rolling(points, min_periods=1).mean()
+        msr = windows(curve)["success_rate"]
+        axes.plot((msr.index + 0.5) * WINDOW_PICKS / 1e6, msr, color="C0")
+        axes.set(ylim=(0, 1.02), ylabel=f"MSR, seed {seed}")
+        axes.yaxis.set_major_formatter(PercentFormatter(1))
+        other = axes.twinx()
+        other.semilogy(millions, failures, color="C1", linewidth=1)
+        other.set(ylim=(1e-4, 1), ylabel="failures")
+        other.grid(False)
+        other.yaxis.label.set_color("C1")
+    panels.flat[-1].set_xlabel("picks (millions)")
+    return figure
