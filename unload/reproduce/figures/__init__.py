@@ -2,5 +2,6 @@
 
 ``mdp`` (Fig. 1), ``containers`` (2), ``substacks`` (3), ``observation`` (4–6), ``network`` (7),
 ``tuning`` (8–10), ``training`` (11 and 12); ``lifting``, ``study``, ``answer``,
-``comparison``, ``resampling``, ``heap`` and ``speed`` are of this repository alone.
+``comparison``, ``resampling``, ``heap`` and ``speed`` are of this repository alone, and so is
+``animation``, the README's moving picture, which ``perspective`` paints.
 """

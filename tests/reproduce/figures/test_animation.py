@@ -1,0 +1,94 @@
+"""The README's moving picture."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from unload import policies
+from unload.load.substacks import front_walls, stack_load
+from unload.reproduce.figures import animation
+from unload.support import files
+
+
+def small(rng):
+    """One wall of a load."""
+    return front_walls(stack_load(rng), 1)
+
+
+def lowest(observations, masks, rng):
+    """The lowest item, which has others on it."""
+    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
+
+
+@pytest.fixture(scope="module")
+def episodes():
+    return {
+        "stuck": animation.record_episode(lowest, 3, stack=small),
+        "empty": animation.record_episode(policies.highest, 3, stack=small),
+    }
+
+
+def test_episode_ends_when_the_container_is_empty_or_the_agent_stuck(episodes):
+    stuck, empty = episodes["stuck"], episodes["empty"]
+    assert empty.unloaded.all() and sorted(empty.items) == list(range(len(empty.load)))
+    assert len(set(stuck.items)) == 1 and not stuck.unloaded.any()
+    assert len(stuck.items) == animation.STUCK
+    assert np.array_equal(stuck.load.positions, empty.load.positions)
+
+
+def test_first_deadlock_is_the_first_seed_that_ends_with_a_failure(episodes, monkeypatch):
+    def record(policy, seed):
+        return episodes["stuck" if seed in (2, 7, 8) else "empty"]
+
+    monkeypatch.setattr(animation, "record_episode", record)
+    assert animation.first_deadlock(lowest, 3) == 7
+    with pytest.raises(ValueError, match="empties the containers of seeds 3 to 6"):
+        animation.first_deadlock(lowest, 3, most=4)
+
+
+def test_frames_begin_slowly_and_show_the_end_twice():
+    counts = animation.picks_of_frames(900)
+    assert counts[:11] == list(range(11)) and counts[-2:] == [900, 900]
+    steps = np.diff(counts[:-2])
+    assert (np.diff(steps) >= 0).all() and steps.max() == animation.STEP
+    assert animation.picks_of_frames(2) == [0, 1, 2, 2]
+
+
+def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_path, monkeypatch):
+    texts = []
+    draw = animation.ImageDraw.ImageDraw.text
+
+    def note(self, place, text, *args, **kwargs):
+        texts.append(text)
+        draw(self, place, text, *args, **kwargs)
+
+    monkeypatch.setattr(animation.ImageDraw.ImageDraw, "text", note)
+    first, second = tmp_path / "a.gif", tmp_path / "b.gif"
+    frames = animation.save_unloading(episodes, first)
+    picks, boxes = len(episodes["stuck"].items), len(episodes["empty"].load)
+    for said in (
+        f"deadlock: the same box fails, {picks} times",
+        f"0 of {boxes}",
+        f"{boxes} of {boxes}",
+        f"empty after {boxes} picks, 0 of them failed",
+    ):
+        assert said in texts
+    animation.save_unloading(episodes, second)
+    assert first.read_bytes() == second.read_bytes()
+    with Image.open(first) as image:
+        assert image.n_frames == len(frames) == len(animation.picks_of_frames(picks))
+        image.seek(image.n_frames - 1)
+        shown = np.asarray(image.convert("RGB")).astype(int)
+    assert np.abs(shown - np.asarray(frames[-1])).mean() < 2  # the palette serves all frames
+    container = shown[animation.ROOM[1] : animation.HEIGHT, animation.WIDTH + 8 :]
+    assert (np.ptp(container, axis=2) < 12).all(), "the emptied container has no coloured box"
+
+
+def test_no_episode_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="episodes is empty"):
+        animation.save_unloading({}, tmp_path / "a.gif")
+    assert not list(tmp_path.iterdir())
+
+
+def test_committed_picture_is_small_enough_for_a_readme():
+    assert (files.FIGURES / "unloading.gif").stat().st_size <= 2_000_000
