@@ -13,10 +13,11 @@ README = (ROOT / "README.md").read_text()
 
 # The files and folders of unload/ that may import a library; "" stands for all.
 LIBRARIES = {
+    "PIL": ("reproduce/figures/",),
     "gymnasium": ("__init__.py", "env/", "agent/", "heap/", "reproduce/"),
     "joblib": ("agent/sweep.py", "reproduce/"),
     "llvmlite": ("agent/fast/kernel.py", "support/compiled.py"),
-    "matplotlib": ("reproduce/figures/",),
+    "matplotlib": ("load/still.py", "reproduce/figures/"),
     "numba": ("support/compiled.py", "agent/fast/kernel.py"),
     "numpy": ("",),
     "pandas": ("agent/", "reproduce/"),

@@ -1,34 +1,45 @@
+import base64
+import copy
 import json
 
 import numpy as np
 import pytest
+from IPython.core.formatters import DisplayFormatter
 
 from unload import Load, view
+from unload.load.colours import COLOURS, css
+from unload.load.view import PLOTLY_MIMETYPE
 
 
-def vertices(figure) -> np.ndarray:
-    mesh = figure.data[0]
-    return np.column_stack([mesh.x, mesh.y, mesh.z])
+def vertices(trace) -> np.ndarray:
+    return np.column_stack([trace.x, trace.y, trace.z])
 
 
-def test_one_mesh_holds_all_boxes(full_load):
+def items(trace) -> list[int]:
+    """The items that a mesh draws, as its labels name them."""
+    return trace.customdata[::8, 0].tolist()
+
+
+def test_a_mesh_holds_the_boxes_of_one_colour(full_load):
     figure = view(full_load)
-    assert [trace.type for trace in figure.data].count("mesh3d") == 1
-    corners = vertices(figure).reshape(len(full_load), 8, 3)
-    low = full_load.positions - full_load.sizes / 2
-    assert corners.min(axis=1) == pytest.approx(low, abs=0.01)
-    assert corners.max(axis=1) == pytest.approx(low + full_load.sizes, abs=0.01)
-    assert len(figure.data[0].facecolor) == 12 * len(full_load)
+    assert {trace.type for trace in figure.data} == {"mesh3d"}
+    assert sorted(sum(map(items, figure.data), [])) == list(range(len(full_load)))
+    for trace in figure.data:
+        corners = vertices(trace).reshape(-1, 8, 3)
+        sizes = full_load.sizes[items(trace)]
+        low = full_load.positions[items(trace)] - sizes / 2
+        assert corners.min(axis=1) == pytest.approx(low, abs=0.01)
+        assert corners.max(axis=1) == pytest.approx(low + sizes, abs=0.01)
 
 
 def test_a_thin_box_is_drawn_no_thicker_than_it_is():
     load = Load([[3.5, 1.25, 0.002]], [[1.0, 1.0, 0.004]], [0], [0])
-    assert np.ptp(vertices(view(load))[:, 2]) < 0.004
+    assert np.ptp(vertices(view(load).data[0])[:, 2]) < 0.004
 
 
 def test_triangles_are_the_faces_of_their_box(boxes):
-    figure = view(boxes((1.0, 0.2), (2.0, 0.2)))
-    mesh, points = figure.data[0], vertices(figure)
+    mesh = view(boxes((1.0, 0.2), (2.0, 0.2))).data[0]
+    points = vertices(mesh)
     triangles = np.column_stack([mesh.i, mesh.j, mesh.k])
     assert set((triangles // 8).min(axis=1)) == {0, 1}
     assert (triangles // 8 == (triangles // 8)[:, :1]).all()
@@ -37,43 +48,85 @@ def test_triangles_are_the_faces_of_their_box(boxes):
     assert area == pytest.approx(2 * 6 * 0.388**2, rel=0.01)
 
 
+def test_the_container_has_its_true_proportions(small_load):
+    scene = view(small_load).layout.scene
+    drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
+    assert scene.aspectmode == "manual"
+    assert drawn / drawn[1] == pytest.approx([2.8, 1, 1])
+    ranges = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
+    assert ranges == pytest.approx(drawn * 2.5)
+
+
+def test_the_camera_is_outside_the_entrance(small_load):
+    camera = view(small_load).layout.scene.camera
+    half = 2.8 / 2  # of the container's length, from its middle to the entrance at x = 7 m
+    assert camera.eye.x > half > camera.center.x
+
+
 def test_present_chooses_what_is_drawn(small_load):
     present = np.zeros(len(small_load), dtype=bool)
     present[[3, 7]] = True
     figure = view(small_load, present=present)
-    assert len(vertices(figure)) == 16
-    assert {text.split(",")[0] for text in figure.data[0].text} == {"item 3", "item 7"}
+    assert sorted(sum(map(items, figure.data), [])) == [3, 7]
+    assert len(view(small_load, present=np.zeros_like(present)).data) == 0
 
 
 def test_packages_have_a_colour_and_a_line_in_the_legend(small_load):
     figure = view(small_load)
-    names = [trace.name for trace in figure.data[1:]]
-    assert names == [f"package {p}" for p in np.unique(small_load.packages)]
-    colours = np.array(figure.data[0].facecolor)[::12]
-    for package in np.unique(small_load.packages):
-        assert len(set(colours[small_load.packages == package])) == 1
-    assert len(set(colours)) == len(names)
+    assert [trace.name for trace in figure.data] == [
+        f"package {p}" for p in np.unique(small_load.packages)
+    ]
+    assert all(trace.showlegend for trace in figure.data) and figure.layout.showlegend
+    assert len({trace.color for trace in figure.data}) == len(figure.data)
+    for trace in figure.data:
+        assert {f"package {p}" for p in small_load.packages[items(trace)]} == {trace.name}
 
 
-def test_groups_differ_in_colour_and_the_later_one_wins(small_load):
+def test_of_two_groups_the_later_one_wins(small_load):
     figure = view(small_load, groups={"visible": [0, 1, 2], "tried": [2, 3]})
-    colours = np.array(figure.data[0].facecolor)[::12]
-    assert colours[0] == colours[1] and colours[2] == colours[3]
-    assert len({colours[0], colours[2], colours[4]}) == 3
-    assert [trace.name for trace in figure.data[1:]] == ["visible", "tried"]
-    legend = [trace.marker.color for trace in figure.data[1:]]
-    assert legend == [colours[0], colours[2]]
+    shown = {trace.name: items(trace) for trace in figure.data}
+    rest = list(range(4, len(small_load)))
+    assert shown == {"visible": [0, 1], "tried": [2, 3], "unseen": rest}
+    for trace in figure.data:
+        assert trace.color == css(COLOURS[trace.name])
 
 
 def test_a_group_may_be_empty(small_load):
     figure = view(small_load, groups={"tried": []})
-    assert len(set(figure.data[0].facecolor)) == 1 and figure.data[1].name == "tried"
+    assert [trace.name for trace in figure.data] == ["tried", "unseen"]
+    assert items(figure.data[0]) == [] and len(items(figure.data[1])) == len(small_load)
+
+
+def test_pointing_at_a_box_names_it_and_its_edges(small_load):
+    trace = view(small_load, groups={"failed": [5]}).data[0]
+    millimetres = np.rint(1000 * small_load.sizes[5]).tolist()
+    assert trace.customdata[3].tolist() == [5, small_load.packages[5], *millimetres]
+    assert "item %{customdata[0]}" in trace.hovertemplate
+    assert "%{fullData.name}" in trace.hovertemplate and trace.name == "failed"
 
 
 def test_a_full_load_is_a_small_file_and_needs_no_network(full_load):
-    content = view(full_load).to_json()
-    assert len(content) < 1_500_000
-    assert "http" not in content and json.loads(content)["data"]
+    bundle = view(full_load)._repr_mimebundle_()
+    assert sum(len(json.dumps(content)) for content in bundle.values()) < 1_000_000
+    assert "http" not in json.dumps(bundle[PLOTLY_MIMETYPE])
+
+
+def test_a_picture_stands_beside_what_plotly_draws(small_load):
+    bundle = view(small_load, height=300)._repr_mimebundle_()
+    assert bundle[PLOTLY_MIMETYPE]["data"]
+    picture = base64.b64decode(bundle["image/png"])
+    assert picture.startswith(b"\x89PNG")
+    assert int.from_bytes(picture[20:24]) == 300  # pixels high
+
+
+def test_ipython_displays_both(small_load):
+    formats, _ = DisplayFormatter().format(view(small_load))
+    assert {"image/png", PLOTLY_MIMETYPE} <= set(formats)
+
+
+def test_a_copy_of_a_view_is_a_figure(small_load):
+    figure = copy.deepcopy(view(small_load))
+    assert figure.data and "image/png" not in figure._repr_mimebundle_()
 
 
 @pytest.mark.parametrize(
@@ -88,6 +141,7 @@ def test_a_full_load_is_a_small_file_and_needs_no_network(full_load):
         ({"groups": [1]}, TypeError, r"groups is \[1\]; expected a dict"),
         ({"groups": {"a": [0.5]}}, TypeError, r"groups\['a'\] has dtype float64"),
         ({"groups": {"a": [True, False]}}, TypeError, r"groups\['a'\] has dtype bool"),
+        ({"height": "tall"}, TypeError, "height is 'tall'; expected an integer"),
     ],
 )
 def test_bad_input_is_refused(small_load, kwargs, error, message):

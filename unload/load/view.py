@@ -1,6 +1,8 @@
 """Interactive 3D views of a load with plotly, which work offline in JupyterLab."""
 
-from collections.abc import Mapping
+import base64
+import json
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import plotly.graph_objects as go
@@ -8,11 +10,11 @@ import plotly.graph_objects as go
 from unload import task
 from unload.load.boxes import Load, check_load
 from unload.load.colours import COLOURS, css
+from unload.load.still import CORNERS, EYE, TARGET, still
 from unload.load.substacks import package_colour
 from unload.support import checks
 
-# The corners of a box, and the twelve triangles of its faces.
-CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+# The twelve triangles of a box's faces.
 TRIANGLES = np.array(
     [
         (0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
@@ -22,6 +24,37 @@ TRIANGLES = np.array(
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
 # Of groups whose names are not in COLOURS, in the order in which they are given.
 OTHER_COLOURS = ((0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.58, 0.40, 0.74), (0.0, 0.0, 0.0))
+PLOTLY_MIMETYPE = "application/vnd.plotly.v1+json"
+UNIT = task.CONTAINER[0] / 2.8  # m, plotly's unit of length in our views
+LABEL = (
+    "item %{customdata[0]}, package %{customdata[1]}<br>"
+    "%{customdata[2]} × %{customdata[3]} × %{customdata[4]} mm<extra>%{fullData.name}</extra>"
+)
+
+
+class View(go.Figure):
+    """A plotly figure with a still picture of itself, for where plotly is not drawn.
+
+    A code-hosting site, for example, shows the pictures in a notebook but runs no JavaScript.
+    plotly draws its own still pictures in a browser, therefore ours come from elsewhere: they
+    do not show what is added to the figure later.
+
+    Args:
+        *args, **kwargs: of ``plotly.graph_objects.Figure``.
+        picture: returns the PNG file; called when the figure is displayed. None: no picture.
+    """
+
+    _ipython_display_ = None  # plotly's own method would display the figure alone
+
+    def __init__(self, *args, picture: Callable[[], bytes] | None = None, **kwargs) -> None:
+        super().__init__(*args, **kwargs)
+        self._picture = picture
+
+    def _repr_mimebundle_(self, include=None, exclude=None, **kwargs) -> dict:
+        bundle = {PLOTLY_MIMETYPE: json.loads(self.to_json()), "text/plain": "View"}
+        if self._picture is not None:
+            bundle["image/png"] = base64.b64encode(self._picture()).decode()
+        return bundle
 
 
 def view(
@@ -29,8 +62,10 @@ def view(
     present: np.ndarray | None = None,
     groups: Mapping[str, np.ndarray] | None = None,
     height: int = 520,
-) -> go.Figure:
-    """A load as one mesh to turn and zoom; pointing at a box names it.
+) -> View:
+    """A load to turn and zoom, in true proportions; pointing at a box says what it is.
+
+    The entrance is at the right in front. A click on a line of the legend hides its boxes.
 
     Args:
         load: the boxes.
@@ -54,41 +89,31 @@ def view(
             f"present has shape {present.shape} and dtype {present.dtype}; "
             f"expected ({len(load)},) bool"
         )
+    height = checks.integer("height", height, 50, 5000)
     if groups is None:
-        colours = np.array([package_colour(package) for package in load.packages])
-        legend = {
-            f"package {package}": package_colour(package)
-            for package in np.unique(load.packages[present]).tolist()
-        }
+        names = {f"package {p}": package_colour(p) for p in np.unique(load.packages[present])}
+        numbers = np.unique(load.packages[present], return_inverse=True)[1]
+        of_item = np.zeros(len(load), dtype=int)
+        of_item[present] = numbers
     else:
-        colours, legend = _group_colours(len(load), groups)
-    items = np.flatnonzero(present)
-    figure = go.Figure(_mesh(load, items, colours[items]))
-    for name, colour in legend.items():
-        figure.add_trace(
-            go.Scatter3d(
-                x=[None], y=[None], z=[None], mode="markers", name=name,
-                marker={"size": 8, "symbol": "square", "color": css(colour)},
-            )
-        )  # fmt: skip
-    length, width, top = task.CONTAINER
-    figure.update_layout(
-        height=height,
-        margin={"l": 0, "r": 0, "t": 0, "b": 0},
-        legend={"x": 0, "y": 1},
-        scene={
-            "aspectmode": "data",
-            "xaxis": {"title": "x (m)", "range": [0, length]},
-            "yaxis": {"title": "y (m)", "range": [0, width]},
-            "zaxis": {"title": "z (m)", "range": [0, top]},
-            "camera": {"eye": {"x": 1.9, "y": -1.3, "z": 0.85}},
-        },
-    )
-    return figure
+        of_item, names = _grouped(present, groups)
+    traces = [
+        mesh(load, np.flatnonzero(present & (of_item == number)), name, colour, legend=True)
+        for number, (name, colour) in enumerate(names.items())
+    ]
+    drawn = np.flatnonzero(present)
+    palette = np.array([*names.values(), (0, 0, 0)])
+
+    def picture() -> bytes:
+        return still(*corners(load, drawn), palette[of_item[drawn]], names, height / 100)
+
+    return View(traces, layout(height), picture=picture)
 
 
-def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict]:
+def _grouped(present: np.ndarray, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict]:
+    """The number of each item's group, (n,) int, and the colours of all groups by name."""
     checks.entries("groups", groups, ())
+    count = len(present)
     others = [name for name in groups if name not in COLOURS]
     if len(others) > len(OTHER_COLOURS):
         raise ValueError(
@@ -96,10 +121,9 @@ def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.nda
             f"besides {list(COLOURS)}"
         )
     named = COLOURS | dict(zip(others, OTHER_COLOURS))
-    colours, legend = np.tile(COLOURS["unseen"], (count, 1)), {}
-    for name, items in groups.items():
+    of_item, names = np.full(count, -1), list(groups)
+    for number, (name, items) in enumerate(groups.items()):
         items = np.asarray(items)
-        legend[name] = named[name]
         if not items.size:
             continue
         if items.dtype.kind not in "iu":
@@ -108,22 +132,81 @@ def _group_colours(count: int, groups: Mapping[str, np.ndarray]) -> tuple[np.nda
             raise ValueError(
                 f"groups[{name!r}] holds {items.min()} to {items.max()}; expected 0 to {count - 1}"
             )
-        colours[items] = named[name]
-    return colours, legend
+        of_item[items] = number
+    if (present & (of_item < 0)).any():
+        if "unseen" not in names:
+            names.append("unseen")
+        of_item[of_item < 0] = names.index("unseen")
+    return of_item, {name: named[name] for name in names}
 
 
-def _mesh(load: Load, items: np.ndarray, colours: np.ndarray) -> go.Mesh3d:
-    sizes = np.maximum(load.sizes - SEAM, load.sizes / 2)[items, None]
-    vertices = load.positions[items, None] + CORNERS * sizes
-    triangles = (TRIANGLES + np.arange(len(items))[:, None, None] * len(CORNERS)).reshape(-1, 3)
-    labels = [f"item {item}, package {load.packages[item]}" for item in items]
+def corners(load: Load, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners of items as they are drawn, (k, 3) float64 each, in m."""
+    centres = load.positions[items]
+    halves = np.maximum(load.sizes - SEAM, load.sizes / 2)[items] / 2
+    return centres - halves, centres + halves
+
+
+def mesh(
+    load: Load,
+    items: np.ndarray,
+    name: str,
+    colour: tuple[float, float, float],
+    legend: bool = False,
+) -> go.Mesh3d:
+    """Items of one colour as a mesh of 8 vertices and 12 triangles each.
+
+    Args:
+        load: holds the items.
+        items: (k,) int, their numbers; may be empty.
+        name: of the group, for the legend and the label of a box.
+        colour: RGB in [0, 1].
+        legend: whether the legend names them.
+    """
+    low, high = corners(load, items)
+    vertices = low[:, None] + CORNERS * (high - low)[:, None]
+    triangles = TRIANGLES + np.arange(len(items))[:, None, None] * len(CORNERS)
+    labels = np.column_stack([items, load.packages[items], np.rint(load.sizes[items] * 1000)])
     return go.Mesh3d(
-        **dict(zip("xyz", vertices.reshape(-1, 3).round(3).T)),
-        **dict(zip("ijk", triangles.T)),
-        facecolor=np.repeat([css(colour) for colour in colours], len(TRIANGLES)),
-        text=np.repeat(labels, len(CORNERS)),
-        hoverinfo="text",
+        # Numbers of few bytes, because they are kept in notebooks.
+        **dict(zip("xyz", vertices.reshape(-1, 3).astype(np.float32).T)),
+        **dict(zip("ijk", triangles.reshape(-1, 3).astype(np.int32).T)),
+        name=name,
+        color=css(colour),
+        showlegend=legend,
+        customdata=np.repeat(labels, len(CORNERS), axis=0).astype(np.int32),
+        hovertemplate=LABEL,
         flatshading=True,
         lighting={"ambient": 0.75, "diffuse": 0.5},
-        showscale=False,
+    )
+
+
+def layout(height: int) -> go.Layout:
+    """The container's axes in true proportions, seen from outside the entrance.
+
+    A white ground, because the axes' names are dark in JupyterLab's dark theme, too.
+
+    Args:
+        height: of the figure in pixels.
+    """
+    sides = {
+        f"{axis}axis": {"title": {"text": f"{axis} (m)"}, "range": [0, length], "nticks": 8}
+        for axis, length in zip("xyz", task.CONTAINER)
+    }
+    middle = task.CONTAINER / 2
+    return go.Layout(
+        height=height,
+        margin={"l": 0, "r": 0, "t": 0, "b": 0},
+        paper_bgcolor="white",
+        legend={"x": 0, "y": 1, "itemsizing": "constant", "bgcolor": "rgba(255,255,255,0.8)"},
+        showlegend=True,  # of a single group, too
+        scene={
+            "aspectmode": "manual",
+            "aspectratio": dict(zip("xyz", task.CONTAINER / UNIT)),
+            **sides,
+            "camera": {
+                "eye": dict(zip("xyz", (EYE - middle) / UNIT)),
+                "center": dict(zip("xyz", (TARGET - middle) / UNIT)),
+            },
+        },
     )
