@@ -33,7 +33,7 @@ def test_each_group_of_runs_has_a_panel():
     picks = np.arange(100_000, 2_000_001, 100_000)
     curve = pd.DataFrame({"picks": picks, "success_rate": 0.5, "loss": 0.2})
     panels = figures.run_curves({"with": [curve], "without": [curve, curve]}).axes
-    assert [axes.get_title() for axes in panels] == ["with (1 runs)", "without (2 runs)"]
+    assert [axes.get_title() for axes in panels] == ["with, runs: 1", "without, runs: 2"]
     assert panels[0].lines[0].get_xdata().tolist() == [0.25, 0.75, 1.25, 1.75]
     assert (panels[1].lines[1].get_ydata() == 0.5).all()
 

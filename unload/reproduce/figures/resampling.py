@@ -24,16 +24,17 @@ def run_curves(groups: Mapping[str, Sequence[pd.DataFrame]]) -> Figure:
         groups: title → curves with ``picks``, ``success_rate`` and ``loss``.
     """
     figure, panels = plt.subplots(
-        1, len(groups), figsize=(3.2 * len(groups) + 0.4, 2.6), sharex=True, sharey=True,
+        1, len(groups), figsize=(2.9 * len(groups) + 0.5, 2.6), sharex=True, sharey=True,
         squeeze=False,
     )  # fmt: skip
     for axes, (title, curves) in zip(panels.flat, groups.items()):
         for number, curve in enumerate(curves):
             msr = windows(curve)["success_rate"]
             middles = (msr.index + 0.5) * WINDOW_PICKS / 1e6
-            axes.plot(middles, msr, color=plt.get_cmap("viridis")(number / 10), linewidth=1)
+            colour = plt.get_cmap("viridis")(0.9 * number / max(len(curves) - 1, 1))
+            axes.plot(middles, msr, color=colour, linewidth=1)
         axes.axhline(PAPER_MSR, color="C1", linestyle=":")
-        axes.set_title(f"{title} ({len(curves)} runs)", fontsize=9)
+        axes.set_title(f"{title}, runs: {len(curves)}", fontsize=9)
         axes.set_xlabel("picks (millions)")
     panels[0, 0].set(ylabel="MSR while training", ylim=(0, 1.02))
     panels[0, 0].yaxis.set_major_formatter(PercentFormatter(1))
@@ -139,6 +140,6 @@ def _shares(axes: Axes, shares: pd.DataFrame, label: str) -> None:
         axes.plot(shares.index, shares[name], f"{marker}-", color=f"C{number}", label=name,
                   markersize=4)  # fmt: skip
     axes.set(xlabel=label)
-    axes.yaxis.set_major_formatter(PercentFormatter(1))
+    axes.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
     axes.minorticks_off()
     axes.legend(fontsize=8)
