@@ -2,7 +2,8 @@
 
 Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the paper's own);
 ``measure``, ``study``, ``random_picks``, ``random_share``, ``answer`` and ``verdict`` (why 60 %);
-``comparison`` and ``robustness`` (policies compared); ``lifts`` and ``agreement`` (the physics);
+``comparison`` and ``robustness`` (policies compared); ``lifts``, ``full_lifts`` and ``agreement``
+(the physics);
 ``heap``, ``heap_learning`` and ``heap_table`` (the unordered load). ``fingerprint`` says whether
 the code still trains as it did, ``intervals`` how sure a mean is, ``resampling`` how far few runs
 mislead, ``exercise`` whether a reader's answer is right. ``__main__`` is the command line, and

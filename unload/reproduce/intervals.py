@@ -1,9 +1,10 @@
-"""Confidence intervals of means over seeds or containers."""
+"""Confidence intervals of means over seeds or containers, and of shares."""
 
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binomtest
 
 from unload.support import checks
 
@@ -37,6 +38,29 @@ def bootstrap_interval(
     rows = rng.integers(values.size, size=(RESAMPLES, values.size))
     low, high = np.quantile(values[rows].mean(axis=1), [(1 - level) / 2, (1 + level) / 2])
     return float(low), float(high)
+
+
+def share_interval(count: int, total: int, level: float = 0.95) -> tuple[float, float]:
+    """Clopper–Pearson interval of a share: exact, two-sided.
+
+    Of nothing in 300 independent trials, a share of up to 1.2 % may be true.
+
+    Args:
+        count: trials that came out so.
+        total: all trials, at least 1.
+        level: of the interval, in (0, 1).
+
+    Returns:
+        Lower and upper end.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    count = checks.integer("count", count, 0, checks.integer("total", total, 1))
+    if not 0 < checks.real("level", level, 0, 1) < 1:
+        raise ValueError(f"level is {level}; expected a number in (0, 1)")
+    interval = binomtest(count, total).proportion_ci(level, method="exact")
+    return float(interval.low), float(interval.high)
 
 
 def with_intervals(table: pd.DataFrame, by: Sequence[str], measures: Sequence[str]) -> pd.DataFrame:
