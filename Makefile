@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test quick lint lab notebooks paper bench clean
+.PHONY: help figures test quick lint lab notebooks paper bench book clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
@@ -38,6 +38,11 @@ paper: $(VENV)/ready  ## compute data/ at the paper's scale (hours; goes on wher
 bench: $(VENV)/ready  ## measure speeds and print their ratios
 	$(BIN)/python benchmarks/run.py
 
+book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: build/book/index.html
+	rm -rf build/book
+	$(BIN)/python -m sphinx -q -E -d build/doctrees -c notebooks/book . build/book
+	$(BIN)/python notebooks/book/links.py build/book
+
 clean:  ## remove the virtual environment and all intermediate results
 	rm -rf $(VENV) build runs
 
@@ -49,4 +54,8 @@ $(VENV)/ready: environment.txt pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	touch $@
+
+$(VENV)/ready-book: $(VENV)/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[book]"
 	touch $@

@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"benchmarks", "notebooks", "tests", "unload"}
+ON_DEMAND = ("book",)  # extras that a make target of their own installs, pinned in pyproject.toml
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
@@ -63,8 +64,10 @@ def distributions(folder: str) -> set[str]:
 
 
 def test_each_library_is_named_once_and_pinned():
-    extras = [name for extra in PROJECT["optional-dependencies"].values() for name in extra]
-    named = [*PROJECT["dependencies"], *extras]
+    extras = dict(PROJECT["optional-dependencies"])
+    for extra in ON_DEMAND:
+        assert all("==" in library for library in extras.pop(extra)), f"{extra} is not pinned"
+    named = [*PROJECT["dependencies"], *(name for extra in extras.values() for name in extra)]
     assert all(name == normal(name) for name in named), "pyproject.toml holds names only"
     assert sorted(named) == sorted(pinned())
 

@@ -1,0 +1,89 @@
+"""What the site needs beyond Sphinx's settings: contents, interactive views, scripts."""
+
+import shutil
+from importlib.util import find_spec
+from pathlib import Path
+
+import nbformat
+import plotly.io
+
+PLOTLY = "application/vnd.plotly.v1+json"
+WIDGET = "application/vnd.jupyter.widget-view+json"
+NEEDS_KERNEL = "*This view needs a kernel: open the notebook in JupyterLab.*"
+
+
+def read_notebook(text: str) -> nbformat.NotebookNode:
+    """Parse a notebook, with its interactive views as HTML.
+
+    plotly's views work without a kernel and are preferred to pictures of them. Widgets do not:
+    where an output holds nothing else to show, a sentence says so.
+    """
+    notebook = nbformat.reads(text, as_version=4)
+    notebook.metadata.pop("widgets", None)
+    views = 0
+    for cell in notebook.cells:
+        for output in cell.get("outputs", []):
+            data = output.get("data", {})
+            if PLOTLY in data:
+                views += 1
+                data["text/html"] = plotly.io.to_html(
+                    data.pop(PLOTLY),
+                    full_html=False,
+                    include_plotlyjs=False,
+                    validate=False,
+                    div_id=f"view-{views}",
+                )
+            if data.pop(WIDGET, None) and not data.keys() - {"text/plain"}:
+                data["text/markdown"] = NEEDS_KERNEL
+    return notebook
+
+
+def add_contents(app, name: str, source: list[str]) -> None:
+    """Append the table of contents to the first page; the theme shows it at the side of each."""
+    if name != app.config.root_doc:
+        return
+    parts = {"Notebooks": [], "Solutions": [], "More": []}
+    for page in sorted(app.env.found_docs - {name}):
+        folder = page.rpartition("/")[0]
+        captions = {"notebooks": "Notebooks", "notebooks/solutions": "Solutions"}
+        parts[captions.get(folder, "More")].append(f"/{page}")
+    for caption, pages in parts.items():
+        lines = ["```{toctree}", f":caption: {caption}", ":hidden:", "", *pages, "```"]
+        source[0] += "\n\n" + "\n".join(lines)
+
+
+def resolve_folders(app, page) -> None:
+    """Lead links to folders to their first page; of others, such as ``data/``, keep the text."""
+    here = (Path(app.srcdir) / app.env.docname).parent
+    for link in list(page.findall(lambda node: node.tagname == "pending_xref")):
+        target = (here / link["reftarget"]).resolve()
+        if not target.is_dir():
+            continue
+        folder = target.relative_to(app.srcdir).as_posix()
+        inside = sorted(name for name in app.env.found_docs if name.startswith(f"{folder}/"))
+        if inside:
+            link["refdomain"], link["reftarget"], link["reftargetid"] = "doc", inside[0], None
+        else:
+            link.replace_self(link.children)
+
+
+def add_plotly(app, name: str, template: str, context: dict, page) -> None:
+    """Let a page with interactive views load plotly's script before them."""
+    if "Plotly.newPlot" in context.get("body", ""):
+        app.add_js_file("plotly.min.js", priority=0)
+
+
+def add_files(app, error) -> None:
+    """Copy MathJax and plotly's script into a site that was built, and add its index.html."""
+    if error:
+        return
+    static = Path(app.outdir) / "_static"
+    mathjax = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static" / "mathjax"
+    fonts = Path("output", "chtml", "fonts", "woff-v2")
+    shutil.copytree(mathjax / fonts, static / "mathjax" / fonts, dirs_exist_ok=True)
+    shutil.copy(mathjax / "tex-chtml.js", static / "mathjax")
+    script = Path(find_spec("plotly").origin).parent / "package_data" / "plotly.min.js"
+    shutil.copy(script, static)
+    first = app.builder.get_target_uri(app.config.root_doc)
+    redirect = f'<meta http-equiv="refresh" content="0; url={first}"><a href="{first}">unload</a>\n'
+    (Path(app.outdir) / "index.html").write_text(redirect)

@@ -1,0 +1,56 @@
+"""The site's own code: how it reads notebooks, and its check of links."""
+
+import nbformat
+import pytest
+
+from notebooks.book import links, pages
+
+
+def notebook(*outputs: dict) -> str:
+    """A notebook whose only cell displays outputs, each given by its data."""
+    new = nbformat.v4
+    shown = [new.new_output("display_data", data=data) for data in outputs]
+    return nbformat.writes(new.new_notebook(cells=[new.new_code_cell("1", outputs=shown)]))
+
+
+def read(*outputs: dict) -> list[dict]:
+    """What the site shows of these outputs."""
+    return [each.data for each in pages.read_notebook(notebook(*outputs)).cells[0].outputs]
+
+
+def test_plotly_is_preferred_to_a_picture_of_it():
+    view = {"data": [{"type": "scatter", "y": [1, 2]}], "layout": {"title": {"text": "a view"}}}
+    first, second = read({pages.PLOTLY: view, "image/png": "AA=="}, {pages.PLOTLY: view})
+    assert pages.PLOTLY not in first
+    assert "Plotly.newPlot" in first["text/html"] and "a view" in first["text/html"]
+    assert "cdn" not in first["text/html"]
+    assert 'id="view-1"' in first["text/html"] and 'id="view-2"' in second["text/html"]
+
+
+def test_a_widget_gives_way_to_what_needs_no_kernel():
+    widget = {pages.WIDGET: {"model_id": "0"}, "text/plain": "Button()"}
+    alone, with_picture = read(widget, widget | {"image/png": "AA=="})
+    assert alone["text/markdown"] == pages.NEEDS_KERNEL
+    assert set(with_picture) == {"text/plain", "image/png"}
+
+
+def test_links_that_lead_nowhere_are_found(tmp_path):
+    (tmp_path / "b.html").write_text('<h1 id="top">b</h1>')
+    (tmp_path / "a.html").write_text(
+        '<a href="b.html">1</a><a href="b.html#top">2</a><a href="#here">3</a><p id="here">'
+        '<a href="https://example.org">4</a><img src="data:image/png;base64,AA==">'
+    )
+    assert links.problems(tmp_path) == []
+    (tmp_path / "c.html").write_text(
+        '<a href="d.html">1</a><a href="b.html#end">2</a><script src="https://example.org/x.js">'
+    )
+    assert links.problems(tmp_path) == [
+        "c.html: no b.html#end",
+        "c.html: no d.html",
+        "c.html: loads https://example.org/x.js",
+    ]
+
+
+def test_a_folder_without_pages_is_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="holds no page"):
+        links.problems(tmp_path)
