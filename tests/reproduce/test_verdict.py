@@ -26,17 +26,18 @@ def test_the_end_is_the_last_tenth():
 
 
 @pytest.mark.parametrize(
-    ("msr", "count"),
+    ("msr", "found"),
     [
-        ([0.3, 0.9, 0.5], 0),  # never high
-        ([0.3, 0.96, 0.81], 0),  # never low again
-        ([0.3, 0.95, 0.9, 0.8, 0.3], 1),
-        ([0.96, 0.5, 0.6, 0.97, 0.7], 2),
-        ([0.96, 0.5, 0.4, 0.9, 0.4], 1),
+        ([0.3, 0.9, 0.5], []),  # never high
+        ([0.3, 0.96, 0.81], []),  # never low again
+        ([0.3, 0.95, 0.9, 0.8, 0.3], [(1, 3)]),
+        ([0.96, 0.5, 0.6, 0.97, 0.7], [(0, 1), (3, 4)]),
+        ([0.96, 0.5, 0.4, 0.9, 0.4], [(0, 1)]),
+        ([0.96, 0.98, 0.5], [(1, 2)]),
     ],
 )
-def test_a_fall_leads_from_high_to_low(msr, count):
-    assert verdict.falls(msr) == count
+def test_a_fall_leads_from_high_to_low(msr, found):
+    assert verdict.falls(msr) == found
 
 
 @pytest.mark.parametrize(
@@ -100,3 +101,52 @@ def test_a_cell_is_summed_up():
     assert table.loc["a", ["fell", "fig11", "fig12", "both"]].tolist() == [1, 2, 1, 1]
     low, high = table.loc["a", ["low", "high"]]
     assert (low, high) == pytest.approx(verdict.t_interval(ends[:2]))
+
+
+def test_failures_in_the_replay_are_those_of_the_last_picks():
+    run = pd.DataFrame({"picks": [100, 200, 300, 400], "success_rate": [0.5, 0.9, 1.0, 0.8]})
+    assert verdict.replay_failures(run, 100).tolist() == pytest.approx([0.5, 0.1, 0, 0.2])
+    # Of the last 150 picks after the second point, 50 are half of the first point's.
+    shares = [0.5, (10 + 25) / 150, 5 / 150, 20 / 150]
+    assert verdict.replay_failures(run, 150).tolist() == pytest.approx(shares)
+    shares = [0.5, 60 / 200, 60 / 300, 80 / 400]
+    assert verdict.replay_failures(run, 10**6).tolist() == pytest.approx(shares)
+    with pytest.raises(ValueError, match="replay_size is 0"):
+        verdict.replay_failures(run, 0)
+
+
+def test_falls_are_listed_with_the_failures_remembered_when_they_begin():
+    run = curve([0.3, 0.3])
+    picks = run["picks"]
+    run["success_rate"] = 0.3
+    run.loc[(picks > 4_000_000) & (picks <= 8_000_000), "success_rate"] = 0.99
+    run.loc[(picks > 15_000_000) & (picks <= 15_520_000), "success_rate"] = 0.97
+    table = verdict.fall_table(run)
+    assert table["begin"].tolist() == [8_000_000, 15_500_000]
+    assert table["end"].tolist() == [8_500_000, 16_000_000]
+    before = 2**20 - 500_000  # picks of the memory from before the second rise
+    expected = [0.01, (0.03 * 500_000 + 0.7 * before) / 2**20]
+    assert table["failures"].tolist() == pytest.approx(expected, abs=0.02)
+    assert verdict.fall_table(curve([0.3, 0.99])).empty
+
+
+def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
+    first, second = np.array([0.6, 0.7, 0.8, 0.5, 0.65]), np.array([0.3, 0.42, 0.35])
+    parts = [values.var(ddof=1) / len(values) for values in (first, second)]
+    freedom = sum(parts) ** 2 / sum(
+        part**2 / (len(values) - 1) for part, values in zip(parts, (first, second))
+    )
+    reach = stats.t.ppf(0.975, freedom) * np.sqrt(sum(parts))
+    middle = first.mean() - second.mean()
+    interval = verdict.welch_interval(first, second)
+    assert interval == pytest.approx((middle - reach, middle + reach))
+    assert np.isnan(verdict.welch_interval(first, [0.3])).all()
+
+
+def test_fishers_test_asks_whether_fewer_runs_fall():
+    # Of the 10 runs 6 fall; that at most 1 of them is among 5 runs: 6 of 252 ways, p = 6 / 252.
+    assert verdict.fisher_p(1, 5, 5, 5) == pytest.approx(6 / 252)
+    assert verdict.fisher_p(5, 5, 1, 5) == pytest.approx(1)
+    assert verdict.fisher_p(0, 5, 5, 5) == pytest.approx(1 / 252)
+    with pytest.raises(ValueError, match="control_fallen is 6; expected an integer >= 0 and <= 5"):
+        verdict.fisher_p(0, 5, 6, 5)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from unload.agent.config import TrainConfig
 from unload.support import checks
 
 END = 0.1  # share of the picks at the end of a run
@@ -31,18 +32,60 @@ def end_msr(curve: pd.DataFrame) -> float:
     return float(curve.loc[curve["picks"] > (1 - END) * last, "success_rate"].mean())
 
 
-def falls(msr: Sequence[float]) -> int:
-    """Return how often the MSR falls to 80 % or less after 95 % or more.
+def falls(msr: Sequence[float]) -> list[tuple[int, int]]:
+    """Return the falls of the MSR to 80 % or less after 95 % or more.
 
     Args:
         msr: of the windows.
+
+    Returns:
+        Of each fall, the last window that is high and the first one that is low.
     """
-    count, was_high = 0, False
-    for value in msr:
-        if was_high and value <= LOW:
-            count, was_high = count + 1, False
-        was_high |= value >= HIGH
-    return count
+    found, high = [], None
+    for window, value in enumerate(msr):
+        if high is not None and value <= LOW:
+            found.append((high, window))
+            high = None
+        if value >= HIGH:
+            high = window
+    return found
+
+
+def replay_failures(curve: pd.DataFrame, replay_size: int = TrainConfig().replay_size) -> pd.Series:
+    """Return the share of failures in the replay memory at each point of a curve.
+
+    It is that of the last picks, because the memory holds these. Where it begins within a
+    point, the point's failures are taken to be spread evenly.
+
+    Args:
+        curve: ``picks`` (increasing) and ``success_rate`` since the point before.
+        replay_size: picks that the memory holds.
+    """
+    replay_size = checks.integer("replay_size", replay_size, 1)
+    picks = np.append(0, curve["picks"])
+    failed = np.append(0, np.cumsum((1 - curve["success_rate"]) * np.diff(picks)))
+    first = np.maximum(picks - replay_size, 0)
+    forgotten = np.interp(first, picks, failed)
+    return pd.Series((failed - forgotten)[1:] / (picks - first)[1:], curve.index)
+
+
+def fall_table(curve: pd.DataFrame, replay_size: int = TrainConfig().replay_size) -> pd.DataFrame:
+    """Return one row per fall of a run (hypothesis 6).
+
+    Args:
+        curve: see ``windows``.
+        replay_size: picks that the replay memory holds.
+
+    Returns:
+        ``begin`` and ``end``: picks at the ends of the last high and of the first low window;
+        ``failures``: share of failures in the replay memory at the beginning.
+    """
+    share, rows = replay_failures(curve, replay_size), []
+    for high, low in falls(windows(curve)["success_rate"]):
+        begin, end = (WINDOW_PICKS * (window + 1) for window in (high, low))
+        failures = np.interp(begin, curve["picks"], share)
+        rows.append({"begin": begin, "end": end, "failures": failures})
+    return pd.DataFrame(rows, columns=["begin", "end", "failures"])
 
 
 def resembles_fig12(curve: pd.DataFrame) -> bool:
@@ -69,7 +112,7 @@ def run_measures(curve: pd.DataFrame) -> dict:
     return {
         "end": end_msr(curve),
         "highest": msr.max(),
-        "falls": falls(msr),
+        "falls": len(falls(msr)),
         "fig11": figures[0],
         "fig12": figures[1],
         "both": all(figures),
@@ -85,6 +128,41 @@ def t_interval(values: Sequence[float]) -> tuple[float, float]:
     if error == 0:
         return values[0], values[0]
     return tuple(map(float, stats.t.interval(LEVEL, len(values) - 1, values.mean(), error)))
+
+
+def welch_interval(first: Sequence[float], second: Sequence[float]) -> tuple[float, float]:
+    """Return the 95 % interval of the difference of two means, first minus second, by Welch.
+
+    NaN if there are fewer than two values of either (hypotheses 2 and 3).
+    """
+    samples = [
+        checks.finite_array(name, values, (None,))
+        for name, values in (("first", first), ("second", second))
+    ]
+    if min(map(len, samples)) < 2:
+        return np.nan, np.nan
+    test = stats.ttest_ind(*samples, equal_var=False)
+    return tuple(map(float, test.confidence_interval(LEVEL)))
+
+
+def fisher_p(fallen: int, runs: int, control_fallen: int, control_runs: int) -> float:
+    """Return the p-value of Fisher's one-sided test that fewer runs fall than in the control.
+
+    Args:
+        fallen, runs: how many runs with the change fell, of how many.
+        control_fallen, control_runs: the same without it.
+
+    Raises:
+        TypeError, ValueError: a number is no integer, or more runs fell than there are.
+    """
+    rows = []
+    for name, fell, total in (
+        ("fallen", fallen, runs), ("control_fallen", control_fallen, control_runs)
+    ):  # fmt: skip
+        total = checks.integer(name.replace("fallen", "runs"), total, 1)
+        fell = checks.integer(name, fell, 0, total)
+        rows.append([fell, total - fell])
+    return float(stats.fisher_exact(rows, alternative="less").pvalue)
 
 
 def interquartile_mean(values: Sequence[float], axis: int = -1) -> float:
