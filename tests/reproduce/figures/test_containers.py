@@ -1,9 +1,11 @@
-"""Fig. 2."""
+"""Fig. 2, views from the side and from the entrance."""
 
 import numpy as np
 import pytest
 
-from unload.reproduce.figures.containers import fig02_containers
+from unload.load.colours import COLOURS
+from unload.load.substacks import front_walls, package_colour, stack_load
+from unload.reproduce.figures.containers import fig02_containers, side_views, wall_views
 
 
 @pytest.fixture
@@ -36,3 +38,55 @@ def test_bad_pictures_are_refused(images):
         fig02_containers(images, [1, 2])
     with pytest.raises(ValueError, match="columns is 0"):
         fig02_containers(images, columns=0)
+
+
+@pytest.fixture
+def load():
+    return front_walls(stack_load(np.random.default_rng(0)), 2)
+
+
+def test_side_views_show_each_group_in_its_colour_to_scale(load):
+    everything = np.arange(len(load))
+    groups = {"unseen": everything, "visible": everything[:5], "failed": everything[3:4]}
+    figure = side_views(load.positions, {"first": groups, "second": {"unseen": everything}})
+    assert [axes.get_title() for axes in figure.axes] == ["first", "second"]
+    for line, (meaning, items) in zip(figure.axes[0].lines, groups.items(), strict=True):
+        assert line.get_label() == meaning and line.get_color() == COLOURS[meaning]
+        assert np.array_equal(line.get_xydata(), load.positions[items][:, [0, 2]])
+    assert all(axes.get_aspect() == 1 for axes in figure.axes)
+    assert [text.get_text() for text in figure.legends[0].texts] == list(groups)
+
+
+def test_wall_views_show_the_boxes_of_each_wall_to_scale(load):
+    walls = np.unique(load.walls)[::-1]
+    visible, present = np.flatnonzero(load.walls == walls[0])[:4], np.ones(len(load), dtype=bool)
+    present[visible[0]] = False
+    figure = wall_views(load, walls, {"visible": visible}, present)
+    for axes, wall in zip(figure.axes, walls, strict=True):
+        assert axes.get_aspect() == 1
+        items = np.flatnonzero(present & (load.walls == wall))
+        for item, box in zip(items, axes.patches, strict=True):
+            meaning = "visible" if item in visible else "unseen"
+            assert box.get_facecolor()[:3] == pytest.approx(COLOURS[meaning])
+            assert (box.get_width(), box.get_height()) == pytest.approx(load.sizes[item, 1:])
+            assert box.get_center() == pytest.approx(load.positions[item, 1:])
+    assert [text.get_text() for text in figure.legends[0].texts] == ["unseen", "visible"]
+
+
+def test_walls_without_groups_show_packages(load):
+    figure = wall_views(load, [load.walls[0]])
+    packages = load.packages[load.walls == load.walls[0]]
+    for package, box in zip(packages, figure.axes[0].patches, strict=True):
+        assert box.get_facecolor()[:3] == pytest.approx(package_colour(package))
+    assert not figure.legends
+
+
+def test_views_of_nothing_and_of_unknown_meanings_are_refused(load):
+    with pytest.raises(ValueError, match="views is empty"):
+        side_views(load.positions, {})
+    with pytest.raises(ValueError, match="a group's name is 'seen'"):
+        side_views(load.positions, {"": {"seen": np.arange(2)}})
+    with pytest.raises(ValueError, match="walls is empty"):
+        wall_views(load, np.array([], dtype=int))
+    with pytest.raises(ValueError, match="a group's name is 'seen'"):
+        wall_views(load, [11], {"seen": np.arange(2)})

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from unload.reproduce.figures.lifting import lift_sequences
+from unload import task
+from unload.load.colours import COLOURS
+from unload.reproduce.figures.lifting import distance_curves, lift_sequences
 
 
 def test_bad_lift_sequences_are_refused():
@@ -17,3 +19,30 @@ def test_bad_lift_sequences_are_refused():
         with pytest.raises(error, match=message):
             lift_sequences(lifts, times)
     assert len(lift_sequences({"a": (sizes, poses)}, [0.0]).axes) == 1
+
+
+def test_colour_of_the_chosen_box_says_what_became_of_it():
+    sizes, poses = np.ones((2, 2)), np.zeros((2, 2, 3))
+    lifted = poses.copy()
+    lifted[1, 0, 1] = task.LIFT_THRESHOLD
+    figure = lift_sequences({"stays": (sizes, poses), "moves": (sizes, lifted)}, [0.0, 0.3])
+    colours = [axes.patches[0].get_facecolor()[:3] for axes in figure.axes]
+    blocked, liftable = COLOURS["blocked"], COLOURS["liftable"]
+    assert np.allclose(colours, [blocked, blocked, liftable, liftable])
+    texts = [text.get_text() for text in figure.legends[0].texts]
+    assert texts == ["chosen box, blocked", "chosen box, liftable", "on top of it", "cannot move"]
+
+
+def test_distance_curves_show_formula_and_measurement():
+    x = np.array([1.0, 2.0])
+    curves = {"one box": (x, x / 10, x / 9), "two boxes": (x, x / 20, x / 21)}
+    figure = distance_curves({"force (N)": curves, "mass (kg)": {}}, {"force (N)": 20})
+    left, right = figure.axes
+    shown = [line.get_xydata().tolist() for line in left.lines[:4]]
+    expected = [np.column_stack([x, y]).tolist() for _, *ys in curves.values() for y in ys]
+    assert shown == expected
+    assert len(left.lines) == 4 + 2 and len(right.lines) == 1  # threshold, and the mark
+    with pytest.raises(ValueError, match="panels has no mass"):
+        distance_curves({"force (N)": curves}, {"mass": 1})
+    with pytest.raises(ValueError, match="panels is empty"):
+        distance_curves({}, {})

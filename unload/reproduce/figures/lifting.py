@@ -7,13 +7,49 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Patch, Polygon, Rectangle
 
 from unload import task
+from unload.load.colours import COLOURS
 from unload.reproduce.figures.style import styled
 from unload.support import checks
 
-CHOSEN, ON_TOP, FIXED = "#2878b5", "#de5638", "#d9d9d6"
+# Boxes that lie on the chosen one, and those that cannot move.
+ON_TOP, FIXED = (0.00, 0.45, 0.70), (0.74, 0.74, 0.72)
+
+
+@styled
+def distance_curves(
+    panels: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray, np.ndarray]]],
+    marks: Mapping[str, float],
+) -> Figure:
+    """How far a box is lifted: lines by a formula, dots as they were measured.
+
+    Args:
+        panels: label of the horizontal axis → curves; these are name → (x, formula, measured),
+            three (k,) float arrays, distances in m.
+        marks: label of the horizontal axis → a value of it that a grey line marks.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described, or there is nothing to draw.
+    """
+    checks.entries("panels", panels, marks)
+    if not panels:
+        raise ValueError("panels is empty; expected at least one")
+    figure, grid = plt.subplots(
+        1, len(panels), figsize=(3.4 * len(panels) + 1, 3.2), sharey=True, squeeze=False
+    )
+    for axes, (label, curves) in zip(grid[0], panels.items()):
+        for number, (name, (x, formula, measured)) in enumerate(curves.items()):
+            axes.plot(x, formula, color=f"C{number}")
+            axes.plot(x, measured, "o", ms=3.5, color=f"C{number}", label=name)
+        axes.axhline(task.LIFT_THRESHOLD, color="C5", ls="--", lw=1, label="threshold")
+        if label in marks:
+            axes.axvline(marks[label], color="#bbbbbb", lw=1, zorder=0)
+        axes.set_xlabel(label)
+        axes.legend(fontsize=8)
+    grid[0, 0].set_ylabel("distance moved (m)")
+    return figure
 
 
 @styled
@@ -22,7 +58,9 @@ def lift_sequences(
     times: Sequence[float],
     dynamic: int = 2,
 ) -> Figure:
-    """One line of pictures for each lift: chosen box blue, boxes on top of it orange.
+    """One line of pictures for each lift.
+
+    The chosen box is "liftable" or "blocked": it has moved by 0.2 m in the last picture, or not.
 
     Args:
         lifts: label → (sizes, poses) of a situation's boxes, the chosen one first and
@@ -30,7 +68,7 @@ def lift_sequences(
             ``poses`` (times, boxes, 3) float, y and z of the centre in m and the angle
             of rotation about the x axis in rad.
         times: when the poses were taken, s.
-        dynamic: how many of the boxes move; the others are grey.
+        dynamic: how many of the boxes can move.
 
     Raises:
         TypeError, ValueError: an argument is not as described, or there is nothing to draw.
@@ -46,17 +84,24 @@ def lift_sequences(
         checks.finite_array(f"poses of {label!r}", poses, (len(times), boxes, 3))
         checks.integer("dynamic", dynamic, 1, boxes)
     figure, grid = plt.subplots(
-        len(lifts), len(times), figsize=(10, 2.05 * len(lifts)), squeeze=False
+        len(lifts), len(times), figsize=(10, 2.05 * len(lifts) + 0.3), squeeze=False
     )
+    meanings = {}
     for line, (label, (sizes, poses)) in zip(grid, lifts.items()):
         limits = _limits(sizes[:dynamic], poses[:, :dynamic])
+        moved = np.hypot(*(poses[-1] - poses[0])[0, :2]) >= task.LIFT_THRESHOLD
+        chosen = "liftable" if moved else "blocked"
+        meanings[f"chosen box, {chosen}"] = COLOURS[chosen]
         for axes, time, pose in zip(line, times, poses):
-            _draw_boxes(axes, sizes, pose, dynamic)
+            _draw_boxes(axes, sizes, pose, dynamic, COLOURS[chosen])
             axes.set(xlim=limits[0], ylim=limits[1], aspect="equal", xticks=[], yticks=[])
             axes.set_title(f"{time:.2f} s", fontsize=8)
             for spine in axes.spines.values():
                 spine.set(visible=True, color="#cccccc")
         line[0].set_ylabel(label, fontsize=9)
+    meanings |= {"on top of it": ON_TOP, "cannot move": FIXED}
+    handles = [Patch(fc=colour, label=meaning) for meaning, colour in meanings.items()]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=9)
     return figure
 
 
@@ -67,11 +112,11 @@ def _limits(sizes: np.ndarray, poses: np.ndarray) -> tuple[tuple, tuple]:
     return (low[0], high[0]), (low[1], high[1])
 
 
-def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, dynamic: int) -> None:
+def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, dynamic: int, chosen) -> None:
     corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
     for box, (size, (y, z, angle)) in enumerate(zip(sizes, pose)):
         turn = np.array([(np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))])
-        colour = FIXED if box >= dynamic else CHOSEN if box == 0 else ON_TOP
+        colour = FIXED if box >= dynamic else chosen if box == 0 else ON_TOP
         axes.add_patch(Polygon(corners * size @ turn + (y, z), fc=colour, ec="white", lw=0.8))
 
 

@@ -8,11 +8,13 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
 from unload.env import observation
 from unload.env.equalization import equalize
+from unload.load.colours import COLOURS
 from unload.load.substacks import package_colour, stack_load
+from unload.reproduce.figures.observation import EQUALIZED
 from unload.reproduce.figures.style import styled
 
 INK, GREY = "#333333", "#9a9a9a"
-BLUE, RED, GREEN = "#2878b5", "#de5638", "#45a661"
+CHOICE = (0.00, 0.45, 0.70)  # of a score that is chosen
 AGENT, ENVIRONMENT = "#eaf2f8", "#f6f1e7"
 # Six items stand for the 128: their scores, and which failed since the last success.
 SCORES = (0.35, 0.9, 0.55, 0.75, 0.2, 0.45)
@@ -124,7 +126,10 @@ def _mini_equalization(axes: Axes, x, y, load) -> None:
     """Depths of twelve observed items before and after equalization."""
     depths = observation.scale(load.positions)[observation.nearest(load.positions)[::11]]
     equal = equalize(depths)
-    for level, values, colour in ((4.4, depths[:, 0], RED), (0.9, equal[:, 0], GREEN)):
+    for level, values, colour in (
+        (4.4, depths[:, 0], COLOURS["visible"]),
+        (0.9, equal[:, 0], EQUALIZED),
+    ):
         axes.plot([x + 1.5, x + 12.5], [y + level] * 2, color=GREY, lw=0.8)
         axes.plot(x + 7 + 5.3 * values, np.full(len(values), y + level), "o", ms=3.2,
                   color=colour, mec="white", mew=0.3)  # fmt: skip
@@ -134,22 +139,22 @@ def _mini_equalization(axes: Axes, x, y, load) -> None:
 def _mini_network(axes: Axes, x, y) -> None:
     """Every item passes the same weights; all are pooled to a common context."""
     heights = y + np.linspace(0.2, 5.2, 4)
-    axes.add_patch(Rectangle((x + 6.3, y - 0.2), 1.4, 5.8, fc=BLUE, alpha=0.3, ec="none"))
+    axes.add_patch(Rectangle((x + 6.3, y - 0.2), 1.4, 5.8, fc=GREY, alpha=0.35, ec="none"))
     for height in heights:
         axes.plot([x + 2, x + 12], [height, height], color=GREY, lw=0.8)
-        axes.plot([x + 2, x + 7, x + 12], [height] * 3, "o", ms=4, color=BLUE)
+        axes.plot([x + 2, x + 7, x + 12], [height] * 3, "o", ms=4, color=COLOURS["visible"])
         axes.plot([x + 7, x + 9.8], [height, y + 2.7], color=GREY, lw=0.6)
-    axes.plot(x + 9.8, y + 2.7, "s", ms=5, color=RED, zorder=4)
+    axes.plot(x + 9.8, y + 2.7, "s", ms=5, color=INK, zorder=4)
 
 
 def _mini_scores(axes: Axes, x, y, chosen) -> None:
-    """Scores of the items; the failed one is struck out, the chosen one is green."""
+    """Scores of the items; the failed one is struck out, the chosen one is dark."""
     for item, score in enumerate(SCORES):
         left, height = x + 1.6 + 1.9 * item, 5.4 * score
-        colour = GREEN if item == chosen else BLUE
+        colour = CHOICE if item == chosen else COLOURS["visible"]
         if item == FAILED:
             axes.add_patch(Rectangle((left, y), 1.3, height, fc="#eeeeee", ec=GREY, lw=0.7))
-            axes.plot([left - 0.2, left + 1.5], [y, y + height], color=RED, lw=1.3)
+            axes.plot([left - 0.2, left + 1.5], [y, y + height], color=COLOURS["failed"], lw=1.8)
         else:
             axes.add_patch(Rectangle((left, y), 1.3, height, fc=colour, ec="none"))
     axes.plot([x + 1.2, x + 12.8], [y, y], color=INK, lw=0.8)
@@ -167,8 +172,8 @@ def _mini_lift(axes: Axes, x, y) -> None:
 
 def _mini_reward(axes: Axes, x, y) -> None:
     for level, text, meaning, colour in (
-        (4.1, "+1", "yes", GREEN),
-        (0.9, "−1", "no", RED),
+        (4.1, "+1", "yes", COLOURS["liftable"]),
+        (0.9, "−1", "no", COLOURS["failed"]),
     ):
         axes.text(x + 5.3, y + level, meaning, ha="right", va="center", fontsize=8.5)
         axes.text(x + 8.6, y + level, text, ha="center", va="center", fontsize=10, color="white",
@@ -198,10 +203,10 @@ def _mini_wall(axes: Axes, x, y, load) -> None:
 
 
 def _mini_observation(axes: Axes, x, y, load) -> None:
-    """Side view of the positions: the observed ones are red."""
+    """Side view of the positions, the observed ones in the colour of what is visible."""
     seen = np.zeros(len(load), dtype=bool)
     seen[observation.nearest(load.positions)] = True
-    for which, colour in ((~seen, GREY), (seen, RED)):
+    for which, colour in ((~seen, "#bdbdba"), (seen, COLOURS["visible"])):
         points = load.positions[which]
         axes.plot(x + 2 + points[:, 0] * 1.43, y + points[:, 2] * 2.5, "o", ms=1.5, mew=0,
                   color=colour)  # fmt: skip

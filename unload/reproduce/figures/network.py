@@ -1,4 +1,6 @@
-"""The permutation-equivariant network (Fig. 7)."""
+"""The permutation-equivariant network (Fig. 7), and what its scores look like."""
+
+from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -72,6 +74,86 @@ def fig07_network(n_features: int = 64) -> Figure:
         low = 0.85 if x == 9.95 else MIDDLE - 1.4
         axes.text(x, low, formula, ha="center", va="top", size=8.5, color=INK, linespacing=1.3)
         axes.text(x, low - 0.92, count, ha="center", va="top", size=8.5, color="#777777")
+    return figure
+
+
+@styled
+def score_landscapes(
+    observed: np.ndarray,
+    grid: np.ndarray,
+    fields: Sequence[np.ndarray],
+    choices: Sequence[int],
+    titles: Sequence[str],
+) -> Figure:
+    """Scores that networks give to an imagined item, over the side view of an observation.
+
+    Args:
+        observed: (items, 3) float, scaled positions, drawn as dots.
+        grid: (k,) float, the imagined item's places along both axes.
+        fields: of each network the scores, (k, k) float, rows along z, columns along x.
+        choices: of each network the row of ``observed`` that it picks, drawn as a star.
+        titles: one for each network.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described, or there is no network.
+    """
+    observed = checks.finite_array("observed", observed, (None, 3))
+    grid = checks.finite_array("grid", grid, (None,))
+    counts = len(fields), len(choices), len(titles)
+    if not counts[0] or len(set(counts)) != 1:
+        raise ValueError(
+            f"fields, choices and titles have {counts} entries; expected as many, at least one"
+        )
+    figure, panels = plt.subplots(
+        1, len(fields), figsize=(3.5 * len(fields), 3.4), sharey=True, squeeze=False
+    )
+    for axes, field, choice, title in zip(panels[0], fields, choices, titles):
+        field = checks.finite_array("a field", field, (len(grid), len(grid)))
+        drawn = axes.contourf(grid, grid, field, levels=20, cmap="viridis")
+        axes.plot(observed[:, 0], observed[:, 2], "k.", ms=4, label="items")
+        star = {"ms": 16, "color": "white", "mec": "black", "mew": 1.2, "ls": "none"}
+        axes.plot(*observed[choice, [0, 2]], "*", label="choice", **star)
+        axes.set(title=title, xlabel=r"$\tilde p_\mathrm{x}$", aspect="equal")
+        figure.colorbar(drawn, ax=axes, format="%.2f")
+    panels[0, 0].set_ylabel(r"$\tilde p_\mathrm{z}$")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    return figure
+
+
+@styled
+def score_gradients(observed: np.ndarray, scores: np.ndarray, jacobian: np.ndarray) -> Figure:
+    """What scores depend on: arrows at the items of the front wall, and the size of all entries.
+
+    Args:
+        observed: (items, 3) float, scaled positions; the front wall is where x is above 0.9.
+        scores: (items,) float.
+        jacobian: (items, items, 3) float, entry [i, j] is the gradient of the score of item i
+            in the position of item j.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    observed = checks.finite_array("observed", observed, (None, 3))
+    count = len(observed)
+    scores = checks.finite_array("scores", scores, (count,))
+    jacobian = checks.finite_array("jacobian", jacobian, (count, count, 3))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.9))
+    front = observed[:, 0] > 0.9
+    y, z = observed[front, 1], observed[front, 2]
+    own = jacobian.diagonal(axis1=0, axis2=1).T[front]
+    dots = left.scatter(y, z, c=scores[front], s=30, cmap="viridis")
+    left.quiver(y, z, own[:, 1], own[:, 2], color=INK, width=0.004)
+    left.set(xlabel=r"$\tilde p_\mathrm{y}$", ylabel=r"$\tilde p_\mathrm{z}$")
+    left.set_title("front wall: scores, and gradients in the own position")
+    left.margins(0.08)
+    figure.colorbar(dots, ax=left, label="score")
+    size = np.linalg.norm(jacobian, axis=2)
+    drawn = right.imshow(np.log10(np.maximum(size, 1e-8)), cmap="magma")
+    right.set(xlabel="position of item j", ylabel="score of item i")
+    right.set_title("size of the gradient")
+    right.grid(False)
+    figure.colorbar(drawn, ax=right, label="power of ten")
     return figure
 
 

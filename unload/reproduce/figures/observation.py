@@ -7,13 +7,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from unload import task
+from unload.env import observation
+from unload.load.colours import COLOURS
+from unload.reproduce.figures.containers import draw_items
 from unload.reproduce.figures.style import styled
 from unload.reproduce.results import read_table
-from unload.support import files
+from unload.support import checks, files
 
 FOLDER = "obs_hist_equal"
-# The paper's colours, in this repository's shades.
-ALL, OBSERVED, EQUALIZED = "#2878b5", "#de5638", "#45a661"
+# Of ranks instead of positions; all other colours mean what they mean in every picture.
+EQUALIZED = (0.90, 0.62, 0.00)
 # Fig. 5: the paper's histogram. The edges lie just outside [-1, 1].
 BINS = np.linspace(-1.001, 1.001, 111)
 
@@ -49,8 +53,12 @@ def fig04_observation(folder: str | Path = files.DATA) -> Figure:
     """
     everything, observed = read_points("all_items", folder), read_points("Observation", folder)
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
-    axes.plot(*everything.T, "o", ms=4, mew=0, color=ALL, label="all items")
-    axes.plot(*observed.T, "o", ms=4, mew=0, color=OBSERVED, label="observed items")
+    for points, meaning, label in (
+        (everything, "unseen", "all items"),
+        (observed, "visible", "observed items"),
+    ):
+        colour = COLOURS[meaning]
+        axes.plot(*points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=colour, label=label)
     _side_view(axes, r"$\tilde{p}_{0,i,\mathrm{x}}$", r"$\tilde{p}_{0,i,\mathrm{z}}$")
     _legend_above(axes)
     return figure
@@ -68,7 +76,7 @@ def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
     """
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
     for name, colour, label in (
-        ("Observation", OBSERVED, "observed items"),
+        ("Observation", COLOURS["visible"], "observed items"),
         ("Equalized_Observation", EQUALIZED, "equalized observation"),
     ):
         axes.hist(
@@ -101,9 +109,47 @@ def fig06_equalized(folder: str | Path = files.DATA) -> Figure:
     Raises:
         FileNotFoundError, ValueError: see ``read_points``.
     """
-    figure, axes = plt.subplots(figsize=(4.6, 4.6))
-    axes.plot(*read_points("Equalized_Observation", folder).T, "o", ms=4, mew=0, color=EQUALIZED)
+    figure, axes = plt.subplots(figsize=(4.6, 4.8))
+    points = read_points("Equalized_Observation", folder)
+    axes.plot(
+        *points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=EQUALIZED, label="equalized observation"
+    )
     _side_view(axes, r"$\tilde{p}'_{0,i,\mathrm{x}}$", r"$\tilde{p}'_{0,i,\mathrm{z}}$")
+    _legend_above(axes)
+    return figure
+
+
+@styled
+def visibility(positions: np.ndarray, visible: np.ndarray) -> Figure:
+    """Side view of all items, of the visible ones, and of lines of equal distance d.
+
+    The thick line goes through the farthest visible item.
+
+    Args:
+        positions: (n, 3) float, centres in m.
+        visible: (k,) int, the visible items.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    positions = checks.finite_array("positions", positions, (None, 3))
+    visible = checks.integer_array("visible", visible, (None,))
+    length, _, height = task.CONTAINER
+    x, z = np.meshgrid(np.linspace(0, length, 200), np.linspace(0, height, 100))
+    points = np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
+    d = observation.distance(points).reshape(x.shape)
+    figure, axes = plt.subplots(figsize=(8, 3.6))
+    lines = axes.contour(x, z, d, levels=np.arange(1, 8), colors="#999999", linewidths=0.7)
+    axes.clabel(lines, fmt="d = %g m", fontsize=8)
+    farthest = observation.distance(positions[visible]).max()
+    axes.contour(x, z, d, levels=[farthest], colors="black", linewidths=1.8)
+    unseen = np.setdiff1d(np.arange(len(positions)), visible)
+    draw_items(axes, positions[:, [0, 2]], {"unseen": unseen, "visible": visible})
+    axes.plot(*task.VIEWPOINT[[0, 2]], "k^", ms=9, clip_on=False, ls="none", label="viewpoint")
+    axes.set(xlim=(0, length), ylim=(0, height), xlabel="x (m), entrance on the right")
+    axes.set(ylabel="z (m)", aspect="equal")
+    axes.grid(False)
+    _legend_above(axes)
     return figure
 
 
@@ -121,4 +167,4 @@ def _side_view(axes: Axes, xlabel: str, ylabel: str) -> None:
 
 
 def _legend_above(axes: Axes) -> None:
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, borderaxespad=0.2)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3, borderaxespad=0.4)
