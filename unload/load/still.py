@@ -40,7 +40,7 @@ def still(
         legend: name → colour.
         height: of the picture in inches.
     """
-    figure = Figure((WIDTH, height), dpi=100, facecolor="white")
+    figure = Figure((WIDTH, height), dpi=100, facecolor="white", layout="none")
     axes = figure.add_axes((LEGEND, 0, 1 - LEGEND, 1))
     walls = np.array([(0, 0, 0), task.CONTAINER])
     for edge in _edges(*walls):
