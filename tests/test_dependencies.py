@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"benchmarks", "notebooks", "tests", "unload"}
-ON_DEMAND = ("book",)  # extras that a make target of their own installs, pinned in pyproject.toml
+ON_DEMAND = ("book", "mujoco")  # extras for a command of their own, pinned in pyproject.toml
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
@@ -59,7 +59,7 @@ def distributions(folder: str) -> set[str]:
             elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
                 names.add(node.args[0].value.split(".")[0])
     beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
-    names -= sys.stdlib_module_names | OWN | (beside - DISTRIBUTIONS.keys())
+    names -= sys.stdlib_module_names | OWN | {*ON_DEMAND} | (beside - DISTRIBUTIONS.keys())
     return {normal(DISTRIBUTIONS[name][0]) for name in names}
 
 
