@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+import unload
 from unload.agent.replay import ReplayBuffer
 
 
@@ -151,3 +152,51 @@ def test_what_would_spoil_learning_is_refused_where_it_enters(rng, change, messa
     assert len(replay) == 0
     replay.add(**batch)
     assert len(replay) == 2
+
+
+def equalized_picks(rng, count: int) -> dict:
+    """Picks of equalized observations of 128 items."""
+    return {
+        "observations": unload.equalize(rng.random((count, 128, 3))),
+        "actions": rng.integers(128, size=count),
+        "rewards": rng.choice([-1.0, 1.0], count),
+    }
+
+
+def test_bytes_hold_the_same_picks_as_floats(rng):
+    batch = equalized_picks(rng, 30)
+    samples = []
+    for equalized in (True, False):
+        replay = ReplayBuffer(20, 128, equalized=equalized)
+        replay.add(**{name: values[:15] for name, values in batch.items()})
+        replay.add(**{name: values[15:] for name, values in batch.items()})
+        samples.append(replay.sample(50, np.random.default_rng(1)))
+        assert replay.arrays["observations"].itemsize == (1 if equalized else 4)
+    for name, values in samples[0].items():
+        assert values.dtype == samples[1][name].dtype
+        np.testing.assert_array_equal(values, samples[1][name])
+
+
+def test_bytes_hold_equalized_observations_only(rng):
+    replay, batch = ReplayBuffer(20, 128, equalized=True), equalized_picks(rng, 3)
+    batch["observations"][2, 127, 2] = 0.3
+    with pytest.raises(ValueError, match="observations holds 0.3"):
+        replay.add(**batch)
+    assert len(replay) == 0
+    for items, next_state in ((64, False), (128, True)):
+        with pytest.raises(ValueError, match="^equalized is True with items="):
+            ReplayBuffer(20, items, next_state, equalized=True)
+
+
+def test_picks_are_overwritten_where_it_is_said(rng):
+    replay = ReplayBuffer(10, 4)
+    replay.add(**picks(0, 6))
+    replay.overwrite(np.array([1, 4]), **picks(50, 2))
+    assert replay.arrays["observations"][:6, 0, 0].tolist() == [0, 50, 2, 3, 51, 5]
+    assert replay.arrays["actions"][:6].tolist() == [0, 2, 2, 3, 3, 1]
+    assert replay.total == 6
+    for slots in ([3, 10], [-1, 2]):
+        with pytest.raises(ValueError, match="^slots holds .*expected 0 to 9"):
+            replay.overwrite(np.array(slots), **picks(0, 2))
+    with pytest.raises(ValueError, match="slots has shape"):
+        replay.overwrite(np.array([3]), **picks(0, 2))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from unload.agent.config import TrainConfig
+from unload.agent.config import ADDED, TrainConfig
 from unload.agent.greedy import Greedy
 from unload.agent.rollout import Rollout
 from unload.agent.weights import load_policy, save_policy
@@ -192,6 +192,7 @@ class RunFolder:
     def _check_same(self, stored: dict, config: TrainConfig) -> None:
         """Raise ValueError unless a stored configuration is ``config``."""
         wanted = json.loads(json.dumps(asdict(config)))
+        stored = {name: getattr(TrainConfig(), name) for name in ADDED} | stored
         # How often it is saved changes nothing in a run.
         names = [name for name in wanted | stored if name != "checkpoint_interval"]
         differing = [name for name in names if stored.get(name) != wanted.get(name)]

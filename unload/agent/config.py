@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unload.env.equalization import TIES
+from unload.env.observation import DRIFTS, MOST_NOISE, POSITION_NOISE
 from unload.network.variants import HEADS, NETWORKS
 from unload.support import checks
 
@@ -20,6 +21,8 @@ MOST = {
     "log_interval": 10**9,
 }
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
+# Settings that older runs do not name: they had the defaults.
+ADDED = ("position_noise", "drift", "staggered", "literal")
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,14 @@ class TrainConfig:
     n_features: int = 64  # * n
     equalize: bool = True  # Sec. III-F
     ties: str = "noise"  # * see unload.equalize
+    # * m, see ContainerEnv; 0 leaves equal coordinates equal, and ranks them in the items' order.
+    position_noise: float = POSITION_NOISE
+    drift: str = "noise"  # * or "settled", in the container: see ContainerVectorEnv
+    staggered: bool = False  # * containers are filled in turn instead of all together
     mask: bool = False  # * whether failed items are masked in training's choices, too
+    # * tanh in single precision, and the choice by the values after it instead of before it; so it
+    # always is with networks other than "peq".
+    literal: bool = False
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
@@ -57,9 +67,10 @@ class TrainConfig:
         checks.one_of("env", self.env, ENVS)
         checks.one_of("ties", self.ties, TIES)
         checks.one_of("network", self.network, NETWORKS)
-        for name in ("env", "ties", "network"):
+        checks.one_of("drift", self.drift, DRIFTS)
+        for name in ("env", "ties", "network", "drift"):
             self._set(name, str(getattr(self, name)))
-        for name in ("equalize", "mask"):
+        for name in ("equalize", "mask", "staggered", "literal"):
             self._set(name, checks.boolean(name, getattr(self, name)))
         for name, most in MOST.items():
             self._set(name, checks.integer(name, getattr(self, name), 1, most))
@@ -71,6 +82,13 @@ class TrainConfig:
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
             self._set(name, checks.real(name, getattr(self, name), 0))
+        self._set(
+            "position_noise", checks.real("position_noise", self.position_noise, 0, MOST_NOISE)
+        )
+        if self.drift != DRIFTS[0] and self.env != ENVS[0]:
+            raise ValueError(
+                f"drift is {self.drift!r}; expected {DRIFTS[0]!r} for env={self.env!r}"
+            )
         if self.network == "attention" and self.n_features % HEADS:
             raise ValueError(
                 f"n_features is {self.n_features}; expected a multiple of {HEADS} for "

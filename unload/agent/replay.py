@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from unload import task
+from unload.agent.fast import ranks
 from unload.support import checks
 
 # By the kind of an array's dtype: what may be written into it.
 CHECKS = {"f": checks.finite_array, "i": checks.integer_array, "b": checks.flag_array}
 
 
-def _checked(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
+def _fitting(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
     """Return ``values`` converted to ``dtype``; raise unless they fit."""
     if isinstance(values, np.ndarray) and (values.dtype, values.shape) == (dtype, shape):
         if dtype.kind != "f" or np.isfinite(values).all():
@@ -43,22 +45,33 @@ class ReplayBuffer:
         items: items per observation.
         next_state: keep the observation and mask after each pick, and whether the task
             ended there.
+        equalized: all observations are equalized, of 128 items each, and kept as bytes, see
+            ``unload.agent.fast.ranks``. What follows a pick is not kept so.
 
     Raises:
+        ValueError: ``equalized`` with another number of items or with ``next_state``.
         MemoryError: the arrays do not fit into memory.
 
     Attributes:
         arrays: name → array whose first axis is the slot. ``observations`` (size, items, 3)
-            float32, ``actions`` (size,) int64, ``rewards`` (size,) float32; with
-            ``next_state`` also ``next_observations`` (size, items, 3) float32,
+            float32, uint8 with ``equalized``; ``actions`` (size,) int64, ``rewards`` (size,)
+            float32; with ``next_state`` also ``next_observations`` (size, items, 3) float32,
             ``next_masks`` (size, items) bool and ``terminations`` (size,) bool.
         total: picks ever added.
     """
 
-    def __init__(self, size: int, items: int, next_state: bool = False) -> None:
+    def __init__(
+        self, size: int, items: int, next_state: bool = False, equalized: bool = False
+    ) -> None:
         self.size = size = checks.integer("size", size, 1)
         items = checks.integer("items", items, 1)
         checks.boolean("next_state", next_state)
+        if checks.boolean("equalized", equalized) and (next_state or items != task.N_VISIBLE):
+            raise ValueError(
+                f"equalized is True with items={items} and next_state={next_state}; "
+                f"expected {task.N_VISIBLE} items and no next_state"
+            )
+        self.equalized = equalized
         self.total = 0
         kinds = {
             "observations": ((items, 3), np.float32),
@@ -71,6 +84,9 @@ class ReplayBuffer:
                 "next_masks": ((items,), bool),
                 "terminations": ((), bool),
             }
+        self._dtypes = {name: np.dtype(dtype) for name, (_, dtype) in kinds.items()}  # as given
+        if equalized:
+            kinds["observations"] = ((items, 3), np.uint8)
         try:
             self.arrays = {
                 name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
@@ -91,13 +107,45 @@ class ReplayBuffer:
             ValueError: a name is missing or unknown, a shape does not fit, or a number is
                 not finite. Nothing is added.
         """
+        checked = self._checked(batch)
+        count = len(checked["rewards"])
+        start = self.total % self.size
+        slots = slice(start, start + count)
+        if start + count > self.size:  # round the end
+            slots = np.arange(start, start + count) % self.size
+        self._write(slots, checked)
+        self.total += count
+
+    def overwrite(self, slots: np.ndarray, **batch: np.ndarray) -> None:
+        """Put a batch of picks in place of others, which stay as old as they were.
+
+        Args:
+            slots: (batch,) int64.
+            **batch: see ``add``.
+
+        Raises:
+            TypeError, ValueError: as ``add`` does, or a slot is out of range.
+        """
+        checked = self._checked(batch)
+        slots = checks.integer_array("slots", slots, (len(checked["rewards"]),))
+        room = len(self.arrays["rewards"])
+        if slots.size and not 0 <= slots.min() <= slots.max() < room:
+            raise ValueError(
+                f"slots holds {slots.min()} to {slots.max()}; expected 0 to {room - 1}"
+            )
+        self._write(slots, checked)
+
+    def _checked(self, batch: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """A batch as the arrays hold it; raise unless it fits."""
         if batch.keys() != self.arrays.keys():
             raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
         count = len(checks.finite_array("rewards", batch["rewards"], (None,)))
         checked = {
-            name: _checked(name, batch[name], (count, *array.shape[1:]), array.dtype)
+            name: _fitting(name, batch[name], (count, *array.shape[1:]), self._dtypes[name])
             for name, array in self.arrays.items()
         }
+        if self.equalized:
+            checked["observations"] = ranks.encode(checked["observations"])
         items = self.arrays["observations"].shape[1]
         if count and not 0 <= checked["actions"].min() <= checked["actions"].max() < items:
             actions = checked["actions"]
@@ -106,13 +154,11 @@ class ReplayBuffer:
             )
         if "next_masks" in checked:
             check_next_masks(checked["next_masks"], checked["terminations"])
-        start = self.total % self.size
-        slots = slice(start, start + count)
-        if start + count > self.size:  # round the end
-            slots = np.arange(start, start + count) % self.size
+        return checked
+
+    def _write(self, slots: slice | np.ndarray, checked: dict[str, np.ndarray]) -> None:
         for name, values in checked.items():
             self.arrays[name][slots] = values
-        self.total += count
 
     def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
         """Draw slots uniformly, with replacement, (batch_size,) int64.
@@ -128,6 +174,12 @@ class ReplayBuffer:
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Copies of picks that ``sample_rows`` draws; raises as it does."""
-        rows = self.sample_rows(batch_size, rng)
+        return self.rows(self.sample_rows(batch_size, rng))
+
+    def rows(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+        """Copies of the picks in some slots, (k,) int64, as ``add`` takes them."""
         # Indexing by ``array[rows]`` would take half as long again.
-        return {name: array.take(rows, axis=0) for name, array in self.arrays.items()}
+        batch = {name: array.take(rows, axis=0) for name, array in self.arrays.items()}
+        if self.equalized:
+            batch["observations"] = ranks.decode(batch["observations"])
+        return batch

@@ -13,7 +13,7 @@ from hashlib import blake2b
 import gymnasium
 import numpy as np
 
-from unload.agent.config import TrainConfig
+from unload.agent.config import ENVS, TrainConfig
 from unload.load.boxes import Load
 
 
@@ -34,7 +34,7 @@ class Rollout:
     """
 
     def __init__(self, config: TrainConfig, reach: int, stack: Callable | None = None) -> None:
-        self._config, self._reach = config, reach
+        self._config, self._reach, self._stack = config, reach, stack
         # Every pick of the run; a row of the observation fits a byte.
         shape = (config.picks // config.num_envs, config.num_envs)
         self._actions = np.empty(shape, np.uint8)
@@ -134,6 +134,23 @@ class Rollout:
                 "of unload as when it was written"
             )
 
+    def actions_since(self, step: int) -> np.ndarray:
+        """Return the rows picked from this step on, (steps, num_envs) uint8.
+
+        It must not lie before what a checkpoint holds, from which the rollout was restored.
+        """
+        return self._actions[step : self.steps].copy()
+
+    def reopen(self, config: TrainConfig) -> None:
+        """Go on with the same episodes in environments of another configuration.
+
+        It must have as many environments, and the same loads.
+        """
+        state = self.envs.get_state()
+        self.envs.close()
+        self._config, self.envs = config, _make_envs(config, self._stack)
+        self._see(*self.envs.set_state(state))
+
     def close(self) -> None:
         """Free the environments."""
         self.envs.close()
@@ -142,13 +159,18 @@ class Rollout:
 def _make_envs(
     config: TrainConfig, stack: Callable[[np.random.Generator], Load] | None
 ) -> gymnasium.vector.VectorEnv:
+    of_containers: dict[str, object] = {} if stack is None else {"stack": stack}
+    if config.env == ENVS[0]:
+        of_containers["drift"] = config.drift
     return gymnasium.make_vec(
         config.env,
         config.num_envs,
         equalize=config.equalize,
         ties=config.ties,
         max_picks=config.max_picks,
-        **({} if stack is None else {"stack": stack}),
+        position_noise=config.position_noise,
+        staggered=config.staggered,
+        **of_containers,
     )
 
 

@@ -16,6 +16,7 @@ from unload.agent.checkpoint import RunFolder, TrainResult
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.curve import Curve
 from unload.agent.dqn import DQN
+from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import Greedy
 from unload.agent.interrupt import deferred_interrupts
 from unload.agent.replay import ReplayBuffer
@@ -45,11 +46,28 @@ class Training:
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
         network = NETWORKS[config.network](config.n_features, generator)
-        self.agent = DQN(network, config.learning_rate, config.gamma, config.beta)
+        self.agent = DQN(
+            network, config.learning_rate, config.gamma, config.beta, literal=config.literal
+        )
         size = min(config.replay_size, config.picks)
-        self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
+        self.replay = ReplayBuffer(
+            size,
+            task.N_VISIBLE,
+            next_state=config.gamma > 0,
+            equalized=config.gamma == 0 and self._ranks_of_all(stack),
+        )
         self.curve = Curve()
         self.rollout = Rollout(config, size, stack)
+
+    def _ranks_of_all(self, stack: Callable | None) -> bool:
+        """Whether each observation holds the ranks of 128 items, which the fused update can read.
+
+        It does until a load is nearly empty, which a load of the paper never is after 500 picks.
+        """
+        config = self.config
+        never_few = stack is None and config.max_picks <= task.MIN_ITEMS - task.N_VISIBLE
+        fused = isinstance(self.agent.learner, FusedLearner)
+        return fused and config.equalize and (never_few or config.env != ENVS[0])
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before.

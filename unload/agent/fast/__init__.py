@@ -1,1 +1,4 @@
-"""The compiled twin of the learner: ``learner``, ``fused``, its loops in ``kernel``, ``adam``."""
+"""The compiled twin of the learner.
+
+Read ``learner``, ``fused``, its loops in ``kernel``, ``adam``, and ``ranks``, in this order.
+"""

@@ -14,21 +14,35 @@ class FusedLearner:
 
     Its update reads the rows where they are, which saves copying them, and goes on in other
     threads while the caller does something else.
+
+    Args:
+        network, learning_rate, beta: see ``PlainLearner``.
+        literal: take tanh in single precision, as ``PlainLearner`` does. By default the update
+            takes it in double precision, where its slope does not become 0 so soon, and the
+            choice compares what stands before it, which never ties.
     """
 
-    def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
-        self.weights, self.beta = fused.weights_of(network), beta
+    def __init__(
+        self, network: PEQNetwork, learning_rate: float, beta: float, literal: bool = False
+    ) -> None:
+        self.weights, self.beta, self.literal = fused.weights_of(network), beta, literal
         self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-        return fused.best_actions(self.weights, observations, allowed)
+        return fused.best_actions(self.weights, observations, allowed, self.literal)
 
     def start(
         self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
     ) -> Callable[[], float]:
         """See ``PlainLearner``; weights and arrays must stay as they are until the call."""
         gradients = fused.start_gradients(
-            self.weights, batch["observations"], batch["actions"], targets, self.beta, rows
+            self.weights,
+            batch["observations"],
+            batch["actions"],
+            targets,
+            self.beta,
+            rows,
+            self.literal,
         )
 
         def finish() -> float:
