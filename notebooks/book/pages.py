@@ -31,6 +31,7 @@ def read_notebook(text: str) -> nbformat.NotebookNode:
                     full_html=False,
                     include_plotlyjs=False,
                     validate=False,
+                    auto_play=False,
                     div_id=f"view-{views}",
                 )
             if data.pop(WIDGET, None) and not data.keys() - {"text/plain"}:
