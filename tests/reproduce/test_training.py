@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import task
+from unload import policies, task
 from unload.agent.weights import load_policy
 from unload.reproduce import training
 from unload.reproduce.figures import training as figures
@@ -58,3 +58,31 @@ def test_training_data(tmp_path, monkeypatch):
 def test_training_shorter_than_an_episode_is_refused(tmp_path):
     with pytest.raises(ValueError, match="picks is 6400"):
         training.training_data(6400, folder=tmp_path)
+
+
+def test_means_over_whole_episodes():
+    """Points of 10 of 500 steps; the last, incomplete episode is left out."""
+    picks = np.arange(1, 121) * 640
+    curve = pd.DataFrame({"picks": picks, "success_rate": np.arange(120.0)})
+    curve = curve.assign(wall_time=picks / 1000, epsilon=1 - picks / 1e6)
+    means = training.episode_means(curve)
+    assert means["picks"].tolist() == [32_000, 64_000]
+    assert means["success_rate"].tolist() == [24.5, 74.5]
+    assert means["epsilon"].tolist() == pytest.approx([0.968, 0.936])
+    with pytest.raises(ValueError, match="points after 1,920 picks each; expected a divisor"):
+        training.episode_means(curve.assign(picks=3 * picks))
+
+
+def test_random_picks_succeed_more_often_in_full_containers():
+    msr = training.msr_by_pick(policies.random, containers=32)
+    assert msr.shape == (500,)
+    assert 0.2 < msr[100:].mean() < 0.3 < msr[:20].mean() < 0.4
+    highest = training.msr_by_pick(policies.highest, containers=2, mask=False)
+    assert (highest == 1).all()
+    # Without the mask a failed item is picked for ever.
+    assert set(training.msr_by_pick(lowest, containers=1, mask=False)) == {0}
+    assert training.msr_by_pick(lowest, containers=1).any()
+
+
+def lowest(observations, masks, rng):
+    return np.where(masks.astype(bool), -observations[..., 2], -np.inf).argmax(axis=1)

@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from unload.env.vector import HighestItemVectorEnv
 from unload.reproduce import tuning
 from unload.reproduce.figures import tuning as figures
 from unload.reproduce.fingerprint import training_fingerprint
@@ -141,3 +142,32 @@ def test_failed_runs_are_named(tmp_path):
     with pytest.raises(RuntimeError, match="dummy_sim_with_hist_equal/bz_8_lr_0.01_agent_0"):
         tuning.tuning_data([1e-2], [8], 1, 5, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
     assert not (tmp_path / "tuning_summary.csv").exists()
+
+
+def test_chance_is_the_share_of_the_highest_items():
+    env = HighestItemVectorEnv()
+    env.reset(seed=0)
+    shares = []
+    for _ in range(100):
+        observations = env.step(np.zeros(64, int))[0]
+        heights = observations[..., 2]
+        shares.append((heights > heights.max(axis=1, keepdims=True) - 0.01).mean())
+    assert tuning.chance() == pytest.approx(np.mean(shares), abs=0.002)
+
+
+def test_greedy_msr_is_found_again_in_that_of_the_exploring_agent():
+    steps = 2000
+    greedy = np.linspace(0.2, 1, steps)
+    epsilon = np.maximum(0, 1 - np.arange(steps) / 1000)
+    mixed = (1 - epsilon) * greedy + epsilon * tuning.chance()
+    found = tuning.greedy_msr(np.array([mixed, mixed]))
+    assert np.isnan(found[:, :45]).all()
+    assert found[:, 60:] == pytest.approx(np.array([greedy, greedy])[:, 60:], abs=0.01)
+    reached = tuning.greedy_reached([mixed, mixed])
+    assert reached["step"] == pytest.approx(1750, abs=10)
+    assert reached["low"] == reached["high"] == reached["step"]
+
+
+def test_a_level_is_reached_where_the_msr_stays_above_it():
+    msr = np.array([[np.nan, 0.95, 0.5, 0.9, 1], [1, 1, 1, 1, 0.5], [1, 1, 1, 1, 1]])
+    assert np.array_equal(tuning.reached_at(msr), [3, np.nan, 0], equal_nan=True)

@@ -6,14 +6,16 @@ Made by ``python -m unload.reproduce training``.
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.evaluation import evaluate
+from unload.agent.evaluation import Policy, evaluate
 from unload.agent.sweep import run_all
 from unload.agent.training import TrainResult, train
 from unload.agent.weights import save_policy
+from unload.env.vector import ContainerVectorEnv
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings, write_table
 from unload.support import checks, files
@@ -73,12 +75,12 @@ def training_data(
     for number, (seed, result) in enumerate(zip(seeds, results)):
         suffix = f"_seed_{seed}" if number else ""
         _write_export(folder / f"loss_function_agent{suffix}.csv", result.curve, "loss")
-        episodes = _episodes(result.curve)
+        episodes = episode_means(result.curve)
         episodes["reward"] = episodes["mean_reward"] * task.MAX_PICKS
         _write_export(folder / f"total_rew_function_agent{suffix}.csv", episodes, "reward")
         save_policy(result.policy, folder / "policies" / f"paper{suffix}.safetensors")
     columns = ["seed", "picks", "success_rate", "deadlocked", "loss", "epsilon"]
-    curves = [_episodes(result.curve).assign(seed=seed) for seed, result in zip(seeds, results)]
+    curves = [episode_means(result.curve).assign(seed=seed) for seed, result in zip(seeds, results)]
     rows = [
         {"seed": seed, **training_summary(result), **_cost(record)}
         for seed, result, record in zip(seeds, results, records)
@@ -105,7 +107,7 @@ def training_summary(result: TrainResult) -> dict[str, float]:
         50 fresh containers with and without the mask, each with its standard deviation over
         the containers, and the share of picks in deadlocks without the mask.
     """
-    msr = _episodes(result.curve)["success_rate"]
+    msr = episode_means(result.curve)["success_rate"]
     row = {
         "msr_start": msr.iloc[0],
         "msr_end": msr.iloc[-max(1, len(msr) // 100) :].mean(),
@@ -118,12 +120,58 @@ def training_summary(result: TrainResult) -> dict[str, float]:
     return row | {"deadlocked_no_mask": table["deadlocked"].mean()}
 
 
-def _episodes(curve: pd.DataFrame) -> pd.DataFrame:
-    """Means of a curve over each episode; all environments start theirs together."""
-    points = task.MAX_PICKS // LOG_INTERVAL
-    complete = curve[: len(curve) // points * points]
-    groups = complete.groupby(complete.index // points)
-    return groups.mean().assign(**groups[["picks", "wall_time", "epsilon"]].last())
+def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
+    """Means of a learning curve over each complete episode of the 64 containers.
+
+    All containers are reset together, every 32,000 picks, and full ones, in which there is no
+    deadlock yet, are easier. Means over less than an episode therefore rise at every reset.
+
+    Args:
+        curve: of ``unload.train`` in 64 containers, with a ``log_interval`` that divides 500.
+
+    Returns:
+        One row per episode with the columns of ``curve``; ``picks``, ``wall_time`` and
+        ``epsilon`` are those at its end.
+
+    Raises:
+        ValueError: a point of the curve lies in two episodes.
+    """
+    length = task.NUM_ENVS * task.MAX_PICKS
+    episode = ((curve["picks"] - 1) // length).rename("episode")
+    groups = curve[curve["picks"] <= curve["picks"].max() // length * length].groupby(episode)
+    ends = groups[["picks", "wall_time", "epsilon"]].last()
+    if (ends["picks"] % length).any():
+        raise ValueError(
+            f"curve has points after {curve['picks'].iloc[0]:,} picks each; "
+            f"expected a divisor of the {length:,} picks of an episode"
+        )
+    return groups.mean().assign(**ends)
+
+
+def msr_by_pick(
+    policy: Policy, containers: int = task.NUM_ENVS, seed: int = 0, mask: bool = True
+) -> np.ndarray:
+    """The MSR at each pick of an episode, over containers that are filled together.
+
+    Args:
+        policy: see ``unload.policies``.
+        containers: how many.
+        seed: of the loads and of the policy's random numbers.
+        mask: whether the policy's masks exclude items that failed since the last success.
+
+    Returns:
+        (500,) float64, the share of the containers in which the pick succeeded.
+    """
+    envs = ContainerVectorEnv(checks.integer("containers", containers, 1))
+    rng = np.random.default_rng(seed)
+    observations, infos = envs.reset(seed=seed)
+    msr = np.empty(task.MAX_PICKS)
+    for pick in range(task.MAX_PICKS):
+        masks = infos["action_mask" if mask else "item_mask"]
+        observations, rewards, _, _, infos = envs.step(policy(observations, masks, rng))
+        msr[pick] = (rewards > 0).mean()
+    envs.close()
+    return msr
 
 
 def _write_export(path: Path, curve: pd.DataFrame, value: str) -> None:

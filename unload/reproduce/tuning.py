@@ -3,7 +3,7 @@
 Made by ``python -m unload.reproduce tuning``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.sweep import run_all
 from unload.agent.training import train
+from unload.env.highest_item import GRID
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings
 from unload.support import checks, files
@@ -25,6 +26,9 @@ STEPS = 3000  # K, one pick in each of 64 environments and one update per step
 SMOOTHING_STEPS = 25  # of the running means
 FINAL = 100  # steps at the end of a run that its final values are means of
 SOLVED = 0.99  # MSR
+REACHED = 0.9  # greedy MSR
+LEAST_GREEDY = 0.05  # share of the picks from which the greedy MSR can be told
+RESAMPLES = 500  # of the runs, for intervals
 LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
 
 OPTIONS = {
@@ -183,6 +187,73 @@ def export_curves(name: str, curve: pd.DataFrame, folder: str | Path) -> None:
 def running_mean(values: np.ndarray) -> np.ndarray:
     """Means over 25 steps around each one, fewer at the ends; NaN does not count."""
     return pd.Series(values).rolling(SMOOTHING_STEPS, min_periods=1, center=True).mean().to_numpy()
+
+
+def chance() -> float:
+    """MSR of random picks in the tuning environment: the expected share of highest items.
+
+    An item of a height is among the highest if none of the 127 others is higher.
+    """
+    heights, counts = np.unique(GRID[:, 2].round(6), return_counts=True)
+    share = counts / counts.sum()
+    return float((share * share.cumsum() ** (task.N_VISIBLE - 1)).sum())
+
+
+def greedy_msr(success_rate: np.ndarray) -> np.ndarray:
+    """The MSR that an agent's greedy picks had while it explored.
+
+    Of the picks at a step a share ε is random, and succeeds by chance. Therefore
+    MSR = (1 - ε) · greedy MSR + ε · chance, here solved for the greedy MSR with means over 25
+    steps. The fewer picks are greedy, the noisier it is: it may leave [0, 1].
+
+    Args:
+        success_rate: (..., steps) MSR while training at each step of a whole run of
+            ``tuning_config``.
+
+    Returns:
+        (..., steps), NaN where fewer than one pick in twenty is greedy.
+    """
+    steps = success_rate.shape[-1]
+    config = tuning_config(1, 1, 0, steps=steps)
+    epsilon = np.array([config.epsilon(step * task.NUM_ENVS) for step in range(steps)])
+    greedy = running_mean(1 - epsilon)
+    by_greedy = np.apply_along_axis(running_mean, -1, success_rate - epsilon * chance())
+    return np.where(greedy < LEAST_GREEDY, np.nan, by_greedy / np.maximum(greedy, LEAST_GREEDY))
+
+
+def reached_at(msr: np.ndarray, level: float = REACHED) -> np.ndarray:
+    """The step from which on an MSR stays at ``level`` or above.
+
+    Args:
+        msr: (..., steps), NaN where it is not known.
+
+    Returns:
+        (...) float64, NaN if it does not end there.
+    """
+    below = ~(msr[..., ::-1] >= level)  # from the last step back; NaN counts as below
+    since = np.where(below.any(axis=-1), below.argmax(axis=-1), msr.shape[-1])
+    return np.where(since > 0, msr.shape[-1] - since, np.nan)
+
+
+def greedy_reached(curves: Iterable[np.ndarray], level: float = REACHED) -> dict[str, float]:
+    """When the mean greedy MSR of a configuration's runs reaches ``level``.
+
+    The mean, because at that time one run alone has too few greedy picks.
+
+    Args:
+        curves: (steps,) MSR while training of each run.
+        level: of the MSR.
+
+    Returns:
+        ``step``, see ``reached_at``, and ``low`` and ``high``, its 95 % bootstrap interval over
+        the runs.
+    """
+    runs = greedy_msr(np.array(list(curves)))
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(len(runs), size=(RESAMPLES, len(runs)))
+    steps = reached_at(runs[drawn].mean(axis=1), level)
+    low, high = np.nanpercentile(steps, [2.5, 97.5])
+    return {"step": float(reached_at(runs.mean(axis=0), level)), "low": low, "high": high}
 
 
 def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:

@@ -2,6 +2,9 @@
 
 import json
 
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
 import pytest
 
 from unload.reproduce.figures import training
@@ -42,3 +45,27 @@ def test_a_reduced_run_says_so(tmp_path, reduced):
     path.write_text(json.dumps(json.loads(path.read_text()) | {"reduced": reduced}))
     note = training.fig11_loss(tmp_path).get_supxlabel()
     assert ("reduced run" in note) == reduced
+
+
+def test_each_seed_has_a_colour_and_a_label():
+    lines = training.fig12_reward().axes[0].lines
+    assert [line.get_label() for line in lines] == [f"seed {seed}" for seed in range(4)]
+    assert len({line.get_color() for line in lines}) == 4
+
+
+def test_a_learning_curve_is_drawn_over_whole_episodes():
+    picks = np.arange(1, 101) * 640
+    curve = pd.DataFrame({"picks": picks, "success_rate": np.tile([0.2, 0.6], 50)})
+    figure, axes = plt.subplots()
+    training.draw_learning_curve(axes, curve.assign(wall_time=0, epsilon=0), "run")
+    points, episodes = axes.lines
+    assert len(points.get_ydata()) == 100
+    assert episodes.get_xdata().tolist() == [16_000, 48_000]
+    assert episodes.get_ydata() == pytest.approx([0.4, 0.4])
+
+
+def test_the_msr_by_pick_is_drawn_as_means():
+    figure, axes = plt.subplots()
+    training.draw_by_pick(axes, {"all": np.ones(500), "none": np.zeros(500)})
+    assert [line.get_label() for line in axes.lines] == ["all", "none"]
+    assert [set(line.get_ydata()) for line in axes.lines] == [{1}, {0}]

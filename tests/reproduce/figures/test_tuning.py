@@ -8,7 +8,12 @@ from unload.reproduce.figures import tuning
 from unload.reproduce.tuning import running_mean, set_name
 from unload.support import files
 
-FIGURES = [tuning.fig08_learning_rate, tuning.fig09_batch_size, tuning.fig10_loss]
+FIGURES = [
+    tuning.fig08_learning_rate,
+    tuning.fig09_batch_size,
+    tuning.fig10_loss,
+    tuning.greedy_curves,
+]
 
 
 @pytest.mark.parametrize("draw", FIGURES)
@@ -34,6 +39,15 @@ def test_strong_lines_are_the_papers_runs():
     named = {line.get_label(): line.get_ydata()[0] for line in axes.lines if line.get_zorder() == 3}
     assert named == {"a": 0.5, "b": 0.2}  # the first one where the paper's is missing
     assert len(axes.lines) == 6
+
+
+def test_greedy_curves_are_means_over_the_runs():
+    figure, axes = plt.subplots()
+    runs = {run: np.full(100, value) for run, value in enumerate((0.25, 0.75))}
+    tuning.draw_greedy(axes, {"a": runs})
+    line = axes.lines[0]
+    assert line.get_label() == "a"
+    assert line.get_ydata()[70:] == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("content", ["", "a\nb\n", "1,2\n3,4\n"])

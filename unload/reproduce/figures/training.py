@@ -1,23 +1,28 @@
-"""Figs. 11 and 12: the training in the container (Sec. IV-B)."""
+"""Figs. 11 and 12: the training in the container (Sec. IV-B), and learning curves by episode."""
 
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from unload import task
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.results import read_table
+from unload.reproduce.training import episode_means
 from unload.support import files
+from unload.support.provenance import read_provenance
 
 COLUMNS = ["Wall time", "Step", "Value"]
+SEED_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")  # told apart by the colour-blind, too
 
 
 @styled
 def fig11_loss(folder: str | Path = files.DATA) -> Figure:
-    """Training loss over picks (Fig. 11); the first run strong, those of other seeds pale.
+    """Training loss over picks (Fig. 11), one line per seed; the first one is strong.
 
     Args:
         folder: of ``loss_function_agent.csv`` and ``loss_function_agent_seed_*.csv``, which
@@ -37,18 +42,24 @@ def fig12_reward(folder: str | Path = files.DATA) -> Figure:
     Arguments, lines and errors as in ``fig11_loss``, for ``total_rew_function_agent*.csv``.
     """
     curves = read_curves(folder, "total_rew_function_agent")
-    means = [curve.assign(Value=curve["Value"] / task.MAX_PICKS) for curve in curves]
+    means = {
+        seed: curve.assign(Value=curve["Value"] / task.MAX_PICKS) for seed, curve in curves.items()
+    }
     return _figure(means, r"$r_\mathrm{mean}$", (-1, 1), folder)
 
 
-def read_curves(folder: str | Path, name: str) -> list[pd.DataFrame]:
-    """The curve ``name`` and those of the other seeds, ``<name>_seed_*``.
+def read_curves(folder: str | Path, name: str) -> dict[int, pd.DataFrame]:
+    """The curve ``name`` and those of the other seeds, ``<name>_seed_*``, by their seeds.
 
     Raises:
         FileNotFoundError, ValueError: see ``read_curve``.
     """
-    others = sorted(path.stem for path in Path(folder).glob(f"{name}_seed_*.csv"))
-    return [read_curve(folder, each) for each in (name, *others)]
+    first = read_curve(folder, name)
+    prefix = f"{name}_seed_"
+    others = [path.stem for path in Path(folder).glob(f"{prefix}*.csv")]
+    seeds = sorted(int(each.removeprefix(prefix)) for each in others)
+    curves = {read_provenance(folder, "training")["settings"]["seeds"][0]: first}
+    return curves | {seed: read_curve(folder, f"{prefix}{seed}") for seed in seeds}
 
 
 def read_curve(folder: str | Path, name: str) -> pd.DataFrame:
@@ -62,17 +73,46 @@ def read_curve(folder: str | Path, name: str) -> pd.DataFrame:
     return read_table(path, "python -m unload.reproduce training", COLUMNS, exact=True)
 
 
+def draw_learning_curve(axes: Axes, curve: pd.DataFrame, name: str, color: str = "C0") -> None:
+    """Draw the MSR while training: pale at each point of the curve, strong over whole episodes.
+
+    Args:
+        axes: where.
+        curve: of ``unload.train``, see ``episode_means``.
+        name: in the legend.
+        color: of both lines.
+    """
+    axes.plot(curve["picks"], curve["success_rate"], color=color, linewidth=0.7, alpha=0.45)
+    episodes = episode_means(curve)
+    middle = episodes["picks"] - task.NUM_ENVS * task.MAX_PICKS / 2
+    axes.plot(middle, episodes["success_rate"], "o-", color=color, markersize=3.5, label=name)
+    axes.set(xlabel="picks", ylabel="MSR while training", ylim=(0, 1.02), xlim=(0, None))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+
+
+def draw_by_pick(axes: Axes, curves: dict[str, np.ndarray]) -> None:
+    """Draw the MSR over the picks of an episode, means over 20 picks.
+
+    Args:
+        axes: where.
+        curves: (500,) each by name, see ``msr_by_pick``.
+    """
+    for name, msr in curves.items():
+        means = msr.reshape(-1, 20).mean(axis=1)
+        axes.plot(np.arange(10, len(msr), 20), means, label=name)
+    axes.set(xlabel="pick of the episode", ylabel="MSR", ylim=(0, 1.02), xlim=(0, task.MAX_PICKS))
+
+
 def _figure(
-    curves: list[pd.DataFrame], label: str, limits: tuple[float, float], folder: str | Path
+    curves: dict[int, pd.DataFrame], label: str, limits: tuple[float, float], folder: str | Path
 ) -> Figure:
     figure, axes = plt.subplots()
-    axes.plot(curves[0]["Step"], curves[0]["Value"], label="first run", zorder=3)
-    for number, curve in enumerate(curves[1:]):
-        name = None if number else "other seeds"
-        axes.plot(curve["Step"], curve["Value"], color="C1", linewidth=0.6, alpha=0.7, label=name)
-    if len(curves) > 1:
-        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
-    end = max(curve["Step"].iloc[-1] for curve in curves)
+    for number, (seed, curve) in enumerate(curves.items()):
+        style = {"linewidth": 0.8, "alpha": 0.8} if number else {"zorder": 3}
+        color = SEED_COLOURS[number % len(SEED_COLOURS)]
+        axes.plot(curve["Step"], curve["Value"], color=color, label=f"seed {seed}", **style)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
+    end = max(curve["Step"].iloc[-1] for curve in curves.values())
     axes.set(xlabel="step $k$ (picks)", ylabel=label, ylim=limits, xlim=(0, end))
     axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
     mark_reduced(figure, folder, "training")

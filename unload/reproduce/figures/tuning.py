@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from unload.reproduce.figures.style import mark_reduced, styled
-from unload.reproduce.tuning import run_name, running_mean, set_name
+from unload.reproduce.tuning import REACHED, greedy_msr, run_name, running_mean, set_name
 from unload.support import files
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
@@ -61,6 +61,60 @@ def fig10_loss(folder: str | Path = files.DATA) -> Figure:
         "without FE": (read_curves(folder, "loss", 2048, 1e-3, equalize=False), 8),
     }
     return _figure(curves, r"loss $\ell$", folder)
+
+
+@styled
+def greedy_curves(folder: str | Path = files.DATA) -> Figure:
+    """Greedy MSR by learning rate, batch size and feature engineering: the runs of Figs. 8–10.
+
+    Each line is the mean over all runs of a configuration, its band one standard error.
+
+    Arguments and errors as in ``fig08_learning_rate``.
+    """
+    panels = {
+        "with FE, b = 1024": {
+            f"μ = {rate:g}": read_curves(folder, "hitrate", 1024, rate)
+            for rate in (1e-1, 1e-2, 1e-3)
+        },
+        "with FE, μ = 0.001": {
+            f"b = {batch_size}": read_curves(folder, "hitrate", batch_size, 1e-3)
+            for batch_size in (64, 256, 1024, 2048)
+        },
+        "μ = 0.001, b = 2048": {
+            f"{'with' if equalize else 'without'} FE": read_curves(
+                folder, "hitrate", 2048, 1e-3, equalize
+            )
+            for equalize in (True, False)
+        },
+    }
+    figure, all_axes = plt.subplots(1, 3, figsize=(9.6, 3.2), sharey=True)
+    for axes, (title, curves), end in zip(all_axes, panels.items(), (3000, 600, 600)):
+        draw_greedy(axes, curves)
+        axes.set(title=title, xlim=(0, end))
+    all_axes[0].set_ylabel("greedy MSR")
+    mark_reduced(figure, folder, "tuning")
+    return figure
+
+
+@styled
+def draw_greedy(axes: Axes, curves: Mapping[str, Curves]) -> None:
+    """Draw the mean greedy MSR of each configuration's runs, with a band of one standard error.
+
+    Args:
+        axes: where.
+        curves: MSR while training of all runs, by the configuration's name.
+    """
+    for number, (name, runs) in enumerate(curves.items()):
+        greedy = greedy_msr(np.array(list(runs.values())))
+        mean, error = greedy.mean(axis=0), greedy.std(axis=0, ddof=1) / len(greedy) ** 0.5
+        steps = np.arange(len(mean))
+        axes.plot(steps, mean, color=f"C{number}", label=name)
+        axes.fill_between(
+            steps, mean - error, mean + error, color=f"C{number}", alpha=0.25, linewidth=0
+        )
+    axes.axhline(REACHED, color="0.4", linestyle=":", linewidth=0.8)
+    axes.set(xlabel="step $k$", ylim=(0, 1.1))
+    axes.legend(loc="lower right", fontsize=8)
 
 
 def read_curves(
