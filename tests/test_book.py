@@ -28,7 +28,7 @@ def test_plotly_is_preferred_to_a_picture_of_it():
 
 
 def test_an_animation_waits_for_its_button():
-    """Three that start at once keep a browser without a graphics card busy for half a minute."""
+    """Several that start at once can block a browser that draws without a graphics card."""
     line = [{"type": "scatter", "y": [1, 2]}]
     (animation,) = read({pages.PLOTLY: {"data": line, "layout": {}, "frames": [{"data": line}]}})
     assert "Plotly.addFrames" in animation["text/html"]
