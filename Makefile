@@ -43,6 +43,9 @@ book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: bui
 	$(BIN)/python -m sphinx -q -E -d build/doctrees -c notebooks/book . build/book
 	$(BIN)/python notebooks/book/links.py build/book
 
+browser: $(VENV)/ready-browser  ## open notebooks in JupyterLab in a browser without a window, run them and look at them
+	$(BIN)/python tests/browser/look.py
+
 clean:  ## remove the virtual environment and all intermediate results
 	rm -rf $(VENV) build runs
 
@@ -58,4 +61,8 @@ $(VENV)/ready: environment.txt pyproject.toml
 
 $(VENV)/ready-book: $(VENV)/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[book]"
+	touch $@
+
+$(VENV)/ready-browser: $(VENV)/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[browser]"
 	touch $@

@@ -22,6 +22,7 @@ import papermill
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
+WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
 
 def notebooks() -> list[Path]:
@@ -66,11 +67,19 @@ def run(notebook: Path, output: Path, parameters: dict) -> None:
 
 
 def tidy(notebook: Path) -> None:
-    """Drop what says where and when a notebook ran, so that the same run gives the same file."""
+    """Drop what says where and when a notebook ran, so that the same run gives the same file.
+
+    Widgets are dropped, too: without a kernel they do not answer, and JupyterLab would show
+    them instead of the replays and pictures that stand beside them.
+    """
     content = nbformat.read(notebook, as_version=4)
+    content.metadata.pop("widgets", None)
     for holder in (content, *content.cells):
         holder.metadata.pop("papermill", None)
         holder.metadata.pop("execution", None)
+    for cell in content.cells:
+        for output in cell.get("outputs", []):
+            output.get("data", {}).pop(WIDGET_MIMETYPE, None)
     nbformat.write(content, notebook)
 
 

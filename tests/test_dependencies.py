@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"benchmarks", "notebooks", "tests", "unload"}
-ON_DEMAND = ("book", "mujoco")  # extras for a command of their own, pinned in pyproject.toml
+ON_DEMAND = ("book", "browser", "mujoco")  # extras for one command each, pinned in pyproject.toml
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
@@ -59,8 +59,14 @@ def distributions(folder: str) -> set[str]:
             elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
                 names.add(node.args[0].value.split(".")[0])
     beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
-    names -= sys.stdlib_module_names | OWN | {*ON_DEMAND} | (beside - DISTRIBUTIONS.keys())
-    return {normal(DISTRIBUTIONS[name][0]) for name in names}
+    names -= sys.stdlib_module_names | OWN | (beside - DISTRIBUTIONS.keys())
+    return {normal(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or not installed
+
+
+def on_demand() -> set[str]:
+    """The names of the libraries that make targets of their own install."""
+    extras = PROJECT["optional-dependencies"]
+    return {library.split("==")[0] for extra in ON_DEMAND for library in extras[extra]}
 
 
 def test_each_library_is_named_once_and_pinned():
@@ -80,5 +86,6 @@ def test_what_is_installed_is_what_is_pinned():
 def test_what_is_imported_is_named():
     assert distributions("unload") <= set(PROJECT["dependencies"])
     others = distributions("tests") | distributions("benchmarks") | distributions("notebooks")
+    others -= on_demand()
     assert others <= set(pinned())
     assert distributions("unload") | others | set(RUN_ONLY) == set(pinned())

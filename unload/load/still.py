@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from PIL import Image
 
 from unload import task
 from unload.load.contacts import OVERLAP, slabs
@@ -22,6 +23,7 @@ CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 # The faces whose outer sides point along x, against y and along z: corners, and brightness.
 FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
 WIDTH = 8.0  # inches, at 100 pixels each
+COLOURS = 128  # of the file
 LEGEND = 0.15  # share of the width at the left
 
 
@@ -62,8 +64,11 @@ def still(
     axes.axis("off")
     handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
     figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
     file = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(file)
+    picture.quantize(COLOURS).save(file, "PNG", optimize=True)  # a third of the bytes
     return file.getvalue()
 
 

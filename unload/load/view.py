@@ -42,18 +42,22 @@ class View(go.Figure):
     Args:
         *args, **kwargs: of ``plotly.graph_objects.Figure``.
         picture: returns the PNG file; called when the figure is displayed. None: no picture.
+
+    Attributes:
+        picture: as given.
     """
 
+    picture: Callable[[], bytes] | None = None
     _ipython_display_ = None  # plotly's own method would display the figure alone
 
     def __init__(self, *args, picture: Callable[[], bytes] | None = None, **kwargs) -> None:
         super().__init__(*args, **kwargs)
-        self._picture = picture
+        self.picture = picture
 
     def _repr_mimebundle_(self, include=None, exclude=None, **kwargs) -> dict:
         bundle = {PLOTLY_MIMETYPE: json.loads(self.to_json()), "text/plain": "View"}
-        if self._picture is not None:
-            bundle["image/png"] = base64.b64encode(self._picture()).decode()
+        if self.picture is not None:
+            bundle["image/png"] = base64.b64encode(self.picture()).decode()
         return bundle
 
 
@@ -140,10 +144,10 @@ def _grouped(present: np.ndarray, groups: Mapping[str, np.ndarray]) -> tuple[np.
     return of_item, {name: named[name] for name in names}
 
 
-def corners(load: Load, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def corners(load: Load, items: np.ndarray, seam: float = SEAM) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper corners of items as they are drawn, (k, 3) float64 each, in m."""
     centres = load.positions[items]
-    halves = np.maximum(load.sizes - SEAM, load.sizes / 2)[items] / 2
+    halves = np.maximum(load.sizes - seam, load.sizes / 2)[items] / 2
     return centres - halves, centres + halves
 
 
@@ -153,6 +157,7 @@ def mesh(
     name: str,
     colour: tuple[float, float, float],
     legend: bool = False,
+    seam: float = SEAM,
 ) -> go.Mesh3d:
     """Items of one colour as a mesh of 8 vertices and 12 triangles each.
 
@@ -162,23 +167,29 @@ def mesh(
         name: of the group, for the legend and the label of a box.
         colour: RGB in [0, 1].
         legend: whether the legend names them.
+        seam: how much smaller than they are they are drawn, in m.
     """
-    low, high = corners(load, items)
+    low, high = corners(load, items, seam)
     vertices = low[:, None] + CORNERS * (high - low)[:, None]
     triangles = TRIANGLES + np.arange(len(items))[:, None, None] * len(CORNERS)
     labels = np.column_stack([items, load.packages[items], np.rint(load.sizes[items] * 1000)])
     return go.Mesh3d(
-        # Numbers of few bytes, because they are kept in notebooks.
         **dict(zip("xyz", vertices.reshape(-1, 3).astype(np.float32).T)),
-        **dict(zip("ijk", triangles.reshape(-1, 3).astype(np.int32).T)),
+        **dict(zip("ijk", _short(triangles.reshape(-1, 3)).T)),
         name=name,
         color=css(colour),
         showlegend=legend,
-        customdata=np.repeat(labels, len(CORNERS), axis=0).astype(np.int32),
+        customdata=_short(np.repeat(labels, len(CORNERS), axis=0)),
         hovertemplate=LABEL,
         flatshading=True,
         lighting={"ambient": 0.75, "diffuse": 0.5},
     )
+
+
+def _short(numbers: np.ndarray) -> np.ndarray:
+    """Whole numbers in few bytes, because they are kept in notebooks."""
+    fits = numbers.max(initial=0) <= np.iinfo(np.int16).max
+    return numbers.astype(np.int16 if fits else np.int32)
 
 
 def layout(height: int) -> go.Layout:

@@ -1,0 +1,270 @@
+"""Run notebooks in JupyterLab in a browser without a window, and look at them as a reader does.
+
+    python tests/browser/look.py               00, 01, 07 and 13
+    python tests/browser/look.py 00 04         those whose names start so
+
+Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
+nothing on stderr; formulas are typeset; 3D views hold pixels; in 00 a click changes the score
+and the play buttons move, with a kernel and without. Pictures of all are kept in build/browser/.
+"""
+
+import argparse
+import io
+import re
+import shutil
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import nbformat
+import numpy as np
+from papermill.parameterize import parameterize_notebook
+from PIL import Image
+from playwright.sync_api import Locator, Page
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+from start import browser, jupyterlab  # noqa: E402
+
+from notebooks import run  # noqa: E402
+
+BUILD = ROOT / "build" / "browser"
+COPIES = BUILD / "notebooks"
+NOTEBOOKS = ("00", "01", "07", "13")
+PLAYGROUND = "00_playground"
+RUN_LIMIT = 400  # s, for all cells of a notebook
+DRAW_LIMIT = 60  # s, for a picture, without a graphics card
+CLICK_LIMIT = 200  # ms, from a click to the new score and the new picture
+CLICKS = 12
+PLOTLY = ".jp-RenderedPlotly"
+SIZE = {"width": 1500, "height": 1000}
+
+OUTPUTS = """() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells
+    .flatMap((cell, number) => (cell.outputs ?? []).map((output) => ({number, ...output})))"""
+# How long after the release of the button the score changes, and the picture around the pointer.
+CLICK = """async (canvas, [x, y]) => {
+    const box = canvas.getBoundingClientRect(), ratio = canvas.width / box.width;
+    const board = canvas.closest(".jp-OutputArea-output").querySelector("[data-picks]");
+    const score = () => board.isConnected ? board.textContent
+        : canvas.closest(".jp-OutputArea-output").querySelector("[data-picks]").textContent;
+    const patch = () => canvas.getContext("2d").getImageData(
+        (x - 20) * ratio, (y - 20) * ratio, 40 * ratio, 40 * ratio).data.join();
+    const before = [score(), patch()], times = [0, 0];
+    const place = {clientX: box.x + x, clientY: box.y + y, pointerId: 1, bubbles: true};
+    canvas.setPointerCapture = () => {};  // it knows no pointers that are not real
+    canvas.dispatchEvent(new PointerEvent("pointerdown", place));
+    const start = performance.now();
+    canvas.dispatchEvent(new PointerEvent("pointerup", place));
+    while (performance.now() - start < 5000 && times.includes(0)) {
+        await new Promise(requestAnimationFrame);
+        [score(), patch()].forEach((now, i) => {
+            if (!times[i] && now !== before[i]) times[i] = performance.now() - start;
+        });
+    }
+    return times;
+}"""
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("names", nargs="*", default=NOTEBOOKS, help="beginnings of notebook names")
+    names = tuple(parser.parse_args().names)
+    chosen = [p for p in run.notebooks() if p.parent == run.HERE and p.name.startswith(names)]
+    if not chosen:
+        parser.error(f"no notebook starts with {names}")
+    shutil.rmtree(BUILD, ignore_errors=True)
+    problems = []
+    with browser() as chromium:
+        for theme in ("Light", "Dark"):
+            copy(chosen)
+            with jupyterlab(COPIES, BUILD / theme.lower(), theme) as address:
+                for notebook in chosen:
+                    print(f"{notebook.stem}, {theme.lower()} …", flush=True)
+                    page = chromium.new_page(viewport=SIZE)
+                    page.goto(address.format(notebook.name))
+                    for problem in look_at(page, notebook.stem, BUILD / theme.lower(), theme):
+                        print(f"  FAILED: {problem}", flush=True)
+                        problems.append(problem)
+                    page.close()
+    print(f"{len(problems)} failed; pictures are in {BUILD.relative_to(ROOT)}")
+    return 1 if problems else 0
+
+
+def copy(notebooks: list[Path]) -> None:
+    """Put notebooks with their reduced counts and their outputs into a folder of their own."""
+    COPIES.mkdir(parents=True, exist_ok=True)
+    for path in notebooks:
+        content = nbformat.read(path, as_version=4)
+        reduced = {} if path.stem == PLAYGROUND else run.reduced_parameters(path)
+        if reduced:
+            content = parameterize_notebook(content, reduced)
+        nbformat.write(content, COPIES / path.name)
+
+
+def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
+    """Yield what is wrong with a notebook, as it is stored and after a run."""
+    page.wait_for_selector(".jp-Notebook .jp-MarkdownOutput", timeout=60_000)
+    page.wait_for_timeout(3000)
+    if name == PLAYGROUND:
+        yield from replay_moves(page, pictures)
+    yield from drawn(page, f"{name}, as stored", pictures)
+    if theme == "Dark" and name != PLAYGROUND:  # a second run would show the same
+        return
+    page.evaluate("() => jupyterapp.serviceManager.ready")
+    page.wait_for_function(
+        "() => jupyterapp.shell.currentWidget.sessionContext.session?.kernel?.status === 'idle'",
+        timeout=60_000,
+    )
+    page.set_default_timeout(1000 * RUN_LIMIT)
+    page.evaluate("() => jupyterapp.commands.execute('notebook:run-all-cells')")
+    page.set_default_timeout(30_000)
+    page.wait_for_timeout(3000)
+    for output in page.evaluate(OUTPUTS):
+        if output["output_type"] == "error" or output.get("name") == "stderr":
+            text = output.get("evalue") or output.get("text")
+            yield f"{name}: cell {output['number']} says {str(text)[:300]!r}"
+    yield from typeset(page, name)
+    yield from drawn(page, name, pictures)
+    if name == PLAYGROUND:
+        yield from clicks_count(page, pictures)
+        yield from play_moves(page, pictures)
+
+
+def typeset(page: Page, name: str) -> Iterator[str]:
+    """Yield whether formulas are missing: the text has dollar signs, or no formula is drawn."""
+    cells = page.evaluate(
+        """() => [...document.querySelectorAll(".jp-MarkdownOutput")].map((cell) => {
+            const copy = cell.cloneNode(true);
+            copy.querySelectorAll("code, pre, mjx-container").forEach((part) => part.remove());
+            return copy.textContent;
+        })"""
+    )
+    left = [text for text in cells if re.search(r"\$[^$]+\$", text)]
+    if left:
+        yield f"{name}: a formula is not typeset in {left[0][:200]!r}"
+    sources = (COPIES / f"{name}.ipynb").read_text()
+    count = page.locator("mjx-container").count()
+    if re.search(r"\$[^$\n]*\\\\[a-z]", sources) and not count:
+        yield f"{name}: no formula is drawn"
+
+
+def drawn(page: Page, name: str, pictures: Path) -> Iterator[str]:
+    """Yield which 3D views are blank, and keep a picture of each and of the page's parts."""
+    stem = re.sub(r"\W+", "-", name)
+    views = page.locator(f"{PLOTLY}, canvas.unload-canvas")
+    for number in range(views.count()):
+        view = views.nth(number)
+        if view.evaluate("(view) => view.matches('.jp-RenderedPlotly')"):
+            interact(view)
+        if not wait_until(lambda view=view: coloured(shot(view)) > 0.02):
+            yield f"{name}: view {number} is blank"
+        shot(view, pictures / f"{stem}-view-{number}.png")
+    cells = page.locator(".jp-Cell")
+    for number in range(0, cells.count(), 4):
+        cells.nth(number).scroll_into_view_if_needed()
+        page.wait_for_timeout(300)
+        page.screenshot(path=pictures / f"{stem}-{number}.png")
+
+
+def interact(view: Locator) -> None:
+    """Let plotly draw: JupyterLab shows the picture beside it until the pointer is on it."""
+    view.scroll_into_view_if_needed()
+    if view.locator(".plot-container").count() == 0:
+        view.locator("img").dispatch_event("mouseenter")
+    view.locator(".gl-container canvas").first.wait_for(state="attached", timeout=60_000)
+    view.page.wait_for_timeout(2000)
+
+
+def shot(view: Locator, file: Path | None = None) -> np.ndarray:
+    """(height, width, 3) int, the pixels of a part of the page."""
+    view.scroll_into_view_if_needed()
+    content = view.screenshot(path=file, timeout=60_000)
+    return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
+
+
+def coloured(pixels: np.ndarray) -> float:
+    """The share of pixels that are far from grey, as boxes in a view are."""
+    return float((np.ptp(pixels, axis=2) > 40).mean())
+
+
+def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:
+    """Whether something holds within some time."""
+    end = time.monotonic() + seconds
+    while not holds():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.5)
+    return True
+
+
+def replay_moves(page: Page, pictures: Path) -> Iterator[str]:
+    """Yield whether the stored replay, which needs no kernel, stands still."""
+    replay = page.locator(PLOTLY).first
+    interact(replay)
+    if not wait_until(lambda: coloured(shot(replay)) > 0.02):
+        yield "00: the replay is blank"
+        return
+    label = replay.locator(".slider-label").first
+    before, pixels = label.text_content(), shot(replay, pictures / "replay-before.png")
+    replay.locator(".updatemenu-button").first.click()
+    moved = wait_until(lambda: label.text_content() != before)
+    page.wait_for_timeout(4000)
+    after = shot(replay, pictures / "replay-after.png")
+    if not moved or (np.abs(after - pixels).max(axis=2) > 40).mean() < 0.01:
+        yield f"00: the replay's play button moves nothing; it shows {label.text_content()!r}"
+
+
+def clicks_count(page: Page, pictures: Path) -> Iterator[str]:
+    """Yield whether clicks on boxes fail to change the score, or are slow."""
+    canvas = page.locator("canvas.unload-canvas").first
+    score = page.locator("[data-picks]").first
+    rng = np.random.default_rng(0)
+    times = []
+    for count in range(CLICKS + 1):
+        pixels = shot(canvas)
+        # Boxes that may be picked are blue, and bluer than the text's antialiasing.
+        blue = (pixels[:, :, 2] - pixels[:, :, 0] > 70) & (pixels[:, :, 1] > pixels[:, :, 0] + 40)
+        blue[:200, :200] = False  # the legend
+        y, x = (int(value) for value in rng.permutation(np.argwhere(blue))[0])
+        if count == 0:  # a real one; the others are sent from within the page, to measure time
+            before = score.text_content()
+            canvas.click(position={"x": x, "y": y})
+            if not wait_until(lambda before=before: score.text_content() != before, 10):
+                yield f"00: a click at {x}, {y} does not change the score {before!r}"
+                return
+        else:
+            times.append(canvas.evaluate(CLICK, [x, y]))
+        page.wait_for_timeout(600)  # the box rises
+    shot(
+        page.locator(".jp-OutputArea-output:has(canvas.unload-canvas)").first, pictures / "you.png"
+    )
+    for what, column in zip(("score", "picture"), zip(*times)):
+        middle = statistics.median(column)
+        print(f"  from a click to the new {what}: {middle:.0f} ms, {max(column):.0f} at most")
+        if 0 in column or middle > CLICK_LIMIT:
+            yield f"00: from a click to the new {what} it takes {column} ms; 0: more than 5 s"
+
+
+def play_moves(page: Page, pictures: Path) -> Iterator[str]:
+    """Yield whether an agent who is watched picks nothing when play is pressed."""
+    output = page.locator(".jp-OutputArea-output:has(canvas.unload-canvas)").nth(1)
+    score = output.locator("[data-picks]")
+    before, pixels = score.text_content(), shot(output.locator("canvas"))
+    output.locator(".jupyter-widgets.widget-play button").first.click()
+    if not wait_until(lambda: int(score.get_attribute("data-picks")) >= 110):
+        yield f"00: play does not move; the score is {score.text_content()!r}, was {before!r}"
+        return
+    after = shot(output, pictures / "deadlock.png")
+    unloaded = score.locator("b").first.text_content()
+    if pixels.shape == after.shape and (pixels == after).all():
+        yield "00: play changes no pixel"
+    output.get_by_text("With the mask").click()
+    if not wait_until(lambda: int(score.locator("b").first.text_content()) > int(unloaded) + 5):
+        yield f"00: the mask does not end the deadlock; the score is {score.text_content()!r}"
+    shot(output, pictures / "deadlock-ended.png")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,194 @@
+"""Picks on one load, one after the other, that can be taken back."""
+
+import sys
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from unload import task
+from unload.env.container import ContainerEnv
+from unload.env.observation import nearest
+from unload.load.boxes import Load
+from unload.physics.situation import Surroundings
+from unload.physics.table import TablePhysics, shared_table
+from unload.support import checks
+
+
+class Pick(NamedTuple):
+    """What became of one pick.
+
+    Attributes:
+        item: the picked item.
+        distance: how far it moved, in m.
+        success: whether that was far enough, so that it is unloaded.
+        on_top: the items that rested on it, directly or over others.
+        deadlocked: whether it had failed before since the last success.
+    """
+
+    item: int
+    distance: float
+    success: bool
+    on_top: tuple[int, ...]
+    deadlocked: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The container between two picks.
+
+    Attributes:
+        present: (n,) bool, which items are in it.
+        visible: (k,) int64, the up to 128 items that may be picked, nearest first.
+        failed: (j,) int64, items that failed since the last success.
+        pick: the last pick, None before the first.
+    """
+
+    present: np.ndarray
+    visible: np.ndarray
+    failed: np.ndarray
+    pick: Pick | None
+
+    def groups(self) -> dict[str, np.ndarray]:
+        """Items by the names of ``unload.load.colours.COLOURS``, the later name holds."""
+        groups = {"visible": self.visible, "tried": self.failed}
+        if self.pick is not None and not self.pick.success:
+            groups["failed"] = np.array([self.pick.item])
+        return groups
+
+
+class Episode:
+    """Picks on one load, one after the other, that can be taken back.
+
+    Args:
+        load: the items.
+        seed: of the blur of their observed positions, see ``ContainerEnv``.
+        physics: ``"local"`` or ``"table"``, see ``ContainerEnv``.
+
+    Attributes:
+        load: the items.
+        picks: those made so far, ``Pick`` each.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+
+    def __init__(self, load: Load, seed: int = 0, physics: str = "table") -> None:
+        checks.one_of("physics", physics, ("local", "table"))
+        self._env = ContainerEnv(physics, max_picks=sys.maxsize)
+        self._now = self._env.reset(seed=checks.integer("seed", seed, 0), options={"load": load})
+        self.load = load
+        self.picks: list[Pick] = []
+        self._past: list[tuple] = []  # before each pick: the environment's state, what was seen
+
+    @property
+    def observation(self) -> np.ndarray:
+        """(128, 3) float32, what the agent sees."""
+        return self._now[0]
+
+    @property
+    def visible(self) -> np.ndarray:
+        """(k,) int64, the items that may be picked, nearest first."""
+        return self._env.visible[self._env.visible >= 0]
+
+    def observed_positions(self) -> np.ndarray:
+        """(n, 3) float64, where all items of the load are seen to be, in m."""
+        return self._env.observed_positions()
+
+    def allowed(self, mask: bool = True) -> np.ndarray:
+        """(128,) int8, 0 in rows without an item and, with the mask, of failed items."""
+        return self._now[1]["action_mask" if mask else "item_mask"]
+
+    def pick(self, item: int) -> Pick:
+        """Lift a visible item.
+
+        Raises:
+            ValueError: the item is not visible.
+        """
+        item = checks.integer("item", item, 0, len(self.load) - 1)
+        rows = np.flatnonzero(self._env.visible == item)
+        if not rows.size:
+            raise ValueError(f"item is {item}; expected one of the visible items")
+        surroundings = Surroundings(self.load, self._env.physics.present)
+        on_top = tuple(surroundings.on_top(item))
+        deadlocked = self.allowed()[rows[0]] == 0
+        before = self._env.get_state(), self._now
+        observation, reward, _, _, info = self._env.step(int(rows[0]))
+        self._past.append(before)
+        self._now = observation, info
+        self.picks.append(Pick(item, info["distance"], reward > 0, on_top, bool(deadlocked)))
+        return self.picks[-1]
+
+    def back_to(self, count: int) -> None:
+        """Take back all picks but the first ``count``.
+
+        Raises:
+            ValueError: there are fewer.
+        """
+        count = checks.integer("count", count, 0, len(self.picks))
+        if count < len(self.picks):
+            state, self._now = self._past[count]
+            self._env.set_state(state)
+            del self.picks[count:], self._past[count:]
+
+    def moment(self, count: int | None = None) -> Moment:
+        """The container after the first ``count`` picks; after all of them if None."""
+        count = len(self.picks) if count is None else count
+        count = checks.integer("count", count, 0, len(self.picks))
+        picks = self.picks[:count]
+        present = np.ones(len(self.load), dtype=bool)
+        present[[pick.item for pick in picks if pick.success]] = False
+        failed = []
+        for pick in reversed(picks):
+            if pick.success:
+                break
+            failed.append(pick.item)
+        left = np.flatnonzero(present)
+        visible = left[nearest(self.observed_positions()[left])]
+        last = picks[-1] if picks else None
+        return Moment(present, visible, np.unique(np.array(failed, np.int64)), last)
+
+    def liftable(self, count: int | None = None) -> np.ndarray:
+        """(k,) int64, the visible items that could be unloaded after the first ``count`` picks."""
+        moment = self.moment(count)
+        physics = TablePhysics(shared_table())
+        try:
+            physics.reset(self.load)
+            for item in np.flatnonzero(~moment.present):
+                physics.remove(item)
+            moved = np.array([physics.lift(item) for item in moment.visible])
+        finally:
+            physics.close()
+        return moment.visible[moved >= task.LIFT_THRESHOLD]
+
+    def unloaded(self, count: int | None = None) -> int:
+        """Number of items unloaded by the first ``count`` picks; by all of them if None."""
+        return sum(pick.success for pick in self.picks[:count])
+
+    def close(self) -> None:
+        """Free the simulator; may be called again."""
+        self._env.close()
+
+
+def explain(pick: Pick) -> str:
+    """Say in a sentence what became of a pick, and why."""
+    moved = f"Item {pick.item} moved by {_length(pick.distance)}"
+    resting = _boxes(len(pick.on_top))
+    if pick.success and not pick.on_top:
+        return f"{moved}, because nothing rests on it: it is unloaded."
+    if pick.success:
+        return f"{moved}: {resting} on it, but tipped aside. It is unloaded."
+    reason = f"because {resting} on it" if pick.on_top else "although nothing rests on it"
+    again = "" if not pick.deadlocked else (
+        " It had failed before, and nothing has changed since: this is a deadlock."
+    )  # fmt: skip
+    threshold = _length(task.LIFT_THRESHOLD)
+    return f"{moved}, {reason}: less than {threshold}, therefore the pick failed.{again}"
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.2f} m" if metres >= 0.1 else f"{1000 * metres:.0f} mm"
+
+
+def _boxes(count: int) -> str:
+    return "1 box rests" if count == 1 else f"{count} boxes rest"

@@ -1,0 +1,90 @@
+"""The players of the playground: rules, and agents whose weights are stored."""
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+
+from unload.agent import policies
+from unload.agent.weights import load_policy
+from unload.load.boxes import Load
+from unload.play.episode import Episode
+from unload.support import checks, files
+
+RULES = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
+# Four runs trained the paper's configuration; they differ in their seed only.
+AGENTS = {
+    "the paper's agent": "paper",
+    "the paper's agent, seed 3": "paper_seed_3",
+    "the recommended agent": "recommended",
+}
+PLAYERS = (*RULES, *AGENTS)
+
+
+@cache
+def policy_of(player: str) -> Callable:
+    """The policy of a player, see ``unload.policies``.
+
+    Raises:
+        ValueError: an unknown player.
+        FileNotFoundError: the agent's weights are not there.
+    """
+    checks.one_of("player", player, PLAYERS)
+    if player in RULES:
+        return RULES[player]
+    return load_policy(files.DATA / "policies" / f"{AGENTS[player]}.safetensors")
+
+
+class Run(Episode):
+    """A player's picks on a load, made as far as they are needed.
+
+    Args:
+        player: one of ``PLAYERS``.
+        load, seed: see ``Episode``; the seed is also that of random picks.
+        mask: whether items that failed since the last success are excluded.
+
+    Attributes:
+        player: as given.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+
+    def __init__(self, player: str, load: Load, seed: int = 0, mask: bool = True) -> None:
+        self.player = player
+        self._policy = policy_of(player)
+        self._mask = checks.boolean("mask", mask)
+        super().__init__(load, seed)
+        self._seed = seed
+
+    @property
+    def mask(self) -> bool:
+        """Whether items that failed since the last success are excluded."""
+        return self._mask
+
+    def play_to(self, count: int) -> int:
+        """Pick until there are ``count`` picks; return how many there are.
+
+        They are fewer if the container is empty before, or all visible items have failed.
+        """
+        checks.integer("count", count, 0)
+        while len(self.picks) < count and self.allowed(self._mask).any():
+            self.pick(self.choose())
+        return min(count, len(self.picks))
+
+    def choose(self) -> int:
+        """Return the item that the player picks next.
+
+        The random numbers depend on the seed and the number of picks alone, so that
+        going back changes nothing.
+        """
+        rng = np.random.default_rng([self._seed, len(self.picks)])
+        allowed = self.allowed(self._mask)
+        row = self._policy(self.observation[None], allowed[None], rng)[0]
+        return int(self.visible[row])
+
+    def change_mask(self, mask: bool, count: int) -> None:
+        """Use the mask, or stop using it, after the first ``count`` picks."""
+        mask = checks.boolean("mask", mask)
+        self.back_to(count)
+        self._mask = mask
