@@ -44,6 +44,14 @@ CELLS: dict[str, TrainConfig] = {
     **_both("memory_23", replay_size=2**23),
     **_both("ties_averaged", ties="average"),
     **_both("positions", equalize=False),
+    **_both("ties_by_order", position_noise=0.0),
+    **_both("ties_by_drift", drift="settled"),
+    **_both("updates_4", gradient_steps=4),  # one per 16 picks
+    **_both("updates_16", gradient_steps=16),  # one per 4 picks
+    **_both("features_16", n_features=16),
+    **_both("features_256", n_features=256),
+    **_both("literal", literal=True),
+    **_both("staggered", staggered=True),
 }
 # Planned seeds of a cell; of those that are not listed, 5.
 SEEDS = {"paper": 10, "paper_b2048": 8}
