@@ -5,7 +5,8 @@
     python benchmarks/engines.py --quick    50 situations; nothing is kept
 
 Containers are unloaded by picks at random, and the distinct situations of visible items with
-exactly one box on top are collected: with none on top every engine lifts, with more none does.
+exactly one box on top are collected, because the outcome hangs on details in these alone: a box
+with none on top is lifted, one with two or more hardly ever.
 MuJoCo is needed for this alone, and is not among the required libraries.
 """
 

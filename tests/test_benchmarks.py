@@ -13,7 +13,7 @@ import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import unload
-from benchmarks import soak
+from benchmarks import engines, soak
 from benchmarks.environments import container_costs, pick_rates
 from benchmarks.floors import bytes_per_second, operations_per_second
 from benchmarks.lifts import fill_rates, lift_rates
@@ -22,6 +22,9 @@ from benchmarks.run import show
 from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
 from benchmarks.timing import best_times
 from benchmarks.updates import update_times
+from unload import task
+from unload.physics.local import LocalPhysics
+from unload.physics.situation import Situation
 from unload.reproduce.figures import speed
 from unload.reproduce.figures.style import save
 from unload.support import files
@@ -193,3 +196,95 @@ def test_the_soak_prints_memory_and_files(capsys):
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 5
     assert all(" MiB" in line and " files" in line for line in lines[:-1])
+
+
+@pytest.fixture(scope="module")
+def hard_situations():
+    return engines.hard_situations(60)
+
+
+def test_situations_for_the_engines_are_distinct_and_have_one_box_on_top(hard_situations):
+    rows, situations = zip(*hard_situations)
+    assert len({situation.key for situation in situations}) == 60
+    assert {situation.on_top for situation in situations} == {1}
+    assert {row["partly"] for row in rows} == {True, False}
+    pairs = {row["pair"]: situation.boxes[:2] for row, situation in hard_situations}
+    assert all(
+        (situation.boxes[:2] == pairs[row["pair"]]).all() for row, situation in hard_situations
+    )
+    again = engines.hard_situations(20)
+    assert [row for row, _ in again] == list(rows[:20])
+    with pytest.raises(ValueError, match="wanted is 0"):
+        engines.hard_situations(0)
+
+
+def test_committed_comparison_of_the_engines(hard_situations):
+    """It starts with the situations collected here, and PyBullet moves them as it did then."""
+    table = engines.read_engines()
+    assert len(table) == engines.SITUATIONS
+    assert table["situation"].nunique() == len(table)
+    first = pd.DataFrame([row for row, _ in hard_situations])
+    assert (table[list(first)][: len(first)] == first).all(axis=None)
+    local = LocalPhysics()
+    distances = [local.simulate(situation) for _, situation in hard_situations]
+    local.close()
+    assert np.allclose(table["pybullet"][: len(first)], distances, atol=1e-6)
+    provenance = read_provenance(speed.FOLDER, "engines")
+    assert provenance["command"] == engines.COMMAND
+    assert provenance["settings"]["situations"] == len(table)
+    assert provenance["settings"]["mujoco"]["mujoco"]
+
+
+def test_situations_that_the_engines_decide_differently_are_close_to_the_threshold():
+    table = engines.read_engines()
+    lifted = table[["pybullet", "mujoco"]] >= task.LIFT_THRESHOLD
+    differing = table[lifted["pybullet"] != lifted["mujoco"]]
+    distances = differing[["pybullet", "mujoco"]].to_numpy()
+    assert np.abs(distances - task.LIFT_THRESHOLD).max(initial=0) < 0.01
+    assert len(differing) < 0.01 * len(table)
+    assert lifted["pybullet"].sum() > 50
+
+
+def test_disagreements_of_the_engines_are_printed_with_both_distances(capsys):
+    row = {"seed": 1, "picks": 0, "item": 5, "situation": "a", "pair": 0, "partly": True}
+    distances = [(0.19, 0.21), (0.3, 0.31), (0.01, 0.012), (0.0, 0.0)]
+    engines.show(
+        pd.DataFrame(
+            [row | {"situation": str(i), "pybullet": p, "mujoco": m}
+             for i, (p, m) in enumerate(distances)]
+        )
+    )  # fmt: skip
+    printed = capsys.readouterr().out
+    assert "agree in 3; they differ in 1, 25.00% (95 %: 0.63% to 80.59%)" in printed
+    assert "0.1900  0.2100" in printed and "0.3000" not in printed
+
+
+def test_without_mujoco_the_command_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "benchmarks.mujoco_lift", None)
+    monkeypatch.setattr(sys, "argv", ["engines.py", "--quick"])
+    with pytest.raises(SystemExit, match="pip install mujoco"):
+        engines.main()
+
+
+def test_mujoco_lifts_as_the_formula_says():
+    pytest.importorskip("mujoco")
+    from benchmarks.mujoco_lift import TIME_STEP, mujoco_lift
+
+    edge = 500_000  # micrometres
+    box, above = (0, 0, 0, edge, edge, edge), (0, 0, edge, edge, edge, edge)
+    for boxes, acceleration in (([box], 20 - 9.81), ([box, above], 20 / 2 - 9.81)):
+        situation = Situation(np.array(boxes, np.int32), len(boxes), -edge // 2, ())
+        expected = acceleration * 0.3 * (0.3 + TIME_STEP) / 2
+        assert mujoco_lift(situation) == pytest.approx(expected, rel=0.02, abs=5e-4)
+    fixed = Situation(np.array([box, above], np.int32), 1, -edge // 2, ())
+    assert mujoco_lift(fixed) < 1e-3  # a fixed box above holds it
+
+
+def test_committed_distances_of_mujoco_are_computed_again(hard_situations):
+    pytest.importorskip("mujoco")
+    from benchmarks.mujoco_lift import SETTINGS, mujoco_lift
+
+    if read_provenance(speed.FOLDER, "engines")["settings"]["mujoco"] != SETTINGS:
+        pytest.skip("another version of MuJoCo")
+    distances = [mujoco_lift(situation) for _, situation in hard_situations[:10]]
+    assert np.allclose(engines.read_engines()["mujoco"][:10], distances, atol=1e-4)
