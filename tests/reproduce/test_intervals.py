@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload.reproduce.intervals import bootstrap_interval, with_intervals
+from unload.reproduce.intervals import bootstrap_interval, share_interval, with_intervals
 
 
 def test_the_interval_covers_the_true_mean_about_as_often_as_it_says(rng):
@@ -49,3 +49,29 @@ def test_groups_keep_their_order_and_their_means():
 def test_a_missing_column_is_refused_by_name():
     with pytest.raises(ValueError, match="msr"):
         with_intervals(pd.DataFrame({"cell": [1]}), ["cell"], ["msr"])
+
+
+def test_share_intervals_are_those_of_the_binomial_distribution(rng):
+    """At the ends of the interval, what was seen or more extreme has a probability of 2.5 %."""
+    assert share_interval(0, 300) == pytest.approx((0, 1 - 0.025 ** (1 / 300)))
+    assert share_interval(300, 300) == pytest.approx((0.025 ** (1 / 300), 1))
+    low, high = share_interval(4, 50)
+    drawn = rng.binomial(50, [[low], [high]], (2, 200_000))
+    assert (drawn[0] >= 4).mean() == pytest.approx(0.025, abs=0.003)
+    assert (drawn[1] <= 4).mean() == pytest.approx(0.025, abs=0.003)
+    narrow = share_interval(4, 50, 0.5)
+    assert low < narrow[0] < 4 / 50 < narrow[1] < high
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((3, 2), "count is 3"),
+        ((0, 0), "total is 0"),
+        ((-1, 2), "count is -1"),
+        ((1, 2, 1), "level"),
+    ],
+)
+def test_impossible_shares_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        share_interval(*arguments)
