@@ -1,5 +1,6 @@
 """Many runs side by side: what is kept, what is reported, and who does the work."""
 
+import logging
 import os
 import signal
 import threading
@@ -112,6 +113,42 @@ def test_a_process_that_dies_is_reported_and_stops_no_other(configs, tmp_path):
     assert report["error"].tolist() == ["its process died, 2 times", "", ""]
     assert len(killer.killed) == 2
     assert not list(tmp_path.rglob("attempts"))
+
+
+@pytest.mark.slow
+def test_a_dask_worker_that_dies_is_reported_and_stops_no_other(configs, tmp_path):
+    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
+    doomed, last = (tuning_config(8, 1e-3, 2, steps=steps, n_features=4) for steps in (10_000, 4))
+    runs = {**configs, "doomed": doomed, "last": last}  # two for each worker, "last" on the other
+    killer = Killer(tmp_path / "doomed")
+    killer.start()
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):  # given up at once
+        cluster = distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )  # fmt: skip
+        with cluster, distributed.Client(cluster):
+            report = sweep.run_sweep(runs, tmp_path, backend="dask", progress=False)
+    killer.done.set()
+    assert "KilledWorker" in report.loc["doomed", "error"]
+    assert (report["error"].drop("doomed") == "").all()
+    assert len(killer.killed) == 1
+
+
+def test_a_run_whose_mark_cannot_be_read_is_reported_and_stops_no_other(
+    configs, tmp_path, monkeypatch
+):
+    """The first run puts something else in the place of the second one's mark."""
+    train_run, mark = sweep.train, tmp_path / "set" / "run_1" / "attempts"
+
+    def train_and_spoil(*args, **kwargs):
+        mark.mkdir(parents=True, exist_ok=True)
+        train_run(*args, **kwargs)
+
+    monkeypatch.setattr(sweep, "train", train_and_spoil)
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert report["error"].iloc[0] == ""
+    assert str(mark) in report["error"].iloc[1]
 
 
 @pytest.mark.slow

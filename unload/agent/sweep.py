@@ -69,8 +69,12 @@ def run_sweep(
             _mark(place).unlink()
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
-    with bar, parallel_config(backend=backend, n_jobs=n_jobs):
-        for name, error in _outcomes(configs, folders):
+    with bar, parallel_config(backend=backend, n_jobs=n_jobs) as chosen:
+        if backend == "dask":
+            outcomes = _on_cluster(chosen["backend"].client, configs, folders)
+        else:
+            outcomes = _on_machine(configs, folders)
+        for name, error in outcomes:
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
             bar.update()
@@ -109,7 +113,32 @@ def _is_plain(name: object) -> bool:
     )
 
 
-def _outcomes(
+def _on_cluster(
+    client, configs: Mapping[str, TrainConfig], folders: Mapping[str, Path]
+) -> Iterator[tuple[str, str]]:
+    """Name and error of each run, as they end.
+
+    Dask begins a run again if its process has died, on another worker or on the same one once
+    that is back. joblib would not do here, because it waits for ever for a run that Dask has
+    given up.
+
+    Args:
+        client: the ``distributed.Client``.
+        configs, folders: of the runs.
+    """
+    left = {
+        name: client.submit(_run, name, config, folders[name], pure=False)
+        for name, config in configs.items()
+    }
+    while left:
+        for name, future in [pair for pair in left.items() if pair[1].done()]:
+            del left[name]
+            error = future.exception()
+            yield (name, f"{type(error).__name__}: {error}") if error else future.result()
+        time.sleep(0.05)
+
+
+def _on_machine(
     configs: Mapping[str, TrainConfig], folders: Mapping[str, Path]
 ) -> Iterator[tuple[str, str]]:
     """Name and error of each run, as they end.
@@ -140,13 +169,19 @@ def _begun(left: Mapping[str, TrainConfig], folders: Mapping[str, Path]) -> dict
 
 def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
     """Train one configuration; its name, and the error's text if it failed."""
-    mark = _mark(folder)
-    attempts = mark.read_text() if mark.exists() else ""
-    if attempts.count("\n") == ATTEMPTS:
-        mark.unlink()
-        return name, f"its process died, {ATTEMPTS} times"
-    start = time.monotonic()
     try:
+        return name, _attempt(config, folder)
+    except Exception as error:  # whatever it was, the other runs go on
+        return name, f"{type(error).__name__}: {error}"
+
+
+def _attempt(config: TrainConfig, folder: Path) -> str:
+    """Train one configuration; an error's text if its process has died too often."""
+    start, mark = time.monotonic(), _mark(folder)
+    attempts = mark.read_text() if mark.exists() else ""
+    try:
+        if attempts.count("\n") == ATTEMPTS:
+            return f"its process died, {ATTEMPTS} times"
         folder.mkdir(parents=True, exist_ok=True)
         mark.write_text(f"{attempts}{os.getpid()}\n")
         resumed = (folder / "checkpoint.npz").exists() or (folder / "config.json").exists()
@@ -156,12 +191,10 @@ def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
             record = {"resumed": resumed, "process": os.getpid()}
             record |= provenance.run_record(time.monotonic() - start)
             files.write_json(folder / "record.json", record)
-    except Exception as error:  # whatever it was, the other runs go on
-        return name, f"{type(error).__name__}: {error}"
+        return ""
     finally:
         if mark.exists():
             mark.unlink()
-    return name, ""
 
 
 @contextmanager
