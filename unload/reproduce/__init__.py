@@ -1,7 +1,8 @@
 """The experiments of the reproduction, one file each, and how their results are kept.
 
 Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the paper's own);
-``measure``, ``study``, ``random_picks``, ``random_share``, ``answer`` and ``verdict`` (why 60 %);
+``measure``, ``study``, ``random_picks``, ``random_share``, ``drift``, ``answer``,
+``changes``, ``interventions`` and ``verdict`` (why 60 %);
 ``comparison`` and ``robustness`` (policies compared); ``lifts``, ``full_lifts`` and ``agreement``
 (the physics);
 ``heap``, ``heap_learning`` and ``heap_table`` (the unordered load). ``fingerprint`` says whether

@@ -7,9 +7,11 @@ from unload.reproduce import (
     agreement,
     answer,
     comparison,
+    drift,
     heap,
     heap_learning,
     heap_table,
+    interventions,
     lifts,
     observation,
     random_picks,
@@ -30,7 +32,13 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "tuning": ("Figs. 8–10", tuning.tuning_data, tuning.OPTIONS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
     "study": ("why 60 %: the controlled experiments", study.studies_data, study.OPTIONS),
+    "drift": ("how the boxes of settled walls move", drift.drift_data, drift.OPTIONS),
     "answer": ("why 60 %: the runs of the plan", answer.answer_data, answer.OPTIONS),
+    "interventions": (
+        "why 60 %: runs changed on the way",
+        interventions.interventions_data,
+        interventions.OPTIONS,
+    ),
     "offline": (
         "what random picks alone teach", random_picks.offline_data, random_picks.OPTIONS
     ),

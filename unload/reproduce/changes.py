@@ -1,0 +1,156 @@
+"""What is changed in a control run of the plan, to learn why runs fall (``data/answer/PLAN.md``).
+
+Each change is a function that alters a ``Training``; ``interventions`` makes them and goes on.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import gymnasium
+import numpy as np
+
+from unload import task
+from unload.agent.config import TrainConfig
+from unload.agent.policies import any_allowed
+from unload.agent.replay import ReplayBuffer
+from unload.agent.rollout import Rollout
+from unload.agent.training import Training
+from unload.load.boxes import Load
+from unload.load.substacks import stack_load
+
+MEMORY = 2**23  # picks of the enlarged replay
+MOST_LOST = 400  # boxes of a replaced container
+EXPLORATION = 0.05
+SLOWER = 10  # divisor of the learning rate
+OTHER_LOADS = 1_000_000  # is added to the seed where random picks are made
+ROWS_AT_ONCE = 2**14  # picks that are moved together
+
+
+def _nothing(run: Training) -> None:
+    """The control."""
+
+
+def _larger_memory(run: Training) -> None:
+    run.replay = moved(run.replay, ReplayBuffer(MEMORY, task.N_VISIBLE, equalized=True))
+
+
+def _refilled(run: Training) -> None:
+    """Once: the next picks overwrite the failures as they overwrite other picks."""
+    count = len(run.replay)
+    slots = run.rng.permutation(count)[: count // 2]
+    run.replay.overwrite(slots, **random_failures(run.config, count // 2, run.rng))
+
+
+def _kept_failures(run: Training) -> None:
+    """For good: the next picks overwrite those of the other half only."""
+    failures = random_failures(run.config, run.replay.size // 2, run.rng)
+    run.replay = FailuresKept(run.replay, failures)
+
+
+def _replaced_containers(run: Training) -> None:
+    # Ranks of fewer than 128 items do not fit into bytes.
+    run.replay = moved(run.replay, ReplayBuffer(run.replay.size, task.N_VISIBLE))
+    run.rollout.envs.stack = partly_unloaded  # of the next episodes
+
+
+def _exploration(run: Training) -> None:
+    run.config = replace(run.config, epsilon_final=EXPLORATION)
+
+
+def _slower_learning(run: Training) -> None:
+    run.agent.learner.optimizer.learning_rate /= SLOWER
+
+
+def _ties_averaged(run: Training) -> None:
+    run.config = replace(run.config, ties="average")
+    run.rollout.reopen(run.config)
+
+
+# Name → what it changes in a run.
+CHANGES: dict[str, Callable[[Training], None]] = {
+    "nothing": _nothing,
+    "memory_23": _larger_memory,
+    "failures_refilled": _refilled,
+    "failures_kept": _kept_failures,
+    "containers_replaced": _replaced_containers,
+    "exploration_held": _exploration,
+    "learning_rate_lowered": _slower_learning,
+    "ties_averaged": _ties_averaged,
+}
+
+
+def moved(replay: ReplayBuffer, empty: ReplayBuffer) -> ReplayBuffer:
+    """Move the picks of a memory, the oldest first, to an empty one; return that.
+
+    If it has less room, the latest picks are in it then.
+    """
+    rows = np.arange(replay.total - len(replay), replay.total) % replay.size
+    for part in np.array_split(rows, len(rows) // ROWS_AT_ONCE + 1):
+        empty.add(**replay.rows(part))
+    return empty
+
+
+class FailuresKept(ReplayBuffer):
+    """A memory that holds the last picks and, for good, failed ones.
+
+    Args:
+        replay: the picks so far, at least as many as there is room for.
+        failures: arrays as ``ReplayBuffer.add`` takes them.
+
+    Raises:
+        ValueError: there are fewer picks.
+    """
+
+    def __init__(self, replay: ReplayBuffer, failures: dict[str, np.ndarray]) -> None:
+        super().__init__(replay.size, task.N_VISIBLE, equalized=replay.equalized)
+        self.size = replay.size - len(failures["rewards"])
+        if len(replay) < self.size:
+            raise ValueError(f"replay holds {len(replay)} picks; expected at least {self.size}")
+        self.overwrite(np.arange(self.size, replay.size), **failures)
+        moved(replay, self)
+
+    def __len__(self) -> int:
+        return len(self.arrays["rewards"])
+
+
+def random_failures(config: TrainConfig, count: int, rng: np.random.Generator) -> dict:
+    """Failed picks of a random policy in containers of their own.
+
+    Args:
+        config: of the containers; the loads are drawn with another seed.
+        count: how many.
+        rng: draws the picks.
+
+    Returns:
+        What ``ReplayBuffer.add`` takes.
+    """
+    rollout = Rollout(replace(config, seed=config.seed + OTHER_LOADS), 1)
+    found: list[dict[str, np.ndarray]] = []
+    failures = 0
+    while failures < count:
+        rewards, transitions = rollout.pick(any_allowed(rollout.allowed, rng))
+        found.append({name: values[rewards < 0] for name, values in transitions.items()})
+        failures += len(found[-1]["rewards"])
+    rollout.close()
+    return {name: np.concatenate([each[name] for each in found])[:count] for name in found[0]}
+
+
+def partly_unloaded(rng: np.random.Generator) -> Load:
+    """A random load that has lost 0 to 400 boxes to a random policy."""
+    load, lost = stack_load(rng), rng.integers(MOST_LOST + 1)
+    env = _player()
+    _, info = env.reset(options={"load": load})
+    while info["unloaded"] < lost:  # picks that have failed need not be repeated
+        (action,) = any_allowed(info["action_mask"][np.newaxis].astype(bool), rng)
+        _, _, _, _, info = env.step(action)
+    left = env.physics.present
+    return Load(load.positions[left], load.sizes[left], load.packages[left], load.walls[left])
+
+
+@cache
+def _player() -> gymnasium.Env:
+    """A container to play in."""
+    name, never = "unload/Container-v0", sys.maxsize
+    return gymnasium.make(name, physics="table", position_noise=0, max_picks=never).unwrapped
