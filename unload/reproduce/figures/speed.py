@@ -1,14 +1,20 @@
-"""How fast the parts are, drawn from what ``benchmarks/run.py`` measured."""
+"""How fast the parts are, mostly drawn from what ``benchmarks/run.py`` measured."""
 
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
 
 from unload import task
+from unload.load.boxes import Load
+from unload.load.colours import COLOURS
+from unload.physics.situation import RESOLUTION, Situation
 from unload.reproduce import results
+from unload.reproduce.figures.lifting import FIXED, ON_TOP
 from unload.reproduce.figures.style import styled
 from unload.support import checks, files
 
@@ -123,4 +129,53 @@ def speed_profile(folder: str | Path = FOLDER) -> Figure:
     axes.set_xlim(0, 1.15 * table["us"].max())
     axes.grid(False, axis="y")
     axes.legend(loc="lower right")
+    return figure
+
+
+@styled
+def situation_in_its_wall(load: Load, item: int, situation: Situation) -> Figure:
+    """The boxes that decide the lift of an item, before its item wall, seen from the entrance.
+
+    Args:
+        load: the boxes.
+        item: the chosen box.
+        situation: of the item.
+    """
+    figure, axes = plt.subplots(figsize=(4.6, 4))
+    for box in np.flatnonzero(load.walls == load.walls[item]):
+        _draw(axes, load.positions[box], load.sizes[box], COLOURS["unseen"], "white")
+    names = {"chosen": COLOURS["tried"], "on top of it": ON_TOP, "cannot move": FIXED}
+    chosen, on_top, fixed = names
+    for row, box in enumerate(situation.boxes * RESOLUTION):
+        name = fixed if row >= situation.dynamic else on_top if row else chosen
+        _draw(axes, load.positions[item] + box[:3], box[3:], names[name], "0.2")
+    _, width, height = task.CONTAINER
+    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
+    axes.set_title(f"{len(situation.boxes)} of {len(load)} boxes matter")
+    handles = [Patch(color=colour, label=name) for name, colour in names.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
+    return figure
+
+
+def _draw(axes: Axes, centre: np.ndarray, size: np.ndarray, colour: tuple, edge: str) -> None:
+    """A box seen from the entrance."""
+    corner = centre[1:] - size[1:] / 2
+    axes.add_patch(Rectangle(corner, *size[1:], facecolor=colour, edgecolor=edge))
+
+
+@styled
+def cost_of_ways(cost: pd.Series) -> Figure:
+    """The cost of some ways to do the same thing, and how many times as fast as the first each is.
+
+    Args:
+        cost: way → µs.
+    """
+    figure, axes = plt.subplots(figsize=(5.6, 0.6 + 0.36 * len(cost)))
+    axes.barh(cost.index, cost)
+    for place, microseconds in enumerate(cost):
+        text = f" {microseconds:.3g} µs, {cost.iloc[0] / microseconds:.3g} ×"
+        axes.text(microseconds, place, text, va="center")
+    axes.set(xlabel="time per observation (µs)", xlim=(0, 1.4 * cost.max()))
+    axes.invert_yaxis()
+    axes.grid(False, axis="y")
     return figure
