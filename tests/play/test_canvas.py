@@ -36,6 +36,6 @@ def test_the_same_lift_twice_is_seen_twice(small_load):
 
 
 def test_an_empty_group_has_no_line_in_the_legend(small_load):
-    canvas = Canvas(small_load)
-    canvas.show(np.zeros(len(small_load)), {"visible": (0, 0, 1)}, {"on it": np.array([], int)})
+    canvas, palette = Canvas(small_load), {"visible": (0, 0, 1), "failed": (1, 0, 0)}
+    canvas.show(np.zeros(len(small_load)), palette, {"on it": np.array([], int)})
     assert [line[0] for line in canvas.legend] == ["visible"]

@@ -43,8 +43,8 @@ class Camera {
     this.ahead = unit(minus(this.target, this.eye));
     this.right = unit(cross(this.ahead, [0, 0, 1]));
     this.up = cross(this.right, this.ahead);
-    this.zoom = 1.25 * Math.min(width, 1.5 * height);
-    this.middle = [width / 2, height / 2];
+    this.zoom = 1.15 * Math.min(width, 1.5 * height);
+    this.middle = [0.53 * width, 0.48 * height]; // the legend is at the left
   }
   project(point) {
     const seen = minus(point, this.eye);
@@ -128,7 +128,9 @@ function render({ model, el }) {
   frame.append(canvas, label);
   el.append(frame);
 
-  const pen = canvas.getContext("2d");
+  const scene = document.createElement("canvas");
+  let pen = canvas.getContext("2d");
+  let stale = true; // whether the scene is to be drawn anew
   const camera = new Camera(model.get("target"));
   let walls = readBoxes(model);
   let order = null; // of drawing; null when the camera has moved
@@ -187,40 +189,57 @@ function render({ model, el }) {
       pen.fillText(name, 30, y + 10);
     });
   }
+  // All but what moves, on a canvas of its own, because drawing it takes longest.
+  function drawScene(ratio) {
+    scene.width = canvas.width;
+    scene.height = canvas.height;
+    const onScreen = pen;
+    pen = scene.getContext("2d");
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    drawContainer();
+    order = order || backToFront(walls, camera.eye);
+    const colours = bytes(model.get("colours"));
+    const palette = model.get("palette");
+    for (const box of order) {
+      if (colours[box.item] !== ABSENT) drawBox(box, palette[colours[box.item]], 0);
+    }
+    pen.strokeStyle = "black";
+    pen.lineWidth = 2.5;
+    const outlined = new Set(model.get("outlined"));
+    for (const box of order.filter((each) => outlined.has(each.item))) {
+      for (const [, points] of visibleFaces(box)) polygon(points), pen.stroke();
+    }
+    drawLegend();
+    pen = onScreen;
+    stale = false;
+  }
   function draw(time) {
     waiting = false;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     if (!width) return;
     const ratio = window.devicePixelRatio || 1;
-    if (canvas.width !== Math.round(width * ratio)) order = null;
+    if (canvas.width !== Math.round(width * ratio)) [order, stale] = [null, true];
     canvas.width = Math.round(width * ratio);
     canvas.height = Math.round(height * ratio);
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     camera.aim(width, height);
-    drawContainer();
-    order = order || backToFront(walls, camera.eye);
-    const colours = bytes(model.get("colours"));
-    const palette = model.get("palette");
-    const outlined = new Set(model.get("outlined"));
-    const share = lift ? Math.min(1, (time - lift.start) / LIFT_MS) : 1;
-    for (const box of order) {
-      const lifted = lift && lift.item === box.item;
-      const colour = lifted ? lift.colour : palette[colours[box.item]];
-      if (!lifted && colours[box.item] === ABSENT) continue;
-      drawBox(box, colour, lifted ? lift.distance * share ** 2 : 0);
-    }
-    pen.strokeStyle = "black";
-    pen.lineWidth = 2.5;
-    for (const box of order.filter((each) => outlined.has(each.item))) {
-      for (const [, points] of visibleFaces(box)) polygon(points), pen.stroke();
-    }
-    drawLegend();
-    if (lift && share < 1) redraw();
-    else if (lift) (lift = null), redraw();
+    if (stale) drawScene(ratio);
+    pen.drawImage(scene, 0, 0);
+    if (!lift) return;
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const share = Math.min(1, (time - lift.start) / LIFT_MS);
+    const box = order.find((each) => each.item === lift.item);
+    if (share < 1) drawBox(box, lift.colour, lift.distance * Math.max(0, share) ** 2);
+    else lift = null;
+    redraw();
   }
   function redraw() {
     if (!waiting) requestAnimationFrame(draw);
     waiting = true;
+  }
+  function change(what) {
+    stale = true;
+    if (what !== "colours") order = null; // the camera or the boxes
+    redraw();
   }
   function boxAt(event) {
     if (!camera.eye) return null;
@@ -257,8 +276,7 @@ function render({ model, el }) {
     Object.assign(pressed, { x: event.clientX, y: event.clientY, dragged: true });
     camera.angle -= dx * 0.008;
     camera.height = Math.min(1.45, Math.max(0.05, camera.height + dy * 0.006));
-    order = null;
-    redraw();
+    change("camera");
   });
   canvas.addEventListener("pointerup", (event) => {
     const item = pressed && !pressed.dragged ? boxAt(event) : null;
@@ -271,8 +289,7 @@ function render({ model, el }) {
     (event) => {
       event.preventDefault();
       camera.distance = Math.min(20, Math.max(4, camera.distance * Math.exp(event.deltaY * 0.001)));
-      order = null;
-      redraw();
+      change("camera");
     },
     { passive: false },
   );
@@ -284,10 +301,11 @@ function render({ model, el }) {
   });
   model.on("change:boxes", () => {
     walls = readBoxes(model);
-    order = null;
-    redraw();
+    change("boxes");
   });
-  for (const name of ["colours", "outlined", "legend", "palette"]) model.on(`change:${name}`, redraw);
+  for (const name of ["colours", "outlined", "legend", "palette"]) {
+    model.on(`change:${name}`, () => change("colours"));
+  }
   const watcher = new ResizeObserver(redraw);
   watcher.observe(canvas);
   return () => watcher.disconnect();

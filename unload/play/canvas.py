@@ -72,16 +72,18 @@ class Canvas(anywidget.AnyWidget):
 
         Args:
             numbers: (n,) int, of each box's colour in the palette, ``ABSENT`` if it is not there.
-            palette: name → RGB; the names stand in the legend.
-            outlined: name → items with a thick outline; the legend has the names that have items.
+            palette: name → RGB. The names of those that occur stand in the legend.
+            outlined: name → items with a thick outline. So do the names of those with items.
             lifted: an item that is seen to rise, how far in m, and its colour.
         """
+        occur = np.isin(np.arange(len(palette)), numbers)
+        legend = [(*line, False) for line, shown in zip(palette.items(), occur) if shown]
         boxes = {name: [int(item) for item in items] for name, items in outlined.items()}
         with self.hold_sync():
             self.colours = np.asarray(numbers, np.uint8).tobytes()
             self.palette = [tuple(colour) for colour in palette.values()]
             self.outlined = sum(boxes.values(), [])
-            self.legend = [(name, colour, False) for name, colour in palette.items()] + [
+            self.legend = legend + [
                 (name, (1.0, 1.0, 1.0), True) for name, items in boxes.items() if items
             ]
             if lifted is not None:

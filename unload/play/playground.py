@@ -80,7 +80,7 @@ class Playground(widgets.VBox):
         self._left = widgets.VBox([self.canvas], layout={"flex": "1 1 60%", "min_width": "0"})
         self._right = widgets.VBox(
             [self.score, self.message, self.board],
-            layout={"flex": "0 0 300px", "padding": "0 0 0 12px"},
+            layout={"flex": "0 0 340px", "padding": "0 0 0 12px"},
         )
         self.undo.on_click(lambda _: self._take_back())
         self.player.observe(lambda _: self._choose_player(), "value")
@@ -107,9 +107,9 @@ class Playground(widgets.VBox):
         """Let PyBullet lift the box on which the reader has clicked."""
         item = content.get("item")
         if self._run is not None:
-            self.message.value = "To pick boxes yourself, choose the player “you”."
+            self._tell("To pick boxes yourself, choose the player “you”.")
         elif item not in self.you.visible:
-            self.message.value = (
+            self._tell(
                 f"Item {item} is not among the {task.N_VISIBLE} nearest ones. "
                 "An agent does not see it, therefore you may not pick it either."
             )
@@ -157,11 +157,14 @@ class Playground(widgets.VBox):
             f"<b>{unloaded}</b> of <b>{count}</b> picks{share}</div>"
         )
         if moment.pick is not None:
-            self.message.value = html.escape(explain(moment.pick))
+            self._tell(explain(moment.pick))
         elif self._run is None:
-            self.message.value = "Click on a box to lift it. Drag to turn, use the wheel to zoom."
+            self._tell("Click on a box to lift it. Drag to turn, use the wheel to zoom.")
         else:
-            self.message.value = "Press play, or move the slider."
+            self._tell("Press play, or move the slider.")
+
+    def _tell(self, sentence: str) -> None:
+        self.message.value = f"<div style='line-height:1.4'>{html.escape(sentence)}</div>"
 
     def _draw(self, moment: Moment, liftable: np.ndarray | None, lifted: bool) -> None:
         groups = moment.groups()
@@ -173,26 +176,24 @@ class Playground(widgets.VBox):
         numbers[~moment.present] = ABSENT
         pick = moment.pick
         on_top = pick.on_top if pick else ()
-        rising = None
-        if pick and lifted:
-            rising = pick.item, pick.distance, COLOURS["liftable" if pick.success else "failed"]
+        rises = pick is not None and pick.success and lifted
+        rising = (pick.item, pick.distance, COLOURS["liftable"]) if rises else None
         palette = {name: COLOURS[name] for name in SHOWN}
         self.canvas.show(numbers, palette, {"rests on the picked item": on_top}, rising)
 
     def _score(self) -> None:
-        rows = "".join(
-            f"<tr><td>{html.escape(name)}{self._without_mask(name)}</td>"
-            f"<td style='text-align:right'>{unloaded}</td>"
-            f"<td style='text-align:right'>{picks}</td></tr>"
-            for name, picks, unloaded in self.standings()
+        rows = [("player", "mask", "unloaded", "picks")]
+        for name, picks, unloaded in self.standings():
+            mask = "" if name == YOU else "with" if self.runs[name].mask else "without"
+            rows.append((html.escape(name), mask, unloaded, picks))
+        lines = (
+            f"<tr><td>{name}</td><td>{mask}</td><td align=right>{unloaded}</td>"
+            f"<td align=right>{picks}</td></tr>"
+            for name, mask, unloaded, picks in rows
         )
         self.board.value = (
-            "<table style='width:100%'><tr><th style='text-align:left'>player</th>"
-            f"<th>unloaded</th><th>picks</th></tr>{rows}</table>"
+            f"<table style='width:100%;line-height:1.5;margin-top:1em'>{''.join(lines)}</table>"
         )
-
-    def _without_mask(self, name: str) -> str:
-        return "" if name not in self.runs or self.runs[name].mask else " (without the mask)"
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
         """The widget, and what is shown of it where no kernel runs."""

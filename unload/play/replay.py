@@ -8,13 +8,13 @@ from unload.load.view import View, layout, mesh, view
 from unload.play.episode import Episode
 from unload.support import checks
 
-STOPS = 32  # of the slider, at most
+STOPS = 24  # of the slider, at most
 EARLY, LATE = np.array((0.00, 0.30, 0.25)), np.array((0.70, 0.93, 0.85))  # what is unloaded
 PAUSE = 250  # ms between two stops while it plays
 
 
 def replay(episode: Episode, height: int = 520) -> View:
-    """Show an episode's picks at up to 32 stops.
+    """Show an episode's picks at up to 24 stops.
 
     The earlier an item is unloaded, the darker it is. Where plotly is not drawn, there is a
     picture of the episode's middle.
