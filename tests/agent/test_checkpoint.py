@@ -100,7 +100,7 @@ def test_a_checkpoint_is_small(tmp_path):
             run.step()
         folder = RunFolder(tmp_path)
         folder.save(run)
-        assert folder.checkpoint.stat().st_size < 0.01 * run.replay.arrays["observations"].nbytes
+        assert folder.checkpoint.stat().st_size < 0.04 * run.replay.arrays["observations"].nbytes
 
 
 def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):

@@ -4,6 +4,10 @@ To settle a load takes seconds, and training draws tens of thousands of loads. T
 ``data/settled.npz`` keeps how far the boxes of some hundred walls have moved, and a load's drift
 is put together from it, one column of a wall at a time. A column is the three substacks that
 stand one upon the other; how its boxes sink depends above all on which variants these are.
+
+The drift tells which boxes can be lifted. Of two visible boxes at one height, after 300 random
+picks, the liftable one has sunk less in 75 % of the pairs (63 to 85 % in each of ten loads); a
+simulation of what is left gives 62 to 80 % (solutions of notebook 04).
 """
 
 from functools import cache
