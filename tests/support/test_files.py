@@ -231,6 +231,39 @@ def test_json_of_other_encodings_is_refused_by_name(tmp_path):
         files.read_json(tmp_path / "x.json")
 
 
+def test_every_damaged_byte_of_checked_json_is_refused_by_name_or_harmless(tmp_path, rng):
+    path, value = tmp_path / "x.json", {"a": [1, 2.5, float("nan")], "b": {"c": "é"}, "d": None}
+    files.write_json(path, value, checked=True)
+    assert repr(files.read_json(path)) == repr(value)  # nan is not equal to itself
+    whole = path.read_bytes()
+    harmless = 0
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + rng.bytes(1) + whole[place + 1 :])
+        try:
+            read = files.read_json(path)
+        except ValueError as error:
+            assert str(error).startswith(f"{path} ")
+            continue
+        # White space, or the name of the digest, without which there is nothing to compare.
+        assert repr(value)[:-1] in repr(read)
+        harmless += 1
+    assert harmless < len(whole) / 3
+
+
+def test_json_that_stays_valid_is_found_out(tmp_path):
+    path = tmp_path / "x.json"
+    files.write_json(path, {"share": 0.25}, checked=True)
+    path.write_text(path.read_text().replace("0.25", "0.75"))
+    with pytest.raises(ValueError, match=f"^{path} was changed or damaged: its digest is"):
+        files.read_json(path)
+
+
+def test_json_without_a_digest_is_read_as_it_is(tmp_path):
+    files.write_json(tmp_path / "x.json", {"share": 0.25})
+    assert (tmp_path / "x.json").read_text() == '{\n  "share": 0.25\n}\n'
+    assert files.read_json(tmp_path / "x.json") == {"share": 0.25}
+
+
 def test_digest_is_that_of_the_content(tmp_path):
     """Known from the command ``b2sum --length 128``."""
     path = tmp_path / "file"

@@ -190,7 +190,7 @@ def _attempt(config: TrainConfig, folder: Path) -> str:
         if not (folder / "record.json").exists():
             record = {"resumed": resumed, "process": os.getpid()}
             record |= provenance.run_record(time.monotonic() - start)
-            files.write_json(folder / "record.json", record)
+            files.write_json(folder / "record.json", record, checked=True)
         return ""
     finally:
         if mark.exists():

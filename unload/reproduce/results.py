@@ -66,7 +66,8 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
     stored = files.read_json(path) if path.exists() else {}
     if stored.get("question") != question:
         value, record = measured(compute)
-        files.write_json(path, {"question": question, "value": value, "record": record})
+        content = {"question": question, "value": value, "record": record}
+        files.write_json(path, content, checked=True)
         stored = files.read_json(path)
     checks.entries(str(path), stored, ("value", "record"))
     return Result(stored["value"], stored["record"])

@@ -72,13 +72,21 @@ def write_text(path: str | Path, text: str) -> None:
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
-def write_json(path: str | Path, value: object) -> None:
-    """Write a value as indented JSON in one atomic step."""
+def write_json(path: str | Path, value: object, checked: bool = False) -> None:
+    """Write a value as indented JSON in one atomic step.
+
+    Args:
+        path: of the file.
+        value: what JSON can hold; an object if ``checked``.
+        checked: add a last entry, ``digest``, by which ``read_json`` notices any change.
+    """
+    if checked:
+        value = value | {"digest": _digest_of(value)}
     write_text(path, json.dumps(value, indent=2) + "\n")
 
 
 def read_json(path: str | Path) -> dict:
-    """Read a JSON file that holds an object.
+    """Read a JSON file that holds an object; without the ``digest`` that ``write_json`` added.
 
     Raises:
         FileNotFoundError: there is no such file.
@@ -90,7 +98,15 @@ def read_json(path: str | Path) -> dict:
         raise ValueError(f"{path} is not a readable JSON file: {error}") from error
     if not isinstance(value, dict):
         raise ValueError(f"{path} holds a {type(value).__name__}; expected an object")
+    if "digest" in value:
+        wanted = value.pop("digest")
+        _check_equal(path, wanted, _digest_of(value))
     return value
+
+
+def _digest_of(value: object) -> str:
+    """Digest of a value as JSON writes it."""
+    return blake2b(json.dumps(value).encode(), digest_size=16).hexdigest()
 
 
 def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
@@ -136,7 +152,10 @@ def check_digest(path: str | Path, wanted: str) -> None:
         FileNotFoundError: there is no such file.
         ValueError: the file has been changed or damaged since.
     """
-    found = digest(path)
+    _check_equal(path, wanted, digest(path))
+
+
+def _check_equal(path: str | Path, wanted: object, found: str) -> None:
     if found != wanted:
         raise ValueError(f"{path} was changed or damaged: its digest is {found}, expected {wanted}")
 
