@@ -1,5 +1,7 @@
 """A load: which boxes it accepts, and what it keeps of them."""
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -31,6 +33,8 @@ def test_a_load_cannot_be_changed(full_load):
     for array in (*full_load.contacts, full_load.contacts.of(ABOVE, 0)):
         with pytest.raises(ValueError, match="read-only"):
             array[:] = 0
+    with pytest.raises(FrozenInstanceError):
+        full_load.sizes = full_load.positions
 
 
 def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
@@ -158,5 +162,5 @@ def test_a_box_that_sticks_out_is_refused(boxes, data):
     step[axis] += data.draw(st.sampled_from([2e-6, 0.001, 10.0])) * (1 if far else -1)
     low[box] += step
     high[box] += step
-    with pytest.raises(ValueError, match="box .* reaches from .* expected it inside"):
+    with pytest.raises(ValueError, match=f"^box {box} reaches from .* expected it inside"):
         load_of(low, high)

@@ -54,19 +54,20 @@ def test_a_box_alone_touches_nothing():
     assert len(found.boxes) == 0 and found.of(ABOVE, 0).tolist() == []
 
 
-def test_a_stack_of_more_contacts_than_expected():
-    """200 thin boxes on one wide box, and the wide box beside another."""
-    count = 200
+def test_crossed_boxes_have_more_contacts_than_expected():
+    """20 bars side by side, and 20 across them, each on all of the first."""
+    count = 20
+    places = np.arange(count) / count
+    zeros = np.zeros(count)
     low = np.vstack(
-        [
-            [0, 0, 0],
-            np.column_stack([np.zeros((count, 1)), np.arange(count) / count, np.ones(count)]),
-        ]
+        [np.column_stack([zeros, places, zeros]), np.column_stack([places, zeros, zeros + 1])]
     )
-    high = np.vstack([[1, 1, 1], low[1:] + (1, 1 / count, 1)])
-    found = contacts(low, high)
-    assert sorted(found.of(ABOVE, 0)) == list(range(1, count + 1))
-    assert len(found.boxes) == 2 * count + 2 * (count - 1)
+    sizes = np.repeat([[1, 1 / count, 1], [1 / count, 1, 1]], count, axis=0)
+    found = contacts(low, low + sizes)
+    assert len(found.boxes) == 2 * (count**2 + count - 1) > 2 * 8 * len(low)
+    for bar in range(count):
+        assert sorted(found.of(ABOVE, bar)) == list(range(count, 2 * count))
+        assert sorted(found.of(BELOW, count + bar)) == list(range(count))
 
 
 def test_overlaps_are_refused():

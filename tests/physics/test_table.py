@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
+import numpy as np
 import pytest
 
 from unload import task
@@ -11,6 +12,7 @@ from unload.physics import table
 from unload.physics.bullet import World
 from unload.physics.lift_table import LiftTable
 from unload.physics.local import LocalPhysics
+from unload.physics.situation import Surroundings
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics
 
 
@@ -65,6 +67,16 @@ def test_boxes_under_three_others_are_held_down_in_local_physics_too(situations)
     physics.close()
 
 
+def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
+    tower = boxes((1.2, 0.2), (1.2, 0.6), (1.2, 1.0), (1.2, 1.4))
+    around = Surroundings(tower, np.ones(4, dtype=bool))
+    physics = TablePhysics(LiftTable())
+    assert physics.simulate(around.situation(0)) == 0 and len(physics.table) == 0
+    distance = physics.simulate(around.situation(1))
+    assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
+    physics.close()
+
+
 def test_threads_that_share_a_table_get_the_right_answers(known, rng):
     """Each thread has a physics, hence a world, of its own."""
     shared, together = LiftTable(), Barrier(4)
@@ -96,6 +108,13 @@ def test_threads_that_ask_first_share_one_table(monkeypatch):
     with ThreadPoolExecutor(4) as pool:
         assert len(set(pool.map(ask, range(4)))) == 1
     assert loads == [LIFTS_FILE]
+
+
+def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):
+    monkeypatch.setattr(table, "LIFTS_FILE", tmp_path / "missing.npz")
+    table._read_once.cache_clear()
+    assert len(table.shared_table()) == 0
+    table._read_once.cache_clear()
 
 
 def test_shipped_table_fits_this_physics(known):
