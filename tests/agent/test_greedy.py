@@ -6,6 +6,7 @@ from tests.agent.networks import peq
 from unload import Greedy, equalize
 from unload.agent.greedy import greedy_actions
 from unload.agent.learner import highest_values
+from unload.env.observation import PADDING
 from unload.network.variants import NETWORKS
 
 
@@ -35,6 +36,18 @@ def test_greedy_equalizes_what_its_network_expects(observations, rng):
     raw = Greedy(peq(), equalize=False)(observations, masks, rng)
     assert (raw == greedy_actions(peq(), observations, masks)).all()
     assert (raw != expected).any()
+
+
+@pytest.mark.parametrize("name", [name for name in NETWORKS if name != "peq"])
+def test_rows_without_an_item_have_no_part_in_the_choice(observations, name, rng):
+    network = NETWORKS[name](16, torch.Generator().manual_seed(2))
+    masks = np.ones((len(observations), 25))
+    full = Greedy(network, equalize=False)(observations, masks, rng)
+    few = network(torch.from_numpy(observations[:, :4])).argmax(dim=1).numpy()
+    observations[:, 4:], masks[:, 4:] = PADDING, 0
+    assert (Greedy(network, equalize=False)(observations, masks, rng) == few).all()
+    with_padding = highest_values(network, observations, masks.astype(bool))
+    assert (with_padding != few).any() and (full != few).any()
 
 
 @pytest.mark.parametrize("name", NETWORKS)

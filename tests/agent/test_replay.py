@@ -133,6 +133,9 @@ def test_a_memory_that_does_not_fit_is_refused_by_name(size):
     ("change", "message"),
     [
         ({"rewards": np.array([1e39, 1.0])}, "rewards holds inf"),
+        ({"rewards": np.array([np.inf, 1.0], np.float32)}, "rewards holds inf"),
+        ({"observations": np.full((2, 5, 3), np.nan, np.float32)}, "observations holds nan"),
+        ({"next_observations": np.full((2, 5, 3), -np.inf, np.float32)}, "next_.* holds -inf"),
         ({"actions": np.array([0, 5])}, "actions holds 0 to 5; expected 0 to 4"),
         ({"next_masks": np.zeros((2, 5), bool)}, "next_masks is all zero in row 0"),
     ],

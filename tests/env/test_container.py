@@ -119,6 +119,14 @@ def test_a_failure_changes_nothing_but_the_mask(make_env):
     assert masks.dtype == bool and (masks == expected).all()
 
 
+def test_the_first_box_of_a_load_fails_like_any_other(make_env, boxes):
+    env = make_env(position_noise=0.0)
+    env.reset(seed=0, options={"load": boxes((1.2, 0.2), (1.2, 0.6))})
+    row = env.unwrapped.visible.tolist().index(0)
+    _, reward, _, _, info = env.step(row)
+    assert reward == -1 and info["item"] == 0 and info["action_mask"][row] == 0
+
+
 def test_failures_add_up_and_a_success_forgives_them(make_env):
     env = make_env()
     seen, _ = env.reset(seed=0)

@@ -50,6 +50,13 @@ def test_items_are_blurred_and_nearest_first(make_env):
         assert (np.diff(distances) > -1e-5).all()
 
 
+def test_boxes_are_seen_a_millimetre_lower_than_their_places(make_env):
+    sharp, _ = make_env(ENV_ID, position_noise=0.0).reset(seed=0)
+    blurred, _ = make_env(ENV_ID, position_noise=1e-6).reset(seed=0)
+    sunk = (sharp[:, 2].mean() - blurred[:, 2].mean()) * 2.5 / 2
+    assert sunk == pytest.approx(0.001, rel=0.01)
+
+
 def test_every_step_shows_new_items(make_env):
     env = make_env(ENV_ID)
     seen = [env.reset(seed=0)[0].tobytes()] + [env.step(0)[0].tobytes() for _ in range(9)]

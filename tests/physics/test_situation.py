@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from unload.load.boxes import Load
+from unload.load.contacts import CONTACT_TOLERANCE
 from unload.load.substacks import CELL
 from unload.physics.situation import Surroundings
 
@@ -47,6 +48,26 @@ def test_floor_and_side_walls(boxes):
     assert around.situation(1).floor is None and around.situation(1).sides == (-200_000,)
     assert around.situation(2).sides == ()
     assert around.situation(3).sides == (200_000,)
+
+
+def test_side_walls_that_only_a_box_on_top_touches(boxes):
+    left = surroundings(boxes((0.5, 0.2), (0.2, 0.6)))
+    right = surroundings(boxes((2.0, 0.2), (2.3, 0.6)))
+    assert left.situation(0).sides == (-500_000,) and right.situation(0).sides == (500_000,)
+    left.present[1] = right.present[1] = False
+    assert left.situation(0).sides == right.situation(0).sides == ()
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_floor_and_side_walls_are_touched_within_the_tolerance(boxes, share):
+    step = share * CONTACT_TOLERANCE
+    around = surroundings(boxes((0.2 + step, 0.2 + step), (2.3 - step, 0.2)))
+    first, second = around.situation(0), around.situation(1)
+    micrometres = round(step * 1e6)
+    near = share < 1
+    assert first.floor == (-200_000 - micrometres if near else None) and second.floor == -200_000
+    assert first.sides == ((-200_000 - micrometres,) if near else ())
+    assert second.sides == ((200_000 + micrometres,) if near else ())
 
 
 def test_equal_situations_at_different_places_have_equal_keys(boxes):

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tests.load.strategies import loads
 from unload import Load, stack_load
 from unload.env.fast import containers
+from unload.load.contacts import CONTACT_TOLERANCE
 from unload.physics.lift_table import EMPTY, LiftTable, digest_of
 from unload.physics.situation import Surroundings
 from unload.physics.table import HELD_DOWN
@@ -45,6 +46,15 @@ def assert_digests_agree(load: Load, present: np.ndarray) -> int:
 def test_digests_of_situations_in_random_loads(load, data):
     some = data.draw(st.lists(st.booleans(), min_size=len(load), max_size=len(load)))
     assert_digests_agree(load, np.array(some))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.9, 1.1])
+def test_digests_of_situations_at_walls_and_floor(boxes, share):
+    step = share * CONTACT_TOLERANCE
+    leaning = boxes((0.5, 0.2), (0.2 + step, 0.6), (2.0, 0.2), (2.3 - step, 0.6))
+    lifted = boxes((0.2 + step, 0.2 + step), (2.3 - step, 0.2), (1.2, 0.2 + step))
+    for load in (leaning, lifted):
+        assert assert_digests_agree(load, np.ones(len(load), bool)) == 0
 
 
 @pytest.mark.parametrize("share", [1.0, 0.7, 0.3])
