@@ -110,9 +110,29 @@ function readBoxes(model) {
     const [low, high] = [numbers.slice(6 * item, 6 * item + 3), numbers.slice(6 * item + 3, 6 * item + 6)];
     const key = Math.round((low[0] + high[0]) * 500);
     if (!walls.has(key)) walls.set(key, []);
-    walls.get(key).push({ item, low, high });
+    walls.get(key).push({ item, low, high, covers: [[], [], [], [], [], []] });
   }
+  const boxes = [...walls.values()].flat();
+  for (const box of boxes) for (const other of boxes) cover(box, other);
   return [...walls.values()];
+}
+
+// Note which share of a face of one box another box covers, because most faces are covered whole
+// and need not be drawn. Faces are numbered 2 · axis + side, side 1 being the high one.
+function cover(box, other) {
+  for (let axis = 0; axis < 3; axis++) {
+    if (Math.abs(box.high[axis] - other.low[axis]) > 1e-3) continue;
+    let share = 1;
+    let back = 1;
+    for (const across of [(axis + 1) % 3, (axis + 2) % 3]) {
+      const low = Math.max(box.low[across], other.low[across]);
+      const both = Math.max(0, Math.min(box.high[across], other.high[across]) - low);
+      share *= both / (box.high[across] - box.low[across]);
+      back *= both / (other.high[across] - other.low[across]);
+    }
+    if (share > 0) box.covers[2 * axis + 1].push([other.item, share]);
+    if (back > 0) other.covers[2 * axis].push([box.item, back]);
+  }
 }
 
 function render({ model, el }) {
@@ -142,17 +162,23 @@ function render({ model, el }) {
     points.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
     pen.closePath();
   }
-  function visibleFaces({ low, high }, rise = 0) {
+  function visibleFaces({ low, high, covers }, rise = 0, colours = null) {
     const [from, to] = [[...low], [...high]];
     from[2] += rise;
     to[2] += rise;
-    return FACES.flatMap(([lowSide, highSide], axis) => {
-      const face = camera.eye[axis] > to[axis] ? highSide : camera.eye[axis] < from[axis] ? lowSide : null;
-      return face ? [[axis, face.map((bits) => camera.project(corner(from, to, bits)))]] : [];
+    return FACES.flatMap((sides, axis) => {
+      const side = camera.eye[axis] > to[axis] ? 1 : camera.eye[axis] < from[axis] ? 0 : -1;
+      if (side < 0 || (colours && isCovered(covers[2 * axis + side], colours))) return [];
+      return [[axis, sides[side].map((bits) => camera.project(corner(from, to, bits)))]];
     });
   }
-  function drawBox(box, colour, rise) {
-    for (const [axis, points] of visibleFaces(box, rise)) {
+  function isCovered(covers, colours) {
+    let left = 0.999;
+    for (const [item, share] of covers) if (colours[item] !== ABSENT) left -= share;
+    return left <= 0;
+  }
+  function drawBox(box, colour, rise = 0, colours = null) {
+    for (const [axis, points] of visibleFaces(box, rise, colours)) {
       const shade = (share) => `rgb(${colour.map((value) => 255 * share * value).join()})`;
       polygon(points);
       pen.fillStyle = shade(SHADES[axis]);
@@ -201,7 +227,7 @@ function render({ model, el }) {
     const colours = bytes(model.get("colours"));
     const palette = model.get("palette");
     for (const box of order) {
-      if (colours[box.item] !== ABSENT) drawBox(box, palette[colours[box.item]], 0);
+      if (colours[box.item] !== ABSENT) drawBox(box, palette[colours[box.item]], 0, colours);
     }
     pen.strokeStyle = "black";
     pen.lineWidth = 2.5;

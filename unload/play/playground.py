@@ -144,9 +144,9 @@ class Playground(widgets.VBox):
         count = run.play_to(self.slider.value) if run else len(self.you.picks)
         moment = episode.moment(count)
         self.undo.disabled = not self.you.picks
-        self._say(episode, count, moment)
         liftable = episode.liftable(count) if self.hints.value else None
         self._draw(moment, liftable, lifted)
+        self._say(episode, count, moment)
         self._score()
 
     def _say(self, episode: Episode, count: int, moment: Moment) -> None:
