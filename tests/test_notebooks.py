@@ -61,6 +61,8 @@ def test_committed_outputs_are_clean(path):
     outputs = [output for cell in code for output in cell["outputs"]]
     assert not [output for output in outputs if output["output_type"] == "error"]
     assert not [output for output in outputs if output.get("name") == "stderr"]
+    assert not [output for output in outputs if run.WIDGET_MIMETYPE in output.get("data", {})]
+    assert "widgets" not in json.loads(path.read_text())["metadata"]
     assert path.stat().st_size < 1_500_000
 
 
@@ -94,3 +96,15 @@ def test_failing_cell_fails_the_run(tmp_path):
     run.nbformat.write(broken, tmp_path / "broken.ipynb")
     with pytest.raises(run.papermill.PapermillExecutionError, match="broken with 2"):
         run.run(tmp_path / "broken.ipynb", tmp_path / "out.ipynb", {"X": 2})
+
+
+def test_a_widget_leaves_what_stands_beside_it(tmp_path):
+    new = run.nbformat.v4
+    data = {run.WIDGET_MIMETYPE: {"model_id": "1"}, "image/png": "iVBORw0KGgo="}
+    cell = new.new_code_cell("x", outputs=[new.new_output("display_data", data)])
+    path = tmp_path / "widget.ipynb"
+    run.nbformat.write(new.new_notebook(metadata={"widgets": {}}, cells=[cell]), path)
+    run.tidy(path)
+    content = run.nbformat.read(path, as_version=4)
+    assert list(content.cells[0].outputs[0].data) == ["image/png"]
+    assert "widgets" not in content.metadata

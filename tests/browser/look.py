@@ -20,6 +20,7 @@ from pathlib import Path
 
 import nbformat
 import numpy as np
+from papermill.iorw import load_notebook_node
 from papermill.parameterize import parameterize_notebook
 from PIL import Image
 from playwright.sync_api import Locator, Page
@@ -99,7 +100,7 @@ def copy(notebooks: list[Path]) -> None:
     """Put notebooks with their reduced counts and their outputs into a folder of their own."""
     COPIES.mkdir(parents=True, exist_ok=True)
     for path in notebooks:
-        content = nbformat.read(path, as_version=4)
+        content = load_notebook_node(str(path))
         reduced = {} if path.stem == PLAYGROUND else run.reduced_parameters(path)
         if reduced:
             content = parameterize_notebook(content, reduced)
