@@ -50,6 +50,17 @@ def test_features_are_those_of_equalize(items, ties):
     assert (observation == items.T).all()
 
 
+@pytest.mark.parametrize("tolerance", [0.25, 0.2499, 0.0])
+def test_values_as_far_apart_as_the_tolerance_are_a_tie(tolerance):
+    values = np.tile(np.arange(128, dtype=np.float32) // 2 / 4, (3, 1))  # 0, 0, 0.25, 0.25, 0.5, …
+    observation = np.empty((128, 3), np.float32)
+    features(
+        values, ranks_of(values).astype(np.int32), True, True, np.float32(tolerance), observation
+    )
+    assert observation.tobytes() == equalize(values.T, "average", tolerance).tobytes()
+    assert (observation == 0).all() == (tolerance == 0.25)
+
+
 @pytest.mark.parametrize("ties", ["noise", "average"])
 def test_nearest_first_sorts_by_distance(items, rng, ties):
     distances, flags = rng.random((2, 128)).round(2), rng.random((2, 128)) < 0.5
