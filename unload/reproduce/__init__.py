@@ -2,7 +2,7 @@
 
 Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the paper's own);
 ``measure``, ``study``, ``random_picks``, ``random_share``, ``drift``, ``answer``,
-``changes``, ``interventions`` and ``verdict`` (why 60 %);
+``changes``, ``interventions``, ``verdict``, ``survival`` and ``questions`` (why 60 %);
 ``comparison`` and ``robustness`` (policies compared); ``lifts``, ``full_lifts`` and ``agreement``
 (the physics);
 ``heap``, ``heap_learning`` and ``heap_table`` (the unordered load). ``fingerprint`` says whether

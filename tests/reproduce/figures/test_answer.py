@@ -34,6 +34,14 @@ def test_the_replay_holds_the_failures_of_the_latest_picks():
     np.testing.assert_allclose(drawn[1:], 1 - (rate[1:] + rate[:-1]) / 2, atol=1e-12)
 
 
+def test_survival_is_drawn_beside_a_constant_chance():
+    axes = answer.survival({"one": np.array([0, 2, 500, 500])}).axes[0]
+    seen, constant = (line.get_ydata() for line in axes.lines)
+    assert seen[[0, 1, 3, 500]].tolist() == [1, 0.75, 0.5, 0.5]
+    chance = 2 / (0 + 2 + 2 * 500 + 2)  # mistakes over picks
+    np.testing.assert_allclose(constant, (1 - chance) ** np.arange(501))
+
+
 def test_bad_input_is_refused(tmp_path):
     with pytest.raises(ValueError, match="cells is 'neither'"):
         answer.cells_msr({"neither": ""})
@@ -41,3 +49,5 @@ def test_bad_input_is_refused(tmp_path):
         answer.cell_curves(folder=tmp_path)
     with pytest.raises(ValueError, match="seeds is 99"):
         answer.falls_and_replay("paper_mask", [99], 2**20)
+    with pytest.raises(ValueError, match="before is empty"):
+        answer.survival({})

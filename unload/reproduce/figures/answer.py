@@ -10,17 +10,10 @@ from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.answer import CELLS, read_answer
 from unload.reproduce.figures.style import styled
+from unload.reproduce.questions import PAPER_CELLS, PAPER_MSR
+from unload.reproduce.survival import constant_chance, surviving
 from unload.reproduce.verdict import WINDOW_PICKS, cell_table, end_msr, windows
 from unload.support import checks, files
-
-PAPER_MSR = 0.6  # at the end of its Fig. 12
-# Cells of the paper's configuration: the mask in training and the batch are not beyond doubt.
-PAPER_CELLS = {
-    "paper_no_mask": "without the mask, b = 256",
-    "paper_b2048_no_mask": "without the mask, b = 2048",
-    "paper_mask": "with the mask, b = 256",
-    "paper_b2048_mask": "with the mask, b = 2048",
-}
 
 
 def _chosen(cells: Mapping[str, str], folder: str | Path) -> dict[str, list]:
@@ -152,4 +145,44 @@ def falls_and_replay(
         other.grid(False)
         other.yaxis.label.set_color("C1")
     panels.flat[-1].set_xlabel("picks (millions)")
+    return figure
+
+
+@styled
+def survival(before: Mapping[str, np.ndarray], columns: int = 5) -> Figure:
+    """Share of episodes without a mistake, pick by pick, and that of a constant chance of failure.
+
+    Args:
+        before: name of a policy → (episodes,) successes before its first mistake, see
+            ``unload.reproduce.survival``.
+        columns: panels in a line.
+
+    Raises:
+        ValueError: ``before`` is empty.
+    """
+    columns = checks.integer("columns", columns, 1)
+    if not before:
+        raise ValueError("before is empty; expected at least one policy")
+    columns = min(columns, len(before))
+    lines = -(-len(before) // columns)
+    figure, grid = plt.subplots(
+        lines, columns, figsize=(1.9 * columns + 0.4, 0.7 + 1.5 * lines), sharex=True, sharey=True,
+        squeeze=False,
+    )  # fmt: skip
+    for axes in grid.flat[len(before) :]:
+        axes.set_visible(False)
+    for axes, (name, successes) in zip(grid.flat, before.items()):
+        share = surviving(successes)
+        picks = np.arange(len(share))
+        axes.plot(picks, share, color="C0", label="seen")
+        expected = (1 - constant_chance(successes)) ** picks
+        axes.plot(
+            picks, expected, "--", color="0.4", linewidth=1, label="if the chance were constant"
+        )
+        axes.set_title(name, fontsize=8)
+    grid[0, 0].set_ylim(0, 1.02)
+    grid[0, 0].yaxis.set_major_formatter(PercentFormatter(1))
+    figure.supxlabel("pick of the episode", fontsize=9)
+    figure.supylabel("without a mistake", fontsize=9)
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
