@@ -84,5 +84,12 @@ def test_random_picks_succeed_more_often_in_full_containers():
     assert training.msr_by_pick(lowest, containers=1).any()
 
 
+def test_favourites_are_asked_for_while_a_player_unloads():
+    lifted = training.favourites(policies.highest, policies.random, containers=2, unloaded=60)
+    assert lifted.shape == (2, 3)
+    assert lifted.all()
+    assert not training.favourites(lowest, policies.highest, containers=1, unloaded=25).any()
+
+
 def lowest(observations, masks, rng):
     return np.where(masks.astype(bool), -observations[..., 2], -np.inf).argmax(axis=1)

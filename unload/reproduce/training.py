@@ -15,6 +15,7 @@ from unload.agent.evaluation import Policy, evaluate
 from unload.agent.sweep import run_all
 from unload.agent.training import TrainResult, train
 from unload.agent.weights import save_policy
+from unload.env.container import ContainerEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings, write_table
@@ -24,6 +25,8 @@ PAPER_PICKS = TrainConfig().picks
 SEEDS = (0, 1, 2, 3)
 LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
 EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
+ASK_EVERY = 25  # unloaded items between two questions for the favourite
+MOST_PICKS = 100_000  # of an episode that is to end by unloading
 
 OPTIONS = {
     "--picks": {"type": int, "default": PAPER_PICKS},
@@ -172,6 +175,40 @@ def msr_by_pick(
         msr[pick] = (rewards > 0).mean()
     envs.close()
     return msr
+
+
+def favourites(
+    policy: Policy, player: Policy, containers: int = 10, seed: int = 0, unloaded: int = 400
+) -> np.ndarray:
+    """Whether a policy's favourite item can be lifted in containers that a player unloads.
+
+    Args:
+        policy: is asked for its favourite, at the start and after every 25 unloaded items.
+        player: unloads the containers, with the mask; it may be the policy itself.
+        containers: how many.
+        seed: of the first load and of the random numbers.
+        unloaded: items that the player unloads from each container.
+
+    Returns:
+        (containers, unloaded / 25 + 1) bool.
+    """
+    checks.integer("containers", containers, 1)
+    checks.integer("unloaded", unloaded, 1)
+    env = ContainerEnv(physics="table", max_picks=MOST_PICKS)
+    rng = np.random.default_rng(seed)
+    found = []
+    for container in range(containers):
+        observation, info = env.reset(seed=seed + container)
+        asked: list[bool] = []
+        while len(asked) <= unloaded // ASK_EVERY:
+            if info["unloaded"] == len(asked) * ASK_EVERY:
+                favourite = policy(observation[None], info["item_mask"][None], rng)[0]
+                asked.append(bool(env.liftable()[favourite]))
+            action = player(observation[None], info["action_mask"][None], rng)[0]
+            observation, *_, info = env.step(int(action))
+        found.append(asked)
+    env.close()
+    return np.array(found)
 
 
 def _write_export(path: Path, curve: pd.DataFrame, value: str) -> None:

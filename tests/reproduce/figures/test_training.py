@@ -69,3 +69,11 @@ def test_the_msr_by_pick_is_drawn_as_means():
     training.draw_by_pick(axes, {"all": np.ones(500), "none": np.zeros(500)})
     assert [line.get_label() for line in axes.lines] == ["all", "none"]
     assert [set(line.get_ydata()) for line in axes.lines] == [{1}, {0}]
+
+
+def test_values_are_drawn_by_what_can_be_lifted():
+    figure, axes = plt.subplots()
+    training.draw_values(axes, np.arange(3) / 3, np.zeros(3), np.array([True, False, True]))
+    blocked, liftable = axes.collections
+    assert (blocked.get_label(), liftable.get_label()) == ("blocked", "liftable")
+    assert (len(blocked.get_offsets()), len(liftable.get_offsets())) == (1, 2)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from unload import task
+from unload.load.colours import COLOURS
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.results import read_table
 from unload.reproduce.training import episode_means
@@ -101,6 +102,20 @@ def draw_by_pick(axes: Axes, curves: dict[str, np.ndarray]) -> None:
         means = msr.reshape(-1, 20).mean(axis=1)
         axes.plot(np.arange(10, len(msr), 20), means, label=name)
     axes.set(xlabel="pick of the episode", ylabel="MSR", ylim=(0, 1.02), xlim=(0, task.MAX_PICKS))
+
+
+def draw_values(axes: Axes, heights: np.ndarray, values: np.ndarray, liftable: np.ndarray) -> None:
+    """Draw the action values of the visible items over their heights.
+
+    Args:
+        axes: where.
+        heights: (items,) scaled to the container.
+        values: (items,) of the network.
+        liftable: (items,) bool, what can be lifted.
+    """
+    for name, rows in (("blocked", ~liftable), ("liftable", liftable)):
+        axes.scatter(heights[rows], values[rows], s=10, color=COLOURS[name], label=name)
+    axes.set(xlabel=r"height $\tilde p_z$", ylabel="action value", ylim=(-1.1, 1.1))
 
 
 def _figure(

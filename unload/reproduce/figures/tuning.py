@@ -18,7 +18,7 @@ Curves = dict[int, np.ndarray]  # one value per training step, by the number of 
 
 @styled
 def fig08_learning_rate(folder: str | Path = files.DATA) -> Figure:
-    """MSR over training steps for three learning rates, batch size 1024 (Fig. 8).
+    """MSR while training over steps for three learning rates, batch size 1024 (Fig. 8).
 
     The strong lines are the runs that the paper shows, or the first one there is; the thin
     ones are all others.
@@ -34,12 +34,12 @@ def fig08_learning_rate(folder: str | Path = files.DATA) -> Figure:
         r"$\mu = 10^{-2}$": (read_curves(folder, "hitrate", 1024, 1e-2), 7),
         r"$\mu = 10^{-3}$": (read_curves(folder, "hitrate", 1024, 1e-3), 5),
     }
-    return _figure(curves, "MSR", folder)
+    return _figure(curves, "MSR while training", folder)
 
 
 @styled
 def fig09_batch_size(folder: str | Path = files.DATA) -> Figure:
-    """MSR over training steps for four batch sizes, learning rate 10⁻³ (Fig. 9).
+    """MSR while training over steps for four batch sizes, learning rate 10⁻³ (Fig. 9).
 
     Arguments, lines and errors as in ``fig08_learning_rate``.
     """
@@ -47,7 +47,7 @@ def fig09_batch_size(folder: str | Path = files.DATA) -> Figure:
         f"$b = {batch_size}$": (read_curves(folder, "hitrate", batch_size, 1e-3), shown)
         for batch_size, shown in ((64, 9), (256, 9), (1024, 5), (2048, 6))
     }
-    return _figure(curves, "MSR", folder)
+    return _figure(curves, "MSR while training", folder)
 
 
 @styled
@@ -188,6 +188,6 @@ def _figure(curves: Mapping[str, tuple[Curves, int]], label: str, folder: str | 
     figure, axes = plt.subplots()
     draw_curves(axes, curves, label)
     steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
-    axes.set(xlim=(0, steps), ylim=(0, 1.02) if label == "MSR" else (0, 0.6))
+    axes.set(xlim=(0, steps), ylim=(0, 0.6) if "loss" in label else (0, 1.02))
     mark_reduced(figure, folder, "tuning")
     return figure
