@@ -62,6 +62,22 @@ def test_loads_of_several_sizes_and_kinds():
     play_both(CONTAINER, 4, 45, max_picks=15, stack=stack)
 
 
+def test_fewer_boxes_may_have_more_contacts():
+    """60 boxes apart, and 40 bars, 20 of them across the others."""
+    count, places = 20, (np.arange(20) + 0.5) / 20
+    bars = np.vstack([
+        np.column_stack([np.full(count, 3.5), 2.5 * places, np.full(count, 0.15)]),
+        np.column_stack([7 * places, np.full(count, 1.25), np.full(count, 0.45)]),
+    ])  # fmt: skip
+    sizes = np.repeat([[7, 2.5 / count, 0.3], [7 / count, 2.5, 0.3]], count, axis=0)
+    crossed = unload.Load(bars, sizes, *np.zeros((2, 2 * count), int))
+    grid = np.stack(np.meshgrid(0.5 * np.arange(12) + 0.4, 0.5 * np.arange(5) + 0.25, 0.15), -1)
+    apart = unload.Load(grid.reshape(60, 3), np.full((60, 3), 0.3), *np.zeros((2, 60), int))
+    assert len(crossed.contacts.boxes) > 800 and len(apart.contacts.boxes) == 0
+    loads = apart, crossed
+    play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])
+
+
 @settings(derandomize=True, deadline=None, max_examples=20)
 @given(
     env_id=st.sampled_from([CONTAINER, HIGHEST]),
