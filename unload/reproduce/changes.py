@@ -3,12 +3,10 @@
 Each change is a function that alters a ``Training``; ``interventions`` makes them and goes on.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 
-import gymnasium
 import numpy as np
 
 from unload import task
@@ -17,8 +15,11 @@ from unload.agent.policies import any_allowed
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.agent.training import Training
+from unload.env import observation
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
+from unload.physics.base import Physics
+from unload.physics.choose import make_physics
 
 MEMORY = 2**23  # picks of the enlarged replay
 MOST_LOST = 400  # boxes of a replaced container
@@ -139,18 +140,20 @@ def random_failures(config: TrainConfig, count: int, rng: np.random.Generator) -
 
 def partly_unloaded(rng: np.random.Generator) -> Load:
     """A random load that has lost 0 to 400 boxes to a random policy."""
-    load, lost = stack_load(rng), rng.integers(MOST_LOST + 1)
-    env = _player()
-    _, info = env.reset(options={"load": load})
-    while info["unloaded"] < lost:  # picks that have failed need not be repeated
-        (action,) = any_allowed(info["action_mask"][np.newaxis].astype(bool), rng)
-        _, _, _, _, info = env.step(action)
-    left = env.physics.present
-    return Load(load.positions[left], load.sizes[left], load.packages[left], load.walls[left])
+    load, lost = stack_load(rng), int(rng.integers(MOST_LOST + 1))
+    physics = _physics()
+    physics.reset(load)
+    left = observation.nearest(load.positions, len(load)).tolist()
+    for _ in range(lost):
+        # Each of the nearest boxes until one can be lifted, because a failure changes nothing.
+        for place in rng.permutation(min(len(left), task.N_VISIBLE)).tolist():
+            if physics.lift(left[place]) >= task.LIFT_THRESHOLD:
+                physics.remove(left.pop(place))
+                break
+    kept = physics.present
+    return Load(load.positions[kept], load.sizes[kept], load.packages[kept], load.walls[kept])
 
 
 @cache
-def _player() -> gymnasium.Env:
-    """A container to play in."""
-    name, never = "unload/Container-v0", sys.maxsize
-    return gymnasium.make(name, physics="table", position_noise=0, max_picks=never).unwrapped
+def _physics() -> Physics:
+    return make_physics("table", "restore")
