@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test quick lint lab notebooks paper bench book clean
+.PHONY: help figures test quick lint lab notebooks paper bench book browser mutants clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
@@ -46,6 +46,9 @@ book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: bui
 browser: $(VENV)/ready-browser  ## open notebooks in JupyterLab in a browser without a window, run them and look at them
 	$(BIN)/python tests/browser/look.py
 
+mutants: $(VENV)/ready-mutants  ## change the code in small ways and count what the tests notice (an hour)
+	nice -n 10 $(BIN)/python benchmarks/mutants.py
+
 clean:  ## remove the virtual environment and all intermediate results
 	rm -rf $(VENV) build runs
 
@@ -65,4 +68,8 @@ $(VENV)/ready-book: $(VENV)/ready
 
 $(VENV)/ready-browser: $(VENV)/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[browser]"
+	touch $@
+
+$(VENV)/ready-mutants: $(VENV)/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[mutants]"
 	touch $@

@@ -14,7 +14,8 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"benchmarks", "notebooks", "tests", "unload"}
-ON_DEMAND = ("book", "browser", "mujoco")  # extras for one command each, pinned in pyproject.toml
+# Extras for one command each, pinned in pyproject.toml.
+ON_DEMAND = ("book", "browser", "mujoco", "mutants")
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",

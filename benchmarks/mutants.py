@@ -1,0 +1,350 @@
+"""Mutation testing: small changes to the code, and how many of them the tests notice.
+
+    make mutants                                       a sample of each module's mutants
+    python benchmarks/mutants.py agent/dqn --sample 0  all mutants of one module
+
+Cosmic Ray makes the mutants. mutmut 3 leaves decorated functions alone, and so would miss all
+compiled ones. Each mutant's module is changed in a copy of the tree, where a forked process
+then runs the tests that belong to it; to fork saves importing PyTorch a thousand times. Modules
+with compiled functions run as plain Python, so that nothing is compiled; ``kernel``, whose
+instructions Python does not have, is compiled anew for each mutant.
+
+Left out are changes without an effect on behaviour: in annotations, in errors that are raised
+(the condition for it counts) and of ``is`` for ``==``. So are decorators, most of which make a
+function fast only, and operators that numbers of the other kind do not have, such as ``<<`` in
+place of ``*``, because each call of such a mutant fails, which would only raise the score.
+``mutants.md`` has the last result, and why each survivor is left.
+"""
+
+import argparse
+import ast
+import contextlib
+import os
+import re
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = "1"
+
+# Imported before any process is forked; the package itself only afterwards, from the copy.
+import gymnasium  # noqa: F401
+import hypothesis  # noqa: F401
+import numba
+import numpy as np
+import pandas as pd
+import pybullet  # noqa: F401
+import pytest
+import scipy.stats
+import stable_baselines3  # noqa: F401
+import torch
+from cosmic_ray.commands.init import _all_work_items
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator
+
+ROOT = Path(__file__).resolve().parent.parent
+COPIED = ("unload", "tests", "data", "pyproject.toml")
+# Tests of the array environment that are quick as plain Python.
+FEW_PICKS = " ".join(
+    f"env/test_vector.py::test_{name}"
+    for name in (
+        "visible_items_and_masks", "a_pick_that_is_interrupted_needs_a_reset",
+        "episodes_that_end_at_once", "unknown_lifts_are_simulated_once_and_remembered",
+        "a_whole_load_to_the_last_item", "fewer_boxes_may_have_more_contacts",
+    )
+)  # fmt: skip
+# The modules, and the tests in tests/ that have to notice their mutants.
+MODULES = {
+    "load/boxes": "load/test_boxes.py",
+    "load/contacts": "load/test_contacts.py load/test_boxes.py",
+    "load/substacks": "load/test_substacks.py",
+    "physics/situation": "physics/test_situation.py env/fast/test_containers.py",
+    "physics/table": "physics/test_table.py",
+    "physics/lift_table": "physics/test_lift_table.py physics/test_table.py",
+    "env/base": "env/test_base.py env/test_container.py env/test_highest_item.py",
+    "env/container": "env/test_container.py env/test_base.py",
+    "env/equalization": "env/test_equalization.py",
+    "env/highest_item": "env/test_highest_item.py env/test_vector_base.py",
+    "env/observation": "env/test_observation.py env/test_base.py env/test_container.py",
+    "env/vector": "env/test_vector.py env/test_vector_base.py",
+    "env/vector_base": "env/test_vector_base.py env/test_vector.py env/test_highest_item.py",
+    "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
+    "env/fast/ranking": "env/fast/test_ranking.py",
+    "network/peq": "network/test_peq.py",
+    "network/variants": "network/test_variants.py",
+    "agent/learner": "agent/test_learner.py agent/test_dqn.py agent/test_greedy.py",
+    "agent/dqn": "agent/test_dqn.py",
+    "agent/replay": "agent/test_replay.py",
+    "agent/fast/adam": "agent/fast/test_adam.py",
+    "agent/fast/fused": "agent/fast/test_fused.py",
+    "agent/fast/kernel": "agent/fast/test_fused.py",
+    "agent/fast/learner": "agent/test_learner.py agent/test_dqn.py",
+}
+# Tests that take long, or start processes of their own.
+SLOW = "compiled_anew or full or program_ends or processes or 64_containers or agent_learns"
+OTHER_CODE = 99  # exit status of a process that did not import the package from its copy
+# Operators that may stand for each other.
+GROUPS = (
+    {"Add", "Sub", "Mul", "Div", "FloorDiv"},
+    {"Mod", "FloorDiv", "Mul"},
+    {"Pow", "Mul"},
+    {"BitAnd", "BitOr", "BitXor"},
+    {"LShift", "RShift"},
+)
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One small change to a module.
+
+    Attributes:
+        module: its path in unload/, without the suffix.
+        line: number of the changed line.
+        before, after: this line.
+        operator: Cosmic Ray's name of the change.
+        code: the whole module after it.
+    """
+
+    module: str
+    line: int
+    before: str
+    after: str
+    operator: str
+    code: str
+
+
+def mutants(
+    path: Path, module: str, sample: int, rng: np.random.Generator
+) -> tuple[list[Mutant], int]:
+    """A random sample of the mutants of the module at ``path`` by line, and the number of all."""
+    source = path.read_text()
+    lines, skipped = source.splitlines(), list(_without_behaviour(ast.parse(source)))
+    found = []
+    for item in _all_work_items([path], {}):
+        (mutation,) = item.mutations
+        operator, start = mutation.operator_name.removeprefix("core/"), tuple(mutation.start_pos)
+        in_signature = lines[start[0] - 1][start[1] :].startswith("*,")  # keyword-only arguments
+        skip = in_signature or any(first <= start < end for first, end in skipped)
+        if _counts(operator) and not skip:
+            found.append((start[0], operator, mutation))
+    found.sort(key=lambda each: each[:2])
+    count = len(found)
+    if sample and count > sample:
+        found = [found[i] for i in sorted(rng.choice(count, sample, replace=False))]
+    chosen = []
+    for _, operator, mutation in found:
+        code = mutate_code(source, get_operator(mutation.operator_name)(), mutation.occurrence)
+        pairs = enumerate(zip(lines, code.splitlines()), 1)
+        line, (before, after) = next((n, pair) for n, pair in pairs if pair[0] != pair[1])
+        chosen.append(Mutant(module, line, before.strip(), after.strip(), operator, code))
+    return chosen, count
+
+
+def _counts(operator: str) -> bool:
+    """Whether an operator's mutants are made at all; see the module's docstring."""
+    if operator == "RemoveDecorator":
+        return False
+    kind, _, pair = operator.partition("_")
+    before, _, after = pair.partition("_")
+    if kind == "ReplaceComparisonOperator":
+        return after not in ("Is", "IsNot") or before in ("Is", "IsNot")
+    if kind == "ReplaceBinaryOperator":
+        return any({before, after} <= group for group in GROUPS)
+    return True
+
+
+def _without_behaviour(tree: ast.AST) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+    """Where annotations and raised errors begin and end: (line, column) each."""
+    for node in ast.walk(tree):
+        parts = [getattr(node, "annotation", None), getattr(node, "returns", None)]
+        for part in [*parts, node if isinstance(node, ast.Raise) else None]:
+            if isinstance(part, ast.AST):
+                yield (part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)
+
+
+def run_tests(tree: Path, module: str) -> int:
+    """Run a module's tests on a copy of the tree in a process that ends here; pytest's status."""
+    os.setsid()
+    os.chdir(tree)
+    output = os.open(tree / "output.txt", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    sys.path.insert(0, str(tree))
+    sys.dont_write_bytecode = True  # it is known by size and second, and mutants are quick
+    source = (tree / "unload" / f"{module}.py").read_text()
+    numba.config.DISABLE_JIT = "@compiled" in source and "@intrinsic" not in source
+    torch.set_num_threads(1)
+    tests = [f"tests/{name}" for name in MODULES[module].split()]
+    options = ["-x", "-p", "no:cacheprovider", "-k", f"not ({SLOW})", "-m", "not slow"]
+    # A single number that overflows warns, and one in compiled code does not.
+    options += ["-W", "ignore:overflow encountered:RuntimeWarning"]
+    options += ["-W", "ignore:invalid value:RuntimeWarning"]
+    options += ["-W", "ignore:Module already imported"]
+    status = pytest.main([*options, *tests])
+    loaded = sys.modules.get("unload")
+    if loaded and not Path(loaded.__file__).is_relative_to(tree):
+        return OTHER_CODE
+    return int(status)
+
+
+class Workers:
+    """Forked processes, each with a copy of the tree, that run tests side by side.
+
+    Attributes:
+        original: a copy that stays as it is, whatever is edited meanwhile.
+    """
+
+    def __init__(self, folder: Path, count: int) -> None:
+        self.original = folder / "original"
+        self._free = [folder / f"copy{number}" for number in range(count)]
+        self._running = {}
+        for tree in (self.original, *self._free):
+            source = ROOT if tree == self.original else self.original
+            tree.mkdir()
+            for name in COPIED:
+                copy = shutil.copytree if (source / name).is_dir() else shutil.copy2
+                copy(source / name, tree / name)
+
+    def source(self, module: str) -> Path:
+        """The module's file, unchanged."""
+        return self.original / "unload" / f"{module}.py"
+
+    def start(self, module: str, code: str | None, seconds: float, key: object) -> Iterator:
+        """Begin one run as soon as a tree is free; yield what ends meanwhile, see ``wait``."""
+        while not self._free:
+            yield from self.wait()
+        tree = self._free.pop()
+        path = tree / "unload" / f"{module}.py"
+        if code is not None:
+            path.write_text(code)
+        sys.stdout.flush()
+        process = os.fork()
+        if not process:
+            try:
+                os._exit(run_tests(tree, module))
+            except BaseException:
+                traceback.print_exc()
+                os._exit(1)  # the tests did not even start
+        self._running[process] = key, tree, module, time.monotonic(), seconds
+
+    def wait(self) -> Iterator[tuple[object, str, float, str]]:
+        """Key, outcome, seconds and output of the runs that have ended, after at least one has."""
+        ended = []
+        while self._running and not ended:
+            time.sleep(0.02)
+            for process, (key, tree, module, start, seconds) in list(self._running.items()):
+                spent = time.monotonic() - start
+                done, status = os.waitpid(process, os.WNOHANG)
+                if not done and spent < seconds:
+                    continue
+                outcome = "time limit"
+                if done:
+                    outcome = "killed" if status else "survived"
+                    if os.waitstatus_to_exitcode(status) == OTHER_CODE:
+                        raise RuntimeError(f"the tests of {module} did not run on {tree}")
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process, signal.SIGKILL)  # and what it may have started
+                if not done:
+                    os.waitpid(process, 0)
+                del self._running[process]
+                shutil.copy2(self.source(module), tree / "unload" / f"{module}.py")
+                self._free.append(tree)
+                output = (tree / "output.txt").read_text(errors="replace")
+                ended.append((key, outcome, spent, output))
+        yield from ended
+
+
+def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame:
+    """Run the mutants of some modules: one row each, with its outcome.
+
+    Raises:
+        RuntimeError: a module's tests fail without any change.
+    """
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        workers = Workers(Path(folder), jobs)
+
+        def keep(results) -> None:
+            for (mutant, count), outcome, spent, output in results:
+                failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
+                rows.append(
+                    {
+                        "module": mutant.module, "line": mutant.line, "operator": mutant.operator,
+                        "before": mutant.before, "after": mutant.after, "outcome": outcome,
+                        "by": failed[0] if failed else "", "seconds": round(spent, 1),
+                        "of": count,
+                    }
+                )  # fmt: skip
+                if outcome == "survived":
+                    print(f"unload/{mutant.module}.py:{mutant.line} {mutant.operator}")
+                    print(f"    - {mutant.before}\n    + {mutant.after}", flush=True)
+
+        for name in names:
+            keep(_all(workers))
+            for _ in workers.start(name, None, 600, None):
+                pass
+            for _, outcome, spent, output in workers.wait():
+                print(f"{name}: {spent:.0f} s without a change", flush=True)
+                if outcome != "survived":
+                    raise RuntimeError(f"the tests of {name} do not pass: {outcome}\n{output}")
+                limit = 2 * spent + 10
+            rng = np.random.default_rng([seed, list(MODULES).index(name)])
+            chosen, count = mutants(workers.source(name), name, sample, rng)
+            for mutant in chosen:
+                keep(workers.start(name, mutant.code, limit, (mutant, count)))
+        keep(_all(workers))
+    return pd.DataFrame(rows).sort_values(["module", "line", "operator"])
+
+
+def _all(workers: Workers) -> Iterator:
+    while workers._running:
+        yield from workers.wait()
+
+
+def scores(table: pd.DataFrame) -> pd.DataFrame:
+    """Mutants and survivors by module and in all; the score with its 95 % interval in %."""
+    rows = []
+    for name, part in [*table.groupby("module", sort=False), ("all", table)]:
+        killed = int((part["outcome"] != "survived").sum())
+        interval = scipy.stats.binomtest(killed, len(part)).proportion_ci(method="wilson")
+        rows.append(
+            {
+                "module": name,
+                "mutants": part.groupby("module")["of"].first().sum(),
+                "tested": len(part),
+                "survived": len(part) - killed,
+                "score": f"{100 * killed / len(part):.0f}",
+                "interval": f"{100 * interval.low:.0f}–{100 * interval.high:.0f}",
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def main() -> None:
+    """Measure, print the survivors and the scores, and keep all rows in build/mutants.csv."""
+    parser = argparse.ArgumentParser(description="Mutation testing.")
+    parser.add_argument("modules", nargs="*", help="such as agent/dqn; all if none is given")
+    parser.add_argument("--sample", type=int, default=60, help="mutants per module, 0 for all")
+    parser.add_argument("--seed", type=int, default=0, help="of the sample")
+    parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
+    arguments = parser.parse_args()
+    for name in arguments.modules:
+        if name not in MODULES:
+            parser.error(f"modules has {name!r}; expected some of {', '.join(MODULES)}")
+    start = time.monotonic()
+    names = arguments.modules or list(MODULES)
+    table = measure(names, arguments.sample, arguments.seed, arguments.jobs)
+    (ROOT / "build").mkdir(exist_ok=True)
+    table.to_csv(ROOT / "build" / "mutants.csv", index=False)
+    print(scores(table).to_string(index=False))
+    print(f"{(time.monotonic() - start) / 60:.0f} minutes")
+
+
+if __name__ == "__main__":
+    main()
