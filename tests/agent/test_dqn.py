@@ -233,13 +233,26 @@ def test_learning_finds_the_highest_item(rng):
     ("kwargs", "message"),
     [
         ({"gamma": 1.5}, "gamma is 1.5"),
-        ({"beta": -1}, "beta is -1"),
+        ({"gamma": -0.5}, "gamma is -0.5"),
+        ({"beta": -0.5}, "beta is -0.5"),
+        ({"learning_rate": -0.5}, "learning_rate is -0.5"),
         ({"learning_rate": float("nan")}, "learning_rate is nan"),
     ],
 )
 def test_bad_settings_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
         DQN(peq(), **kwargs)
+
+
+def test_the_defaults_are_those_of_the_paper(rng):
+    batch = make_batch(rng)
+    batch["rewards"] *= 3  # errors on both sides of beta
+    paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0, "literal": False}
+    states = []
+    for agent in (DQN(peq()), DQN(peq(), **paper)):
+        losses = [agent.update(batch) for _ in range(20)]
+        states.append([losses, *(array.tobytes() for array in agent.state().values())])
+    assert states[0] == states[1]
 
 
 def test_what_is_no_network_or_no_batch_is_refused():
