@@ -53,7 +53,7 @@ def test_missing_runs_are_said():
     few = questions.measured(cell("paper_mask", STEADY, 3))
     answer = questions.reproduced(few)
     assert answer.status == "shown so far"
-    assert "3 of 10 runs, 3 like the paper's" in answer.so_far
+    assert "3 of 10 runs, 3 of them at 50% to 70%, 3 like the paper's" in answer.so_far
     assert "Still missing: without the mask, b = 256;" in answer.so_far
     assert questions.reproduced({}).status == "still running"
 

@@ -9,6 +9,7 @@ import pandas as pd
 from unload.reproduce.answer import CELLS, seeds_of
 from unload.reproduce.interventions import FAILURES
 from unload.reproduce.verdict import (
+    LIKE_THE_PAPER,
     WINDOW_PICKS,
     fall_table,
     falls,
@@ -83,12 +84,14 @@ def measured(runs: Iterable[Run]) -> dict[str, pd.DataFrame]:
 def reproduced(cells: dict[str, pd.DataFrame]) -> Answer:
     """Question 1."""
     parts, holding, alike = [], [], []
+    least, most = LIKE_THE_PAPER
     for cell in (cell for cell in PAPER_CELLS if len(cells.get(cell, ())) > 1):
         table = cells[cell]
         low, high = np.clip(t_interval(table["end"]), 0, 1)
         parts.append(
             f"{PAPER_CELLS[cell]}: {table['end'].mean():.0%} ({low:.0%} to {high:.0%}, "
-            f"{_there(cells, cell)}, {table['both'].sum()} like the paper's)"
+            f"{_there(cells, cell)}, {table['end'].between(least, most).sum()} of them at "
+            f"{least:.0%} to {most:.0%}, {table['both'].sum()} like the paper's)"
         )
         if low <= PAPER_MSR <= high:
             holding.append(cell)

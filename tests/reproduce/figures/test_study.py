@@ -5,9 +5,8 @@ import pandas as pd
 import pytest
 
 from unload.reproduce.figures import study
-from unload.support import files
 
-FIGURES = [study.why_60, study.offline_msr, study.factorial_msr, study.factorial_curves]
+FIGURES = [study.offline_msr, study.factorial_msr, study.factorial_curves]
 
 
 @pytest.mark.parametrize("draw", FIGURES)
@@ -18,21 +17,6 @@ def test_figure_is_saved_as_the_same_bytes(draw, saved_twice):
 @pytest.mark.parametrize("draw", FIGURES)
 def test_missing_data_names_the_command_that_makes_it(draw, names_its_command):
     names_its_command(draw)
-
-
-def test_bars_of_why_60_are_the_means_of_the_data():
-    bars = [bar.get_width() for bar in study.why_60().axes[0].patches]
-    rows = pd.read_csv(files.DATA / "study" / "factorial.csv")
-    rows = rows[rows["epsilon_final"] == 0]
-
-    def end(features, mask):
-        cell = rows[(rows["features"] == features) & (rows["mask"] == mask)]
-        return cell["msr_training"].mean()
-
-    ours = pd.read_csv(files.DATA / "training_summary.csv")["msr_end"].mean()
-    changed = [("noisy ranks", False), ("noisy ranks", True), ("tied ranks", False)]
-    expected = [0.6, ours, *(end(*cell) for cell in changed), end("positions", False)]
-    np.testing.assert_allclose(bars, expected)
 
 
 def write_study(folder, experiment, settings):
@@ -76,3 +60,35 @@ def test_other_columns_of_the_fits_are_refused(tmp_path):
     (tmp_path / "study" / "offline.csv").write_text("features,seed\npositions,0\n")
     with pytest.raises(ValueError, match="offline.csv has no deadlocked, loss, msr_mask"):
         study.offline_msr(tmp_path)
+
+
+def test_the_highest_of_128_items_has_rank_1():
+    equalized = (2 * np.arange(128) - 127) / 127
+    assert study.rank_from_top(equalized).tolist() == list(range(128, 0, -1))
+
+
+def test_trainings_are_shown_by_their_own_picks_and_features():
+    trials = pd.DataFrame(
+        {
+            "features": ["noisy ranks"] * 3 + ["positions"],
+            "epsilon": [1, 0.5, 0.5, 0.5],
+            "msr_no_mask": [0.9, 0.2, 0.4, 1],
+        }
+    )
+    left, right = study.own_picks(trials).axes
+    assert left.lines[0].get_ydata() == pytest.approx([0.3, 0.9])  # means, by the random share
+    assert left.lines[1].get_xdata().tolist() == [0, 0.5, 0.5]
+    assert [line.get_ydata().tolist() for line in right.lines] == [[0.2, 0.4], [1]]
+
+
+def test_success_is_counted_for_each_rank():
+    z = np.array([1, 1, 125 / 127])  # the highest item twice, and the second
+    probes = np.column_stack([np.zeros(3), np.zeros(3), z, [1, 0, 1]])
+    axes = study.success_by_height({"random picks": probes}, ranks=2).axes[0]
+    assert axes.lines[0].get_ydata().tolist() == [0.5, 1]
+
+
+def test_shares_of_picks_add_up():
+    axes = study.ranks_of_picks({"one": np.array([3, 1, 1, 2])}).axes[0]
+    assert axes.lines[0].get_xdata().tolist() == [1, 1, 2, 3]
+    assert axes.lines[0].get_ydata().tolist() == [0.25, 0.5, 0.75, 1]

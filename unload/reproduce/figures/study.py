@@ -1,6 +1,6 @@
 """Why 60 %: what the controlled experiments show."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -10,72 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 
-from unload.reproduce.figures.style import mark_reduced, styled
+from unload import task
+from unload.reproduce.figures.style import styled
 from unload.reproduce.intervals import bootstrap_interval, with_intervals
 from unload.reproduce.results import COMMAND, read_table
 from unload.reproduce.study import FEATURE_SETTINGS, read_study
 from unload.support import checks, files
-from unload.support.provenance import read_provenance
 
 CELL = ["features", "mask", "epsilon_final"]
-APPLIED = {"msr_mask": ("C0", "o", "told what failed"), "msr_no_mask": ("C1", "s", "not told")}
+APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", "without the mask")}
 PAPER_MSR = 0.6  # at the end of its Fig. 12
 OFFLINE = ["features", "seed", "loss", "msr_mask", "msr_no_mask", "deadlocked"]
-# Why 60 %: what is changed, in which cell of the factorial study, and the bar's colour.
-CHANGES = {
-    "nothing": (("noisy ranks", False), "C1"),
-    "mask in training": (("noisy ranks", True), "C3"),
-    "equal coordinates share one rank": (("tied ranks", False), "C2"),
-    "positions instead of ranks": (("positions", False), "C0"),
-}
-
-
-@styled
-def why_60(folder: str | Path = files.DATA) -> Figure:
-    """MSR at the end of training: as reported, of the same configuration, and one change away.
-
-    The measure is the paper's (Fig. 12): all containers of the training, over its last part.
-    Bars are means over the seeds, the dots; lines are 95 % intervals.
-
-    Args:
-        folder: of ``training_summary.csv`` and ``study/factorial.csv``.
-
-    Raises:
-        FileNotFoundError: a table is missing; the message says how to compute it.
-    """
-    path = Path(folder) / "training_summary.csv"
-    training = read_table(path, f"{COMMAND} training", ["msr_start", "msr_end"])
-    rows, _ = read_study("factorial", folder)
-    cells = rows[rows["epsilon_final"] == 0].groupby(["features", "mask"])["msr_training"]
-    count = EngFormatter(sep=" ")
-    long, short = read_provenance(folder, "training")["settings"]["picks"], rows["picks"].max()
-    bars = {
-        "the paper reports": ([PAPER_MSR], "0.6"),
-        f"its training here, {count(long)} picks": (training["msr_end"], "C1"),
-        **{name: (cells.get_group(cell), colour) for name, (cell, colour) in CHANGES.items()},
-    }
-    places = [0, 1, 2.8, 3.8, 4.8, 5.8]  # room for a heading above the changes
-    figure, axes = plt.subplots(figsize=(6.4, 3.2))
-    for place, (values, colour) in zip(places, bars.values()):
-        mean = np.mean(values)
-        axes.barh(place, mean, color=colour, height=0.72)
-        if len(values) > 1:
-            axes.plot(bootstrap_interval(values), [place, place], color="black", linewidth=1)
-            axes.plot(values, [place] * len(values), "o", color="black", markersize=2.5, alpha=0.6)
-        axes.text(max(values) + 0.02, place, f"{mean:.0%}", va="center", fontsize=11)
-    start = training["msr_start"].mean()
-    axes.axvline(start, color="0.4", linestyle=":", linewidth=1)
-    axes.text(start, -0.55, "random picks", ha="center", va="bottom", color="0.4", fontsize=8)
-    axes.text(-0.02, 2.05, f"{count(short)} picks, one thing changed:", ha="right", va="center",
-              color="0.4", transform=axes.get_yaxis_transform())  # fmt: skip
-    axes.set_yticks(places, bars)
-    axes.set(ylim=(6.4, -0.6), xlim=(0, 1.1), xticks=np.linspace(0, 1, 6))
-    axes.set_xlabel("mean success rate (MSR) at the end of training")
-    axes.xaxis.set_major_formatter(PercentFormatter(1))
-    axes.grid(False, axis="y")
-    axes.tick_params(axis="y", length=0)
-    mark_reduced(figure, folder, "training")
-    return figure
 
 
 @styled
@@ -180,11 +125,89 @@ def factorial_curves(folder: str | Path = files.DATA) -> Figure:
             _band(axes, cell, "msr_no_mask", f"C{int(mask)}", "--" if floor else "-", label)
         axes.set(title=features, xlabel="picks", ylim=(0, 1.02))
         axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
-    panels[0].set_ylabel("greedy MSR, not told")
+    panels[0].set_ylabel("greedy MSR, without the mask")
     panels[0].yaxis.set_major_formatter(PercentFormatter(1))
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure
+
+
+@styled
+def own_picks(trials: pd.DataFrame) -> Figure:
+    """MSR without the mask of small trainings: by the share of own picks, and by the features.
+
+    Left are the paper's features, the noisy ranks; right all features with half of the picks
+    the agent's own. A dot is a training, the line runs through the means.
+
+    Args:
+        trials: ``features``, ``epsilon`` (share of random picks) and ``msr_no_mask`` of each.
+    """
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(8.4, 2.8), sharey=True, width_ratios=(1, 1.6)
+    )
+    noisy = trials[trials["features"] == "noisy ranks"]
+    means = noisy.groupby("epsilon")["msr_no_mask"].mean()
+    left.plot(1 - means.index, means, color="C1")
+    left.plot(1 - noisy["epsilon"], noisy["msr_no_mask"], "o", color="C1", alpha=0.6)
+    left.set(xlabel="share of the agent's own picks", title="noisy ranks", ylim=(0, 1.03))
+    left.set_ylabel("MSR, without the mask")
+    left.xaxis.set_major_formatter(PercentFormatter(1))
+    left.yaxis.set_major_formatter(PercentFormatter(1))
+    groups = dict(list(trials[trials["epsilon"] == 0.5].groupby("features", sort=False)))
+    for place, (features, group) in enumerate(groups.items()):
+        colour = "C1" if "noisy" in features else "C0"
+        right.plot([place] * len(group), group["msr_no_mask"], "o", color=colour, alpha=0.6)
+    names = [name.replace(" of", "\nof").replace(" ", "\n", 1) for name in groups]
+    right.set_xticks(range(len(groups)), names, fontsize=8)
+    right.set(xlim=(-0.5, len(groups) - 0.5), title="half of the picks its own")
+    return figure
+
+
+@styled
+def success_by_height(probes: Mapping[str, np.ndarray], ranks: int = 24) -> Figure:
+    """Share of random picks that succeed, by the rank of the height.
+
+    Args:
+        probes: who has made the containers → (k, 4) picks, see ``random_share.Learned``.
+        ranks: how many from the top.
+    """
+    figure, axes = plt.subplots(figsize=(5, 2.8))
+    for number, (makers, picks) in enumerate(probes.items()):
+        rank = rank_from_top(picks[:, 2])
+        share = [picks[rank == each, 3].mean() for each in range(1, ranks + 1)]
+        axes.plot(range(1, ranks + 1), share, "os"[number % 2] + "-", markersize=3, label=makers)
+    axes.set(xlabel="rank of the height, from the top", ylabel="share that succeeds")
+    axes.set_ylim(0, 1.03)
+    axes.yaxis.set_major_formatter(PercentFormatter(1))
+    axes.legend(title="containers made by", loc="lower left")
+    return figure
+
+
+@styled
+def ranks_of_picks(ranks: Mapping[str, np.ndarray]) -> Figure:
+    """Share of picks up to each rank of the height, counted from the top.
+
+    Args:
+        ranks: policy → ranks of its picks.
+    """
+    figure, axes = plt.subplots(figsize=(5.6, 3))
+    for number, (name, values) in enumerate(ranks.items()):
+        ordered = np.sort(values)
+        share = np.arange(1, len(ordered) + 1) / len(ordered)
+        line = ("-", "--", ":", "-.")[number % 4]
+        axes.step(ordered, share, line, color=f"C{number}", where="post", label=name)
+    ticks = [1, 2, 5, 10, 20, 50, 128]
+    axes.set(xscale="log", xlabel="rank of the height, from the top", ylim=(0, 1.02))
+    axes.set_ylabel("share of picks up to it")
+    axes.set_xticks(ticks, ticks)
+    axes.minorticks_off()
+    axes.legend(fontsize=8)
+    return figure
+
+
+def rank_from_top(z: np.ndarray) -> np.ndarray:
+    """Return the rank, 1 for the highest of 128 items, of an equalized height in [-1, 1]."""
+    return task.N_VISIBLE - np.round((task.N_VISIBLE - 1) * (z + 1) / 2)
 
 
 def _one_panel(names: Sequence[str], cells: Sequence[pd.DataFrame]) -> Figure:
