@@ -192,8 +192,9 @@ def shot(view: Locator, file: Path | None = None) -> np.ndarray:
 
 
 def is_drawn(pixels: np.ndarray) -> bool:
-    """Whether a picture shows boxes: text and axes are less, the ground is brighter."""
-    return float((pixels.max(axis=2) < 225).mean()) > 0.04
+    """Whether a picture shows boxes: they are coloured or dark, and more than text and axes."""
+    marked = (np.ptp(pixels, axis=2) > 40) | (pixels.max(axis=2) < 225)
+    return float(marked.mean()) > 0.02
 
 
 def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:

@@ -52,7 +52,9 @@ def browser() -> Iterator[Browser]:
 
 @contextmanager
 def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
-    """A running JupyterLab; its address, to which a notebook's name can be appended.
+    """A running JupyterLab; its address, in which ``format`` puts a notebook's name.
+
+    The address resets the workspace, which would open earlier notebooks again, too.
 
     Args:
         notebooks: folder that it shows.
@@ -91,7 +93,7 @@ def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
         )
         try:
             _wait_for(f"http://127.0.0.1:{port}/api/status?token={token}", server, log.name)
-            yield f"http://127.0.0.1:{port}/lab/tree/{{}}?token={token}"
+            yield f"http://127.0.0.1:{port}/lab/tree/{{}}?token={token}&reset"
         finally:
             server.terminate()
             server.wait(30)
