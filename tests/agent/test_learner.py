@@ -51,6 +51,19 @@ def test_learners_have_one_interface(rng, kind):
     assert np.array_equal(*chosen)
 
 
+@pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
+def test_without_the_literal_update_tanh_is_taken_in_double_precision(rng, kind):
+    """Where the value is nearly 1, the slope of tanh in single precision is 0."""
+    saturated = network()
+    with torch.no_grad():
+        saturated.scorer.bias.fill_(12.0)
+    batch, _ = batch_of(rng)
+    learner = kind(saturated, 1e-3, 1.0)
+    for _ in range(3):
+        learner.start(batch, np.full(SIZE, -1, np.float32))()
+    assert (saturated.scorer.bias.item() < 12) == (kind is FusedLearner)
+
+
 def test_plain_means_plain_everywhere(rng, monkeypatch):
     """Without the fused update, nothing of it is called, neither to learn nor to choose."""
     for name in ("start_gradients", "best_actions"):

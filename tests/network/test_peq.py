@@ -64,7 +64,7 @@ def test_the_generator_decides_the_weights():
     assert first.scorer.weight.abs().max() <= 20**-0.5
 
 
-@pytest.mark.parametrize("shape", [(4, 3), (2, 4, 2), (2, 0, 3), (2, 4, 3, 1)])
+@pytest.mark.parametrize("shape", [(4, 3), (2, 4, 2), (2, 4, 4), (2, 0, 3), (2, 4, 3, 1)])
 def test_other_shapes_are_refused(shape):
     with pytest.raises(ValueError, match=r"observations has shape .*expected \(batch, items, 3\)"):
         network()(torch.zeros(shape))
@@ -121,11 +121,14 @@ def test_gradients_ignore_rows_that_are_not_present(rng):
         assert torch.allclose(padded, alone, atol=1e-6)
 
 
-def test_an_observation_without_items_has_finite_values():
+def test_an_observation_without_items_has_finite_values_and_no_global_features():
     peq = network()
-    values = peq(torch.full((2, 7, 3), -1.0), torch.zeros((2, 7), dtype=torch.bool))
+    observations = torch.full((2, 7, 3), -1.0)
+    values = peq(observations, torch.zeros((2, 7), dtype=torch.bool))
     values.sum().backward()
-    assert values.isfinite().all()
+    own = torch.relu(peq.extractor(observations[0, 0]))
+    alone = torch.tanh(peq.scorer(torch.cat([own, torch.zeros(3 * len(own))])))
+    assert torch.allclose(values, alone.expand(2, 7), atol=1e-6)
     assert all(parameter.grad.isfinite().all() for parameter in peq.parameters())
 
 

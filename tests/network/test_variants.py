@@ -108,6 +108,11 @@ def test_parameter_counts(n):
         assert sum(parameter.numel() for parameter in kind(n).parameters()) == count, kind
 
 
+@pytest.mark.parametrize("name", NETWORKS)
+def test_64_features_by_default(name):
+    assert NETWORKS[name]().n_features == 64
+
+
 def test_linear_with_context_is_the_layer_on_both(items):
     layer, own, context = torch.nn.Linear(5, 4), items(2, 6), torch.rand(2, 2)
     both = torch.cat([own, context[:, None].expand(-1, 6, -1)], dim=2)

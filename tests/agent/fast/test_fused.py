@@ -288,6 +288,7 @@ def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
         ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
         ("rewards", np.zeros(BATCH + 1, np.float32), "targets has shape"),
         ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
+        ("observations", np.zeros((BATCH, 0, 3), np.float32), "observations has shape"),
         ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
     ],
 )
