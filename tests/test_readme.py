@@ -2,6 +2,8 @@
 
 import re
 
+from unload.reproduce.answer import read_answer, seeds_of
+from unload.reproduce.verdict import cell_table
 from unload.support import files
 
 README = (files.ROOT / "README.md").read_text()
@@ -33,3 +35,17 @@ def test_the_way_to_contribute_names_files_that_exist():
     assert len(paths) > 10
     places = (files.ROOT, files.ROOT / "unload")
     assert not [path for path in paths if not any((place / path).exists() for place in places)]
+
+
+def test_the_answer_is_that_of_the_data():
+    row = r"\| (off|on) \| (256|2048)[^|]* \| (\d+) of (\d+) \| (?:(\d+) %, (\d+)–(\d+) %)? ?\|"
+    found = re.findall(row, README)
+    assert len(found) == 4
+    table = cell_table(read_answer()).set_index("cell")
+    for mask, batch, *numbers in found:
+        cell = f"paper{'_b2048' * (batch == '2048')}_{'mask' if mask == 'on' else 'no_mask'}"
+        runs = table["runs"].get(cell, 0)
+        expected = [runs, len(seeds_of(cell)), "", "", ""]
+        if runs > 1:
+            expected[2:] = (table.loc[cell, ["mean", "low", "high"]] * 100).clip(0, 100).round()
+        assert numbers == [f"{value:.0f}" if value != "" else "" for value in expected], cell
