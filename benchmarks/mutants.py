@@ -29,6 +29,7 @@ import time
 import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import cache_from_source
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = "1"
@@ -72,7 +73,7 @@ MODULES = {
     "env/equalization": "env/test_equalization.py",
     "env/highest_item": "env/test_highest_item.py env/test_vector_base.py",
     "env/observation": "env/test_observation.py env/test_base.py env/test_container.py",
-    "env/vector": "env/test_vector.py env/test_vector_base.py",
+    "env/vector": "env/test_settled.py env/test_vector.py env/test_vector_base.py",
     "env/vector_base": "env/test_vector_base.py env/test_vector.py env/test_highest_item.py",
     "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
     "env/fast/ranking": "env/fast/test_ranking.py",
@@ -176,7 +177,7 @@ def run_tests(tree: Path, module: str) -> int:
     os.dup2(output, 1)
     os.dup2(output, 2)
     sys.path.insert(0, str(tree))
-    sys.dont_write_bytecode = True  # it is known by size and second, and mutants are quick
+    sys.dont_write_bytecode = False
     source = (tree / "unload" / f"{module}.py").read_text()
     numba.config.DISABLE_JIT = "@compiled" in source and "@intrinsic" not in source
     torch.set_num_threads(1)
@@ -215,14 +216,18 @@ class Workers:
         """The module's file, unchanged."""
         return self.original / "unload" / f"{module}.py"
 
+    def _put(self, tree: Path, module: str, code: str) -> None:
+        """Write a module, and remove its bytecode, which is known by size and second only."""
+        path = tree / "unload" / f"{module}.py"
+        path.write_text(code)
+        Path(cache_from_source(path)).unlink(missing_ok=True)
+
     def start(self, module: str, code: str | None, seconds: float, key: object) -> Iterator:
         """Begin one run as soon as a tree is free; yield what ends meanwhile, see ``wait``."""
         while not self._free:
             yield from self.wait()
         tree = self._free.pop()
-        path = tree / "unload" / f"{module}.py"
-        if code is not None:
-            path.write_text(code)
+        self._put(tree, module, self.source(module).read_text() if code is None else code)
         sys.stdout.flush()
         process = os.fork()
         if not process:
@@ -253,7 +258,7 @@ class Workers:
                 if not done:
                     os.waitpid(process, 0)
                 del self._running[process]
-                shutil.copy2(self.source(module), tree / "unload" / f"{module}.py")
+                self._put(tree, module, self.source(module).read_text())
                 self._free.append(tree)
                 output = (tree / "output.txt").read_text(errors="replace")
                 ended.append((key, outcome, spent, output))

@@ -39,6 +39,7 @@ def test_seeds():
     first, _ = envs.reset(seed=4)
     listed, _ = envs.reset(seed=[5, 4])
     assert (first == listed[::-1]).all()
+    assert (envs.reset(seed=[0, 1])[0] == envs.reset(seed=0)[0]).all()
     following, _ = envs.reset()
     assert not (following == listed).all()
     kept, _ = envs.reset(seed=[None, 4])
@@ -183,6 +184,14 @@ def test_an_environment_waits_for_the_pick_that_begins_its_episode(env_id, rng):
         assert_same(alone.set_state(one)[0][0], observations[env])
 
 
+def test_a_state_says_after_how_many_picks_each_episode_ends():
+    envs = gymnasium.make_vec(CONTAINER, 3, max_picks=10).unwrapped
+    envs.reset(seed=0)
+    envs.set_state(envs.get_state() | {"limits": np.array([1, 3, 9])})
+    ends = [envs.step(np.zeros(3, int))[3].tolist() for _ in range(3)]
+    assert ends == [[True, False, False], [False, False, False], [False, True, False]]
+
+
 # --- bad input ----------------------------------------------------------------------
 
 
@@ -239,12 +248,14 @@ def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
     [
         ({"rng": np.array(["{}", "{}"])}, ValueError, r"state\['rng'\] is .*generator's state"),
         ({"rng": np.array(["{}"])}, ValueError, r"state\['rng'\] has shape \(1,\)"),
+        ({"rng": np.array(["{}"] * 3)}, ValueError, r"state\['rng'\] has shape \(3,\)"),
         ({"rng": [["{}"], "{}"]}, ValueError, r"state\['rng'\] is \['{}'\]"),
         ({"rng": ["[" * 100_000] * 2}, ValueError, r"state\['rng'\] is .*generator's state"),
         ({"rng": None}, ValueError, r"state\['rng'\] has shape \(\)"),
         ({"actions": np.full((3, 2), 128)}, ValueError, r"state\['actions'\] holds 128 to 128"),
         ({"actions": np.full((3, 2), -2)}, ValueError, r"state\['actions'\] holds -2 to -2"),
         ({"actions": np.array([[0, 1], [1, -1]])}, ValueError, "holds -1 after a pick"),
+        ({"actions": np.array([[1, 0], [1, -1]])}, ValueError, "holds -1 after a pick"),
         ({"actions": np.zeros((3, 4), int)}, ValueError, r"state\['actions'\] has shape \(3, 4\)"),
     ],
 )
