@@ -53,6 +53,9 @@ def test_length_grows_to_the_size():
         lengths.append(len(replay))
         replay.add(**picks(first, 2))
     assert lengths == [0, 2, 4, 5]
+    last = ReplayBuffer(1, 4)
+    last.add(**picks(0, 3))
+    assert len(last) == 1 and last.arrays["actions"].tolist() == [2]
 
 
 def test_samples_are_uniform_and_seeded(rng):
@@ -186,7 +189,7 @@ def test_bytes_hold_equalized_observations_only(rng):
     with pytest.raises(ValueError, match="observations holds 0.3"):
         replay.add(**batch)
     assert len(replay) == 0
-    for items, next_state in ((64, False), (128, True)):
+    for items, next_state in ((64, False), (129, False), (128, True)):
         with pytest.raises(ValueError, match="^equalized is True with items="):
             ReplayBuffer(20, items, next_state, equalized=True)
 
@@ -198,6 +201,8 @@ def test_picks_are_overwritten_where_it_is_said(rng):
     assert replay.arrays["observations"][:6, 0, 0].tolist() == [0, 50, 2, 3, 51, 5]
     assert replay.arrays["actions"][:6].tolist() == [0, 2, 2, 3, 3, 1]
     assert replay.total == 6
+    replay.overwrite(np.array([0]), **picks(60, 1))
+    assert replay.arrays["observations"][:3, 0, 0].tolist() == [60, 50, 2]
     for slots in ([3, 10], [-1, 2]):
         with pytest.raises(ValueError, match="^slots holds .*expected 0 to 9"):
             replay.overwrite(np.array(slots), **picks(0, 2))

@@ -49,6 +49,13 @@ def test_boxes_at_random_places(rng, walls):
         assert sorted(found.of(BESIDE, box)) == np.flatnonzero(sideways).tolist()
 
 
+@pytest.mark.parametrize(("gap", "touches"), [(CONTACT_TOLERANCE, True), (1.01e-4, False)])
+def test_boxes_touch_up_to_the_tolerance(gap, touches):
+    low = np.array([[0, 0, 0], [0, 1 + gap, 0]])
+    found = contacts(low, low + 1)
+    assert found.of(BESIDE, 0).tolist() == ([1] if touches else [])
+
+
 def test_a_box_alone_touches_nothing():
     found = contacts(np.zeros((1, 3)), np.ones((1, 3)))
     assert len(found.boxes) == 0 and found.of(ABOVE, 0).tolist() == []
