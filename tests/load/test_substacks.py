@@ -13,12 +13,14 @@ from unload.load.substacks import (
     COLUMNS,
     DEPTH,
     FRONT_WALLS,
+    PACKAGE_COLOURS,
     PACKAGES,
     ROWS,
     ROWS_HIGH,
     WALLS,
     build_load,
     front_walls,
+    package_colour,
     stack_load,
     substacks_that_fit,
     wall_cells,
@@ -83,6 +85,22 @@ def test_variants_are_drawn_anew_until_the_count_fits():
     low = build_load(np.full((WALLS, ROWS, 4), 2))
     high = build_load(np.full((WALLS, ROWS, 4), 0))
     assert len(low) < 800 and len(high) > 1000  # such draws exist and must be refused
+
+
+@pytest.mark.parametrize("bound", ["MIN_ITEMS", "MAX_ITEMS"])
+def test_a_load_of_exactly_as_many_items_as_allowed_is_kept(monkeypatch, bound):
+    first = stack_load(np.random.default_rng(5))
+    monkeypatch.setattr(task, bound, len(first))
+    again = stack_load(np.random.default_rng(5))
+    assert again.positions.tobytes() == first.positions.tobytes()
+    monkeypatch.setattr(task, bound, len(first) + (1 if bound == "MIN_ITEMS" else -1))
+    assert len(stack_load(np.random.default_rng(5))) != len(first)
+
+
+def test_colours_of_packages_are_their_codes_and_begin_again():
+    assert [round(255 * part) for part in package_colour(0)] == [0x1F, 0x3A, 0x5F]
+    assert [round(255 * part) for part in package_colour(12)] == [0xF6, 0xE2, 0x7F]
+    assert package_colour(13) == package_colour(0) and len(set(PACKAGE_COLOURS)) == 13
 
 
 def test_the_same_seed_gives_the_same_load_byte_for_byte():
