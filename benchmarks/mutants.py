@@ -21,6 +21,7 @@ import ast
 import contextlib
 import os
 import re
+import resource
 import shutil
 import signal
 import sys
@@ -28,7 +29,7 @@ import tempfile
 import time
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib.util import cache_from_source
 from pathlib import Path
 
@@ -89,6 +90,8 @@ MODULES = {
 }
 # Tests that take long, or start processes of their own.
 SLOW = "compiled_anew or full or program_ends or processes or 64_containers or agent_learns"
+NO_CACHE = shutil.ignore_patterns("__pycache__")  # the first run compiles, as mutants do
+WALL_LIMIT = 900  # s, of a run that waits for ever
 OTHER_CODE = 99  # exit status of a process that did not import the package from its copy
 # Operators that may stand for each other.
 GROUPS = (
@@ -209,8 +212,10 @@ class Workers:
             source = ROOT if tree == self.original else self.original
             tree.mkdir()
             for name in COPIED:
-                copy = shutil.copytree if (source / name).is_dir() else shutil.copy2
-                copy(source / name, tree / name)
+                if (source / name).is_dir():
+                    shutil.copytree(source / name, tree / name, ignore=NO_CACHE)
+                else:
+                    shutil.copy2(source / name, tree / name)
 
     def source(self, module: str) -> Path:
         """The module's file, unchanged."""
@@ -222,8 +227,15 @@ class Workers:
         path.write_text(code)
         Path(cache_from_source(path)).unlink(missing_ok=True)
 
-    def start(self, module: str, code: str | None, seconds: float, key: object) -> Iterator:
-        """Begin one run as soon as a tree is free; yield what ends meanwhile, see ``wait``."""
+    def start(self, module: str, code: str | None, limit: int, key: object) -> Iterator:
+        """Begin one run as soon as a tree is free; yield what ends meanwhile, see ``wait``.
+
+        Args:
+            module: whose tests are run.
+            code: of the module, or None to leave it as it is.
+            limit: processor time in s, because wall time depends on what else runs.
+            key: what ``wait`` yields with the outcome.
+        """
         while not self._free:
             yield from self.wait()
         tree = self._free.pop()
@@ -232,37 +244,53 @@ class Workers:
         process = os.fork()
         if not process:
             try:
+                resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
                 os._exit(run_tests(tree, module))
             except BaseException:
                 traceback.print_exc()
                 os._exit(1)  # the tests did not even start
-        self._running[process] = key, tree, module, time.monotonic(), seconds
+        self._running[process] = key, tree, module, time.monotonic()
 
     def wait(self) -> Iterator[tuple[object, str, float, str]]:
-        """Key, outcome, seconds and output of the runs that have ended, after at least one has."""
+        """Key, outcome, processor time and output of ended runs, after at least one has ended."""
         ended = []
         while self._running and not ended:
             time.sleep(0.02)
-            for process, (key, tree, module, start, seconds) in list(self._running.items()):
-                spent = time.monotonic() - start
-                done, status = os.waitpid(process, os.WNOHANG)
-                if not done and spent < seconds:
-                    continue
-                outcome = "time limit"
-                if done:
-                    outcome = "killed" if status else "survived"
-                    if os.waitstatus_to_exitcode(status) == OTHER_CODE:
-                        raise RuntimeError(f"the tests of {module} did not run on {tree}")
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(process, signal.SIGKILL)  # and what it may have started
+            for process, (key, tree, module, start) in list(self._running.items()):
+                if time.monotonic() - start > WALL_LIMIT:
+                    _kill(process)
+                done, status, used = os.wait4(process, os.WNOHANG)
                 if not done:
-                    os.waitpid(process, 0)
+                    continue
+                _kill(process)  # and what it may have left running
+                code = os.waitstatus_to_exitcode(status)
+                if code == OTHER_CODE:
+                    raise RuntimeError(f"the tests of {module} did not run on {tree}")
+                outcome = "killed" if code else "survived"
+                if code in (-signal.SIGKILL, -signal.SIGXCPU):
+                    outcome = "time limit"
                 del self._running[process]
                 self._put(tree, module, self.source(module).read_text())
                 self._free.append(tree)
                 output = (tree / "output.txt").read_text(errors="replace")
-                ended.append((key, outcome, spent, output))
+                ended.append((key, outcome, used.ru_utime + used.ru_stime, output))
         yield from ended
+
+    def rest(self) -> Iterator[tuple[object, str, float, str]]:
+        """Wait for all runs that are under way; see ``wait``."""
+        while self._running:
+            yield from self.wait()
+
+    def close(self) -> None:
+        """End the runs that are under way."""
+        for process in self._running:
+            _kill(process)
+
+
+def _kill(process: int) -> None:
+    """Kill a process and those that it has started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process, signal.SIGKILL)
 
 
 def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame:
@@ -272,59 +300,58 @@ def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame
         RuntimeError: a module's tests fail without any change.
     """
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        workers = Workers(Path(folder), jobs)
-
-        def keep(results) -> None:
-            for (mutant, count), outcome, spent, output in results:
-                failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
-                rows.append(
-                    {
-                        "module": mutant.module, "line": mutant.line, "operator": mutant.operator,
-                        "before": mutant.before, "after": mutant.after, "outcome": outcome,
-                        "by": failed[0] if failed else "", "seconds": round(spent, 1),
-                        "of": count,
-                    }
-                )  # fmt: skip
-                if outcome == "survived":
-                    print(f"unload/{mutant.module}.py:{mutant.line} {mutant.operator}")
-                    print(f"    - {mutant.before}\n    + {mutant.after}", flush=True)
-
-        for name in names:
-            keep(_all(workers))
-            for _ in workers.start(name, None, 600, None):
-                pass
-            for _, outcome, spent, output in workers.wait():
-                print(f"{name}: {spent:.0f} s without a change", flush=True)
-                if outcome != "survived":
-                    raise RuntimeError(f"the tests of {name} do not pass: {outcome}\n{output}")
-                limit = 2 * spent + 10
-            rng = np.random.default_rng([seed, list(MODULES).index(name)])
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.closing(Workers(Path(folder), jobs)) as workers,
+    ):
+        for number, name in enumerate(MODULES):
+            if name not in names:
+                continue
+            limit = round(2 * _seconds_unchanged(workers, name) + 10)
+            rng = np.random.default_rng([seed, number])
             chosen, count = mutants(workers.source(name), name, sample, rng)
             for mutant in chosen:
-                keep(workers.start(name, mutant.code, limit, (mutant, count)))
-        keep(_all(workers))
-    return pd.DataFrame(rows).sort_values(["module", "line", "operator"])
+                rows += [_row(*end) for end in workers.start(name, mutant.code, limit, mutant)]
+            rows += [_row(*end) for end in workers.rest()]
+            print(f"{name}: {len(chosen)} of {count} mutants tested", flush=True)
+    return pd.DataFrame(rows).sort_values(["module", "line", "operator"], ignore_index=True)
 
 
-def _all(workers: Workers) -> Iterator:
-    while workers._running:
-        yield from workers.wait()
+def _seconds_unchanged(workers: Workers, name: str) -> float:
+    """Processor time of a module's tests, which have to pass, without a change."""
+    ends = [*workers.start(name, None, WALL_LIMIT, None), *workers.rest()]
+    ((_, outcome, seconds, output),) = ends
+    if outcome != "survived":
+        raise RuntimeError(f"the tests of {name} do not pass: {outcome}\n{output}")
+    return seconds
+
+
+def _row(mutant: Mutant, outcome: str, seconds: float, output: str) -> dict:
+    """What is kept of a run; survivors are printed, too."""
+    failed = re.findall(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
+    row = asdict(mutant) | {"outcome": outcome, "by": "".join(failed[:1]), "s": round(seconds, 1)}
+    del row["code"]
+    if outcome == "survived":
+        print(f"unload/{mutant.module}.py:{mutant.line} {mutant.operator}")
+        print(f"    - {mutant.before}\n    + {mutant.after}", flush=True)
+    return row
 
 
 def scores(table: pd.DataFrame) -> pd.DataFrame:
-    """Mutants and survivors by module and in all; the score with its 95 % interval in %."""
+    """Mutants tested and survivors by module and in all; the score and its 95 % interval in %."""
     rows = []
-    for name, part in [*table.groupby("module", sort=False), ("all", table)]:
-        killed = int((part["outcome"] != "survived").sum())
-        interval = scipy.stats.binomtest(killed, len(part)).proportion_ci(method="wilson")
+    for name, part in [*table.groupby("module"), ("all", table)]:
+        outcomes = part["outcome"].value_counts()
+        survived = outcomes.get("survived", 0)
+        score = scipy.stats.binomtest(len(part) - survived, len(part))
+        interval = score.proportion_ci(method="wilson")
         rows.append(
             {
                 "module": name,
-                "mutants": part.groupby("module")["of"].first().sum(),
                 "tested": len(part),
-                "survived": len(part) - killed,
-                "score": f"{100 * killed / len(part):.0f}",
+                "survived": survived,
+                "over time": outcomes.get("time limit", 0),
+                "score": f"{100 * score.statistic:.0f}",
                 "interval": f"{100 * interval.low:.0f}–{100 * interval.high:.0f}",
             }
         )
@@ -335,7 +362,7 @@ def main() -> None:
     """Measure, print the survivors and the scores, and keep all rows in build/mutants.csv."""
     parser = argparse.ArgumentParser(description="Mutation testing.")
     parser.add_argument("modules", nargs="*", help="such as agent/dqn; all if none is given")
-    parser.add_argument("--sample", type=int, default=60, help="mutants per module, 0 for all")
+    parser.add_argument("--sample", type=int, default=40, help="mutants per module, 0 for all")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
     arguments = parser.parse_args()
