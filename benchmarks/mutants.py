@@ -13,7 +13,7 @@ Left out are changes without an effect on behaviour: in annotations, in errors t
 (the condition for it counts) and of ``is`` for ``==``. So are decorators, most of which make a
 function fast only, and operators that numbers of the other kind do not have, such as ``<<`` in
 place of ``*``, because each call of such a mutant fails, which would only raise the score.
-``mutants.md`` has the last result, and why each survivor is left.
+The survivors are listed at the end.
 """
 
 import argparse
