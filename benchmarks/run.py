@@ -47,7 +47,7 @@ def speeds(quick: bool = False) -> pd.DataFrame:
     load = unload.stack_load(np.random.default_rng(0), *([1] if quick else []))
     batch_size = 128 if quick else 2048
     update = f"update, b = {batch_size}, n = 64"
-    few = {"ours": 6400, "memory": 3200, "plain": 640, "theirs": 64}
+    few = {"ours": 6400, "memory": 3200, "plain": 128, "before": 2304, "theirs": 64}
     parts = (  # what, unit, how it is measured, and what changes in small
         ("lifts", "lifts/s", partial(lift_rates, load), {"full": 1, "others": 5, "rounds": 1}),
         ("fill the full simulation", "containers/s", partial(fill_rates, load), {"rounds": 1}),

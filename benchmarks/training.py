@@ -19,6 +19,7 @@ def training_rates(
     ours: int = 256_000,
     memory: int = unload.TrainConfig().replay_size,
     plain: int = 3_200,
+    before: int = 3_200,
     theirs: int = 960,
 ) -> dict[str, float]:
     """Picks per second in the paper's configuration, from end to end.
@@ -33,7 +34,8 @@ def training_rates(
     Args:
         ours: picks that count of our training with the fused update.
         memory: picks made before them.
-        plain: picks that count with plain PyTorch's update, after 3200 others.
+        plain: picks that count with plain PyTorch's update.
+        before: picks made before those.
         theirs: of Stable-Baselines3's DQN.
 
     Returns:
@@ -44,7 +46,7 @@ def training_rates(
         name = f"{threads} thread{'s' * (threads > 1)}"
         rates[f"Stable-Baselines3, {name}"] = _their_rate(theirs, threads)
     with mock.patch.object(fused, "applies", return_value=False):
-        rates["here, PyTorch's update, 1 thread"] = _our_rate(plain, 1, 3200)
+        rates["here, PyTorch's update, 1 thread"] = _our_rate(plain, 1, before)
     for threads in (1, 2):
         name = f"{threads} thread{'s' * (threads > 1)}"
         rates[f"here, fused update, {name}"] = _our_rate(ours, threads, memory)
@@ -54,7 +56,8 @@ def training_rates(
 
 def _our_rate(picks: int, threads: int, before: int) -> float:
     torch.set_num_threads(threads)
-    config = unload.TrainConfig(picks=picks + before, log_interval=10)
+    steps = picks // unload.TrainConfig().num_envs
+    config = unload.TrainConfig(picks=picks + before, log_interval=min(10, steps))
     with tempfile.TemporaryDirectory() as folder:
         curve = unload.train(config, folder, progress=False).curve
     times = curve.loc[curve["picks"] >= before, "wall_time"].to_numpy()

@@ -44,7 +44,7 @@ def partly_unloaded(load: Load, share: float, rng: np.random.Generator) -> Load:
 
 @pytest.mark.slow
 def test_local_agrees_with_full():
-    """On 105 picks of loads in all states, half of them of the hard class if there are any."""
+    """On picks of loads in all states, half of them of the hard class if there are any."""
     rng = np.random.default_rng(2)
     full, local = FullPhysics(), LocalPhysics()
     results = []
@@ -52,7 +52,7 @@ def test_local_agrees_with_full():
         load = partly_unloaded(stack_load(rng, walls=walls), share, rng)
         full.reset(load)
         local.reset(load)
-        for number in range(21):
+        for number in range(11):
             hard = hard_items(load, local.present) if number % 2 else []
             item = int(rng.choice(hard if hard else np.flatnonzero(local.present)))
             distances = full.lift(item), local.lift(item)
@@ -70,7 +70,7 @@ def test_local_agrees_with_full():
         f"{agree[hard].sum()} of {hard.sum()} hard ones; lifted: {success[:, 0].sum()} and "
         f"{success[hard, 0].sum()}"
     )
-    assert len(agree) >= 100 and hard.sum() >= 40 and success[:, 0].sum() >= 10
+    assert len(agree) == 55 and hard.sum() >= 20 and success[:, 0].sum() >= 5
     near = ((distances > 0.17) & (distances < 0.23)).all(axis=1)
     assert (agree | near).all(), distances[~agree]
     assert agree.mean() >= 0.97

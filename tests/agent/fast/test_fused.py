@@ -341,7 +341,7 @@ def test_fused_update_is_a_hundred_times_faster(rng):
         return min(times[1:])  # without the compilation
 
     fast = seconds(lambda: fused.loss_and_gradients(net, observations, actions, targets), 100)
-    assert seconds(plain, 5) > 100 * fast
+    assert seconds(plain, 2) > 100 * fast
 
 
 def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bits(tmp_path):
