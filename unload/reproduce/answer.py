@@ -53,6 +53,13 @@ CELLS: dict[str, TrainConfig] = {
     **_both("literal", literal=True),
     **_both("staggered", staggered=True),
 }
+# The paper's cells, as text and figures name them.
+PAPER_CELLS = {
+    "paper_no_mask": "without the mask, b = 256",
+    "paper_mask": "with the mask, b = 256",
+    "paper_b2048_no_mask": "without the mask, b = 2048",
+    "paper_b2048_mask": "with the mask, b = 2048",
+}
 # Planned seeds of a cell; of those that are not listed, 5.
 SEEDS = {"paper": 10, "paper_b2048": 8}
 OPTIONS = {

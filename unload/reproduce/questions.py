@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from unload.reproduce.answer import CELLS, seeds_of
+from unload.reproduce.answer import CELLS, PAPER_CELLS, seeds_of
 from unload.reproduce.interventions import FAILURES
 from unload.reproduce.verdict import (
     LIKE_THE_PAPER,
+    PAPER_MSR,
     WINDOW_PICKS,
     fall_table,
     falls,
@@ -20,13 +21,6 @@ from unload.reproduce.verdict import (
     windows,
 )
 
-PAPER_MSR = 0.6
-PAPER_CELLS = {
-    "paper_no_mask": "without the mask, b = 256",
-    "paper_mask": "with the mask, b = 256",
-    "paper_b2048_no_mask": "without the mask, b = 2048",
-    "paper_b2048_mask": "with the mask, b = 2048",
-}
 MEMORIES = [cell for cell in CELLS if cell.startswith("memory")]  # replays of 2²² and 2²³ picks
 FEW, MANY = 0.01, 0.03  # shares of failures in the replay that hypothesis 6 speaks of
 FEWEST = 5  # runs of an intervention that count as a result

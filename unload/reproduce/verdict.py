@@ -12,6 +12,7 @@ from unload.support import checks
 END = 0.1  # share of the picks at the end of a run
 WINDOW_PICKS = 500_000
 HIGH, LOW = 0.95, 0.8  # MSR that a fall begins at, and ends at
+PAPER_MSR = 0.6  # at the end of its Fig. 12
 LIKE_THE_PAPER = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
 LEVEL = 0.95  # of the intervals
 

@@ -8,11 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from unload.reproduce.answer import CELLS, read_answer
+from unload.reproduce.answer import CELLS, PAPER_CELLS, read_answer
 from unload.reproduce.figures.style import styled
-from unload.reproduce.questions import PAPER_CELLS, PAPER_MSR
 from unload.reproduce.survival import constant_chance, surviving
-from unload.reproduce.verdict import WINDOW_PICKS, cell_table, end_msr, windows
+from unload.reproduce.verdict import PAPER_MSR, WINDOW_PICKS, cell_table, end_msr, windows
 from unload.support import checks, files
 
 

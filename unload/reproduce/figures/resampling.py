@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.figures.style import styled
-from unload.reproduce.verdict import LEVEL, WINDOW_PICKS, windows
+from unload.reproduce.verdict import LEVEL, PAPER_MSR, WINDOW_PICKS, windows
 
-PAPER_MSR = 0.6  # at the end of its Fig. 12
 MARKERS = "o", "s", "^"
 
 

@@ -15,11 +15,11 @@ from unload.reproduce.figures.style import styled
 from unload.reproduce.intervals import bootstrap_interval, with_intervals
 from unload.reproduce.results import COMMAND, read_table
 from unload.reproduce.study import FEATURE_SETTINGS, read_study
+from unload.reproduce.verdict import PAPER_MSR
 from unload.support import checks, files
 
 CELL = ["features", "mask", "epsilon_final"]
 APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", "without the mask")}
-PAPER_MSR = 0.6  # at the end of its Fig. 12
 OFFLINE = ["features", "seed", "loss", "msr_mask", "msr_no_mask", "deadlocked"]
 
 
