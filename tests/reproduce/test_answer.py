@@ -4,6 +4,7 @@ import pytest
 from unload import load_policy
 from unload.reproduce import answer
 from unload.reproduce.fingerprint import training_fingerprint
+from unload.reproduce.verdict import end_msr
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -84,3 +85,12 @@ def test_unknown_cells_are_refused(tmp_path):
     with pytest.raises(ValueError, match="cells is 'tea'; expected one of 'paper_no_mask'"):
         answer.answer_data(["tea"], folder=tmp_path, runs_dir=tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_the_runs_of_the_papers_cells_are_whole():
+    runs = answer.paper_runs()
+    assert {cell for cell, _, _ in runs} <= set(answer.PAPER_CELLS)
+    assert len({(cell, seed) for cell, seed, _ in runs}) == len(runs) >= 22
+    for _, _, curve in runs:
+        assert curve["picks"].iloc[-1] == 20_000_000
+        assert 0.2 < end_msr(curve) <= 1

@@ -3,7 +3,6 @@ import pandas as pd
 import pytest
 
 from unload.reproduce import resampling
-from unload.reproduce.verdict import end_msr
 
 TWO_ENDINGS = [0.37, 0.40, 0.90, 0.95]
 
@@ -11,31 +10,6 @@ TWO_ENDINGS = [0.37, 0.40, 0.90, 0.95]
 @pytest.fixture
 def rng():
     return np.random.default_rng(0)
-
-
-def test_runs_of_all_experiments_are_found_once():
-    runs = resampling.paper_runs()
-    cells = [cell for cell, _, _ in runs]
-    keys = [(cell, seed) for cell, seed, _ in runs]
-    assert cells == sorted(cells, key=list(resampling.PAPER_CELLS).index)
-    assert len(set(keys)) == len(keys)
-    assert {("paper_b2048_no_mask", 0), ("paper_no_mask", 0), ("paper_mask", 0)} <= set(keys)
-    for _, _, curve in runs:
-        assert curve["picks"].iloc[-1] == 20_000_000
-        assert 0.2 < end_msr(curve) <= 1
-
-
-def test_a_run_of_the_plan_comes_before_one_of_another_experiment(monkeypatch):
-    curve = pd.DataFrame({"picks": [1], "success_rate": [0.5], "loss": [0.1]})
-    monkeypatch.setattr(resampling, "read_answer", lambda folder: [("paper_no_mask", 2, curve)])
-    runs = {(cell, seed): curve for cell, seed, curve in resampling.paper_runs()}
-    assert runs["paper_no_mask", 2] is curve
-    assert len(runs) == 8
-
-
-def test_missing_data_is_refused(tmp_path):
-    with pytest.raises(FileNotFoundError, match="python -m unload.reproduce training"):
-        resampling.paper_runs(tmp_path)
 
 
 def test_intervals_cover_as_promised_where_values_are_normal_and_many(rng):

@@ -156,3 +156,8 @@ def read_answer(folder: str | Path = files.DATA) -> Iterator[tuple[str, int, pd.
         for path in sorted((Path(folder) / "answer" / cell).glob("seed_*.csv")):
             seed = int(path.stem.removeprefix("seed_"))
             yield cell, seed, read_table(path, f"{COMMAND} answer --cells {cell}", COLUMNS)
+
+
+def paper_runs(folder: str | Path = files.DATA) -> list[tuple[str, int, pd.DataFrame]]:
+    """Cell, seed and curve of each published run of the paper's cells."""
+    return [run for run in read_answer(folder) if run[0] in PAPER_CELLS]

@@ -6,54 +6,16 @@ concluded is then known for every sample, and so is how often it would have been
 
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from unload.reproduce.answer import read_answer
-from unload.reproduce.results import COMMAND, read_table
-from unload.reproduce.study import read_study
 from unload.reproduce.verdict import LEVEL, t_interval
-from unload.support import checks, files
+from unload.support import checks
 
-# Cells of the paper's configuration, as figures name them.
-PAPER_CELLS = {
-    "paper_b2048_no_mask": "without the mask, b = 2048",
-    "paper_no_mask": "without the mask, b = 256",
-    "paper_b2048_mask": "with the mask, b = 2048",
-    "paper_mask": "with the mask, b = 256",
-}
 BOOTSTRAPS = 999  # of each interval
 BATCH = 100  # samples whose bootstraps are drawn at a time
-
-
-def paper_runs(folder: str | Path = files.DATA) -> list[tuple[str, int, pd.DataFrame]]:
-    """Return all runs of the paper's configuration, whichever experiment has made them.
-
-    Args:
-        folder: of the data.
-
-    Returns:
-        Cell (in the order of ``PAPER_CELLS``), seed, and curve with the columns ``picks``,
-        ``success_rate`` and ``loss``. The curves have a row per episode of all environments,
-        those of the experiment "endings" one per million picks.
-
-    Raises:
-        FileNotFoundError: data is missing; the message says how to compute it.
-    """
-    path = Path(folder) / "training_curves.csv"
-    training = read_table(path, f"{COMMAND} training", ["seed", "picks", "success_rate", "loss"])
-    _, endings = read_study("endings", folder)
-    found = {("paper_b2048_no_mask", seed): curve for seed, curve in training.groupby("seed")}
-    found |= {("paper_no_mask", seed): curve for seed, curve in endings.groupby("seed")}
-    found |= {(cell, seed): curve for cell, seed, curve in read_answer(folder)}
-    return [
-        (cell, seed, found[cell, seed])
-        for cell in PAPER_CELLS
-        for seed in sorted(seed for each, seed in found if each == cell)
-    ]
 
 
 def coverage(

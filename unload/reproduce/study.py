@@ -91,11 +91,6 @@ def long(picks: int = 20_000_000, seeds: int = 3) -> dict[str, TrainConfig]:
     return _varied([{}], ("positions",), picks, seeds)
 
 
-def endings(picks: int = 20_000_000, seeds: int = 4) -> dict[str, TrainConfig]:
-    """The paper's features and picks, with more seeds than its batch would allow."""
-    return _varied([{}], ("noisy ranks",), picks, seeds)
-
-
 def recommended(picks: int = 1_000_000, seeds: int = 5) -> dict[str, TrainConfig]:
     """The paper's configuration but for one thing, and shorter: positions, not ranks."""
     return _varied([{"batch_size": TrainConfig().batch_size}], ("positions",), picks, seeds)
@@ -103,7 +98,7 @@ def recommended(picks: int = 1_000_000, seeds: int = 5) -> dict[str, TrainConfig
 
 EXPERIMENTS: dict[str, Callable[..., dict[str, TrainConfig]]] = {
     experiment.__name__: experiment
-    for experiment in (factorial, recommended, rewards, search, networks, attention, long, endings)
+    for experiment in (factorial, recommended, rewards, search, networks, attention, long)
 }
 OPTIONS = {
     "--experiments": {"nargs": "+", "choices": EXPERIMENTS, "default": tuple(EXPERIMENTS)},
