@@ -1,0 +1,166 @@
+"""Numbers that sentences state, in README and notebooks, are those of data/.
+
+Each claim is a sentence's words with numbers in braces; the data fill them in. Where data change,
+the test names the sentence that has to be written anew.
+"""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload import task
+from unload.reproduce.answer import PAPER_CELLS, paper_runs, seeds_of
+from unload.reproduce.figures.tuning import read_curves
+from unload.reproduce.measure import POLICY_LOADS
+from unload.reproduce.study import read_study
+from unload.reproduce.tuning import greedy_msr, greedy_reached, reached_at, running_mean
+from unload.reproduce.verdict import LIKE_THE_PAPER, end_msr, windows
+from unload.support import files
+
+COUNTS = "no one two three four five six seven eight nine ten".split()
+
+
+def text_of(name: str) -> str:
+    """The words of a text file, or of a notebook's text cells, with single spaces."""
+    path = files.ROOT / name
+    text = path.read_text()
+    if path.suffix == ".ipynb":
+        cells = json.loads(text)["cells"]
+        text = "\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "markdown")
+    return " ".join(text.replace("*", "").split())
+
+
+def curves_of(cell: str) -> list[pd.DataFrame]:
+    return [curve for each, _, curve in paper_runs() if each == cell]
+
+
+def tops(cell: str) -> np.ndarray:
+    """Highest window of each run, in percent."""
+    return np.array([100 * windows(each)["success_rate"].max() for each in curves_of(cell)])
+
+
+def ends(cell: str) -> np.ndarray:
+    """MSR over the last tenth of each run, in percent."""
+    return np.array([100 * end_msr(each) for each in curves_of(cell)])
+
+
+def runs_done():
+    return len(paper_runs()), sum(len(seeds_of(cell)) for cell in PAPER_CELLS)
+
+
+def recommended_picks():
+    rows, _ = read_study("recommended")
+    assert (rows[["msr_mask", "msr_no_mask"]] == 1).all(axis=None)
+    return (POLICY_LOADS * task.MAX_PICKS,)
+
+
+def runs_with_positions():
+    rows = pd.concat([read_study(name)[0] for name in ("recommended", "long", "factorial")])
+    rows = rows[rows["features"] == "positions"]
+    assert (rows[["msr_mask", "msr_no_mask"]] > 0.9995).all(axis=None)
+    return len(rows), rows["picks"].min() / 1e6, rows["picks"].max() / 1e6
+
+
+def unmasked_runs():
+    return tops("paper_no_mask").min(), tops("paper_no_mask").max()
+
+
+def masked_runs():
+    low, high = (100 * end for end in LIKE_THE_PAPER)
+    alike = ((low <= ends("paper_mask")) & (ends("paper_mask") <= high)).sum()
+    return tops("paper_mask").min(), tops("paper_mask").max(), alike, low, high
+
+
+def first_large_runs():
+    return tuple(ends("paper_b2048_no_mask")[:4])
+
+
+def large_runs_by_end():
+    found = np.sort(ends("paper_b2048_no_mask"))
+    assert len(found) == 4
+    return tuple(found)
+
+
+def engines_apart():
+    rows = pd.read_csv(files.DATA / "benchmarks" / "engines.csv")
+    lifted = rows[["pybullet", "mujoco"]] >= task.LIFT_THRESHOLD
+    differing = rows[lifted["pybullet"] != lifted["mujoco"]]
+    most = (differing[["pybullet", "mujoco"]] - task.LIFT_THRESHOLD).abs().max(axis=None)
+    return len(differing), len(rows), np.ceil(1000 * most)
+
+
+def greedy_steps():
+    steps = []
+    for equalize in (True, False):
+        runs = read_curves(files.DATA, "hitrate", 2048, 1e-3, equalize)
+        steps.append(greedy_reached(runs.values())["step"])
+    return steps
+
+
+def fast_enough_at_a_high_rate():
+    runs = read_curves(files.DATA, "hitrate", 1024, 1e-2).values()
+    steps = [reached_at(running_mean(greedy_msr(run))) for run in runs]
+    return COUNTS[np.isfinite(steps).sum()], COUNTS[len(steps)]
+
+
+def trained_ends():
+    runs = ends("paper_b2048_no_mask")[:4]
+    high, low = COUNTS[(runs > 90).sum()], COUNTS[(runs < 40).sum()]
+    return high.capitalize(), COUNTS[len(runs)], low
+
+
+def lost_without_the_mask():
+    table = pd.read_csv(files.DATA / "comparison.csv")
+    rows = table[(table["policy"] == "paper") & ~table["mask"]]
+    lost = 100 * (1 - rows.groupby("condition")["success_rate"].mean())
+    return tuple(lost[["500 picks", "boxes × 1.2"]].sort_values())
+
+
+# File, words with places for numbers, and what fills these from data/.
+CLAIMS = [
+    ("README.md", "{} of the {} planned runs of the paper's configuration", runs_done),
+    ("README.md", "misses none of {:,} picks in fresh containers", recommended_picks),
+    ("README.md", "all {} runs of {:.0f} to {:.0f} million picks", runs_with_positions),
+    ("README.md", "rise to {:.0f}–{:.0f} % for a while, and come down again", unmasked_runs),
+    ("README.md", "rise to {:.0f}–{:.0f} %; 9 fall, {} end at {:.0f}–{:.0f} %", masked_runs),
+    ("README.md", "two end at {:.0f} and {:.0f} %, two at {:.0f} and {:.0f} %", large_runs_by_end),
+    ("notebooks/03_lifting.ipynb", "within {2:.0f} mm of the threshold", engines_apart),
+    (
+        "notebooks/08_hyperparameters.ipynb",
+        "{:.0f} steps with FE and {:.0f} without at this batch size",
+        greedy_steps,
+    ),
+    (
+        "notebooks/08_hyperparameters.ipynb",
+        "{} of these {} runs get there",
+        fast_enough_at_a_high_rate,
+    ),
+    (
+        "notebooks/09_training.ipynb",
+        "{} of the {} rise again late and end above 90 %; the other {} end below 40 %",
+        trained_ends,
+    ),
+    (
+        "notebooks/10_paper_and_here.ipynb",
+        "otherwise in {} of {:,} hard situations, all within {:.0f} mm of the threshold",
+        engines_apart,
+    ),
+    (
+        "notebooks/12_from_surprise_to_answer.ipynb",
+        "ended at {:.0f}, {:.0f}, {:.0f} and {:.0f} %",
+        first_large_runs,
+    ),
+    (
+        "notebooks/13_a_policy_without_a_miss.ipynb",
+        "the same weights lose {:.0f} to {:.0f} % of all picks",
+        lost_without_the_mask,
+    ),
+]
+
+
+@pytest.mark.parametrize("name, words, numbers", CLAIMS, ids=[claim[1] for claim in CLAIMS])
+def test_a_sentence_states_what_the_data_say(name, words, numbers):
+    sentence = words.format(*numbers())
+    assert sentence in text_of(name), f"{name} should say: {sentence}"
