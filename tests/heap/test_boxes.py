@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from unload.heap.boxes import DOOR, REAR, Heap, package_sizes
+from unload.heap.boxes import DOOR, FARTHEST_EDGE, REAR, Heap, package_sizes
 
 
 def turned(angle: float, axis: int) -> Heap:
@@ -32,6 +32,12 @@ def test_tilt_is_measured_from_the_nearest_axis(angle, tilt):
 def test_front_is_the_foremost_face_not_the_foremost_centre(cubes):
     assert cubes((5, 1, 0), (6, 1, 0)).front() == pytest.approx(6.2)
     assert cubes((5, 1, 0)).only(np.array([], int)).front() == REAR
+
+
+def test_the_edge_is_at_the_front_but_does_not_give_way_beyond_the_door(cubes):
+    assert cubes((5, 1, 0), (6, 1, 0)).edge() == pytest.approx(6.2)
+    assert cubes((5, 1, 0), (7.1, 1, 0)).edge() == FARTHEST_EDGE
+    assert DOOR < FARTHEST_EDGE < 7.3
 
 
 def test_only_keeps_boxes_by_number_and_by_flag(cubes):

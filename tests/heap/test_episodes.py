@@ -60,10 +60,23 @@ def test_the_oracle_picks_the_box_that_brings_most(make_heap_env, cubes):
     """Of a row of three and a single box, the rear one of the row brings all three."""
     heap = cubes((4.8, 0.5, 0), (5.21, 0.5, 0), (5.62, 0.5, 0), (5.62, 2.0, 0))
     env = make_heap_env(heaps=[heap])
-    oracle = Oracle(env, falls_weight=1.0)
+    for again in (None, "whole"):
+        oracle = Oracle(env, falls_weight=1.0, again=again)
+        episode = play(env, oracle, heap, 0)
+        oracle.close()
+        assert int(episode.boxes[0]) == 0 and episode.unloaded[0] == 3
+
+
+def test_an_oracle_that_tries_again_believes_the_second_physics(make_heap_env, cubes, monkeypatch):
+    """A first physics in which all boxes look alike leaves the choice to the second."""
+    heap = cubes((5.62, 2.0, 0), (4.8, 0.5, 0), (5.21, 0.5, 0), (5.62, 0.5, 0))
+    env = make_heap_env(heaps=[heap])
+    oracle = Oracle(env, falls_weight=1.0, again="coarse")
+    nothing = oracle._rakes[0].pick(cubes((4.5, 1, 0)), 0)
+    monkeypatch.setattr(oracle._rakes[0], "pick", lambda heap, box: nothing)
     episode = play(env, oracle, heap, 0)
     oracle.close()
-    assert int(episode.boxes[0]) == 0 and episode.unloaded[0] == 3
+    assert int(episode.boxes[0]) == 1 and episode.unloaded[0] == 3
 
 
 def test_bad_input_is_refused(make_heap_env, pile):

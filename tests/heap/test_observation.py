@@ -58,6 +58,12 @@ def test_features_do_not_change_where_the_heap_stands(camera, pile):
     assert features(moved) == pytest.approx(features(seen), abs=1e-6)
 
 
+def test_boxes_outside_the_door_do_not_move_the_edge(camera, cubes):
+    heap = cubes((6.0, 1.0, 0), (7.1, 2.0, 0))
+    rows = features(true_boxes(heap, camera.scan(heap)))
+    assert column(rows, "behind") == pytest.approx([0.1, 1.2])
+
+
 def test_the_camera_knows_the_part_that_shows(camera, pile):
     scan = camera.scan(pile)
     true, seen = true_boxes(pile, scan), camera_boxes(pile, scan)

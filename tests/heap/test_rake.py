@@ -24,6 +24,12 @@ def test_a_box_too_far_behind_pushes_none_over_the_edge(cubes, make_rake):
     assert make_rake().pick(row, 0).unloaded.tolist() == [True, False, False]
 
 
+def test_boxes_that_lie_outside_do_not_push_the_edge_away(cubes, make_rake):
+    """The third reaches to 7.39 m; the second is pushed to 7.28 m, past the edge at 7.2 m."""
+    heap = cubes((6.0, 1, 0), (6.5, 1, 0), (7.19, 2, 0))
+    assert make_rake().pick(heap, 0).unloaded.tolist() == [True, True, False]
+
+
 def test_too_heavy_a_row_does_not_come(cubes, make_rake):
     row = cubes(*((4.3 + 0.405 * k, 1, level) for k in range(5) for level in range(4)))
     outcome = make_rake(friction=1.0, mass=3.0).pick(row, 0)

@@ -32,7 +32,8 @@ class HeapEnv(EpisodeEnv):
     box towards the door, at 1 m/s, with at most 60 N (the weight of six boxes), for 0.7 m (the
     longest edge of a box) or 1 s. The box came if it moved 0.63 m, nine tenths of that. Other
     boxes are pushed, carried or lose their support. The conveyor's edge stands at the foremost
-    face of the heap, where it cannot count boxes that creep by millimetres. After 0.5 s of
+    face of the heap, where it cannot count boxes that creep by millimetres, but never more
+    than 0.2 m outside the door: it does not give way to boxes that come out. After 0.5 s of
     rest, in which a box falls by 1.2 m, boxes whose centre is beyond the edge are unloaded; so
     is the dragged one if it came. Rest and unloading are repeated, four times at most, until
     nothing more is unloaded and no box is faster than 0.2 m/s: a toppling box is, a creeping
@@ -50,7 +51,7 @@ class HeapEnv(EpisodeEnv):
 
     | Column | Observation | unit |
     |---|---|---|
-    | 0 | distance of the centre behind the foremost visible face | m |
+    | 0 | distance of the centre behind the conveyor's edge, by the foremost visible face | m |
     | 1 | y of the centre, from the middle | m |
     | 2 | z of the centre | m |
     | 3–5 | extents of the upright block around the box, along x, y, z | m |

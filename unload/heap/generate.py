@@ -35,7 +35,8 @@ def settled_heap(rng: np.random.Generator, scale: float = 1.0, tries: int = 20) 
 
     Args:
         rng: makes it.
-        scale: of all edges of the boxes.
+        scale: of all edges of the boxes. If it is above 1, fewer boxes are dropped, and must
+            be left, so that their volume stays the same.
         tries: heaps made at most.
 
     Raises:
@@ -44,25 +45,26 @@ def settled_heap(rng: np.random.Generator, scale: float = 1.0, tries: int = 20) 
     """
     checks.generator("rng", rng)
     checks.real("scale", scale, 0.5, 1.5)
+    boxes = min(BOXES, round(BOXES / scale**3))
     for _ in range(checks.integer("tries", tries, 1)):
-        heap, fastest = _settled(_dropped(rng, scale))
-        if _accepted(heap, fastest):
+        heap, fastest = _settled(_dropped(rng, scale, boxes))
+        if _accepted(heap, fastest, FEWEST * boxes / BOXES):
             return heap
     raise RuntimeError(f"{tries} heaps of scale {scale} were rejected; see settled_heap")
 
 
-def _dropped(rng: np.random.Generator, scale: float) -> Heap:
+def _dropped(rng: np.random.Generator, scale: float, count: int) -> Heap:
     """Boxes that have come to lie behind the barrier."""
-    packages = rng.integers(len(PACKAGES), size=BOXES)
+    packages = rng.integers(len(PACKAGES), size=count)
     sizes = package_sizes(packages, scale)
     time_step, iterations, _ = PHYSICS["coarse"]
     world = World(time_step, iterations=iterations)
     add_walls(world)
     world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0)
     bodies: list[int] = []
-    for first in range(0, BOXES, LAYER):
+    for first in range(0, count, LAYER):
         top = max((world.pose(body)[0][2] for body in bodies), default=0.0)
-        for number in range(first, min(first + LAYER, BOXES)):
+        for number in range(first, min(first + LAYER, count)):
             turn = rng.normal(size=4)
             place = (
                 rng.uniform(REAR + MARGIN, BARRIER - MARGIN),
@@ -108,11 +110,11 @@ def _settled(heap: Heap) -> tuple[Heap, float]:
     return left, fastest
 
 
-def _accepted(heap: Heap, fastest: float) -> bool:
+def _accepted(heap: Heap, fastest: float, fewest: float) -> bool:
     """Whether a heap is worth keeping."""
     top = (heap.positions[:, 2] + heap.extents()[:, 2] / 2).max()
     inside = ((heap.positions > (REAR, 0, 0)) & (heap.positions < (DOOR, WIDTH, HIGHEST))).all()
-    return bool(len(heap) >= FEWEST and top <= HIGHEST and inside and fastest <= FASTEST)
+    return bool(len(heap) >= fewest and top <= HIGHEST and inside and fastest <= FASTEST)
 
 
 def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from unload.heap.boxes import WIDTH, Heap
+from unload.heap.boxes import FARTHEST_EDGE, WIDTH, Heap
 from unload.heap.camera import SEEN, Scan, visible_boxes
 
 ROWS = 96  # about 55 boxes are visible; if more are, those farthest from the door are left out
@@ -90,7 +90,7 @@ def features(seen: SeenBoxes) -> np.ndarray:
     """
     count = len(seen.numbers)
     low, high = seen.centres - seen.extents / 2, seen.centres + seen.extents / 2
-    edge = high[:, 0].max(initial=-np.inf)
+    edge = min(high[:, 0].max(initial=-np.inf), FARTHEST_EDGE)
     rows = np.zeros((ROWS, len(COLUMNS)), np.float32)
     rows[:count] = np.column_stack(
         [
