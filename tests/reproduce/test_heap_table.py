@@ -7,12 +7,14 @@ import pandas as pd
 import pytest
 import torch
 
-from unload.heap.env import HeapEnv
+from unload.heap.env import HeapEnv, stored_heaps
 from unload.heap.learning import save_network
 from unload.heap.network import HeapNetwork
 from unload.heap.rules import family
 from unload.reproduce import heap_table
 from unload.reproduce.heap_learning import network_path
+from unload.reproduce.heap_variation import varied_path
+from unload.reproduce.intervals import bootstrap_interval
 
 
 @pytest.fixture
@@ -44,6 +46,16 @@ def test_compared_gives_means_and_ratios_over_pairs(episodes):
     assert 1.1 < learned["boxes_ratio_low"] < 1.25 < learned["boxes_ratio_high"] < 1.6
     assert learned["net_ratio"] == pytest.approx(2.0 / 1.5)
     assert learned["boxes_low"] < 2.5 < learned["boxes_high"]
+    assert learned[["net_more", "net_more_low", "net_more_high"]].tolist() == [0.5, 0.5, 0.5]
+
+
+def test_a_policy_on_fewer_heaps_is_compared_on_those(episodes):
+    few = episodes[(episodes["policy"] == "learned") & (episodes["heap"] < 2)]
+    rest = episodes[episodes["policy"] == "best rule"]
+    table = heap_table.compared(pd.concat([rest, few])).set_index("policy")
+    row = table.loc["learned"]
+    assert row["heaps"] == 2 and row["boxes"] == 2.0
+    assert row["boxes_ratio"] == pytest.approx(2.0 / 1.5) and row["net_more"] == 0.5
 
 
 def test_pairs_make_the_interval_narrow():
@@ -54,10 +66,58 @@ def test_pairs_make_the_interval_narrow():
     assert np.isnan(heap_table.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
 
 
+def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
+    """What distinguishes them from percentile ones, and their agreement with scipy's own."""
+    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
+    mean, low, high = heap_table.mean_interval(values)
+    percentile = bootstrap_interval(values)
+    assert mean == 4.1 and low < mean < high
+    assert low > percentile[0] and high > percentile[1]
+    assert heap_table.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
+    assert heap_table.mean_interval(values) == (mean, low, high)
+
+
 def test_the_best_rule_depends_on_the_weight_of_falls():
     rules = pd.DataFrame({"rule": ["bold", "shy"], "boxes": [2.0, 1.2], "falls": [1.0, 0.0]})
     assert heap_table.best_rule(rules, 0.0) == "bold"
     assert heap_table.best_rule(rules, 1.0) == "shy"
+
+
+def test_variants_are_named_by_what_they_differ_in():
+    names = [heap_table.learned_name(*variant) for variant in heap_table.VARIANTS]
+    assert names == [
+        "learned", "learned, γ=0.5", "learned, γ=0.8", "learned, pooled", "learned, own"
+    ]  # fmt: skip
+
+
+def save_networks(folder, count=2):
+    for seed in range(count):
+        network = HeapNetwork("own", 8, torch.Generator().manual_seed(seed))
+        for kind, gamma in heap_table.VARIANTS:
+            save_network(network, network_path(1, kind, gamma, seed, folder))
+
+
+def test_the_plan_plays_what_is_worth_it(tmp_path):
+    """All policies at the λ of the table; few of them elsewhere."""
+    save_networks(tmp_path, 5)
+    rules = pd.DataFrame({"rule": list(heap_table.family())[:2], "boxes": [2, 1], "falls": [1, 0]})
+    cells = heap_table.plan(rules, runs_dir=tmp_path)
+    of = {}
+    for cell in cells:
+        of.setdefault((cell.condition, cell.falls_weight), []).append(cell.policy)
+    shown = of.pop(("as trained", 1.0))
+    assert len(shown) == len(set(shown)) == 18
+    assert {"oracle", "learned seed 4", "learned, own", *heap_table.RULES} <= set(shown)
+    few = {"random", "highest", "best rule", "learned"}
+    for (condition, weight), policies in of.items():
+        wanted = {"best rule", "learned"} if condition == "as trained" else few
+        assert set(policies) == wanted and len(policies) == len(wanted), (condition, weight)
+    assert len(of) == 11
+    assert {cell.heaps for cell in cells if cell.policy != "oracle"} == {30}
+    assert [cell.heaps for cell in cells if cell.policy == "oracle"] == [10]
+    assert sum(cell.heaps for cell in cells) / 30 < 52
+    with pytest.raises(FileNotFoundError, match="heap-variation makes it"):
+        heap_table.plan(rules, variation=True, runs_dir=tmp_path)
 
 
 @pytest.mark.slow
@@ -68,30 +128,36 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     some = dict(list(family().items())[:2])
     monkeypatch.setattr(heap_table, "family", lambda: some)
     heap_table.rules_data(1, tmp_path, tmp_path, progress=False)
-    for seed in (0, 1):
-        network = HeapNetwork("own", 8, torch.Generator().manual_seed(seed))
-        save_network(network, network_path(1, "pairs", 0.0, seed, tmp_path))
+    save_networks(tmp_path)
+    save_network(HeapNetwork("own", 8), varied_path(0, tmp_path))
+    monkeypatch.setattr(heap_table, "sized_heap", lambda *given: stored_heaps("train")[0])
+    monkeypatch.setattr(heap_table, "sized_job", lambda *given: ({"sized": given}, int))
     arguments = {
         "heaps": 2,
         "physics": "near",
-        "conditions": ["as trained", "camera"],
+        "conditions": ["as trained", "camera", "boxes × 0.8"],
         "weights": [0.0],
         "rounds": 2,
         "variants": [("pairs", 0.0)],
-        "oracle": False,
+        "oracle_heaps": 0,
+        "variation": True,
         "folder": tmp_path,
         "runs_dir": tmp_path,
         "progress": False,
     }
     table = heap_table.table_data(**arguments)
     trained = table[(table["condition"] == "as trained") & (table["falls_weight"] == 1.0)]
-    learned = [f"learned pairs γ=0{end}" for end in ("", " seed 0", " seed 1")]
+    learned = ["learned", "learned seed 0", "learned seed 1", "trained with variation"]
     assert set(trained["policy"]) == {*rules, "best rule", *learned}
-    camera = table[table["condition"] == "camera"]
-    assert set(camera["policy"]) == set(trained["policy"])
+    for condition in ("camera", "boxes × 0.8"):
+        few = {"random", "best rule", "learned", "trained with variation"}
+        assert set(table["policy"][table["condition"] == condition]) == few
     varied = table[table["falls_weight"] == 0.0]
-    assert set(varied["policy"]) == {"best rule", "learned pairs γ=0"}
+    assert set(varied["policy"]) == {"best rule", "learned"}
     assert (table["heaps"] == 2).all()
+    episodes = pd.read_csv(tmp_path / "heap" / "episodes.csv")
+    boxes = episodes[(episodes["policy"] == "random")].groupby("condition")["boxes"].sum()
+    assert boxes["as trained"] != boxes["boxes × 0.8"], "other heaps"
     stored = sorted((tmp_path / "heap" / "episodes").iterdir())
     written = [path.stat().st_mtime_ns for path in stored]
     again = heap_table.table_data(**arguments)
@@ -99,6 +165,17 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     assert [path.stat().st_mtime_ns for path in stored] == written
 
 
-def test_unknown_conditions_are_refused(tmp_path):
+def test_an_oracle_plays_its_heaps(tmp_path):
+    """It tries boxes in two physics."""
+    env = HeapEnv("test", physics="near", max_picks=1)
+    policy = heap_table.make_policy({"oracle": 1.0}, env)
+    assert [rake.physics for rake in policy._rakes] == ["near", heap_table.PHYSICS]
+    policy.close()
+    env.close()
+
+
+def test_unknown_conditions_and_missing_rules_are_refused(tmp_path):
+    with pytest.raises(FileNotFoundError, match="heap-rules makes it"):
+        heap_table.table_data(folder=tmp_path)
     with pytest.raises(ValueError, match="a condition is 'rain'; expected one of 'as trained'"):
         heap_table.table_data(conditions=["rain"], folder=tmp_path)

@@ -122,15 +122,13 @@ class Rake:
         Raises:
             TypeError, ValueError: ``heap`` is no ``Heap``, or ``box`` none of its boxes.
         """
-        if not isinstance(heap, Heap):
-            raise TypeError(f"heap is {heap!r}; expected a Heap")
-        box = checks.integer("box", box, 0, len(heap) - 1)
+        box = self._check(heap, box)
         world, edge = self._world, heap.edge()
         bodies = self._build(heap, box)
         moved = world.drag(bodies[box], SPEED, FORCE, REACH, TIME)
         came = moved >= CAME
         unloaded = np.zeros(len(heap), bool)
-        last = _Poses(heap)
+        last = Poses(heap)
         for _ in range(RESTS):
             world.step(REST)
             last.read(world, bodies)
@@ -147,6 +145,12 @@ class Rake:
         left = np.flatnonzero(~unloaded)
         after = Heap(last.positions, last.orientations, heap.sizes, heap.packages).only(left)
         return Outcome(after, left, unloaded, fallen, float(moved), bool(came))
+
+    def _check(self, heap: Heap, box: int) -> int:
+        """The box as an int, if both are as ``pick`` expects them."""
+        if not isinstance(heap, Heap):
+            raise TypeError(f"heap is {heap!r}; expected a Heap")
+        return checks.integer("box", box, 0, len(heap) - 1)
 
     def _build(self, heap: Heap, box: int) -> dict[int, int]:
         """Fill the world; return the bodies of the boxes that can move, by box number."""
@@ -173,7 +177,7 @@ class Rake:
         self._world.close()
 
 
-class _Poses:
+class Poses:
     """Where the boxes of a heap were last seen."""
 
     def __init__(self, heap: Heap) -> None:

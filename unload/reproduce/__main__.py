@@ -10,7 +10,9 @@ from unload.reproduce import (
     drift,
     heap,
     heap_learning,
+    heap_lifts,
     heap_table,
+    heap_variation,
     interventions,
     lifts,
     observation,
@@ -49,7 +51,9 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "policies with every box simulated", robustness.robustness_data, robustness.OPTIONS
     ),
     **heap.PARTS,
+    **heap_lifts.PARTS,
     **heap_learning.PARTS,
+    **heap_variation.PARTS,
     **heap_table.PARTS,
 }  # fmt: skip
 
