@@ -23,7 +23,7 @@ LIBRARIES = {
     "numba": ("support/compiled.py", "agent/fast/kernel.py"),
     "numpy": ("",),
     "pandas": ("agent/", "reproduce/"),
-    "plotly": ("load/view.py", "play/replay.py"),
+    "plotly": ("load/view.py", "play/replay.py", "reproduce/figures/heap_view.py"),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("agent/weights.py", "heap/learning.py"),
     "scipy": ("heap/", "reproduce/"),

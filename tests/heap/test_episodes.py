@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from unload.heap.episodes import Oracle, episode_from, exploring, picks_of, play
+from unload.heap.episodes import Oracle, episode_from, exploring, outcomes, picks_of, play
 from unload.heap.rules import RULES
 
 
@@ -41,6 +41,18 @@ def test_picks_are_transitions(make_heap_env, cubes):
     assert np.array_equal(picks.next_observations[0], picks.observations[1])
     assert not picks.next_masks[-1].any(), "the heap is empty at the end"
     assert picks.unloaded.sum() == 2
+
+
+def test_outcomes_of_an_episode_are_those_that_were_played(make_heap_env, make_rake, pile):
+    episode = play(make_heap_env(max_picks=3), RULES["lowest"], pile, 0, keep_heaps=True)
+    found = outcomes(episode, make_rake("coarse"))
+    assert [int(one.unloaded.sum()) for one in found] == episode.unloaded.tolist()
+    assert [int(one.fallen.sum()) for one in found] == episode.falls.tolist()
+    assert [one.moved for one in found] == episode.moved.tolist()
+    with pytest.raises(ValueError, match="other physics than the episode's; it is whole"):
+        outcomes(episode, make_rake("whole"))
+    with pytest.raises(ValueError, match="episode holds no heaps"):
+        outcomes(play(make_heap_env(), RULES["lowest"], pile, 0), make_rake("coarse"))
 
 
 def test_exploring_picks_half_at_random_and_half_as_its_favourite(rng):

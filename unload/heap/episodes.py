@@ -9,7 +9,7 @@ from unload.heap.boxes import Heap
 from unload.heap.env import HeapEnv
 from unload.heap.learning import Picks
 from unload.heap.observation import COLUMNS, ROWS
-from unload.heap.rake import Rake
+from unload.heap.rake import Outcome, Rake
 from unload.heap.rules import FAMILY_COLUMNS, best, linear, random
 from unload.support import checks
 
@@ -106,6 +106,29 @@ def play(
         *columns,
         tuple(heaps) if keep_heaps else (),
     )
+
+
+def outcomes(episode: Episode, rake: Rake) -> list[Outcome]:
+    """What each pick of an episode with its heaps has done, box by box.
+
+    It is computed again, which gives the same to the bit, because a pick is a function of the
+    heap and the box.
+
+    Args:
+        episode: with ``heaps``.
+        rake: with the physics of the environment that was played.
+
+    Raises:
+        ValueError: the episode does not hold its heaps, or the rake's physics is another.
+    """
+    if not episode.heaps:
+        raise ValueError("episode holds no heaps; expected one played with keep_heaps=True")
+    found = []
+    for heap, box, after in zip(episode.heaps, episode.boxes.tolist(), episode.heaps[1:]):
+        found.append(rake.pick(heap, box))
+        if not np.array_equal(found[-1].heap.positions, after.positions):
+            raise ValueError(f"rake has other physics than the episode's; it is {rake.physics}")
+    return found
 
 
 def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Callable:

@@ -1,35 +1,57 @@
 """The figures of the heaps."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from unload.reproduce.figures import heap
+from unload.reproduce.heap_table import compared
 from unload.support.provenance import run_record, write_provenance
 
-FIGURES = [heap.throughput_falls, heap.physics_agreement]
+FIGURES = [
+    heap.policies,
+    heap.ablations,
+    heap.conditions,
+    heap.throughput_falls,
+    heap.lifts_and_picks,
+    heap.camera_errors,
+    heap.physics_agreement,
+]
+BOXES = {"lowest": 1.2, "highest": 1.0, "best rule": 1.8, "learned": 2.4}
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """Made-up tables of three policies and of four picks."""
+    """Made-up tables: four policies and a seed on three heaps, two λ, two conditions."""
+    rng = np.random.default_rng(0)
+    cells = [("as trained", 1.0, name) for name in (*BOXES, "learned seed 0", "learned, own")]
+    cells += [("as trained", 0.0, name) for name in ("best rule", "learned")]
+    cells += [("camera", 1.0, name) for name in ("best rule", "highest", "learned")]
     rows = []
-    for policy, weights in (("lowest", [1.0]), ("best rule", [0.0, 1.0]), ("learned", [0.0, 1.0])):
-        for weight in weights:
-            boxes = len(policy) / 5 - weight / 5
-            row = {"condition": "as trained", "falls_weight": weight, "policy": policy}
-            rows.append(row | {"boxes": boxes, "boxes_low": boxes - 0.2, "boxes_high": boxes + 0.3})
-            rows[-1]["falls"] = 0.8 - weight / 2
-    rows.append(rows[-1] | {"condition": "camera", "boxes": 9.0})
-    rows.append(rows[0] | {"policy": "learned seed 0"})
-    (tmp_path / "heap").mkdir()
-    pd.DataFrame(rows).to_csv(tmp_path / "heap" / "table.csv", index=False)
+    for condition, weight, name in cells:
+        boxes = BOXES.get(name, 2.2) - weight / 5 + 7 * (condition == "camera")
+        for number in range(3):
+            row = {"condition": condition, "falls_weight": weight, "policy": name, "heap": number}
+            row |= {"boxes": boxes + rng.uniform(-0.2, 0.2), "falls": 0.8 - weight / 2}
+            rows.append(row | {"net": row["boxes"] - weight * row["falls"]})
+    folder = tmp_path / "heap"
+    folder.mkdir()
+    compared(pd.DataFrame(rows)).to_csv(folder / "table.csv", index=False)
     picks = [
         {"pick": pick, "physics": physics, "unloaded": pick + (physics == "near"), "falls": 0,
          "came": True, "moved": 0.7, "cpu_ms": 100.0}
         for pick in range(4) for physics in ("whole", "coarse", "near")
     ]  # fmt: skip
-    pd.DataFrame(picks).to_csv(tmp_path / "heap" / "agreement.csv", index=False)
-    write_provenance(tmp_path / "heap", "table", "made up", {"runs": 7}, True, run_record(1.0))
+    pd.DataFrame(picks).to_csv(folder / "agreement.csv", index=False)
+    lifts = [
+        {"policy": name, "heap": number, "success_rate": rate - 0.1 * number, "falls": 0.0}
+        for name, rate in (("lowest", 0.4), ("highest", 1.0)) for number in range(3)
+    ]  # fmt: skip
+    pd.DataFrame(lifts).to_csv(folder / "lifts.csv", index=False)
+    pixels = np.arange(4, 104)
+    camera = {"pixels": pixels, "centre_error": 1 / pixels, "extent_error": -1 / pixels}
+    pd.DataFrame(camera).to_csv(folder / "camera.csv", index=False)
+    write_provenance(folder, "table", "made up", {"runs": 7}, True, run_record(1.0))
     return tmp_path
 
 
@@ -43,14 +65,56 @@ def test_missing_data_names_the_command_that_makes_it(draw, names_its_command):
     names_its_command(draw)
 
 
+def labels(axes) -> list[str]:
+    return [text.get_text() for text in axes.get_yticklabels()]
+
+
+def test_policies_are_rows_with_intervals_as_trained(folder):
+    table = heap.read_heap_table(folder).set_index(["condition", "falls_weight", "policy"])
+    axes = heap.policies(folder).axes
+    assert labels(axes[0]) == ["highest", "lowest", "best rule", "learned"]
+    learned = table.loc[("as trained", 1.0, "learned")]
+    assert axes[2].lines[-1].get_xdata() == pytest.approx([learned["net"]])
+    interval = axes[2].lines[-2].get_xdata()
+    assert list(interval) == pytest.approx([learned["net_low"], learned["net_high"]])
+
+
+def test_ablations_have_variants_and_seeds(folder):
+    axes = heap.ablations(folder).axes
+    assert labels(axes[0]) == ["best rule", "learned", "learned, own", "learned seed 0"]
+    reference = axes[1].lines[1].get_xdata()
+    assert reference == pytest.approx([0.0]), "no more than itself"
+
+
+def test_conditions_show_few_policies(folder):
+    axes = heap.conditions(folder).axes[0]
+    assert labels(axes) == ["camera", "as trained"]
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == ["highest", "best rule", "learned"]
+    dots = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 1]
+    assert len(dots) == 6 and sum(value > 7 for value in dots) == 3, "camera"
+
+
 def test_rules_are_points_and_what_depends_on_the_weight_is_a_curve(folder):
     axes = heap.throughput_falls(folder).axes[0]
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["best rule", "learned"]
-    assert [text.get_text() for text in axes.texts] == ["lowest"]
-    drawn = {tuple(line.get_ydata()) for line in axes.lines}
-    assert (1.4, 1.2) in {tuple(round(y, 6) for y in ys) for ys in drawn}
-    assert max(max(ys, default=0) for ys in drawn) < 9, "another condition"
+    names = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert names == ["best rule", "learned"]
+    assert {text.get_text() for text in axes.texts} == {"lowest", "highest", "λ = 0", "λ = 1"}
+    assert {len(line.get_ydata()) for line in axes.lines} >= {1, 2}
+    assert max(max(line.get_ydata(), default=0) for line in axes.lines) < 7, "another condition"
+
+
+def test_lifts_stand_beside_picks_of_the_same_rules(folder):
+    left, right = heap.lifts_and_picks(folder).axes
+    assert labels(left) == ["highest", "lowest"], "the best first"
+    assert left.lines[1].get_xdata() == pytest.approx([0.9])
+    assert len(right.lines) == 4
+
+
+def test_camera_errors_have_a_median_over_pixels(folder):
+    left, _ = heap.camera_errors(folder).axes
+    (line,) = left.lines
+    assert len(line.get_xdata()) == 8 and (np.diff(line.get_ydata()) < 0).all()
 
 
 def test_agreement_counts_what_is_the_same(folder):

@@ -1,22 +1,142 @@
-"""Bulk picks from heaps: throughput against falls, and the physics against one another."""
+"""Bulk picks from heaps: policies compared, the camera, and the physics against one another."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from unload.heap.rake import PHYSICS
 from unload.heap.rules import RULES
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.heap import NAME
-from unload.reproduce.heap_table import REFERENCE
+from unload.reproduce.heap_learning import VARIANTS
+from unload.reproduce.heap_table import (
+    AS_TRAINED,
+    FEW,
+    LEARNED,
+    MEASURES,
+    REFERENCE,
+    SHOWN_WEIGHT,
+    VARIED,
+    learned_name,
+    mean_interval,
+)
 from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
 
-COLOURS = {REFERENCE: "C1", "oracle": "0.4"}
-AS_TRAINED = "as trained"
+COLOURS = {
+    REFERENCE: "C1", LEARNED: "C0", VARIED: "C2", "oracle": "0.2", "random": "C5", "highest": "C3"
+}  # fmt: skip
+KEY = "condition", "falls_weight", "policy", "heaps"
+ENDS = "", "_low", "_high"
+COLUMNS = [*KEY, *(measure + end for measure in (*MEASURES, "net_more") for end in ENDS)]
+UNITS = {
+    "boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick",
+    "net_more": "more than the best rule", "success": "share of lifts that succeed",
+}  # fmt: skip
+
+
+def read_heap_table(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """``heap/table.csv``, see ``unload.reproduce.heap_table.compared``.
+
+    Raises:
+        FileNotFoundError: it is missing; the message names the command.
+    """
+    return read_table(Path(folder) / NAME / "table.csv", f"{COMMAND} heap-table", COLUMNS)
+
+
+def at_shown_weight(
+    table: pd.DataFrame, policies: Sequence[str], condition: str = AS_TRAINED
+) -> pd.DataFrame:
+    """Rows of a table at the λ that it shows, by policy, as far as they are there."""
+    rows = table[(table["condition"] == condition) & (table["falls_weight"] == SHOWN_WEIGHT)]
+    rows = rows.set_index("policy")
+    return rows.loc[[name for name in policies if name in rows.index]]
+
+
+def _dots(axes: Axes, rows: pd.DataFrame, measure: str) -> None:
+    """A dot with its interval for each policy, the first one on top."""
+    places = np.arange(len(rows))[::-1]
+    for place, (name, row) in zip(places, rows.iterrows()):
+        kind = LEARNED if str(name).startswith(LEARNED) else name
+        low, value, high = row[f"{measure}_low"], row[measure], row[f"{measure}_high"]
+        colour = COLOURS.get(kind, "0.55")
+        axes.plot([low, high], [place, place], color=colour, lw=2)
+        axes.plot(value, place, "o", color=colour, ms=5)
+    axes.set(yticks=places, yticklabels=list(rows.index), xlabel=UNITS[measure])
+
+
+@styled
+def policies(folder: str | Path = files.DATA) -> Figure:
+    """Boxes, falls and their balance for each policy as trained, with 95 % intervals.
+
+    Args:
+        folder: of ``heap/table.csv``.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    rows = at_shown_weight(read_heap_table(folder), [*RULES, REFERENCE, LEARNED, VARIED, "oracle"])
+    figure, grid = plt.subplots(1, len(MEASURES), figsize=(9, 3.4), sharey=True)
+    for axes, measure in zip(grid, MEASURES):
+        _dots(axes, rows, measure)
+    mark_reduced(figure, Path(folder) / NAME, "table")
+    return figure
+
+
+@styled
+def ablations(folder: str | Path = files.DATA) -> Figure:
+    """Balance of the variants of the learned agent, and of each seed alone.
+
+    Args:
+        folder: of ``heap/table.csv``.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    table = read_heap_table(folder)
+    names = table["policy"].unique()
+    variants = [learned_name(*variant) for variant in VARIANTS]
+    seeds = sorted(name for name in names if name.startswith(f"{LEARNED} seed "))
+    rows = at_shown_weight(table, [REFERENCE, *variants, *seeds])
+    figure, grid = plt.subplots(1, 2, figsize=(8, 3.6), sharey=True)
+    for axes, measure in zip(grid, ("net", "net_more")):
+        _dots(axes, rows, measure)
+    grid[1].axvline(0, color="0.6", lw=1, zorder=0)
+    mark_reduced(figure, Path(folder) / NAME, "table")
+    return figure
+
+
+@styled
+def conditions(folder: str | Path = files.DATA) -> Figure:
+    """Balance of few policies under each condition, with 95 % intervals.
+
+    Args:
+        folder: of ``heap/table.csv``.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    table = read_heap_table(folder)
+    names = list(dict.fromkeys(table["condition"]))
+    figure, axes = plt.subplots(figsize=(7, 0.55 * len(names) + 1.4))
+    shown = [name for name in FEW if name in set(table["policy"])]
+    for number, name in enumerate(shown):
+        shift = 0.14 * ((len(shown) - 1) / 2 - number)
+        for place, condition in enumerate(reversed(names)):
+            for _, row in at_shown_weight(table, [name], condition).iterrows():
+                y, colour = place + shift, COLOURS[name]
+                axes.plot([row["net_low"], row["net_high"]], [y, y], color=colour, lw=1.6)
+                label = name if not place else None
+                axes.plot(row["net"], y, "o", color=colour, ms=4.5, label=label)
+    axes.set(yticks=range(len(names)), yticklabels=names[::-1], xlabel=UNITS["net"])
+    axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), fontsize=8)
+    mark_reduced(figure, Path(folder) / NAME, "table")
+    return figure
 
 
 @styled
@@ -25,38 +145,91 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
 
     Args:
         folder: of ``heap/table.csv``; the conditions other than the trained one are left out,
-            and so are single networks of an average.
+            and so are the variants and single seeds of the learned agent.
 
     Raises:
         FileNotFoundError: the table is missing; the message names the command.
     """
-    columns = ["condition", "falls_weight", "policy", "boxes", "boxes_low", "boxes_high", "falls"]
-    place = Path(folder) / NAME
-    table = read_table(place / "table.csv", f"{COMMAND} heap-table", columns)
-    table = table[(table["condition"] == AS_TRAINED) & ~table["policy"].str.contains(" seed ")]
+    table = read_heap_table(folder)
+    shown = [*RULES, REFERENCE, LEARNED, VARIED, "oracle"]
+    table = table[(table["condition"] == AS_TRAINED) & table["policy"].isin(shown)]
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
     for name, rows in table.groupby("policy", sort=False):
         rows = rows.sort_values("falls_weight")
-        errors = np.abs(rows[["boxes_low", "boxes_high"]].to_numpy().T - rows["boxes"].to_numpy())
-        if name in RULES:
-            axes.errorbar(rows["falls"], rows["boxes"], errors, fmt="o", color="0.6", ms=4)
+        colour = "0.6" if name in RULES else COLOURS[name]
+        label = None if name in RULES else name
+        x, y = (
+            np.abs(rows[[f"{part}_low", f"{part}_high"]].to_numpy().T - rows[part].to_numpy())
+            for part in ("falls", "boxes")
+        )
+        axes.errorbar(rows["falls"], rows["boxes"], y, x, "o", color=colour, ms=4, lw=0.8)
+        axes.plot(rows["falls"], rows["boxes"], "o-", color=colour, ms=4, lw=1.6, label=label)
+        marks = [(name, rows.iloc[0])]
+        if name not in RULES:
+            marks = [(f"λ = {row['falls_weight']:g}", row) for _, row in rows.iterrows()]
+        for text, row in marks if name in (*RULES, LEARNED) else []:
             axes.annotate(
-                name,
-                (rows["falls"].iloc[0], rows["boxes"].iloc[0]),
-                xytext=(5, 3),
-                textcoords="offset points",
-                fontsize=8,
-                color="0.4",
-            )
-        else:
-            axes.errorbar(
-                rows["falls"], rows["boxes"], errors, fmt="o-", ms=4, lw=1, label=name,
-                color=COLOURS.get(name),
+                text, (row["falls"], row["boxes"]), xytext=(5, 4), textcoords="offset points",
+                fontsize=8, color="0.4" if name in RULES else colour,
             )  # fmt: skip
-    axes.set(xlabel="falls per pick", ylabel="boxes unloaded per pick", ylim=(0, None))
+    axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"], ylim=(0, None))
     axes.set_xlim(left=0)
     axes.legend(loc="lower right", fontsize=8)
+    mark_reduced(figure, Path(folder) / NAME, "table")
+    return figure
+
+
+@styled
+def lifts_and_picks(folder: str | Path = files.DATA) -> Figure:
+    """What rules reach with single lifts, and the same rules with the rake.
+
+    Args:
+        folder: of ``heap/lifts.csv`` and ``heap/table.csv``.
+
+    Raises:
+        FileNotFoundError: a table is missing; the message names the command.
+    """
+    place = Path(folder) / NAME
+    lifts = read_table(
+        place / "lifts.csv", f"{COMMAND} heap-lifts", ["policy", "heap", "success_rate", "falls"]
+    )
+    rows = {}
+    for name, of in lifts.groupby("policy", sort=False):
+        mean, low, high = mean_interval(of["success_rate"])
+        rows[name] = {"success": mean, "success_low": low, "success_high": high}
+    order = sorted(rows, key=lambda name: -rows[name]["success"])
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3), sharey=True)
+    _dots(left, pd.DataFrame(rows).T.loc[order], "success")
+    left.set(xlim=(0, 1.02))
+    _dots(right, at_shown_weight(read_heap_table(folder), order), "net")
+    left.set_title("single lifts")
+    right.set_title("bulk picks")
     mark_reduced(figure, place, "table")
+    return figure
+
+
+@styled
+def camera_errors(folder: str | Path = files.DATA) -> Figure:
+    """How far off the camera's boxes are, by how much of a box shows.
+
+    Args:
+        folder: of ``heap/camera.csv``.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    place = Path(folder) / NAME
+    columns = ["pixels", "centre_error", "extent_error"]
+    frame = read_table(place / "camera.csv", f"{COMMAND} heap-camera", columns)
+    figure, grid = plt.subplots(1, 2, figsize=(8, 3.2), sharex=True)
+    named = {"centre_error": "error of the centre (m)", "extent_error": "error of the extents (m)"}
+    for axes, (column, label) in zip(grid, named.items()):
+        axes.scatter(frame["pixels"], frame[column], s=5, alpha=0.35, color="C0", lw=0)
+        parts = frame.groupby(pd.qcut(frame["pixels"], 8, duplicates="drop"), observed=True)
+        middle = parts[["pixels", column]].median()
+        axes.plot(middle["pixels"], middle[column], "o-", color="C1", label="median")
+        axes.set(xscale="log", xlabel="pixels that show the box", ylabel=label)
+    grid[0].legend()
     return figure
 
 
