@@ -9,6 +9,9 @@ then runs the tests that belong to it; to fork saves importing PyTorch a thousan
 with compiled functions run as plain Python, so that nothing is compiled; ``kernel``, whose
 instructions Python does not have, is compiled anew for each mutant.
 
+With the default sample and seed, the scores go into ``mutants.md`` beside this file, which also
+says of each survivor why it survives; those of which it does not are counted at the end.
+
 Left out are changes without an effect on behaviour: in annotations, in errors that are raised
 (the condition for it counts) and of ``is`` for ``==``. So are decorators, most of which make a
 function fast only, and operators that numbers of the other kind do not have, such as ``<<`` in
@@ -30,6 +33,7 @@ import time
 import traceback
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from datetime import date
 from importlib.util import cache_from_source
 from pathlib import Path
 
@@ -51,6 +55,9 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 
 ROOT = Path(__file__).resolve().parent.parent
+REPORT = Path(__file__).with_name("mutants.md")
+SCORES = re.compile(r"(?<=<!-- scores -->\n).*?(?=<!-- end -->)", re.DOTALL)  # in the report
+SAMPLE, SEED = 40, 0  # mutants per module, and of their choice, in the report
 COPIED = ("unload", "tests", "data", "pyproject.toml")
 # Tests of the array environment that are quick as plain Python.
 FEW_PICKS = " ".join(
@@ -310,9 +317,11 @@ def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame
             limit = round(2 * _seconds_unchanged(workers, name) + 10)
             rng = np.random.default_rng([seed, number])
             chosen, count = mutants(workers.source(name), name, sample, rng)
+            ends = []
             for mutant in chosen:
-                rows += [_row(*end) for end in workers.start(name, mutant.code, limit, mutant)]
-            rows += [_row(*end) for end in workers.rest()]
+                ends += [_row(*end) for end in workers.start(name, mutant.code, limit, mutant)]
+            ends += [_row(*end) for end in workers.rest()]
+            rows += [row | {"of": count} for row in ends]
             print(f"{name}: {len(chosen)} of {count} mutants tested", flush=True)
     return pd.DataFrame(rows).sort_values(["module", "line", "operator"], ignore_index=True)
 
@@ -338,32 +347,61 @@ def _row(mutant: Mutant, outcome: str, seconds: float, output: str) -> dict:
 
 
 def scores(table: pd.DataFrame) -> pd.DataFrame:
-    """Mutants tested and survivors by module and in all; the score and its 95 % interval in %."""
+    """One row per module: mutants killed, tested and in all; those over time count as killed."""
     rows = []
-    for name, part in [*table.groupby("module"), ("all", table)]:
-        outcomes = part["outcome"].value_counts()
-        survived = outcomes.get("survived", 0)
-        score = scipy.stats.binomtest(len(part) - survived, len(part))
-        interval = score.proportion_ci(method="wilson")
-        rows.append(
-            {
-                "module": name,
-                "tested": len(part),
-                "survived": survived,
-                "over time": outcomes.get("time limit", 0),
-                "score": f"{100 * score.statistic:.0f}",
-                "interval": f"{100 * interval.low:.0f}–{100 * interval.high:.0f}",
-            }
-        )
-    return pd.DataFrame(rows)
+    for name, part in table.groupby("module"):
+        killed = int((part["outcome"] != "survived").sum())
+        row = {"module": name, "killed": killed, "tested": len(part), "of": part["of"].iloc[0]}
+        over = int((part["outcome"] == "time limit").sum())
+        rows.append(row | {"over time": over, "measured": date.today().isoformat()})
+    return pd.DataFrame(rows).astype(str)
+
+
+def merged(new: pd.DataFrame, report: str) -> pd.DataFrame:
+    """Scores, and those in the report of the modules that have not been measured now."""
+    lines = [line.strip("| ").split(" | ") for line in SCORES.search(report)[0].splitlines()]
+    old = pd.DataFrame([line[:-1] for line in lines if line[0] in MODULES], columns=new.columns)
+    both = pd.concat([old[~old["module"].isin(new["module"])], new])
+    return both.sort_values("module", key=lambda names: names.map([*MODULES].index))
+
+
+def as_text(table: pd.DataFrame) -> str:
+    """Scores as a Markdown table, and the share of all mutants killed with a 95 % interval."""
+    killed, tested, of = (table[name].astype(int) for name in ("killed", "tested", "of"))
+    lines = [[*table.columns, "score"], ["---"] * (len(table.columns) + 1)]
+    for row, score in zip(table.to_numpy().tolist(), killed / tested):
+        lines.append([*row, f"{100 * score:.0f} %"])
+    rows = "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    score = scipy.stats.binomtest(int(killed.sum()), int(tested.sum()))
+    low, high = score.proportion_ci(method="wilson")
+    return (
+        f"{rows}\nIn all {killed.sum()} of {tested.sum()} tested mutants are killed: "
+        f"{100 * score.statistic:.1f} %, 95 % Wilson interval {100 * low:.1f}–{100 * high:.1f} %. "
+        f"There are {of.sum()} mutants.\n"
+    )
+
+
+def unexplained(table: pd.DataFrame, report: str) -> pd.DataFrame:
+    """The survivors of which the report does not say why they survive."""
+
+    def is_missing(row: pd.Series) -> bool:
+        return f"| {row['module']} | {_code(row['before'])} | {_code(row['after'])} |" not in report
+
+    survivors = table[table["outcome"] == "survived"]
+    return survivors[[is_missing(row) for _, row in survivors.iterrows()]]
+
+
+def _code(line: str) -> str:
+    """A line of code in a cell of a Markdown table."""
+    return f"`{line}`".replace("|", "\\|")
 
 
 def main() -> None:
-    """Measure, print the survivors and the scores, and keep all rows in build/mutants.csv."""
+    """Measure, print survivors and scores; keep all in build/mutants.csv, scores in the report."""
     parser = argparse.ArgumentParser(description="Mutation testing.")
     parser.add_argument("modules", nargs="*", help="such as agent/dqn; all if none is given")
-    parser.add_argument("--sample", type=int, default=40, help="mutants per module, 0 for all")
-    parser.add_argument("--seed", type=int, default=0, help="of the sample")
+    parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per module, 0 for all")
+    parser.add_argument("--seed", type=int, default=SEED, help="of the sample")
     parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
     arguments = parser.parse_args()
     for name in arguments.modules:
@@ -374,7 +412,12 @@ def main() -> None:
     table = measure(names, arguments.sample, arguments.seed, arguments.jobs)
     (ROOT / "build").mkdir(exist_ok=True)
     table.to_csv(ROOT / "build" / "mutants.csv", index=False)
-    print(scores(table).to_string(index=False))
+    print(as_text(scores(table)))
+    report = REPORT.read_text()
+    if (arguments.sample, arguments.seed) == (SAMPLE, SEED):
+        text = as_text(merged(scores(table), report))
+        REPORT.write_text(SCORES.sub(lambda _: text, report))
+    print(f"{len(unexplained(table, report))} survivors are not in {REPORT.name}")
     print(f"{(time.monotonic() - start) / 60:.0f} minutes")
 
 

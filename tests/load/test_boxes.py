@@ -83,6 +83,17 @@ def test_bad_loads_are_refused(changes, error, message):
         one_box(**changes)
 
 
+def test_the_box_that_sticks_out_is_named():
+    """On both sides; two others do so by less than is tolerated."""
+    little, label = 5e-7, np.zeros(3, int)
+    positions = np.array([[0.5 - little, 0.5, 0.5], [6.5 + little, 0.5, 0.5], [3.5, 1.25, 0.5]])
+    sizes = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 3.0, 1.0]])
+    with pytest.raises(ValueError, match="^box 2 reaches from"):
+        Load(positions, sizes, label, label)
+    sizes[2, 1] = 1
+    assert len(Load(positions, sizes, label, label)) == 3
+
+
 @pytest.mark.parametrize(
     "step", [(0.3, 0, 0), (0, 0.3, 0), (0, 0, 0.3), (0.3, 0.3, 0.3), (0, 0, 0)]
 )

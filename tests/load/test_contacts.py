@@ -49,7 +49,9 @@ def test_boxes_at_random_places(rng, walls):
         assert sorted(found.of(BESIDE, box)) == np.flatnonzero(sideways).tolist()
 
 
-@pytest.mark.parametrize(("gap", "touches"), [(CONTACT_TOLERANCE, True), (1.01e-4, False)])
+@pytest.mark.parametrize(
+    ("gap", "touches"), [(0.99e-4, True), (CONTACT_TOLERANCE, True), (1.01e-4, False)]
+)
 def test_boxes_touch_up_to_the_tolerance(gap, touches):
     low = np.array([[0, 0, 0], [0, 1 + gap, 0]])
     found = contacts(low, low + 1)

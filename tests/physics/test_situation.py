@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from unload import task
 from unload.load.boxes import Load
 from unload.load.contacts import CONTACT_TOLERANCE
 from unload.load.substacks import CELL
@@ -68,6 +69,13 @@ def test_floor_and_side_walls_are_touched_within_the_tolerance(boxes, share):
     assert first.floor == (-200_000 - micrometres if near else None) and second.floor == -200_000
     assert first.sides == ((-200_000 - micrometres,) if near else ())
     assert second.sides == ((200_000 + micrometres,) if near else ())
+
+
+def test_a_box_exactly_at_the_tolerance_touches_the_side_wall():
+    y = task.CONTAINER[1] - CONTACT_TOLERANCE - 0.25  # exact in bits, and so is y + 0.25
+    label = np.zeros(1, int)
+    around = surroundings(Load(np.array([[3.5, y, 0.25]]), np.full((1, 3), 0.5), label, label))
+    assert around.situation(0).sides == (250_100,)
 
 
 def test_equal_situations_at_different_places_have_equal_keys(boxes):

@@ -195,6 +195,9 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
     assert gradients(net, batch) == two
     assert gradients(net, batch) == two  # and again
     assert len(submitted) == 1  # no thread where one is asked for
+    torch.set_num_threads(2)
+    gradients(net, random_batch(rng, fused.CHUNK * fused.CHUNKS_PER_THREAD))
+    assert len(submitted) == 1  # and none for a batch that one thread has done as soon
 
 
 def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
