@@ -111,6 +111,14 @@ def test_lifts_stand_beside_picks_of_the_same_rules(folder):
     assert len(right.lines) == 4
 
 
+def test_predictions_stand_against_what_came():
+    expected = pd.DataFrame({"boxes": [1.5, 0.5], "falls": [0.25, 2.0]})
+    found = pd.DataFrame({"boxes": [2, 1], "falls": [0, 3]})
+    boxes, falls = heap.predictions(expected, found).axes
+    assert boxes.collections[0].get_offsets().tolist() == [[1.5, 2], [0.5, 1]]
+    assert falls.collections[0].get_offsets().tolist() == [[0.25, 0], [2.0, 3]]
+
+
 def test_camera_errors_have_a_median_over_pixels(folder):
     left, _ = heap.camera_errors(folder).axes
     (line,) = left.lines
