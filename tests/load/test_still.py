@@ -5,6 +5,7 @@ import numpy as np
 from matplotlib.image import imread
 
 from unload.load.still import EYE, back_to_front, project, still
+from unload.load.substacks import package_colour
 
 RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
 
@@ -54,6 +55,19 @@ def test_boxes_in_a_circle_are_all_drawn():
 def test_nothing_is_drawn_of_no_boxes():
     picture = pixels(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
     assert seen(picture, RED) == seen(picture, BLUE) == 0
+
+
+def test_the_colours_of_boxes_and_legend_are_kept():
+    """Although many colours are reduced to few."""
+    low = np.array([(1 + number / 3, 0, 0) for number in range(13)])
+    names = {f"package {number}": package_colour(number) for number in range(13)}
+    colours = np.array([*names.values()])
+    png = still(low, low + (0.3, 2, 1), colours, names, 4.0)
+    shown = np.rint(255 * imread(io.BytesIO(png))[:, :, :3])
+    legend, boxes = shown[:, :110], shown[:, 110:]
+    for colour in 255 * colours:
+        for part in (legend, boxes):
+            assert (np.abs(part - colour).max(axis=2) < 6).any()
 
 
 def test_what_is_up_is_seen_higher():

@@ -119,9 +119,9 @@ def test_a_picture_stands_beside_what_plotly_draws(small_load):
     assert int.from_bytes(picture[20:24]) == 300  # pixels high
 
 
-def test_ipython_displays_both(small_load):
+def test_ipython_displays_both_and_nothing_that_needs_a_network(small_load):
     formats, _ = DisplayFormatter().format(view(small_load))
-    assert {"image/png", PLOTLY_MIMETYPE} <= set(formats)
+    assert set(formats) == {"image/png", "text/plain", PLOTLY_MIMETYPE}
 
 
 def test_a_copy_of_a_view_is_a_figure(small_load):

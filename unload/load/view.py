@@ -23,7 +23,7 @@ TRIANGLES = np.array(
 )  # fmt: skip
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
 # Of groups whose names are not in COLOURS, in the order in which they are given.
-OTHER_COLOURS = ((0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.58, 0.40, 0.74), (0.0, 0.0, 0.0))
+OTHER_COLOURS = ((0.58, 0.40, 0.74), (0.90, 0.62, 0.00), (0.55, 0.34, 0.16), (0.0, 0.0, 0.0))
 PLOTLY_MIMETYPE = "application/vnd.plotly.v1+json"
 UNIT = task.CONTAINER[0] / 2.8  # m, plotly's unit of length in our views
 LABEL = (
@@ -49,6 +49,7 @@ class View(go.Figure):
 
     picture: Callable[[], bytes] | None = None
     _ipython_display_ = None  # plotly's own method would display the figure alone
+    _repr_html_ = None  # plotly's own method would load a script from the network
 
     def __init__(self, *args, picture: Callable[[], bytes] | None = None, **kwargs) -> None:
         super().__init__(*args, **kwargs)

@@ -16,7 +16,7 @@ from unload.support import checks
 
 
 class Pick(NamedTuple):
-    """What became of one pick.
+    """One pick and its outcome.
 
     Attributes:
         item: the picked item.
@@ -171,7 +171,7 @@ class Episode:
 
 
 def explain(pick: Pick) -> str:
-    """Say in a sentence what became of a pick, and why."""
+    """Say in a sentence how a pick ended, and why."""
     moved = f"Item {pick.item} moved by {_length(pick.distance)}"
     resting = _boxes(len(pick.on_top))
     if pick.success and not pick.on_top:

@@ -179,7 +179,7 @@ class Playground(widgets.VBox):
         rises = pick is not None and pick.success and lifted
         rising = (pick.item, pick.distance, COLOURS["liftable"]) if rises else None
         palette = {name: COLOURS[name] for name in SHOWN}
-        self.canvas.show(numbers, palette, {"rests on the picked item": on_top}, rising)
+        self.canvas.show(numbers, palette, {"on top of the picked item": on_top}, rising)
 
     def _score(self) -> None:
         rows = [("player", "mask", "unloaded", "picks")]

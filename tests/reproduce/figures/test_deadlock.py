@@ -28,5 +28,5 @@ def test_the_wall_of_a_stuck_item():
     colours = [to_rgb(box.get_facecolor()) for box in axes.patches]
     assert len(colours) == len(wall) - 1
     assert colours.count(COLOURS["blocked"]) == 1
-    assert colours.count(to_rgb("0.45")) == 2
+    assert colours.count(COLOURS["on top of it"]) == 2
     assert len(axes.get_legend().get_texts()) == 3

@@ -21,7 +21,7 @@ def test_bad_lift_sequences_are_refused():
     assert len(lift_sequences({"a": (sizes, poses)}, [0.0]).axes) == 1
 
 
-def test_colour_of_the_chosen_box_says_what_became_of_it():
+def test_colour_of_the_chosen_box_says_whether_it_was_lifted():
     sizes, poses = np.ones((2, 2)), np.zeros((2, 2, 3))
     lifted = poses.copy()
     lifted[1, 0, 1] = task.LIFT_THRESHOLD

@@ -29,13 +29,16 @@ def test_situation_is_drawn_where_its_boxes_stand():
     surroundings = Surroundings(load, np.ones(len(load), bool))
     item = next(item for item in range(len(load)) if len(surroundings.on_top(item)) == 2)
     situation = surroundings.situation(item)
-    figure = speed.situation_in_its_wall(load, item, situation)
+    figure = speed.situation_in_its_wall(load, item, situation, 0.01)
     (axes,) = figure.axes
     wall = np.flatnonzero(load.walls == load.walls[item])
     background, boxes = axes.patches[: len(wall)], axes.patches[len(wall) :]
     assert len(boxes) == len(situation.boxes)
     assert all(box.get_facecolor()[:3] == COLOURS["unseen"] for box in background)
-    assert boxes[0].get_facecolor()[:3] == COLOURS["tried"]
+    assert boxes[0].get_facecolor()[:3] == COLOURS["blocked"]
+    assert boxes[1].get_facecolor()[:3] == COLOURS["on top of it"]
+    lifted = speed.situation_in_its_wall(load, item, situation, 0.2).axes[0].patches[len(wall)]
+    assert lifted.get_facecolor()[:3] == COLOURS["liftable"]
     corners = {tuple(np.round(box.get_xy(), 3)) for box in background}
     assert tuple(np.round(boxes[0].get_xy(), 3)) in corners
     assert sum(box.get_facecolor() == boxes[1].get_facecolor() for box in boxes) == 2

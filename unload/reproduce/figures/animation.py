@@ -27,8 +27,8 @@ FIRST, EARLY, LATE, LAST = 1500, 240, 80, 5000  # ms that frames are shown
 INK, FAINT, RAIL = "#222222", "#6f6f6f", "#e4e4e1"
 PALETTE = 127  # colours of all frames, besides white
 LEGEND = {
-    "unseen": "not seen by the agent",
-    "visible": "seen",
+    "unseen": "unseen",
+    "visible": "visible",
     "liftable": "unloaded",
     "failed": "failed to move",
 }

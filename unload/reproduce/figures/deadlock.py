@@ -36,7 +36,7 @@ def draw_stuck(axes: Axes, load: Load, present: np.ndarray, item: int, above: np
     wall = np.flatnonzero((load.walls == load.walls[item]) & present)
     kinds = {
         f"item {item}, which is blocked": (COLOURS["blocked"], wall == item),
-        "items that rest on it": ("0.45", np.isin(wall, above)),
+        "on top of it": (COLOURS["on top of it"], np.isin(wall, above)),
         "other items of the wall": (COLOURS["unseen"], (wall != item) & ~np.isin(wall, above)),
     }
     for name, (colour, chosen) in kinds.items():

@@ -14,9 +14,6 @@ from unload.load.colours import COLOURS
 from unload.reproduce.figures.style import styled
 from unload.support import checks
 
-# Boxes that lie on the chosen one, and those that cannot move.
-ON_TOP, FIXED = (0.00, 0.45, 0.70), (0.74, 0.74, 0.72)
-
 
 @styled
 def distance_curves(
@@ -99,7 +96,7 @@ def lift_sequences(
             for spine in axes.spines.values():
                 spine.set(visible=True, color="#cccccc")
         line[0].set_ylabel(label, fontsize=9)
-    meanings |= {"on top of it": ON_TOP, "cannot move": FIXED}
+    meanings |= {name: COLOURS[name] for name in ("on top of it", "cannot move")}
     handles = [Patch(fc=colour, label=meaning) for meaning, colour in meanings.items()]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=9)
     return figure
@@ -116,7 +113,8 @@ def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, dynamic: int, c
     corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
     for box, (size, (y, z, angle)) in enumerate(zip(sizes, pose)):
         turn = np.array([(np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))])
-        colour = FIXED if box >= dynamic else chosen if box == 0 else ON_TOP
+        other = COLOURS["on top of it" if box < dynamic else "cannot move"]
+        colour = other if box else chosen
         axes.add_patch(Polygon(corners * size @ turn + (y, z), fc=colour, ec="white", lw=0.8))
 
 

@@ -14,7 +14,6 @@ from unload.reproduce.figures.observation import EQUALIZED
 from unload.reproduce.figures.style import styled
 
 INK, GREY = "#333333", "#9a9a9a"
-CHOICE = (0.00, 0.45, 0.70)  # of a score that is chosen
 AGENT, ENVIRONMENT = "#eaf2f8", "#f6f1e7"
 # Six items stand for the 128: their scores, and which failed since the last success.
 SCORES = (0.35, 0.9, 0.55, 0.75, 0.2, 0.45)
@@ -151,7 +150,7 @@ def _mini_scores(axes: Axes, x, y, chosen) -> None:
     """Scores of the items; the failed one is struck out, the chosen one is dark."""
     for item, score in enumerate(SCORES):
         left, height = x + 1.6 + 1.9 * item, 5.4 * score
-        colour = CHOICE if item == chosen else COLOURS["visible"]
+        colour = INK if item == chosen else COLOURS["visible"]
         if item == FAILED:
             axes.add_patch(Rectangle((left, y), 1.3, height, fc="#eeeeee", ec=GREY, lw=0.7))
             axes.plot([left - 0.2, left + 1.5], [y, y + height], color=COLOURS["failed"], lw=1.8)

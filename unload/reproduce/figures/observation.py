@@ -55,7 +55,7 @@ def fig04_observation(folder: str | Path = files.DATA) -> Figure:
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
     for points, meaning, label in (
         (everything, "unseen", "all items"),
-        (observed, "visible", "observed items"),
+        (observed, "visible", "visible items"),
     ):
         colour = COLOURS[meaning]
         axes.plot(*points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=colour, label=label)
@@ -66,7 +66,7 @@ def fig04_observation(folder: str | Path = files.DATA) -> Figure:
 
 @styled
 def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
-    """Fig. 5: histogram of the observed items' x, before and after equalization.
+    """Fig. 5: histogram of the visible items' x, before and after equalization.
 
     Args:
         folder: holds ``obs_hist_equal/{Observation,Equalized_Observation}.csv``.
@@ -76,7 +76,7 @@ def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
     """
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
     for name, colour, label in (
-        ("Observation", COLOURS["visible"], "observed items"),
+        ("Observation", COLOURS["visible"], "visible items"),
         ("Equalized_Observation", EQUALIZED, "equalized observation"),
     ):
         axes.hist(
@@ -101,7 +101,7 @@ def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
 
 @styled
 def fig06_equalized(folder: str | Path = files.DATA) -> Figure:
-    """Fig. 6: side view of the observed items after equalization.
+    """Fig. 6: side view of the visible items after equalization.
 
     Args:
         folder: holds ``obs_hist_equal/Equalized_Observation.csv``.

@@ -17,11 +17,11 @@ from unload.reproduce.figures.style import styled
 
 SIZE = 560, 400  # pixels of a picture
 ROOM = 6, 6, 6, 6  # around the container
-PICKED = {"unseen": "not seen", "visible": "seen by the agent", "liftable": "its next pick"}
+PICKED = {"unseen": "unseen", "visible": "visible", "liftable": "next pick"}
 
 
 class Stage(NamedTuple):
-    """A container before a pick.
+    """A container before a pick that succeeds.
 
     Attributes:
         present: (n,) bool, the boxes that are left.

@@ -14,7 +14,6 @@ from unload.load.boxes import Load
 from unload.load.colours import COLOURS
 from unload.physics.situation import RESOLUTION, Situation
 from unload.reproduce import results
-from unload.reproduce.figures.lifting import FIXED, ON_TOP
 from unload.reproduce.figures.style import styled
 from unload.support import checks, files
 
@@ -133,19 +132,21 @@ def speed_profile(folder: str | Path = FOLDER) -> Figure:
 
 
 @styled
-def situation_in_its_wall(load: Load, item: int, situation: Situation) -> Figure:
+def situation_in_its_wall(load: Load, item: int, situation: Situation, distance: float) -> Figure:
     """The boxes that decide the lift of an item, before its item wall, seen from the entrance.
 
     Args:
         load: the boxes.
         item: the chosen box.
         situation: of the item.
+        distance: how far its lift moves it, in m.
     """
     figure, axes = plt.subplots(figsize=(4.6, 4))
     for box in np.flatnonzero(load.walls == load.walls[item]):
         _draw(axes, load.positions[box], load.sizes[box], COLOURS["unseen"], "white")
-    names = {"chosen": COLOURS["tried"], "on top of it": ON_TOP, "cannot move": FIXED}
-    chosen, on_top, fixed = names
+    outcome = "liftable" if distance >= task.LIFT_THRESHOLD else "blocked"
+    chosen, on_top, fixed = f"chosen box, {outcome}", "on top of it", "cannot move"
+    names = {chosen: COLOURS[outcome], on_top: COLOURS[on_top], fixed: COLOURS[fixed]}
     for row, box in enumerate(situation.boxes * RESOLUTION):
         name = fixed if row >= situation.dynamic else on_top if row else chosen
         _draw(axes, load.positions[item] + box[:3], box[3:], names[name], "0.2")
