@@ -100,6 +100,9 @@ def test_a_replay_has_a_stop_for_each_pick_and_needs_no_kernel(played):
     assert [frame.name for frame in replay.frames] == ["0", "1"]
     assert [step["args"][0][0] for step in replay.layout.sliders[0].steps] == ["0", "1"]
     assert {trace.scene for trace in replay.data[:2]} == {"scene", "scene2"}
+    assert replay.data[0].x.dtype == np.int16
+    assert replay.data[0].x == pytest.approx(1000 * played.state(0)[0][..., 0].ravel(), abs=0.5)
+    assert replay.layout.scene.xaxis.range[0] == 4000
     titles = [note.text for note in replay.frames[1].layout.annotations]
     assert titles == ["left: 2 unloaded, 1 fallen", "right: 2 unloaded, 1 fallen"]
     bundle = replay._repr_mimebundle_()

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from PIL import Image
 
 from unload import task
 from unload.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
@@ -31,6 +32,8 @@ OUTSIDE = FARTHEST_EDGE + 0.6  # m, how far the pictures reach
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 LIGHT = np.array([0.55, -0.45, 0.7]) / np.linalg.norm([0.55, -0.45, 0.7])
 PAUSE = 900  # ms between two picks while a replay plays
+MM = 1000  # a replay's coordinates are whole millimetres, in half of the bytes
+PALETTE = 128  # colours of a still
 
 
 def corners(heap: Heap) -> np.ndarray:
@@ -212,10 +215,10 @@ def replay_heaps(episodes: Mapping[str, Played], height: int = 460) -> View:
     traces, scenes, titles = [], {}, []
     for place, (name, played) in enumerate(episodes.items()):
         scene = f"scene{place + 1}" if place else "scene"
-        traces.append(_mesh(*played.state(0)).update(scene=scene))
+        traces.append(_mesh(*played.state(0), MM).update(scene=scene))
         width = 1 / len(episodes)
         domain = {"x": [place * width, (place + 1) * width], "y": [0.1, 1]}
-        scenes[scene] = _layout(height).scene.update(domain=domain)
+        scenes[scene] = _layout(height, MM).scene.update(domain=domain)
         titles.append({
             "x": (place + 0.5) * width, "y": 1, "xref": "paper", "yref": "paper",
             "xanchor": "center", "showarrow": False, "text": played.title(name, 0),
@@ -223,7 +226,7 @@ def replay_heaps(episodes: Mapping[str, Played], height: int = 460) -> View:
     frames = [
         go.Frame(
             name=str(stop),
-            data=[_moved(*played.state(stop)) for played in episodes.values()],
+            data=[_moved(*played.state(stop), MM) for played in episodes.values()],
             traces=list(range(len(traces))),
             layout={
                 "annotations": [
@@ -252,8 +255,8 @@ def replay_heaps(episodes: Mapping[str, Played], height: int = 460) -> View:
     return figure
 
 
-def _mesh(places: np.ndarray, numbers: np.ndarray) -> go.Mesh3d:
-    """Boxes with given corners, one colour for each meaning."""
+def _mesh(places: np.ndarray, numbers: np.ndarray, unit: int = 1) -> go.Mesh3d:
+    """Boxes with given corners (m), one colour for each meaning; ``unit`` is drawn as 1 m."""
     triangles = TRIANGLES + np.arange(len(places))[:, None, None] * len(CORNERS)
     steps = np.linspace(0, 1, len(MEANINGS) + 1)
     scale = [
@@ -271,13 +274,15 @@ def _mesh(places: np.ndarray, numbers: np.ndarray) -> go.Mesh3d:
         hoverinfo="skip",
         flatshading=True,
         lighting={"ambient": 0.7, "diffuse": 0.5, "specular": 0.0},
-        **_moved(places, numbers),
+        **_moved(places, numbers, unit),
     )
 
 
-def _moved(places: np.ndarray, numbers: np.ndarray) -> dict:
+def _moved(places: np.ndarray, numbers: np.ndarray, unit: int = 1) -> dict:
     """What a frame changes of a mesh."""
-    coordinates = dict(zip("xyz", places.reshape(-1, 3).astype(np.float32).T))
+    points = unit * places.reshape(-1, 3)
+    points = points.astype(np.float32) if unit == 1 else np.rint(points).astype(np.int16)
+    coordinates = dict(zip("xyz", points.T))
     cells = np.repeat(numbers, len(TRIANGLES)).astype(np.int8)
     return {"type": "mesh3d", **coordinates, "intensity": cells}
 
@@ -293,13 +298,16 @@ def _legend_traces() -> list[go.Scatter3d]:
     ]  # fmt: skip
 
 
-def _layout(height: int) -> go.Layout:
-    """The last metres of the container, in true proportions."""
+def _layout(height: int, unit: int = 1) -> go.Layout:
+    """The last metres of the container, in true proportions; lengths only if in metres."""
     made = layout(height)
     low, high = np.array([REAR, 0, 0]), np.array([OUTSIDE, WIDTH, task.CONTAINER[2]])
     middle = (low + high) / 2
+    for axis, *ends in zip("xyz", unit * low, unit * high):
+        made.scene[f"{axis}axis"].update(range=ends)
+        if unit != 1:
+            made.scene[f"{axis}axis"].update(showticklabels=False, title={"text": ""})
     made.scene.update(
-        xaxis_range=[REAR, OUTSIDE],
         aspectratio=dict(zip("xyz", (high - low) / UNIT)),
         camera={
             "eye": dict(zip("xyz", 0.78 * (EYE - middle) / UNIT)),
@@ -361,4 +369,7 @@ def _still(states: Mapping[str, tuple[Heap, np.ndarray]]) -> bytes:
         _add_legend(figure)
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
-    return file.getvalue()
+    small = io.BytesIO()
+    picture = Image.open(file).convert("RGB").quantize(PALETTE)
+    picture.save(small, "PNG", optimize=True)  # a third of the bytes
+    return small.getvalue()
