@@ -1,0 +1,436 @@
+"""The paper's numbers beside ours, section by section, as notebook 10 shows them.
+
+Ours are constants of the code, measured within a minute, or computed from ``data/``; only the
+paper's are typed. Each function returns a table indexed by ``number``, all columns text:
+``source`` (the section of the paper), ``paper``, ``here``, and ``agrees``, which is "yes", "no",
+a reason why neither can be said, or empty where the paper has no such number.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import gymnasium
+import numpy as np
+import pandas as pd
+
+from unload import task
+from unload.agent import policies
+from unload.agent.config import TrainConfig
+from unload.agent.evaluation import evaluate
+from unload.env.equalization import equalize
+from unload.load import substacks
+from unload.network.peq import PEQNetwork
+from unload.physics import bullet
+from unload.reproduce.answer import PAPER_CELLS, paper_runs
+from unload.reproduce.tuning import (
+    RUN_COUNT,
+    STEPS,
+    greedy_reached,
+    run_name,
+    running_mean,
+    set_name,
+)
+from unload.reproduce.verdict import LIKE_THE_PAPER, PAPER_MSR, run_measures, t_interval, windows
+from unload.support import checks, files
+
+CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
+STEADY = 0.05  # MSR that a steady rise may lose
+TOO_WIDE = 0.4  # MSR, of an interval that cannot decide
+BATCH_SIZES = (64, 256, 1024, 2048)  # of the tuning runs
+SETTLED = 200  # tuning steps after which the noise of the loss is measured
+
+
+class Row(NamedTuple):
+    """One number, see the module's docstring.
+
+    Attributes:
+        number, source, paper, here: as they are shown.
+        agrees: whether ours agrees with the paper's; None if there is nothing to compare, or the
+            reason why this cannot be said.
+    """
+
+    number: str
+    source: str
+    paper: str
+    here: str
+    agrees: bool | str | None = None
+
+
+def table(rows: list[Row]) -> pd.DataFrame:
+    """Return rows as text, indexed by ``number``."""
+    frame = pd.DataFrame(rows).set_index("number")
+    words = [
+        each if isinstance(each, str) else "" if each is None else "yes" if each else "no"
+        for each in frame["agrees"]
+    ]
+    return frame.assign(agrees=words)
+
+
+def constants() -> pd.DataFrame:
+    """The constants that the paper gives, and those of the code."""
+    config = TrainConfig()
+    network = PEQNetwork(n := config.n_features)
+    kinds = substacks.LEFT, substacks.MID, substacks.RIGHT
+    walls = substacks.ROWS, len(substacks.COLUMNS)
+    inputs = network.extractor.in_features, network.scorer.in_features
+    epsilon = config.epsilon_init, config.epsilon_final, config.epsilon_fraction
+    given = [
+        ("container", "III-B", (7.0, 2.5, 2.5), tuple(task.CONTAINER.tolist())),
+        ("items in a container", "III-A", (800, 1000), (task.MIN_ITEMS, task.MAX_ITEMS)),
+        ("package sizes", "III-A", 13, len(substacks.PACKAGES)),
+        ("rows of a wall; substacks of a row", "III-A", (3, 4), walls),
+        (
+            "variants of the left, mid and right substack", "Fig. 3", (3, 3, 3),
+            tuple(map(len, kinds)),
+        ),
+        (
+            "packages in them, variants 0–2", "Fig. 3", ((9, 5, 2), (12, 7, 3), (10, 5, 3)),
+            tuple(tuple(map(len, kind)) for kind in kinds),
+        ),
+        ("viewpoint (m)", "III-B", (7.0, 1.25, 2.5), tuple(task.VIEWPOINT.tolist())),
+        ("weights of the distance", "III-B", (1, 0, 4), tuple(task.DISTANCE_WEIGHTS.tolist())),
+        ("items observed, actions", "III-B, C", 128, task.N_VISIBLE),
+        ("mass (kg)", "appendix", 1, task.MASS),
+        ("force (N)", "III-C", 20, task.PICK_FORCE),
+        ("time of a lift (s)", "III-C", 0.3, task.LIFT_TIME),
+        ("threshold (m)", "III-C", 0.2, task.LIFT_THRESHOLD),
+        ("picks of an episode", "III-C", 500, config.max_picks),
+        ("environments", "Fig. 2", 64, config.num_envs),
+        ("discount factor γ", "III-E", 0, config.gamma),
+        ("inputs of the extractor, of the scorer", "III-G", (3, 4 * n), inputs),
+        ("β of the loss", "III-G", 1, config.beta),
+        ("tuning: runs, steps K", "IV-A", (10, 3000), (RUN_COUNT, STEPS)),
+        ("training steps K", "IV-B", 20_000_000, config.picks),
+        ("learning rate μ", "IV-B", 1e-3, config.learning_rate),
+        ("batch size b", "IV-B", 2048, config.batch_size),
+        ("ε at first, at last, after", "IV-B", (1, 0, 0.5), epsilon),
+        ("replay", "IV-B", 2**20, config.replay_size),
+    ]  # fmt: skip
+    return table(
+        [
+            Row(name, source, str(paper), str(here), paper == here)
+            for name, source, paper, here in given
+        ]
+    )
+
+
+def loads_and_lifts(
+    rng: np.random.Generator, loads: int, folder: str | Path = files.DATA
+) -> pd.DataFrame:
+    """The size of a load, Tab. I, the appendix's lifts, and Fig. 5.
+
+    Args:
+        rng: draws the loads.
+        loads: how many.
+        folder: of the data.
+    """
+    checks.integer("loads", loads, 1)
+    counts = np.array([len(substacks.stack_load(rng)) for _ in range(loads)])
+    spread = f"{counts.mean():.0f} ± {counts.std():.0f} ({counts.min()}–{counts.max()})"
+    low, high = task.MIN_ITEMS, task.MAX_ITEMS
+    inside = low <= counts.min() and counts.max() <= high
+    return table(
+        [
+            Row("items in a full container", "III-A", f"{low}–{high}", spread, inside),
+            _tab_i(),
+            *_lifts(),
+            _tallest_bar(folder),
+        ]
+    )
+
+
+def _tab_i() -> Row:
+    values = np.array([0.10, 0.12, 0.11, 0.20, 0.19, 0.18, 0.30])
+    given = np.array([-1.00, -0.33, -0.66, 0.66, 0.33, 0.00, 1.00])
+    equalized = equalize(values[:, None])[:, 0]
+    paper, here = (" ".join(f"{value:.2f}" for value in each) for each in (given, equalized))
+    agrees = np.abs(equalized - given).max() < 0.01  # the paper cuts 2/3 to 0.66
+    return Row("Tab. I", "III-F", paper, here, agrees)
+
+
+def _lifts() -> list[Row]:
+    one, two = lifted_distance(1), lifted_distance(2)
+    near = abs(one - 0.46) < 0.005, abs(two - 0.009) < 0.0005
+    return [
+        Row("lift of one box", "appendix", "0.46 m", f"{one:.3f} m", near[0]),
+        Row("lift of two boxes", "appendix", "9 mm", f"{1000 * two:.1f} mm", near[1]),
+    ]
+
+
+def lifted_distance(stack: int) -> float:
+    """Return how far PyBullet lifts the lowest of so many boxes on top of one another, in m."""
+    world = bullet.World()
+    world.add_box((0, 0, -0.5), (2, 2, 1), 0)  # the floor
+    bodies = [
+        world.add_box((0, 0, 0.1 + 0.2 * level), (0.5, 0.4, 0.2), task.MASS)
+        for level in range(stack)
+    ]
+    distance = world.pull(bodies[0])
+    world.close()
+    return distance
+
+
+def _tallest_bar(folder: str | Path) -> Row:
+    bars = {}
+    for name in ("Observation", "Equalized_Observation"):
+        x = pd.read_csv(Path(folder) / "obs_hist_equal" / f"{name}.csv")["x"]
+        bars[name] = np.histogram(x, 110, (-1.001, 1.001))[0].max()  # the bins of the paper's plot
+    return Row(
+        "tallest bar of the histogram",
+        "Fig. 5",
+        "fits an axis to 70",
+        f"{bars['Observation']}; equalized {bars['Equalized_Observation']}",
+        max(bars.values()) <= 70,
+    )
+
+
+def chance(episodes: int, seed: int) -> pd.DataFrame:
+    """What random picks can hope for in full containers, and what they reach.
+
+    Args:
+        episodes: containers.
+        seed: of the episodes of random picks; the containers whose free items are counted have
+            the seeds from 0 on.
+    """
+    free, visible = free_shares(episodes)
+    reached = evaluate(policies.random, episodes, seed, mask=False)["success_rate"]
+    blocked = f"{1 - free:.1%} of all, {1 - visible:.1%} of the visible"
+    msr = f"{reached.mean():.1%} ± {reached.std():.1%}"
+    return table(
+        [
+            Row(
+                "items with nothing on top", "IV-B", "about 20 %", f"{free:.1%}",
+                abs(free - 0.2) < CHANCE_ERROR,
+            ),
+            Row(
+                "non-pickable items", "IV-B", "about 80 %", blocked,
+                abs(1 - visible - 0.8) < CHANCE_ERROR,
+            ),
+            Row("visible items that can be lifted, at the start", "—", "—", f"{visible:.1%}"),
+            Row(
+                "MSR of random picks", "abstract, IV-B", "20 %", msr,
+                abs(reached.mean() - 0.2) < CHANCE_ERROR,
+            ),
+        ]
+    )  # fmt: skip
+
+
+def free_shares(episodes: int) -> tuple[float, float]:
+    """Means over the full containers of the seeds from 0 on.
+
+    Returns:
+        The share of all items with nothing on top; the share of the visible items that can be
+        lifted.
+    """
+    env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
+    free, visible = [], []
+    for seed in range(checks.integer("episodes", episodes, 1)):
+        env.reset(seed=seed)
+        visible.append(env.liftable().mean())
+        on_top = env.physics.surroundings.on_top
+        free.append(np.mean([not on_top(item) for item in range(len(env.physics.load))]))
+    env.close()
+    return float(np.mean(free)), float(np.mean(visible))
+
+
+def rules(episodes: int, seed: int) -> pd.DataFrame:
+    """The MSR of two rules without the mask.
+
+    Args:
+        episodes: containers.
+        seed: of the first one.
+    """
+    highest, nearest = (
+        evaluate(rule, episodes, seed, mask=False)["success_rate"].mean()
+        for rule in (policies.highest, policies.nearest)
+    )
+    best = f"highest item: {highest:.1%}"
+    return table(
+        [
+            Row("MSR of an optimal policy", "IV-B", "100 %", best, highest == 1),
+            Row("MSR of the nearest item", "—", "—", f"{nearest:.1%}"),
+        ]
+    )
+
+
+def tuning(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """The tuning environment: learning rates, batch sizes, feature engineering.
+
+    Args:
+        folder: of the data.
+    """
+    summary = pd.read_csv(Path(folder) / "tuning_summary.csv")
+    summary = summary.set_index(["equalize", "batch_size", "learning_rate"])
+    reached = {size: greedy_reached(_curves("hitrate", True, size, folder)) for size in BATCH_SIZES}
+    noise = {size: loss_noise(True, size, folder) for size in BATCH_SIZES}
+    return table(
+        [
+            *_learning_rates(summary),
+            *_batches(summary, reached, noise),
+            *_feature_engineering(summary, reached[2048], noise[2048], folder),
+        ]
+    )
+
+
+def _learning_rates(summary: pd.DataFrame) -> list[Row]:
+    rows = []
+    for rate, claim in (
+        (0.1, "unstable, in most cases unsuccessful"),
+        (0.01, "the same"),
+        (0.001, "successful"),
+    ):
+        runs = summary.loc[True, 1024, rate]
+        here = f"{_solved(runs)}; MSR at the end {runs.final_msr:.0%}"
+        agrees = (runs.solved > runs.runs / 2) == (rate == 0.001)
+        rows.append(Row(f"tuning, b = 1024, μ = {rate:g}", "IV-A, Fig. 8", claim, here, agrees))
+    return rows
+
+
+def _batches(summary: pd.DataFrame, reached: dict, noise: dict) -> list[Row]:
+    rows = [
+        Row(
+            f"tuning, b = {size}, μ = 0.001", "IV-A, Fig. 9", "a curve",
+            f"{_solved(summary.loc[True, size, 0.001])}; {_since(reached[size])}; "
+            f"noise of the loss {noise[size]:.4f}",
+        )
+        for size in BATCH_SIZES
+    ]  # fmt: skip
+    faster = "steps of the greedy MSR, above: b = 2048 against 64"
+    return [
+        *rows,
+        Row(
+            "… less noisy with larger b", "IV-A", "yes", "noise of the loss, above",
+            list(noise.values()) == sorted(noise.values(), reverse=True),
+        ),
+        Row(
+            "… faster with larger b", "IV-A", "yes", faster,
+            reached[2048]["high"] < reached[64]["low"],
+        ),
+    ]  # fmt: skip
+
+
+def _feature_engineering(
+    summary: pd.DataFrame, reached: dict, noise: float, folder: str | Path
+) -> list[Row]:
+    rows = []
+    for equalized, label in ((True, "with FE"), (False, "without FE")):
+        loss = summary.loc[equalized, 2048, 0.001]
+        here = f"{loss.loss_start:.2f}, {loss.loss_dip:.2f}, {loss.loss_peak:.2f}"
+        here += f", {loss.loss_end:.3f} at the end"
+        agrees = loss.loss_start > loss.loss_dip < loss.loss_peak > loss.loss_end
+        rows.append(
+            Row(f"tuning, loss {label}", "IV-A, Fig. 10", "falls, rises, falls", here, agrees)
+        )
+    without = greedy_reached(_curves("hitrate", False, 2048, folder))
+    spread = loss_noise(False, 2048, folder)
+    return [
+        *rows,
+        Row(
+            "… shorter with FE", "IV-A", "significantly",
+            f"with FE, {_since(reached)}; without, from {_steps(without)} on",
+            reached["high"] < without["low"],
+        ),
+        Row(
+            "… more stable with FE", "IV-A", "yes",
+            f"noise of the loss {noise:.4f} with FE, {spread:.4f} without", noise < spread,
+        ),
+    ]  # fmt: skip
+
+
+def loss_noise(equalized: bool, batch_size: int, folder: str | Path = files.DATA) -> float:
+    """Return the standard deviation of the losses of tuning runs around their running means.
+
+    Args:
+        equalized: whether with feature engineering.
+        batch_size: of the runs; their learning rate is the paper's.
+        folder: of the data.
+    """
+    loss = _curves("loss", equalized, batch_size, folder)
+    apart = loss - np.array([running_mean(run) for run in loss])
+    return float(np.nanstd(apart[:, SETTLED:]))
+
+
+def _curves(kind: str, equalized: bool, batch_size: int, folder: str | Path) -> np.ndarray:
+    """The curves of all tuning runs with the paper's learning rate, (runs, steps)."""
+    place = Path(folder) / set_name(equalized)
+    names = [f"{kind}_curve_{run_name(batch_size, 1e-3, run)}.csv" for run in range(RUN_COUNT)]
+    return np.array([np.loadtxt(place / name) for name in names if (place / name).is_file()])
+
+
+def _solved(runs: pd.Series) -> str:
+    return f"{runs.solved:.0f} of {runs.runs:.0f} runs end at 99 %"
+
+
+def _steps(reached: dict) -> str:
+    return f"{reached['step']:.0f} ({reached['low']:.0f}–{reached['high']:.0f})"
+
+
+def _since(reached: dict) -> str:
+    return f"greedy MSR above 90 % from step {_steps(reached)} on"
+
+
+def training(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """The training, by the plan's measures in ``unload.reproduce.verdict``.
+
+    Args:
+        folder: of the data.
+    """
+    runs = paper_runs(folder)
+    rows = _start(np.array([curve["success_rate"].iloc[0] for _, _, curve in runs]))
+    for cell, name in PAPER_CELLS.items():
+        curves = [curve for each, _, curve in runs if each == cell]
+        if len(curves) > 1:
+            rows += _cell(f"{name}, {len(curves)} runs", curves)
+    trained = pd.read_csv(Path(folder) / "training_summary.csv")
+    for mask, column in (("without", "msr_no_mask"), ("with", "msr_mask")):
+        label = f"MSR of the policies trained without the mask, b = 2048, applied {mask} it"
+        msr = trained[column]
+        rows.append(Row(label, "—", "—", f"{msr.mean():.0%} ({msr.min():.0%}–{msr.max():.0%})"))
+    return table(rows)
+
+
+def _start(msr: np.ndarray) -> list[Row]:
+    """The first episodes of all runs: mean reward and MSR."""
+    mean, reward = msr.mean(), 2 * msr.mean() - 1
+    return [
+        Row(
+            "mean reward at the start (first episodes)", "IV-B, Fig. 12", "-0.7", f"{reward:.2f}",
+            abs(reward + 0.7) < 2 * CHANCE_ERROR,
+        ),
+        Row(
+            "MSR at the start (first episodes)", "IV-B", "15 %", f"{mean:.1%}",
+            abs(mean - 0.15) < CHANCE_ERROR,
+        ),
+    ]  # fmt: skip
+
+
+def _cell(label: str, curves: list[pd.DataFrame]) -> list[Row]:
+    """The end, the rise and the loss of the runs of one cell."""
+    measured = pd.DataFrame([run_measures(curve) for curve in curves])
+    end, (low, high) = measured["end"], t_interval(measured["end"])
+    near, half = int(end.between(*LIKE_THE_PAPER).sum()), len(curves) / 2
+    msr = [windows(curve)["success_rate"].to_numpy() for curve in curves]
+    steady = sum((np.maximum.accumulate(each) - each).max() <= STEADY for each in msr)
+    like_11 = int(measured["fig11"].sum())
+    holds = bool(low <= PAPER_MSR <= high)
+    return [
+        Row(
+            f"mean reward at the end: {label}", "IV-B, Fig. 12", "around 0.2",
+            f"{2 * end.mean() - 1:.2f} (95 % t interval {2 * low - 1:.2f} to {2 * high - 1:.2f})",
+            "too wide to tell" if high - low > TOO_WIDE else holds,
+        ),
+        Row(
+            f"MSR at the end: {label}", "abstract, IV-B, V", "60 %",
+            f"{end.mean():.0%} ({end.min():.0%}–{end.max():.0%}); "
+            f"{near} of {len(end)} runs in 50–70 %",
+            holds and near >= half,
+        ),
+        Row(
+            f"steady rise: {label}", "IV-B", "yes", f"{steady} of {len(curves)} runs",
+            steady >= half,
+        ),
+        Row(
+            f"loss: {label}", "IV-B, Fig. 11", "falls, rises, falls",
+            f"{like_11} of {len(curves)} runs", like_11 >= half,
+        ),
+    ]  # fmt: skip
