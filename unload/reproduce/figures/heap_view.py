@@ -370,6 +370,7 @@ def _still(states: Mapping[str, tuple[Heap, np.ndarray]]) -> bytes:
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
     small = io.BytesIO()
-    picture = Image.open(file).convert("RGB").quantize(PALETTE)
+    # By octree: the few coloured pixels among many grey ones keep their colours.
+    picture = Image.open(file).convert("RGB").quantize(PALETTE, Image.Quantize.FASTOCTREE)
     picture.save(small, "PNG", optimize=True)  # a third of the bytes
     return small.getvalue()
