@@ -57,17 +57,17 @@ def test_nothing_is_drawn_of_no_boxes():
     assert seen(picture, RED) == seen(picture, BLUE) == 0
 
 
-def test_the_colours_of_boxes_and_legend_are_kept():
+def test_the_colours_of_boxes_and_of_the_ground_are_kept():
     """Although many colours are reduced to few."""
     low = np.array([(1 + number / 3, 0, 0) for number in range(13)])
     names = {f"package {number}": package_colour(number) for number in range(13)}
-    colours = np.array([*names.values()])
-    png = still(low, low + (0.3, 2, 1), colours, names, 4.0)
+    png = still(low, low + (0.3, 2, 1), np.array([*names.values()]), names, 4.0)
     shown = np.rint(255 * imread(io.BytesIO(png))[:, :, :3])
     legend, boxes = shown[:, :110], shown[:, 110:]
-    for colour in 255 * colours:
+    for colour in names.values():
         for part in (legend, boxes):
-            assert (np.abs(part - colour).max(axis=2) < 6).any()
+            assert (part == np.rint(255 * np.array(colour))).all(axis=2).any()
+    assert (shown[-1] == 255).all()
 
 
 def test_what_is_up_is_seen_higher():

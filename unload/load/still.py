@@ -66,19 +66,24 @@ def still(
     figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
     file = io.BytesIO()
+    picture = np.asarray(canvas.buffer_rgba())[:, :, :3]
     _with_few_colours(picture, legend.values()).save(file, "PNG", optimize=True)
     return file.getvalue()
 
 
-def _with_few_colours(picture: Image.Image, exact: Iterable) -> Image.Image:
+def _with_few_colours(picture: np.ndarray, boxes: Iterable) -> Image.Image:
     """Reduce the colours, which takes a quarter of the bytes; those of boxes stay as they are."""
-    shades = np.multiply.outer([shade for _, shade in FACES], np.array([*exact]).reshape(-1, 3))
-    others = picture.quantize(COLOURS).getpalette()[: 3 * COLOURS]
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([*np.rint(255 * shades).astype(int).ravel().tolist(), *others])
-    return picture.quantize(palette=palette, dither=Image.Dither.NONE)
+    shades = np.multiply.outer([1, *(shade for _, shade in FACES)], np.reshape([*boxes], (-1, 3)))
+    kept = np.unique(np.rint(255 * np.vstack([*shades, (1, 1, 1)])), axis=0)
+    others = Image.fromarray(picture).quantize(COLOURS).getpalette()[: 3 * COLOURS]
+    palette = np.vstack([kept, np.reshape(others, (-1, 3))]).astype(int)
+    codes, pixels = np.unique(picture @ np.array((1 << 16, 1 << 8, 1)), return_inverse=True)
+    apart = (codes[:, None] >> (16, 8, 0) & 255)[:, None] - palette
+    nearest = (apart**2).sum(axis=2).argmin(axis=1).astype(np.uint8)
+    image = Image.fromarray(nearest[pixels].reshape(picture.shape[:2]))
+    image.putpalette(palette.ravel().tolist())
+    return image
 
 
 def project(points: np.ndarray) -> np.ndarray:
