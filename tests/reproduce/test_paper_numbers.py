@@ -128,6 +128,11 @@ def test_a_mean_of_60_percent_is_not_enough(monkeypatch):
     assert agrees["mean reward at the start (first episodes)"] == "no"
 
 
+def test_two_runs_far_apart_decide_nothing_although_half_end_near(monkeypatch):
+    found, _ = agreement_of(monkeypatch, np.linspace(0.3, 0.64, 20), np.linspace(0.3, 0.96, 20))
+    assert found["mean reward at the end"] == found["MSR at the end"] == "too wide to tell"
+
+
 def test_a_single_run_is_not_compared(monkeypatch):
     found, _ = agreement_of(monkeypatch, np.linspace(0.15, 0.6, 20))
     assert not found

@@ -173,7 +173,7 @@ def survival(before: Mapping[str, np.ndarray], columns: int = 5) -> Figure:
     for axes, (name, successes) in zip(grid.flat, before.items()):
         share = surviving(successes)
         picks = np.arange(len(share))
-        axes.plot(picks, share, color="C0", label="measured")
+        axes.plot(picks, share, color="C0", label="episodes")
         expected = (1 - constant_chance(successes)) ** picks
         axes.plot(
             picks, expected, "--", color="0.4", linewidth=1, label="if the chance were constant"
