@@ -1,7 +1,7 @@
 """How fast the parts are: measured, printed and kept in data/benchmarks.
 
     python benchmarks/run.py            all, in about seven minutes
-    python benchmarks/run.py --quick    in small, within a minute; nothing is kept
+    python benchmarks/run.py --quick    at reduced size, within a minute; nothing is kept
 
 Absolute times depend on the machine and on what else it does; the ratios, each to the
 first row of its kind and all of one run, say more. All is on one thread unless said.
@@ -48,7 +48,7 @@ def speeds(quick: bool = False) -> pd.DataFrame:
     batch_size = 128 if quick else 2048
     update = f"update, b = {batch_size}, n = 64"
     few = {"ours": 6400, "memory": 3200, "plain": 128, "before": 2304, "theirs": 64}
-    parts = (  # what, unit, how it is measured, and what changes in small
+    parts = (  # what, unit, how it is measured, and what changes at reduced size
         ("lifts", "lifts/s", partial(lift_rates, load), {"full": 1, "others": 5, "rounds": 1}),
         ("fill the full simulation", "containers/s", partial(fill_rates, load), {"rounds": 1}),
         ("random picks", "picks/s", pick_rates, {"num_envs": 2, "picks": 20, "rounds": 1}),

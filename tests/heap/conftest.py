@@ -28,7 +28,7 @@ def cubes() -> Callable[..., Heap]:
 
 @pytest.fixture(scope="session")
 def pile(cubes) -> Heap:
-    """Nine cubes in three rows and two levels, a few of them turned: a heap in small."""
+    """Nine cubes in three rows and two levels, a few of them turned: a small heap."""
     heap = cubes(
         *((x, y, 0) for x in (4.5, 5.0) for y in (0.5, 1.0, 1.5)),
         *((4.75, y, 1) for y in (0.5, 1.0, 1.5)),

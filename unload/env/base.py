@@ -70,7 +70,7 @@ class EpisodeEnv(gymnasium.Env):
 
 
 class PickingEnv(EpisodeEnv):
-    """Base of environments whose action picks one of the 128 observed items.
+    """Base of environments whose action picks one of the 128 visible items.
 
     Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
     episode's end. What changes the episode stands in ``AllOrReset``.

@@ -28,7 +28,7 @@ MOST_ENVS = 2**16  # several GB
 
 
 class PickingVectorEnv(gymnasium.vector.VectorEnv):
-    """Base of environments in which each action picks one of 128 observed items.
+    """Base of environments in which each action picks one of 128 visible items.
 
     Args:
         num_envs: number of environments.

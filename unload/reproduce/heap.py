@@ -4,7 +4,7 @@
     python -m unload.reproduce heap-agreement     # data/heap/agreement.csv
     python -m unload.reproduce heap-camera        # data/heap/camera.csv
 
-Everything is kept in ``runs/heap`` in small parts: a command that was stopped goes on.
+Everything is kept in ``runs/heap`` in parts: a command that was stopped goes on.
 """
 
 import time

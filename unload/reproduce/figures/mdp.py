@@ -122,7 +122,7 @@ def _path(axes: Axes, corners) -> None:
 
 
 def _mini_equalization(axes: Axes, x, y, load) -> None:
-    """Depths of twelve observed items before and after equalization."""
+    """Depths of twelve visible items before and after equalization."""
     depths = observation.scale(load.positions)[observation.nearest(load.positions)[::11]]
     equal = equalize(depths)
     for level, values, colour in (
