@@ -12,13 +12,13 @@ help:  ## this list
 figures: $(VENV)/ready  ## run every notebook at reduced counts and write figures/ (sets all up first)
 	$(BIN)/python notebooks/run.py
 
-test: $(VENV)/ready  ## run all tests
-	$(BIN)/python -m pytest
+test: $(VENV)/ready  ## run all tests, in two processes
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # Left out: tests marked slow; those that compile anew, kill runs or simulate every box, by name;
 # experiments, figures, notebooks and benchmarks.
 quick: $(VENV)/ready  ## run most tests of the rooms in a minute or so (the Makefile says what it leaves out)
-	$(BIN)/python -m pytest -m "not slow" -k "not (compiled or killed or full)" \
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow" -k "not (compiled or killed or full)" \
 	--ignore tests/reproduce --ignore tests/test_notebooks.py --ignore tests/test_benchmarks.py
 
 lint: $(VENV)/ready  ## check style and format with ruff, notebooks included
