@@ -4,6 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from unload.load.colours import COLOURS
+from unload.load.slider import buttons, slider
 from unload.load.view import View, layout, mesh, view
 from unload.play.episode import Episode
 from unload.support import checks
@@ -53,7 +54,8 @@ def replay(episode: Episode, height: int = 520) -> View:
     middle = episode.moment(stops[len(stops) // 2])
     still = view(load, middle.present, middle.groups(), height)
     figure = View(traces, layout(height), frames, picture=still.picture)
-    figure.update_layout(sliders=[_slider(episode, stops)], updatemenus=[_buttons()])
+    labels = {str(stop): f"{stop} picks, {episode.unloaded(stop)} unloaded" for stop in stops}
+    figure.update_layout(sliders=[slider(labels)], updatemenus=[buttons(PAUSE)])
     return figure
 
 
@@ -66,48 +68,3 @@ def _last_failure(episode: Episode, count: int) -> go.Mesh3d:
     trace = mesh(episode.load, items, "failed", COLOURS["failed"], legend=True, seam=0)
     trace.visible = True if failed else "legendonly"
     return trace
-
-
-def _slider(episode: Episode, stops: list[int]) -> dict:
-    steps = [
-        {
-            "label": f"{stop} picks, {episode.unloaded(stop)} unloaded",
-            "method": "animate",
-            "args": [[str(stop)], _timing(0)],
-        }
-        for stop in stops
-    ]
-    return {
-        "steps": steps,
-        "x": 0.12,
-        "len": 0.86,
-        "y": 0.02,
-        "yanchor": "bottom",
-        "ticklen": 0,
-        "font": {"color": "rgba(0,0,0,0)"},  # of the labels below the slider: too many to read
-        "currentvalue": {"font": {"color": "black"}},
-    }
-
-
-def _buttons() -> dict:
-    return {
-        "type": "buttons",
-        "direction": "left",
-        "x": 0.0,
-        "xanchor": "left",
-        "y": 0.04,
-        "yanchor": "bottom",
-        "buttons": [
-            {"label": "▶", "method": "animate", "args": [None, _timing(PAUSE, True)]},
-            {"label": "❚❚", "method": "animate", "args": [[None], _timing(0)]},
-        ],
-    }
-
-
-def _timing(pause: int, from_here: bool = False) -> dict:
-    return {
-        "mode": "immediate",
-        "fromcurrent": from_here,
-        "frame": {"duration": pause, "redraw": True},
-        "transition": {"duration": 0},
-    }

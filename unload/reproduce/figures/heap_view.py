@@ -16,6 +16,7 @@ from unload import task
 from unload.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from unload.heap.rake import Outcome
 from unload.load.colours import COLOURS, css
+from unload.load.slider import buttons, slider
 from unload.load.still import CORNERS, EYE, project
 from unload.load.view import SEAM, TRIANGLES, UNIT, View, layout
 from unload.reproduce.figures.style import STYLE, styled
@@ -249,8 +250,9 @@ def replay_heaps(episodes: Mapping[str, Played], height: int = 460) -> View:
         )
 
     figure = View([*traces, *_legend_traces()], _layout(height), frames, picture=picture)
+    labels = {str(stop): f"pick {stop + 1}" for stop in stops}
     figure.update_layout(
-        **scenes, annotations=titles, sliders=[_slider(stops)], updatemenus=[_buttons()]
+        **scenes, annotations=titles, sliders=[slider(labels)], updatemenus=[buttons(PAUSE)]
     )
     return figure
 
@@ -315,47 +317,6 @@ def _layout(height: int, unit: int = 1) -> go.Layout:
         },
     )
     return made
-
-
-def _slider(stops: range) -> dict:
-    steps = [
-        {"label": f"pick {stop + 1}", "method": "animate", "args": [[str(stop)], _timing(0)]}
-        for stop in stops
-    ]
-    return {
-        "steps": steps,
-        "x": 0.12,
-        "len": 0.86,
-        "y": 0.02,
-        "yanchor": "bottom",
-        "ticklen": 0,
-        "font": {"color": "rgba(0,0,0,0)"},  # of the labels below the slider: too many to read
-        "currentvalue": {"font": {"color": "black"}},
-    }
-
-
-def _buttons() -> dict:
-    return {
-        "type": "buttons",
-        "direction": "left",
-        "x": 0.0,
-        "xanchor": "left",
-        "y": 0.04,
-        "yanchor": "bottom",
-        "buttons": [
-            {"label": "▶", "method": "animate", "args": [None, _timing(PAUSE)]},
-            {"label": "❚❚", "method": "animate", "args": [[None], _timing(0)]},
-        ],
-    }
-
-
-def _timing(pause: int) -> dict:
-    return {
-        "mode": "immediate",
-        "fromcurrent": True,
-        "frame": {"duration": pause, "redraw": True},
-        "transition": {"duration": 0},
-    }
 
 
 def _still(states: Mapping[str, tuple[Heap, np.ndarray]]) -> bytes:
