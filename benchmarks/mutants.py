@@ -7,7 +7,8 @@ Cosmic Ray makes the mutants. mutmut 3 leaves decorated functions alone, and so 
 compiled ones. Each mutant's module is changed in a copy of the tree, where a forked process
 then runs the tests that belong to it; to fork saves importing PyTorch a thousand times. Modules
 with compiled functions run as plain Python, so that nothing is compiled; ``kernel``, whose
-instructions Python does not have, is compiled anew for each mutant.
+instructions Python does not have, is compiled anew for each mutant, and so that it refuses places
+outside of its arrays.
 
 With the default sample and seed, the scores go into ``mutants.md`` beside this file, which also
 says of each survivor why it survives; those of which it does not are counted at the end.
@@ -190,6 +191,7 @@ def run_tests(tree: Path, module: str) -> int:
     sys.dont_write_bytecode = False
     source = (tree / "unload" / f"{module}.py").read_text()
     numba.config.DISABLE_JIT = "@compiled" in source and "@intrinsic" not in source
+    numba.config.BOUNDSCHECK = "@intrinsic" in source or None  # as Python does by itself
     torch.set_num_threads(1)
     tests = [f"tests/{name}" for name in MODULES[module].split()]
     options = ["-x", "-p", "no:cacheprovider", "-k", f"not ({SLOW})", "-m", "not slow"]

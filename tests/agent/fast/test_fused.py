@@ -172,6 +172,17 @@ def test_a_dead_network_has_no_gradients_but_the_last_bias(batch):
     check(net, batch)
 
 
+def test_double_precision_decides_whether_a_feature_is_active():
+    """Its value is 2⁻²⁶ - 2⁻³⁶; single precision rounds the first part away."""
+    net = network(1)
+    with torch.no_grad():
+        net.extractor.weight[:] = torch.tensor([-1 - 2.0**-12, 2.0**-26, 0])
+        net.extractor.bias[:] = 1
+        net.scorer.weight[:] = torch.tensor([1.0, 1.0, 1.0, 0.0])  # the mean does not count
+    items = np.tile(np.array([1 - 2.0**-12 + 2.0**-24, 1, 0], np.float32), (1, 3, 1))
+    check(net, {"observations": items, "actions": np.array([0]), "rewards": np.ones(1, np.float32)})
+
+
 @pytest.fixture
 def two_threads():
     before = torch.get_num_threads()
