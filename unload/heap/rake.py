@@ -85,12 +85,12 @@ class Rake:
 
     A pick drags a box towards the door: ``SPEED``, at most ``FORCE``, until it has moved by
     ``REACH`` or ``TIME`` is over. After ``REST``, the boxes whose centre is beyond the edge of
-    the conveyor are unloaded; it stands where the foremost face of the heap was before the
-    pick, at most 0.2 m outside the door (``Heap.edge``). (At the foremost centre, boxes that
-    creep by millimetres would count.) So is the dragged box, if it came. Since that takes
-    supports away, and boxes may still be toppling, this is repeated until nothing is unloaded
-    and nothing is faster than ``STILL``, at most ``RESTS`` times, so that what falls counts
-    for the pick that has caused it.
+    the conveyor are unloaded, and so is the dragged box, if it came. The edge stands where the
+    foremost face of the heap was before the pick, at most 0.2 m outside the door
+    (``Heap.edge``); at the foremost centre, boxes that creep by millimetres would count. Since
+    unloading takes supports away, and boxes may still be toppling, this is repeated until
+    nothing is unloaded and nothing is faster than ``STILL``, at most ``RESTS`` times, so that
+    what falls counts for the pick that has caused it.
 
     Every pick builds the world anew from the heap, so that it depends on nothing else, to the
     bit: not on earlier picks, of which PyBullet would remember contacts.
