@@ -2,7 +2,6 @@
 
 from functools import partial
 
-import numpy as np
 import pandas as pd
 import pytest
 import torch
@@ -11,10 +10,9 @@ from unload.heap.env import HeapEnv, stored_heaps
 from unload.heap.learning import save_network
 from unload.heap.network import HeapNetwork
 from unload.heap.rules import family
-from unload.reproduce import heap_table
+from unload.reproduce import heap_episodes, heap_rules, heap_table
 from unload.reproduce.heap_learning import network_path
 from unload.reproduce.heap_variation import varied_path
-from unload.reproduce.intervals import bootstrap_interval
 
 
 @pytest.fixture
@@ -58,31 +56,6 @@ def test_a_policy_on_fewer_heaps_is_compared_on_those(episodes):
     assert row["boxes_ratio"] == pytest.approx(2.0 / 1.5) and row["net_more"] == 0.5
 
 
-def test_pairs_make_the_interval_narrow():
-    reference = np.array([1.0, 5.0, 2.0, 8.0])
-    ratio, low, high = heap_table.ratio_interval(1.3 * reference, reference)
-    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
-    assert np.isnan(heap_table.ratio_interval(reference, -reference)).all()
-    assert np.isnan(heap_table.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
-
-
-def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
-    """What distinguishes them from percentile ones, and their agreement with scipy's own."""
-    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
-    mean, low, high = heap_table.mean_interval(values)
-    percentile = bootstrap_interval(values)
-    assert mean == 4.1 and low < mean < high
-    assert low > percentile[0] and high > percentile[1]
-    assert heap_table.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
-    assert heap_table.mean_interval(values) == (mean, low, high)
-
-
-def test_the_best_rule_depends_on_the_weight_of_falls():
-    rules = pd.DataFrame({"rule": ["bold", "shy"], "boxes": [2.0, 1.2], "falls": [1.0, 0.0]})
-    assert heap_table.best_rule(rules, 0.0) == "bold"
-    assert heap_table.best_rule(rules, 1.0) == "shy"
-
-
 def test_variants_are_named_by_what_they_differ_in():
     names = [heap_table.learned_name(*variant) for variant in heap_table.VARIANTS]
     assert names == [
@@ -122,15 +95,16 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
 
 @pytest.mark.slow
 def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(heap_table, "HeapEnv", partial(HeapEnv, max_picks=2))
+    monkeypatch.setattr(heap_episodes, "HeapEnv", partial(HeapEnv, max_picks=2))
     rules = {name: heap_table.RULES[name] for name in ("random", "lowest")}
     monkeypatch.setattr(heap_table, "RULES", rules)
     some = dict(list(family().items())[:2])
-    monkeypatch.setattr(heap_table, "family", lambda: some)
-    heap_table.rules_data(1, tmp_path, tmp_path, progress=False)
+    for module in (heap_rules, heap_table):
+        monkeypatch.setattr(module, "family", lambda: some)
+    heap_rules.rules_data(1, tmp_path, tmp_path, progress=False)
     save_networks(tmp_path)
     save_network(HeapNetwork("own", 8), varied_path(0, tmp_path))
-    monkeypatch.setattr(heap_table, "sized_heap", lambda *given: stored_heaps("train")[0])
+    monkeypatch.setattr(heap_episodes, "sized_heap", lambda *given: stored_heaps("train")[0])
     monkeypatch.setattr(heap_table, "sized_job", lambda *given: ({"sized": given}, int))
     arguments = {
         "heaps": 2,
@@ -163,15 +137,6 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     again = heap_table.table_data(**arguments)
     pd.testing.assert_frame_equal(table, again)
     assert [path.stat().st_mtime_ns for path in stored] == written
-
-
-def test_an_oracle_plays_its_heaps(tmp_path):
-    """It tries boxes in two physics."""
-    env = HeapEnv("test", physics="near", max_picks=1)
-    policy = heap_table.make_policy({"oracle": 1.0}, env)
-    assert [rake.physics for rake in policy._rakes] == ["near", heap_table.PHYSICS]
-    policy.close()
-    env.close()
 
 
 def test_unknown_conditions_and_missing_rules_are_refused(tmp_path):

@@ -2,7 +2,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload.reproduce.intervals import bootstrap_interval, share_interval, with_intervals
+from unload.reproduce.intervals import (
+    bootstrap_interval,
+    mean_interval,
+    ratio_interval,
+    share_interval,
+    with_intervals,
+)
 
 
 def test_the_interval_covers_the_true_mean_about_as_often_as_it_says(rng):
@@ -75,3 +81,22 @@ def test_share_intervals_are_those_of_the_binomial_distribution(rng):
 def test_impossible_shares_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         share_interval(*arguments)
+
+
+def test_pairs_make_the_interval_narrow():
+    reference = np.array([1.0, 5.0, 2.0, 8.0])
+    ratio, low, high = ratio_interval(1.3 * reference, reference)
+    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
+    assert np.isnan(ratio_interval(reference, -reference)).all()
+    assert np.isnan(ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
+
+
+def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
+    """What distinguishes them from percentile ones, and their agreement with scipy's own."""
+    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
+    mean, low, high = mean_interval(values)
+    percentile = bootstrap_interval(values)
+    assert mean == 4.1 and low < mean < high
+    assert low > percentile[0] and high > percentile[1]
+    assert mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
+    assert mean_interval(values) == (mean, low, high)

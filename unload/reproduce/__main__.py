@@ -11,6 +11,7 @@ from unload.reproduce import (
     heap,
     heap_learning,
     heap_lifts,
+    heap_rules,
     heap_table,
     heap_variation,
     interventions,
@@ -54,6 +55,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     **heap_lifts.PARTS,
     **heap_learning.PARTS,
     **heap_variation.PARTS,
+    **heap_rules.PARTS,
     **heap_table.PARTS,
 }  # fmt: skip
 

@@ -9,7 +9,8 @@ that was stopped goes on, and seeds make an episode the same in whatever order i
 
 import hashlib
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from unload.heap.env import MAX_PICKS, HeapEnv
-from unload.heap.episodes import episode_from, exploring, picks_of, play
+from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
 from unload.heap.learning import STEPS, Learned, Picks, fit, joined, load_network, save_network
 from unload.heap.network import KINDS
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
@@ -102,17 +103,34 @@ def record_picks(
     folder = Path(runs_dir) / NAME
     known = network_paths(round_number - 1, *VARIANTS[0], runs_dir) if round_number else []
     path = folder / "picks" / f"round{round_number}"
-    missing = [n for n in range(episodes) if not (path / f"{n:05}.npz").exists()]
+    record_episodes(
+        {
+            path / f"{number:05}.npz": partial(_explored, number, round_number, physics, known)
+            for number in range(episodes)
+        },
+        n_jobs,
+        progress,
+    )
+
+
+def record_episodes(
+    players: Mapping[Path, Callable[[], Episode]], n_jobs: int, progress: bool
+) -> None:
+    """Store the episode that each function plays in its file, unless it is there already."""
+    missing = {path: player for path, player in players.items() if not path.exists()}
     done = Parallel(n_jobs, return_as="generator")(
-        delayed(_record)(path / f"{number:05}.npz", number, round_number, physics, known)
-        for number in missing
+        delayed(_record)(path, player) for path, player in missing.items()
     )
     list(tqdm(done, total=len(missing), unit="episode", disable=not progress, ncols=100))
 
 
-def _record(path: Path, number: int, round_number: int, physics: str, known: list[Path]) -> None:
-    """Play one exploring episode and store it."""
+def _record(path: Path, player: Callable[[], Episode]) -> None:
     torch.set_num_threads(1)
+    files.write_arrays(path, player().arrays())
+
+
+def _explored(number: int, round_number: int, physics: str, known: list[Path]) -> Episode:
+    """One exploring episode on a training heap."""
     rng = np.random.default_rng([SEEDS["train"], round_number, number])
     favourite = None
     if known:
@@ -121,10 +139,9 @@ def _record(path: Path, number: int, round_number: int, physics: str, known: lis
     env = HeapEnv("train", physics=physics)
     try:
         heap = env.heaps[number % len(env.heaps)]
-        episode = play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
+        return play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
     finally:
         env.close()
-    files.write_arrays(path, episode.arrays())
 
 
 def read_picks(runs_dir: str | Path = files.RUNS, rounds: Iterable[int] = range(ROUNDS)) -> Picks:

@@ -1,45 +1,36 @@
 """Policies on the same unseen heaps: table, conditions, and throughput against falls.
 
-    python -m unload.reproduce heap-rules     # data/heap/rules.csv: the family on training heaps
-    python -m unload.reproduce heap-table     # data/heap/{episodes,table}.csv
+    python -m unload.reproduce heap-table
 
 Each episode is kept in ``runs/heap``: a command that was stopped goes on. All policies of a
 condition play the same heaps, so that differences are those of pairs. A pick takes 0.7 s of CPU,
 so that a policy's 30 episodes take 5 minutes; ``plan`` says which of them are worth it.
 """
 
-import warnings
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-import torch
-from scipy import stats
 
-from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
-from unload.heap.episodes import Oracle, play
-from unload.heap.learning import Learned, load_network
+from unload.heap.env import MAX_PICKS
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
-from unload.heap.rules import RULES, best, family, linear
+from unload.heap.rules import RULES, family
 from unload.reproduce.heap import HEAPS, NAME
+from unload.reproduce.heap_episodes import PHYSICS, SIZED_SEED, episode_job
 from unload.reproduce.heap_learning import (
     ROUNDS,
     VARIANTS,
     WEIGHTS,
     network_paths,
-    weights_digest,
 )
-from unload.reproduce.heap_variation import sized_heap, sized_job, varied_paths
-from unload.reproduce.intervals import RESAMPLES
+from unload.reproduce.heap_rules import best_rule
+from unload.reproduce.heap_variation import sized_job, varied_paths
+from unload.reproduce.intervals import mean_interval, ratio_interval
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
 from unload.support import checks, files
 
-RULE_HEAPS = 10  # training heaps on which the family is compared
-RULE_PHYSICS = "coarse"  # 71 rules are many; "near" would favour those that make boxes fall
-PHYSICS = "whole"
 # Arguments of HeapEnv, and ``scale``, of the boxes: those of the stored heaps if there is none.
 # The networks were trained on none but the first, except those "trained with variation".
 CONDITIONS: dict[str, dict] = {
@@ -57,47 +48,8 @@ LEARNED = "learned"
 VARIED = "trained with variation"
 FEW = "random", "highest", REFERENCE, LEARNED, VARIED  # played under all conditions
 ORACLE_HEAPS = 10  # it takes 2.5 minutes of CPU a heap
-SIZED_SEED = 7000  # of the heaps of other sizes; no other data uses it
-LEVEL = 0.95
 SHOWN_WEIGHT = 1.0  # λ of the table
 MEASURES = "boxes", "falls", "net"
-
-
-def rules_data(
-    heaps: int = RULE_HEAPS,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = 1,
-    progress: bool = True,
-) -> pd.DataFrame:
-    """Play every rule of the family on training heaps; write ``heap/rules.csv``.
-
-    Returns:
-        One row per rule: ``rule``, ``boxes`` and ``falls`` per pick.
-    """
-    checks.integer("heaps", heaps, 1, HEAPS["train"])
-    jobs = [
-        _job({"linear": weights}, {}, "train", number, RULE_PHYSICS, runs_dir)
-        for weights in family().values()
-        for number in range(heaps)
-    ]
-    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs, progress)
-    rows = []
-    for place, name in enumerate(family()):
-        of = [answer.value for answer in answers[place * heaps : (place + 1) * heaps]]
-        means = {part: np.mean([np.mean(one[part]) for one in of]) for part in ("boxes", "falls")}
-        rows.append({"rule": name} | means)
-    frame = pd.DataFrame(rows)
-    settings = {"heaps": heaps, "split": "train", "physics": RULE_PHYSICS, "picks": MAX_PICKS}
-    records = [answer.record for answer in answers]
-    command, reduced = f"{COMMAND} heap-rules --heaps {heaps}", heaps < RULE_HEAPS
-    publish(Path(folder) / NAME, "rules", {"rules": frame}, command, settings, reduced, records)
-    return frame
-
-
-def best_rule(rules: pd.DataFrame, falls_weight: float) -> str:
-    """The rule with the most boxes - λ falls."""
-    return rules["rule"][(rules["boxes"] - falls_weight * rules["falls"]).idxmax()]
 
 
 def learned_name(kind: str, gamma: float) -> str:
@@ -200,63 +152,6 @@ def plan(
     return cells
 
 
-def make_policy(player: Mapping, env: HeapEnv) -> Callable:
-    """The policy that a specification describes.
-
-    Args:
-        player: ``{"rule": name}``, ``{"linear": weights}``, ``{"networks": paths,
-            "falls_weight": λ}`` or ``{"oracle": λ}``.
-        env: which an oracle may look into.
-    """
-    if "rule" in player:
-        return RULES[player["rule"]]
-    if "linear" in player:
-        return best(linear(player["linear"]))
-    if "networks" in player:
-        return Learned([load_network(path) for path in player["networks"]], player["falls_weight"])
-    return Oracle(env, player["oracle"], again=PHYSICS)
-
-
-def _job(
-    player: Mapping,
-    condition: Mapping,
-    split: str,
-    number: int,
-    physics: str,
-    runs_dir: str | Path,
-) -> tuple[dict, Callable]:
-    """The question of one episode and what answers it."""
-    question = {
-        "player": dict(player),
-        "condition": dict(condition),
-        "heap": [split, number],
-        "physics": physics,
-        "picks": MAX_PICKS,
-    }
-    if "networks" in player:  # named by what is in them, wherever they are
-        digest = weights_digest(player["networks"])
-        question["player"] = {"digest": digest, "falls_weight": player["falls_weight"]}
-    return question, partial(_play, dict(player), dict(condition), split, number, physics, runs_dir)
-
-
-def _play(
-    player: dict, condition: dict, split: str, number: int, physics: str, runs_dir: str | Path
-) -> dict:
-    torch.set_num_threads(1)
-    arguments = dict(condition)
-    scale = arguments.pop("scale", None)
-    if scale is None:
-        heap = stored_heaps(split)[number]
-    else:
-        heap = sized_heap(SIZED_SEED, number, scale, runs_dir)
-    env = HeapEnv(heaps=[heap], physics=physics, **arguments)
-    try:
-        episode = play(env, make_policy(player, env), heap, seed=number)
-    finally:
-        env.close()
-    return {"boxes": episode.unloaded.tolist(), "falls": episode.falls.tolist()}
-
-
 def table_data(
     heaps: int = HEAPS["test"],
     physics: str = PHYSICS,
@@ -309,7 +204,7 @@ def table_data(
     keep_all(Path(runs_dir) / NAME / "heaps", sized, n_jobs, progress)
     places = [(cell, number) for cell in cells for number in range(cell.heaps)]
     jobs = [
-        _job(cell.player, CONDITIONS[cell.condition], "test", number, physics, runs_dir)
+        episode_job(cell.player, CONDITIONS[cell.condition], "test", number, physics, runs_dir)
         for cell, number in places
     ]
     answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs, progress)
@@ -390,55 +285,8 @@ def _ends(name: str, value: float, low: float, high: float) -> dict[str, float]:
     return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 
-def mean_interval(values: Sequence[float], seed: int = 0) -> tuple[float, float, float]:
-    """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
-    values = checks.finite_array("values", values, (None,))
-    if np.ptp(values) < 1e-12:
-        return (float(values.mean()),) * 3
-    return float(values.mean()), *_bca((values,), np.mean, seed)
-
-
-def ratio_interval(
-    values: Sequence[float], reference: Sequence[float], seed: int = 0
-) -> tuple[float, float, float]:
-    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
-
-    NaN where the reference's mean is not > 0 in every resample, because such a ratio means
-    nothing. If all pairs have the same ratio, the interval has no width.
-    """
-    values = checks.finite_array("values", values, (None,))
-    reference = checks.finite_array("reference", reference, values.shape)
-    rows = np.random.default_rng(seed).integers(len(values), size=(RESAMPLES, len(values)))
-    if (reference[rows].mean(axis=1) <= 0).any():
-        return np.nan, np.nan, np.nan
-    ratio = float(values.mean() / reference.mean())
-    if np.abs(values - ratio * reference).max() < 1e-12:
-        return ratio, ratio, ratio
-    return ratio, *_bca((values, reference), _ratio, seed)
-
-
-def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
-    return values.mean(axis=axis) / reference.mean(axis=axis)
-
-
-def _bca(samples: tuple[np.ndarray, ...], statistic: Callable, seed: int) -> tuple[float, float]:
-    """BCa interval of a statistic of one sample, or of pairs; NaN of fewer than two values."""
-    if len(samples[0]) < 2:
-        return np.nan, np.nan
-    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
-        warnings.simplefilter("ignore")
-        interval = stats.bootstrap(
-            samples, statistic, n_resamples=RESAMPLES, paired=True, confidence_level=LEVEL,
-            method="BCa", vectorized=True, axis=-1, rng=np.random.default_rng(seed),
-        ).confidence_interval  # fmt: skip
-    return float(interval.low), float(interval.high)
-
-
-def _options(heaps: int) -> dict:
-    return JOBS | {"--heaps": {"type": int, "default": heaps, "help": "heaps to play"}}
-
-
-TABLE_OPTIONS = _options(HEAPS["test"]) | {
+OPTIONS = JOBS | {
+    "--heaps": {"type": int, "default": HEAPS["test"], "help": "heaps to play"},
     "--physics": {"default": PHYSICS, "choices": PHYSICS_KINDS, "help": "that judges"},
     "--rounds": {"type": int, "default": ROUNDS, "help": "of heap-learning that were made"},
     "--oracle-heaps": {
@@ -446,7 +294,4 @@ TABLE_OPTIONS = _options(HEAPS["test"]) | {
     },
     "--variation": {"action": "store_true", "help": "the networks of heap-variation play, too"},
 }  # fmt: skip
-PARTS = {
-    "heap-rules": ("the family of rules on training heaps", rules_data, _options(RULE_HEAPS)),
-    "heap-table": ("all policies on unseen heaps", table_data, TABLE_OPTIONS),
-}
+PARTS = {"heap-table": ("all policies on unseen heaps", table_data, OPTIONS)}

@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 import torch
 from joblib import Parallel, delayed
-from tqdm import tqdm
 
 from unload.heap.boxes import Heap, package_sizes
 from unload.heap.env import MAX_PICKS, HeapEnv
-from unload.heap.episodes import episode_from, exploring, picks_of, play
+from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
 from unload.heap.generate import settled_heap
 from unload.heap.learning import STEPS, Learned, fit, joined, load_network, save_network
 from unload.reproduce.heap import NAME
@@ -30,6 +29,7 @@ from unload.reproduce.heap_learning import (
     WEIGHTS,
     network_paths,
     read_picks,
+    record_episodes,
 )
 from unload.reproduce.results import COMMAND, JOBS, keep_all, kept
 from unload.support import checks, files
@@ -112,11 +112,14 @@ def variation_data(
     folder = Path(runs_dir) / NAME
     jobs = [sized_job(SEED, number, varied_scale(number)) for number in range(HEAPS)]
     keep_all(folder / "heaps", jobs[:episodes], n_jobs, progress)
-    missing = [n for n in range(episodes) if not _episode_path(n, runs_dir).exists()]
-    done = Parallel(n_jobs, return_as="generator")(
-        delayed(_record)(number, known, runs_dir) for number in missing
+    record_episodes(
+        {
+            _episode_path(number, runs_dir): partial(_varied, number, known, runs_dir)
+            for number in range(episodes)
+        },
+        n_jobs,
+        progress,
     )
-    list(tqdm(done, total=len(missing), unit="episode", disable=not progress, ncols=100))
     paths = [varied_path(seed, runs_dir) for seed in range(seeds)]
     Parallel(n_jobs)(
         delayed(_learn)(path, seed, rounds, episodes, steps, runs_dir)
@@ -150,9 +153,8 @@ def _episode_path(number: int, runs_dir: str | Path) -> Path:
     return Path(runs_dir) / NAME / "picks" / "varied" / f"{number:05}.npz"
 
 
-def _record(number: int, known: list[Path], runs_dir: str | Path) -> None:
-    """Play one exploring episode with its own friction and mass, and store it."""
-    torch.set_num_threads(1)
+def _varied(number: int, known: list[Path], runs_dir: str | Path) -> Episode:
+    """One exploring episode with its own friction and mass."""
     rng = np.random.default_rng([SEED, HEAPS + number])
     friction, mass = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in (FRICTIONS, MASSES))
     favourite = Learned([load_network(known[number % len(known)])], float(rng.choice(WEIGHTS)))
@@ -160,10 +162,9 @@ def _record(number: int, known: list[Path], runs_dir: str | Path) -> None:
     heap = sized_heap(SEED, place, varied_scale(place), runs_dir)
     env = HeapEnv(heaps=[heap], physics=PHYSICS, friction=friction, mass=mass)
     try:
-        episode = play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
+        return play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
     finally:
         env.close()
-    files.write_arrays(_episode_path(number, runs_dir), episode.arrays())
 
 
 def _learn(

@@ -23,8 +23,8 @@ from unload.reproduce.heap_table import (
     SHOWN_WEIGHT,
     VARIED,
     learned_name,
-    mean_interval,
 )
+from unload.reproduce.intervals import mean_interval
 from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
 
