@@ -30,7 +30,7 @@ LEGEND = {
     "unseen": "unseen",
     "visible": "visible",
     "liftable": "unloaded",
-    "failed": "failed to move",
+    "failed": "failed",
 }
 
 
