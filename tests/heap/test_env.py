@@ -159,11 +159,11 @@ def test_bad_input_is_refused(make_heap_env, pile):
         ({"falls_weight": -1}, "falls_weight is -1"),
         ({"max_picks": 0}, "max_picks is 0"),
         ({"heaps": []}, "heaps is empty"),
-        ({"heaps": [pile.only(np.array([], int))]}, "heaps holds a heap without boxes"),
+        ({"heaps": [pile.only(np.array([], int))]}, r"heaps\[0\] holds no box"),
     ):
         with pytest.raises(ValueError, match=message):
             make_heap_env(**change)
-    with pytest.raises(TypeError, match="heaps holds 3; expected a Heap"):
+    with pytest.raises(TypeError, match=r"heaps\[0\] is 3; expected a Heap"):
         make_heap_env(heaps=[3])
     env = make_heap_env()
     with pytest.raises(ResetNeeded, match="not started"):

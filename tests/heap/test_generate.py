@@ -52,7 +52,7 @@ def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
 
 def test_a_heap_that_is_never_accepted_is_an_error(monkeypatch):
     monkeypatch.setattr("unload.heap.generate.BOXES", 10)  # fewer than FEWEST
-    with pytest.raises(RuntimeError, match="2 heaps of scale 1.0 were rejected"):
+    with pytest.raises(RuntimeError, match="2 heaps of scale 1.0 and friction 0.5 were rejected"):
         settled_heap(np.random.default_rng(0), tries=2)
 
 

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from unload.heap.rake import CAME, FALL, PHYSICS, REACH, near_boxes
+from unload.heap.env import stored_heaps
+from unload.heap.rake import CAME, FALL, PHYSICS, REACH, REST, Poses, near_boxes
+from unload.physics.bullet import FRICTION
 
 
 @pytest.mark.parametrize("physics", PHYSICS)
@@ -41,15 +43,29 @@ def test_a_box_that_loses_its_support_falls_but_the_dragged_one_does_not_count(c
     tower = cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (4.55, 1, 0))
     high = make_rake().pick(tower, 2)
     assert high.came and not high.fallen.any(), "the dragged box dropped by 0.8 m"
-    middle = make_rake(friction=0.05).pick(tower, 0)
-    drop = tower.positions[:, 2] - EDGE_ON_FLOOR
-    assert (drop[middle.fallen] > FALL - 0.05).all()
+    tower = cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (5, 1, 3))
+    lowest = make_rake(friction=0.05).pick(tower, 0)
+    assert lowest.fallen.tolist() == [False, False, True, True]
+    on_floor = 0.2  # m, a cube's centre
+    assert (tower.positions[lowest.fallen, 2] - on_floor > FALL).all()
 
 
-EDGE_ON_FLOOR = 0.2  # m, height of the centre of a cube that lies on the floor
+def test_heaps_are_at_rest_at_their_own_friction(make_rake):
+    """While no box is dragged, none moves far; at another friction the heaps slump."""
+    moved = {}
+    for friction in (FRICTION, 0.3):
+        moved[friction] = 0
+        for heap in stored_heaps("test")[:3]:
+            rake, last = make_rake(friction=friction), Poses(heap)
+            bodies = rake._build(heap, 0)
+            rake._world.step(REST)
+            last.read(rake._world, bodies)
+            distances = np.linalg.norm(last.positions - heap.positions, axis=1)
+            moved[friction] += (distances > 0.1).sum()
+    assert moved[FRICTION] <= 2 and moved[0.3] > 20, "of about 315 boxes"
 
 
-def test_nothing_is_unloaded_from_a_heap_that_only_creeps(cubes, make_rake):
+def test_too_heavy_boxes_stay(cubes, make_rake):
     """A failed pick: a force too small moves nothing, and nothing counts."""
     heap = cubes((5, 1, 0), (6, 1, 0))
     outcome = make_rake(friction=3.0, mass=20.0).pick(heap, 0)
@@ -92,3 +108,5 @@ def test_bad_input_is_refused(cubes, make_rake):
         make_rake().pick(heap, 1)
     with pytest.raises(TypeError, match="heap is 'heap'"):
         make_rake().pick("heap", 0)
+    with pytest.raises(ValueError, match="heap holds a box with its centre at x = 7.3 m"):
+        make_rake().pick(cubes((5, 1, 0), (7.3, 1, 0)), 0)

@@ -50,7 +50,7 @@ def test_linear_weighs_columns(three_boxes, rng):
 
 def test_the_family_holds_each_rule_once_and_none_without_weights():
     rules = family()
-    assert len(rules) == 71 == len({tuple(sorted(rule.items())) for rule in rules.values()})
+    assert len(rules) == 107 == len({tuple(sorted(rule.items())) for rule in rules.values()})
     assert all(rule and set(rule) <= set(FAMILY_COLUMNS) for rule in rules.values())
 
 

@@ -15,7 +15,8 @@ from unload.support.provenance import read_provenance
 def quick_heaps(monkeypatch):
     """A generator of parts of a stored heap, which the seed chooses."""
 
-    def make(rng: np.random.Generator) -> Heap:
+    def make(rng: np.random.Generator, scale: float, friction: float) -> Heap:
+        assert (scale, friction) == (1.0, 0.5)
         whole = stored_heaps("train")[0]
         return whole.only(np.sort(rng.choice(len(whole), 5, replace=False)))
 

@@ -8,6 +8,6 @@ def test_an_oracle_plays_its_heaps():
     """It tries boxes in two physics."""
     env = HeapEnv("test", physics="near", max_picks=1)
     policy = make_policy({"oracle": 1.0}, env)
-    assert [rake.physics for rake in policy._rakes] == ["near", PHYSICS]
+    assert [rake.physics for rake in policy._rakes] == ["coarse", PHYSICS]
     policy.close()
     env.close()

@@ -22,14 +22,16 @@ def short_episodes(monkeypatch):
 def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path):
     arguments = {"picks": 12, "physics": "near", "seeds": 2, "steps": 2, "progress": False}
     heap_learning.learning_data(folder=tmp_path / "data", runs_dir=tmp_path, **arguments)
-    assert len(heap_learning.read_picks(tmp_path)) == 12
-    assert len(heap_learning.read_picks(tmp_path, [0])) == 6
+    assert len(heap_learning.read_picks(tmp_path, ["round0", "round1"])) == 12
+    assert len(heap_learning.read_picks(tmp_path, ["round0"])) == 6
     episodes = sorted((tmp_path / "heap" / "picks").rglob("*.npz"))
     written = [path.stat().st_mtime_ns for path in episodes]
     kept = sorted((tmp_path / "data" / "heap" / "networks").glob("*.safetensors"))
     assert len(episodes) == 4 and len(kept) == 2
     assert {load_network(path).kind for path in kept} == {"pairs"}
-    assert read_provenance(tmp_path / "data" / "heap", "networks")["reduced"]
+    provenance = read_provenance(tmp_path / "data" / "heap", "networks")
+    assert provenance["reduced"] and provenance["runs"] == 4 + 2 + 4
+    assert provenance["wall_time_s"] > 0
     networks = [path.read_bytes() for path in kept]
     episodes[0].unlink()
     heap_learning.learning_data(folder=tmp_path / "data", runs_dir=tmp_path, **arguments)
@@ -44,7 +46,7 @@ def test_an_episode_is_the_same_whenever_it_is_recorded(tmp_path):
         (tmp_path / name / "heap/picks/round0/00000.npz").read_bytes() for name in ("all", "one")
     )
     assert first == second
-    picks = heap_learning.read_picks(tmp_path / "all")
+    picks = heap_learning.read_picks(tmp_path / "all", ["round0"])
     assert len(picks) == 6 and np.isfinite(picks.observations).all()
 
 
@@ -52,8 +54,21 @@ def test_missing_rounds_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match="heap-learning makes it"):
         heap_learning.record_picks(3, 1, "near", tmp_path, progress=False)
     with pytest.raises(FileNotFoundError, match="heap-learning records them"):
-        heap_learning.read_picks(tmp_path)
+        heap_learning.read_picks(tmp_path, ["round0"])
     with pytest.raises(ValueError, match="round_number is 2"):
         heap_learning.record_picks(3, 2, "near", tmp_path, progress=False)
     with pytest.raises(ValueError, match="kind is 'best'"):
         heap_learning.learn(0, 1, [("best", 0.0)], tmp_path)
+
+
+def test_results_with_other_settings_are_not_mixed(tmp_path):
+    """Files are named by numbers, so that only their settings tell what they are."""
+    heap_learning.record_picks(3, 0, "near", tmp_path, progress=False)
+    with pytest.raises(ValueError, match="'physics': 'near'.*expected.*'physics': 'coarse'"):
+        heap_learning.record_picks(3, 0, "coarse", tmp_path, progress=False)
+    heap_learning.learn(0, 1, [("linear", 0.0)], tmp_path, steps=2)
+    with pytest.raises(ValueError, match="'steps': 2.*expected.*'steps': 3"):
+        heap_learning.learn(0, 1, [("linear", 0.0)], tmp_path, steps=3)
+    heap_learning.record_picks(6, 0, "near", tmp_path, progress=False)
+    with pytest.raises(ValueError, match="'episodes': 1.*expected.*'episodes': 2"):
+        heap_learning.learn(0, 2, [("linear", 0.0)], tmp_path, steps=2)

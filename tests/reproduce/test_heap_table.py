@@ -10,7 +10,7 @@ from unload.heap.env import HeapEnv, stored_heaps
 from unload.heap.learning import save_network
 from unload.heap.network import HeapNetwork
 from unload.heap.rules import family
-from unload.reproduce import heap_episodes, heap_rules, heap_table
+from unload.reproduce import heap, heap_episodes, heap_rules, heap_table
 from unload.reproduce.heap_learning import network_path
 from unload.reproduce.heap_variation import varied_path
 
@@ -19,14 +19,14 @@ from unload.reproduce.heap_variation import varied_path
 def episodes() -> pd.DataFrame:
     """Two policies on four heaps; the learned one brings half a box more on each."""
     rows = []
-    for heap, boxes in enumerate((1.0, 2.0, 3.0, 2.0)):
+    for number, boxes in enumerate((1.0, 2.0, 3.0, 2.0)):
         for policy, more in (("best rule", 0.0), ("learned", 0.5)):
             rows.append(
                 {
                     "condition": "as trained",
                     "falls_weight": 1.0,
                     "policy": policy,
-                    "heap": heap,
+                    "heap": number,
                     "boxes": boxes + more,
                     "falls": 0.5,
                     "net": boxes + more - 0.5,
@@ -59,7 +59,8 @@ def test_a_policy_on_fewer_heaps_is_compared_on_those(episodes):
 def test_variants_are_named_by_what_they_differ_in():
     names = [heap_table.learned_name(*variant) for variant in heap_table.VARIANTS]
     assert names == [
-        "learned", "learned, γ=0.5", "learned, γ=0.8", "learned, pooled", "learned, own"
+        "learned", "learned, γ=0.5", "learned, γ=0.8", "learned, pooled", "learned, own",
+        "learned, linear",
     ]  # fmt: skip
 
 
@@ -73,22 +74,24 @@ def save_networks(folder, count=2):
 def test_the_plan_plays_what_is_worth_it(tmp_path):
     """All policies at the λ of the table; few of them elsewhere."""
     save_networks(tmp_path, 5)
-    rules = pd.DataFrame({"rule": list(heap_table.family())[:2], "boxes": [2, 1], "falls": [1, 0]})
+    rules = pd.DataFrame(
+        {"rule": list(family())[:2], "heaps": [20, 20], "boxes": [2, 1], "falls": [1, 0]}
+    )
     cells = heap_table.plan(rules, runs_dir=tmp_path)
     of = {}
     for cell in cells:
         of.setdefault((cell.condition, cell.falls_weight), []).append(cell.policy)
     shown = of.pop(("as trained", 1.0))
-    assert len(shown) == len(set(shown)) == 18
+    assert len(shown) == len(set(shown)) == 20
     assert {"oracle", "learned seed 4", "learned, own", *heap_table.RULES} <= set(shown)
-    few = {"random", "highest", "best rule", "learned"}
+    few = {"random", "best rule", "learned"}
     for (condition, weight), policies in of.items():
-        wanted = {"best rule", "learned"} if condition == "as trained" else few
+        wanted = {"best rule", "learned, linear", "learned"} if condition == "as trained" else few
         assert set(policies) == wanted and len(policies) == len(wanted), (condition, weight)
     assert len(of) == 11
     assert {cell.heaps for cell in cells if cell.policy != "oracle"} == {30}
-    assert [cell.heaps for cell in cells if cell.policy == "oracle"] == [10]
-    assert sum(cell.heaps for cell in cells) / 30 < 52
+    assert [cell.heaps for cell in cells if cell.policy == "oracle"] == [30]
+    assert sum(cell.heaps for cell in cells) / 30 < 60
     with pytest.raises(FileNotFoundError, match="heap-variation makes it"):
         heap_table.plan(rules, variation=True, runs_dir=tmp_path)
 
@@ -99,13 +102,11 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     rules = {name: heap_table.RULES[name] for name in ("random", "lowest")}
     monkeypatch.setattr(heap_table, "RULES", rules)
     some = dict(list(family().items())[:2])
-    for module in (heap_rules, heap_table):
-        monkeypatch.setattr(module, "family", lambda: some)
+    monkeypatch.setattr(heap_rules, "family", lambda: some)
     heap_rules.rules_data(1, tmp_path, tmp_path, progress=False)
     save_networks(tmp_path)
     save_network(HeapNetwork("own", 8), varied_path(0, tmp_path))
-    monkeypatch.setattr(heap_episodes, "sized_heap", lambda *given: stored_heaps("train")[0])
-    monkeypatch.setattr(heap_table, "sized_job", lambda *given: ({"sized": given}, int))
+    monkeypatch.setattr(heap, "settled_heap", lambda *given: stored_heaps("train")[0])
     arguments = {
         "heaps": 2,
         "physics": "near",
@@ -121,8 +122,14 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     }
     table = heap_table.table_data(**arguments)
     trained = table[(table["condition"] == "as trained") & (table["falls_weight"] == 1.0)]
-    learned = ["learned", "learned seed 0", "learned seed 1", "trained with variation"]
-    assert set(trained["policy"]) == {*rules, "best rule", *learned}
+    learned = ["learned", "learned seed 0", "learned seed 1"]
+    assert set(trained["policy"]) == {
+        *rules,
+        "best rule",
+        *learned,
+        "learned, by probability",
+        "trained with variation",
+    }
     for condition in ("camera", "boxes × 0.8"):
         few = {"random", "best rule", "learned", "trained with variation"}
         assert set(table["policy"][table["condition"] == condition]) == few

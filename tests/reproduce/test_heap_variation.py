@@ -1,4 +1,4 @@
-"""Heaps of other sizes and training with variation, at reduced size."""
+"""Heaps of boxes with other properties and training with variation, at reduced size."""
 
 from functools import partial
 
@@ -9,7 +9,8 @@ import torch
 from unload.heap.env import HeapEnv, stored_heaps
 from unload.heap.learning import load_network, save_network
 from unload.heap.network import HeapNetwork
-from unload.reproduce import heap_variation
+from unload.physics.bullet import FRICTION
+from unload.reproduce import heap, heap_learning, heap_variation
 from unload.reproduce.heap_learning import network_path
 
 
@@ -18,7 +19,8 @@ def quick(monkeypatch):
     """Episodes of two picks of boxes nearby, on parts of stored heaps; what was played."""
     played = []
 
-    def make(rng, scale):
+    def make(rng, scale, friction):
+        assert friction != FRICTION, "the heap settles with the friction that is played"
         whole = stored_heaps("train")[0]
         return whole.only(np.sort(rng.choice(len(whole), 20, replace=False)))
 
@@ -26,7 +28,7 @@ def quick(monkeypatch):
         played.append(kwargs)
         return HeapEnv(max_picks=2, **kwargs)
 
-    monkeypatch.setattr(heap_variation, "settled_heap", make)
+    monkeypatch.setattr(heap, "settled_heap", make)
     monkeypatch.setattr(heap_variation, "HeapEnv", env)
     monkeypatch.setattr(heap_variation, "PHYSICS", "near")
     monkeypatch.setattr(heap_variation, "MAX_PICKS", 2)
@@ -34,22 +36,24 @@ def quick(monkeypatch):
     return played
 
 
-def test_a_sized_heap_has_larger_boxes_and_is_kept(tmp_path, monkeypatch):
-    heap = heap_variation.sized_heap(1, 2, 0.8, tmp_path)
-    assert heap.sizes == pytest.approx(0.8 * heap_variation.package_sizes(heap.packages))
-    monkeypatch.setattr(heap_variation, "settled_heap", None)
-    again = heap_variation.sized_heap(1, 2, 0.8, tmp_path)
-    assert again.positions.tobytes() == heap.positions.tobytes()
+def test_a_heap_of_other_boxes_has_their_sizes_and_is_kept(tmp_path, monkeypatch):
+    properties = heap_variation.Properties(0.8, 0.35, 2.0)
+    first = heap_variation.varied_heap(1, 2, properties, tmp_path)
+    assert first.sizes == pytest.approx(0.8 * heap_variation.package_sizes(first.packages))
+    monkeypatch.setattr(heap, "settled_heap", None)
+    again = heap_variation.varied_heap(1, 2, properties, tmp_path)
+    assert again.positions.tobytes() == first.positions.tobytes()
 
 
-def test_scales_are_within_their_range_and_differ():
-    scales = [heap_variation.varied_scale(number) for number in range(20)]
-    low, high = heap_variation.SCALES
-    assert low <= min(scales) < max(scales) <= high and len(set(scales)) > 15
-    assert scales[3] == heap_variation.varied_scale(3)
+def test_properties_are_within_their_ranges_and_differ():
+    columns = zip(*(heap_variation.varied_properties(number) for number in range(20)))
+    ranges = heap_variation.SCALES, heap_variation.FRICTIONS, heap_variation.MASSES
+    for drawn, (low, high) in zip(columns, ranges, strict=True):
+        assert low <= min(drawn) < max(drawn) <= high and len(set(drawn)) > 15
+    assert heap_variation.varied_properties(3) == heap_variation.varied_properties(3)
 
 
-def test_episodes_differ_in_friction_and_mass_and_networks_learn_from_them(
+def test_episodes_have_the_properties_of_their_heap_and_networks_learn_from_them(
     tmp_path, monkeypatch, quick
 ):
     network = HeapNetwork("own", 8, torch.Generator().manual_seed(0))
@@ -60,10 +64,7 @@ def test_episodes_differ_in_friction_and_mass_and_networks_learn_from_them(
         learned.append((len(picks), seed, kind, gamma, steps))
         return network
 
-    monkeypatch.setattr(heap_variation, "fit", fit)
-    no_picks = heap_variation.joined
-    monkeypatch.setattr(heap_variation, "read_picks", lambda runs_dir, rounds: None)
-    monkeypatch.setattr(heap_variation, "joined", lambda parts: no_picks(parts[1:]))
+    monkeypatch.setattr(heap_learning, "fit", fit)
     make = partial(heap_variation.variation_data, 6, 1, 2, 5, tmp_path, progress=False)
     paths = make()
     assert learned == [(6, 0, "pairs", 0.0, 5), (6, 1, "pairs", 0.0, 5)]
@@ -73,7 +74,8 @@ def test_episodes_differ_in_friction_and_mass_and_networks_learn_from_them(
         ("friction", heap_variation.FRICTIONS), ("mass", heap_variation.MASSES)
     ):  # fmt: skip
         drawn = [kwargs[name] for kwargs in quick]
-        assert len(set(drawn)) == 3 and low <= min(drawn) < max(drawn) <= high
+        assert len(set(drawn)) == 2 and low <= min(drawn) < max(drawn) <= high
+        assert drawn[0] == drawn[2], "one of two heaps again"
     assert {len(kwargs["heaps"][0]) for kwargs in quick} == {20}
     make()
     assert len(quick) == 3 and len(learned) == 2, "kept"

@@ -1,6 +1,7 @@
 """Turned boxes in a heap: their state, and the geometry that everything else reads from it."""
 
 from dataclasses import dataclass
+from hashlib import blake2b
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -74,6 +75,11 @@ class Heap:
             self.positions[boxes], self.orientations[boxes], self.sizes[boxes], self.packages[boxes]
         )
 
+    def digest(self) -> str:
+        """A name for this heap: equal for equal heaps."""
+        parts = (self.positions, self.orientations, self.sizes, self.packages.astype(np.int64))
+        return blake2b(b"".join(part.tobytes() for part in parts), digest_size=8).hexdigest()
+
     def axes(self) -> np.ndarray:
         """(n, 3, 3) float64: in column j, the direction of a box's own axis j."""
         if not len(self):
@@ -97,6 +103,25 @@ class Heap:
     def edge(self) -> float:
         """x of the conveyor's edge, m: at the foremost face, but at most at ``FARTHEST_EDGE``."""
         return min(self.front(), FARTHEST_EDGE)
+
+
+def check_heap(name: str, heap: object) -> None:
+    """Refuse what no pick can begin with.
+
+    Raises:
+        TypeError: ``heap`` is no ``Heap``.
+        ValueError: it holds no box, or one whose centre is beyond ``FARTHEST_EDGE``.
+    """
+    if not isinstance(heap, Heap):
+        raise TypeError(f"{name} is {heap!r}; expected a Heap")
+    if not len(heap):
+        raise ValueError(f"{name} holds no box; expected at least one")
+    foremost = heap.positions[:, 0].max()
+    if foremost > FARTHEST_EDGE:
+        raise ValueError(
+            f"{name} holds a box with its centre at x = {foremost} m; expected at most "
+            f"{FARTHEST_EDGE} m, where the conveyor's edge may stand"
+        )
 
 
 def package_sizes(packages: np.ndarray, scale: float = 1.0) -> np.ndarray:

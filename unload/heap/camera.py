@@ -1,4 +1,4 @@
-"""A depth camera at the door: which boxes it sees, and the boxes one can make of its points."""
+"""A depth camera before the door: which boxes it sees, and the boxes one can make of its points."""
 
 from dataclasses import dataclass
 
@@ -14,6 +14,7 @@ EYE = (DOOR + 2.0, WIDTH / 2, 2.4)  # m: outside, so that a heap that reaches th
 TARGET = (5.4, WIDTH / 2, 0.8)  # m
 SEEN = 4  # pixels that make a box visible: three points span a face, and one may be noise
 PIXELS = PIXELS_WIDE * PIXELS_HIGH
+CONSTANTS = (PIXELS_WIDE, PIXELS_HIGH, ANGLE, EYE, TARGET, SEEN)  # what a scan depends on
 
 
 @dataclass(frozen=True, eq=False)

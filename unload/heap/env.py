@@ -10,7 +10,7 @@ from gymnasium.utils import seeding
 from unload import task
 from unload.env.base import AllOrReset, EpisodeEnv
 from unload.heap import generate
-from unload.heap.boxes import Heap
+from unload.heap.boxes import Heap, check_heap
 from unload.heap.camera import Camera
 from unload.heap.observation import COLUMNS, ROWS, camera_boxes, features, true_boxes
 from unload.heap.rake import Outcome, Rake
@@ -45,9 +45,9 @@ class HeapEnv(EpisodeEnv):
 
     ## Observation space
     ``Box(-20, 20, (96, 13), float32)``: one row for each visible box, from the door to the
-    rear; rows without a box are 0. Visible is a box of which a depth camera of 128 × 96
-    pixels, 2 m outside the door and 2.4 m high, shows at least four pixels. That is true of
-    about 55 boxes. No row tells of hidden boxes.
+    rear; rows without a box are 0. A box is visible if a depth camera of 128 × 96 pixels, 2 m
+    outside the door and 2.4 m high, shows at least four pixels of it. That is true of about 55
+    boxes. No row tells of hidden boxes, unless none is visible: then there is a row for each.
 
     | Column | Observation | unit |
     |---|---|---|
@@ -130,8 +130,8 @@ class HeapEnv(EpisodeEnv):
         self.heaps = stored_heaps(split) if heaps is None else tuple(heaps)
         if not self.heaps:
             raise ValueError("heaps is empty; expected at least one Heap")
-        for heap in self.heaps:
-            check_heap("heaps", heap)
+        for number, heap in enumerate(self.heaps):
+            check_heap(f"heaps[{number}]", heap)
         self.observation_space = gymnasium.spaces.Box(
             -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
         )
@@ -212,6 +212,8 @@ class HeapEnv(EpisodeEnv):
         self._check_open()
         checks.entries("state", state, STATE)
         heap = Heap(*(state[name] for name in STATE[:4]))
+        if len(heap):
+            check_heap("state", heap)
         failed = checks.flag_array("state['failed']", state["failed"], (len(heap),))
         counts = checks.integer_array("state['counts']", state["counts"], (1,))
         picks = checks.integer("state['counts'][0]", int(counts[0]), 0, self.max_picks)
@@ -264,11 +266,3 @@ class HeapEnv(EpisodeEnv):
 def stored_heaps(split: str) -> tuple[Heap, ...]:
     """The stored heaps of a split, read once."""
     return tuple(generate.read_heaps(split))
-
-
-def check_heap(name: str, heap: object) -> None:
-    """Raise TypeError unless ``heap`` is a ``Heap``, ValueError unless it holds a box."""
-    if not isinstance(heap, Heap):
-        raise TypeError(f"{name} holds {heap!r}; expected a Heap")
-    if not len(heap):
-        raise ValueError(f"{name} holds a heap without boxes; expected at least one box")

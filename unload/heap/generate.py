@@ -8,7 +8,7 @@ from unload import task
 from unload.heap.boxes import DOOR, REAR, WIDTH, Heap, package_sizes
 from unload.heap.rake import PHYSICS, add_walls
 from unload.load.substacks import PACKAGES
-from unload.physics.bullet import World
+from unload.physics.bullet import FRICTION, World
 from unload.support import checks, files
 
 BOXES = 130  # dropped; with 140, half of the heaps are higher than the container
@@ -24,7 +24,12 @@ FEWEST, HIGHEST, FASTEST = 80, float(task.CONTAINER[2]), 0.1  # boxes, m, m/s: s
 SPLITS = "train", "test"
 
 
-def settled_heap(rng: np.random.Generator, scale: float = 1.0, tries: int = 20) -> Heap:
+def settled_heap(
+    rng: np.random.Generator,
+    scale: float = 1.0,
+    friction: float = FRICTION,
+    tries: int = 20,
+) -> Heap:
     """A random heap at rest, about 3 s of CPU time.
 
     Packages and orientations are uniformly random. The drop is simulated by ``"coarse"``
@@ -37,6 +42,8 @@ def settled_heap(rng: np.random.Generator, scale: float = 1.0, tries: int = 20) 
         rng: makes it.
         scale: of all edges of the boxes. If it is above 1, fewer boxes are dropped, and must
             be left, so that their volume stays the same.
+        friction: of boxes, floor and walls; a heap that has settled at another one would
+            slump at the first pick.
         tries: heaps made at most.
 
     Raises:
@@ -45,22 +52,25 @@ def settled_heap(rng: np.random.Generator, scale: float = 1.0, tries: int = 20) 
     """
     checks.generator("rng", rng)
     checks.real("scale", scale, 0.5, 1.5)
+    checks.real("friction", friction, 0, 10)
     boxes = min(BOXES, round(BOXES / scale**3))
     for _ in range(checks.integer("tries", tries, 1)):
-        heap, fastest = _settled(_dropped(rng, scale, boxes))
+        heap, fastest = _settled(_dropped(rng, scale, friction, boxes), friction)
         if _accepted(heap, fastest, FEWEST * boxes / BOXES):
             return heap
-    raise RuntimeError(f"{tries} heaps of scale {scale} were rejected; see settled_heap")
+    raise RuntimeError(
+        f"{tries} heaps of scale {scale} and friction {friction} were rejected; see settled_heap"
+    )
 
 
-def _dropped(rng: np.random.Generator, scale: float, count: int) -> Heap:
+def _dropped(rng: np.random.Generator, scale: float, friction: float, count: int) -> Heap:
     """Boxes that have come to lie behind the barrier."""
     packages = rng.integers(len(PACKAGES), size=count)
     sizes = package_sizes(packages, scale)
     time_step, iterations, _ = PHYSICS["coarse"]
     world = World(time_step, iterations=iterations)
-    add_walls(world)
-    world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0)
+    add_walls(world, friction)
+    world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0, friction=friction)
     bodies: list[int] = []
     for first in range(0, count, LAYER):
         top = max((world.pose(body)[0][2] for body in bodies), default=0.0)
@@ -72,7 +82,7 @@ def _dropped(rng: np.random.Generator, scale: float, count: int) -> Heap:
                 top + SPACING * (1 + number - first),
             )
             turn /= np.linalg.norm(turn)
-            bodies.append(world.add_box(place, sizes[number], task.MASS, turn))
+            bodies.append(world.add_box(place, sizes[number], task.MASS, turn, friction))
         world.step(LAYER_TIME)
     world.step(SETTLE)
     positions, orientations = (np.array(part) for part in zip(*map(world.pose, bodies)))
@@ -80,12 +90,15 @@ def _dropped(rng: np.random.Generator, scale: float, count: int) -> Heap:
     return Heap(positions, orientations, sizes, packages)
 
 
-def _settled(heap: Heap) -> tuple[Heap, float]:
-    """The heap without its barrier and without what leaves the door, and its fastest box's m/s."""
+def _settled(heap: Heap, friction: float) -> tuple[Heap, float]:
+    """The heap without its barrier and without what leaves the door, and its fastest box's m/s.
+
+    The speed is infinite if boxes were still leaving at last.
+    """
     world = World()
-    add_walls(world)
+    add_walls(world, friction)
     bodies = {
-        number: world.add_box(place, size, task.MASS, turn)
+        number: world.add_box(place, size, task.MASS, turn, friction)
         for number, (place, size, turn) in enumerate(
             zip(heap.positions, heap.sizes, heap.orientations)
         )
@@ -100,7 +113,9 @@ def _settled(heap: Heap) -> tuple[Heap, float]:
         poses = [world.pose(body) for body in bodies.values()]
         moved = np.array([pose[0] for pose in poses]) - before
         fastest = float(np.linalg.norm(moved, axis=1).max()) / PAUSE
-        if not outside and fastest <= FASTEST:
+        if outside:
+            fastest = np.inf
+        elif fastest <= FASTEST:
             break
     world.close()
     numbers = list(bodies)

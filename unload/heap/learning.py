@@ -9,7 +9,7 @@ import torch
 from safetensors.torch import load_file, save
 from torch import nn
 
-from unload.heap.network import HeapNetwork
+from unload.heap.network import CONTEXTS, FEATURES, HeapNetwork
 from unload.heap.observation import COLUMN
 from unload.heap.rules import check_batch
 from unload.support import checks, files
@@ -85,8 +85,8 @@ def fit(
         kind: of the network, see ``HeapNetwork``.
         gamma: discount in [0, 1).
         falls_weight: λ, of the picks to come; without effect if γ = 0.
-        steps: of the optimizer, a batch each, in the first round and in all the others together.
-        rounds: of Q iteration.
+        steps: of the optimizer, a batch each, in all rounds together.
+        rounds: of Q iteration, after the regression that they begin with.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
@@ -103,11 +103,13 @@ def fit(
         for array in (picks.observations, picks.actions, picks.unloaded, picks.falls)
     ]
     fell = (data[3] > 0).float()
-    _descend(network, (*data, fell), steps, generator)
-    for _ in range(rounds if gamma else 0):
+    rounds = rounds if gamma else 0
+    share = max(1, steps // (1 + rounds))
+    _descend(network, (*data, fell), share, generator)
+    for _ in range(rounds):
         boxes, falls = _to_come(network, picks, falls_weight)
         targets = data[2] + gamma * boxes, data[3] + gamma * falls
-        _descend(network, (*data[:2], *targets, fell), max(1, steps // rounds), generator)
+        _descend(network, (*data[:2], *targets, fell), share, generator)
     return network.eval()
 
 
@@ -236,16 +238,17 @@ def load_network(path: str | Path) -> HeapNetwork:
         raise FileNotFoundError(f"{path} is missing")
     try:
         weights = load_file(path)
-        n_features = weights["own.weight"].shape[0]
-        kind = _kind(weights, n_features)
-        network = HeapNetwork(kind, n_features)
+        network = HeapNetwork(*_shape(weights))
         network.load_state_dict(weights)
     except Exception as error:
         raise ValueError(f"{path} holds no HeapNetwork: {error}") from error
     return network.eval()
 
 
-def _kind(weights: dict[str, torch.Tensor], n_features: int) -> str:
-    """The kind of network that weights belong to, by what its hidden layer reads."""
-    context = weights["hidden.weight"].shape[1] // n_features - 1
-    return {0: "own", 1: "pooled", 2: "pairs"}[context]
+def _shape(weights: dict[str, torch.Tensor]) -> tuple[str, int]:
+    """Kind and features of the network that weights belong to, by what its hidden layer reads."""
+    if "hidden.weight" not in weights:
+        return "linear", FEATURES
+    n_features, inputs = weights["hidden.weight"].shape
+    kinds = {context: kind for kind, context in CONTEXTS.items()}
+    return kinds[inputs // n_features - 1], n_features

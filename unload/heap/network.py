@@ -14,7 +14,8 @@ from unload.network.variants import linear_with_context, maximum_over_items
 from unload.support import checks
 
 FEATURES = 64
-KINDS = "pairs", "pooled", "own"
+CONTEXTS = {"pairs": 2, "pooled": 1, "own": 0}  # layers' outputs beside a row's own one
+KINDS = *CONTEXTS, "linear"
 PAIR_COLUMNS = 6  # see ``pair_columns``
 HEADS = 3
 
@@ -34,7 +35,8 @@ class HeapNetwork(nn.Module):
         kind: what a box's answer depends on besides its own row. ``"pairs"``: for every other
             box, a two-layer network of both rows and of how the two blocks lie to each other
             (``pair_columns``), pooled by sum and maximum; ``"pooled"``: the maximum of each
-            feature over all boxes, as in ``unload.EquivariantStack``; ``"own"``: nothing.
+            feature over all boxes, as in ``unload.EquivariantStack``; ``"own"``: nothing;
+            ``"linear"``: nothing, and the network has no hidden layer.
         n_features: of each layer.
         generator: draws the weights, U(±1/√inputs); torch's global one if None.
 
@@ -52,16 +54,17 @@ class HeapNetwork(nn.Module):
         checks.one_of("kind", kind, KINDS)
         self.kind = kind
         self.n_features = n = checks.integer("n_features", n_features, 1)
-        self.own = nn.Linear(len(COLUMNS), n)
-        context = {"pairs": 2 * n, "pooled": n, "own": 0}[kind]
+        if kind != "linear":
+            self.own = nn.Linear(len(COLUMNS), n)
         if kind == "pairs":
             self.chosen = nn.Linear(len(COLUMNS), n)
             self.other = nn.Linear(len(COLUMNS), n, bias=False)
             self.pair = nn.Linear(PAIR_COLUMNS, n, bias=False)
             self.message = nn.Linear(n, n)
-        self.hidden = nn.Linear(n + context, n)
-        self.last = nn.Linear(n, n)
-        self.heads = nn.Linear(n, HEADS)
+        if kind != "linear":
+            self.hidden = nn.Linear(n + CONTEXTS[kind] * n, n)
+            self.last = nn.Linear(n, n)
+        self.heads = nn.Linear(len(COLUMNS) if kind == "linear" else n, HEADS)
         for layer in self.modules():
             if isinstance(layer, nn.Linear):
                 for weight in (layer.weight, layer.bias):
@@ -89,6 +92,8 @@ class HeapNetwork(nn.Module):
         asked = observations
         if rows is not None:
             asked = observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
+        if self.kind == "linear":
+            return _expected(self.heads(asked))
         own = torch.relu(self.own(asked))
         if self.kind == "pairs":
             own = torch.cat([own, self._neighbours(asked, observations, present)], dim=2)
@@ -99,9 +104,7 @@ class HeapNetwork(nn.Module):
             own = torch.relu(linear_with_context(self.hidden, own, pooled))
         else:
             own = torch.relu(self.hidden(own))
-        heads = self.heads(torch.relu(self.last(own)))
-        boxes, falls = nn.functional.softplus(heads[..., :2]).unbind(2)
-        return Expected(boxes, falls, heads[..., 2])
+        return _expected(self.heads(torch.relu(self.last(own))))
 
     def _neighbours(
         self, asked: torch.Tensor, others: torch.Tensor, present: torch.Tensor
@@ -113,6 +116,11 @@ class HeapNetwork(nn.Module):
         # Messages are >= 0, so that 0 adds nothing to the sum and leaves the maximum.
         message = message * present[:, None, :, None]
         return torch.cat([message.sum(dim=2) / 16, message.amax(dim=2)], dim=2)
+
+
+def _expected(heads: torch.Tensor) -> Expected:
+    boxes, falls = nn.functional.softplus(heads[..., :2]).unbind(2)
+    return Expected(boxes, falls, heads[..., 2])
 
 
 def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unload import task
-from unload.heap.boxes import DOOR, REAR, WIDTH, Heap
+from unload.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, check_heap
 from unload.physics.bullet import FRICTION, World
 from unload.support import checks
 
@@ -29,6 +29,22 @@ PHYSICS = {
     "coarse": (1 / 120, 20, False),
     "near": (1 / 120, 20, True),
 }
+
+# What a pick depends on besides the heap, the box and the arguments of ``Rake``.
+CONSTANTS = (
+    SPEED,
+    FORCE,
+    REACH,
+    TIME,
+    CAME,
+    REST,
+    RESTS,
+    STILL,
+    FALL,
+    NEAR,
+    SUPPORT,
+    FARTHEST_EDGE,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +136,8 @@ class Rake:
         """Drag one box and see what comes.
 
         Raises:
-            TypeError, ValueError: ``heap`` is no ``Heap``, or ``box`` none of its boxes.
+            TypeError, ValueError: ``heap`` is as ``check_heap`` refuses it, or ``box`` none of
+                its boxes.
         """
         box = self._check(heap, box)
         world, edge = self._world, heap.edge()
@@ -148,8 +165,7 @@ class Rake:
 
     def _check(self, heap: Heap, box: int) -> int:
         """The box as an int, if both are as ``pick`` expects them."""
-        if not isinstance(heap, Heap):
-            raise TypeError(f"heap is {heap!r}; expected a Heap")
+        check_heap("heap", heap)
         return checks.integer("box", box, 0, len(heap) - 1)
 
     def _build(self, heap: Heap, box: int) -> dict[int, int]:

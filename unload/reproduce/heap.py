@@ -22,13 +22,14 @@ from unload.heap.generate import BOXES, settled_heap, write_heaps
 from unload.heap.observation import camera_boxes, true_boxes
 from unload.heap.rake import PHYSICS, Rake
 from unload.heap.rules import random
+from unload.physics.bullet import FRICTION
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
 from unload.support import checks, files
 from unload.support.provenance import joined, write_provenance
 
 NAME = "heap"
 HEAPS = {"train": 70, "test": 30}
-SEEDS = {"train": 3000, "test": 4000}  # of the heaps; no other data uses them
+SEEDS = {"train": 3000, "test": 4000}  # of the heaps; of recorded picks, the first with more
 AGREEMENT_PICKS = 300
 AGREEMENT_SEED = 5000
 
@@ -51,7 +52,7 @@ def heaps_data(
         if number < count
     ]
     jobs = [
-        ({"heap": [SEEDS[split], number]}, partial(_heap_lists, SEEDS[split], number))
+        ({"heap": [SEEDS[split], number]}, partial(heap_lists, SEEDS[split], number))
         for split, number in names
     ]
     answers = keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs, progress)
@@ -66,8 +67,11 @@ def heaps_data(
     write_provenance(folder, "heaps", f"{COMMAND} heaps", settings, reduced, record)
 
 
-def _heap_lists(seed: int, number: int) -> dict[str, list]:
-    heap = settled_heap(np.random.default_rng([seed, number]))
+def heap_lists(
+    seed: int, number: int, scale: float = 1.0, friction: float = FRICTION
+) -> dict[str, list]:
+    """A new heap as lists that can be kept: ``positions``, ``orientations`` and ``packages``."""
+    heap = settled_heap(np.random.default_rng([seed, number]), scale, friction)
     names = "positions", "orientations", "packages"
     return {name: getattr(heap, name).tolist() for name in names}
 

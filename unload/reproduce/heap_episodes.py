@@ -6,23 +6,24 @@ from pathlib import Path
 
 import torch
 
+from unload.heap import camera, rake
 from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from unload.heap.episodes import Oracle, play
 from unload.heap.learning import Learned, load_network
 from unload.heap.rules import RULES, best, linear
 from unload.reproduce.heap_learning import weights_digest
-from unload.reproduce.heap_variation import sized_heap
+from unload.reproduce.heap_variation import Properties, heap_job, varied_heap
 
 PHYSICS = "whole"  # that judges
-SIZED_SEED = 7000  # of the heaps of other sizes; no other data uses it
+VARIED_SEED = 7000  # of the heaps of boxes with other properties; no other data uses it
 
 
 def make_policy(player: Mapping, env: HeapEnv) -> Callable:
     """The policy that a specification describes.
 
     Args:
-        player: ``{"rule": name}``, ``{"linear": weights}``, ``{"networks": paths,
-            "falls_weight": λ}`` or ``{"oracle": λ}``.
+        player: ``{"rule": name}``, ``{"linear": weights}``, ``{"oracle": λ}``, or
+            ``{"networks": paths}`` with further arguments of ``Learned``.
         env: which an oracle may look into.
     """
     if "rule" in player:
@@ -30,8 +31,20 @@ def make_policy(player: Mapping, env: HeapEnv) -> Callable:
     if "linear" in player:
         return best(linear(player["linear"]))
     if "networks" in player:
-        return Learned([load_network(path) for path in player["networks"]], player["falls_weight"])
+        arguments = {name: value for name, value in player.items() if name != "networks"}
+        return Learned([load_network(path) for path in player["networks"]], **arguments)
     return Oracle(env, player["oracle"], again=PHYSICS)
+
+
+def varied_job(condition: Mapping, number: int) -> tuple[dict, Callable] | None:
+    """What makes the heap of a condition, see ``keep_all``; None if it is a stored one.
+
+    A heap is one that has settled with the condition's size and friction; at another friction
+    than its own it would slump at the first pick, whatever the policy does.
+    """
+    if not {"scale", "friction"} & set(condition):
+        return None
+    return heap_job(VARIED_SEED, number, _properties(condition))
 
 
 def episode_job(
@@ -42,31 +55,51 @@ def episode_job(
     physics: str,
     runs_dir: str | Path,
 ) -> tuple[dict, Callable]:
-    """The question of one episode and what answers it."""
+    """The question of one episode and what answers it, see ``keep_all``.
+
+    Args:
+        player: see ``make_policy``.
+        condition: ``observation`` and fields of ``Properties``, where they are not the default.
+        split: of the stored heaps.
+        number: of the heap.
+        physics: see ``Rake``.
+        runs_dir: where heaps of boxes with other properties are.
+    """
+    varied = varied_job(condition, number)
     question = {
         "player": dict(player),
         "condition": dict(condition),
-        "heap": [split, number],
+        "heap": stored_heaps(split)[number].digest() if varied is None else varied[0],
+        "number": number,
         "physics": physics,
+        "constants": [*rake.CONSTANTS, *camera.CONSTANTS],
         "picks": MAX_PICKS,
     }
     if "networks" in player:  # named by what is in them, wherever they are
-        digest = weights_digest(player["networks"])
-        question["player"] = {"digest": digest, "falls_weight": player["falls_weight"]}
+        question["player"]["networks"] = weights_digest(player["networks"])
     return question, partial(_play, dict(player), dict(condition), split, number, physics, runs_dir)
+
+
+def _properties(condition: Mapping) -> Properties:
+    return Properties(**{name: condition[name] for name in Properties._fields if name in condition})
 
 
 def _play(
     player: dict, condition: dict, split: str, number: int, physics: str, runs_dir: str | Path
 ) -> dict:
     torch.set_num_threads(1)
-    arguments = dict(condition)
-    scale = arguments.pop("scale", None)
-    if scale is None:
+    properties = _properties(condition)
+    if varied_job(condition, number) is None:
         heap = stored_heaps(split)[number]
     else:
-        heap = sized_heap(SIZED_SEED, number, scale, runs_dir)
-    env = HeapEnv(heaps=[heap], physics=physics, **arguments)
+        heap = varied_heap(VARIED_SEED, number, properties, runs_dir)
+    env = HeapEnv(
+        heaps=[heap],
+        physics=physics,
+        observation=condition.get("observation", "truth"),
+        friction=properties.friction,
+        mass=properties.mass,
+    )
     try:
         episode = play(env, make_policy(player, env), heap, seed=number)
     finally:

@@ -8,7 +8,6 @@ that was stopped goes on, and seeds make an episode the same in whatever order i
 """
 
 import hashlib
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import product
@@ -19,22 +18,26 @@ import torch
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
-from unload.heap.env import MAX_PICKS, HeapEnv
+from unload.heap import camera, rake
+from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
 from unload.heap.learning import STEPS, Learned, Picks, fit, joined, load_network, save_network
 from unload.heap.network import KINDS
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
 from unload.reproduce.heap import NAME, SEEDS
-from unload.reproduce.results import COMMAND, JOBS
+from unload.reproduce.results import COMMAND, JOBS, measured, same_settings
 from unload.support import checks, files
-from unload.support.provenance import run_record, write_provenance
+from unload.support.provenance import joined as joined_records
+from unload.support.provenance import write_provenance
 
 PICKS = 50_000  # of both rounds
 PHYSICS = "coarse"
 ROUNDS = 2
 SEEDS_LEARNED = 5
 # What is learned: kind of network and γ; the recommended one first.
-VARIANTS = (("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0))
+VARIANTS = (
+    ("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0), ("linear", 0.0)
+)  # fmt: skip
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record, in all rounds"},
@@ -58,11 +61,11 @@ def learning_data(
 
     ``heap/networks`` are the recommended variant's networks of the last round, one per seed.
     """
-    start = time.monotonic()
+    made = []
     for round_number in range(checks.integer("rounds", rounds, 1, ROUNDS)):
-        record_picks(picks // rounds, round_number, physics, runs_dir, n_jobs, progress)
+        made += record_picks(picks // rounds, round_number, physics, runs_dir, n_jobs, progress)
         variants = VARIANTS if round_number == rounds - 1 else VARIANTS[:1]
-        learn(round_number, seeds, variants, runs_dir, n_jobs, steps)
+        made += learn(round_number, seeds, variants, runs_dir, n_jobs, steps)
     paths = network_paths(rounds - 1, *VARIANTS[0], runs_dir)
     for seed, path in enumerate(paths):
         target = Path(folder) / NAME / "networks" / f"seed{seed}.safetensors"
@@ -72,8 +75,12 @@ def learning_data(
         "networks",
         f"{COMMAND} heap-learning --picks {picks} --rounds {rounds} --physics {physics}",
         {"picks": picks, "physics": physics, "rounds": rounds, "seeds": seeds, "steps": steps},
-        picks < PICKS or rounds < ROUNDS or physics != PHYSICS or seeds < SEEDS_LEARNED,
-        run_record(time.monotonic() - start),
+        picks < PICKS
+        or rounds < ROUNDS
+        or physics != PHYSICS
+        or seeds < SEEDS_LEARNED
+        or steps < STEPS,
+        joined_records(files.read_json(path.with_suffix(".json")) for path in made),
     )
 
 
@@ -84,7 +91,7 @@ def record_picks(
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
     progress: bool = True,
-) -> None:
+) -> list[Path]:
     """Record exploring episodes on the training heaps, each as ``runs/heap/picks/…npz``.
 
     Args:
@@ -95,38 +102,62 @@ def record_picks(
         n_jobs: processes, as in joblib.
         progress: show a progress bar.
 
+    Returns:
+        Where the episodes are; beside each stands the ``run_record`` of its computation.
+
     Raises:
         FileNotFoundError: there are no networks to explore around.
+        ValueError: episodes with other settings are there.
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
     episodes = -(-checks.integer("picks", picks, 1) // MAX_PICKS)
-    folder = Path(runs_dir) / NAME
     known = network_paths(round_number - 1, *VARIANTS[0], runs_dir) if round_number else []
-    path = folder / "picks" / f"round{round_number}"
-    record_episodes(
-        {
-            path / f"{number:05}.npz": partial(_explored, number, round_number, physics, known)
-            for number in range(episodes)
-        },
-        n_jobs,
-        progress,
-    )
+    players = {
+        episode_path(round_name(round_number), number, runs_dir): partial(
+            _explored, number, round_number, physics, known
+        )
+        for number in range(episodes)
+    }
+    heaps = [heap.digest() for heap in stored_heaps("train")]
+    return record_episodes(players, {"physics": physics, "heaps": heaps}, n_jobs, progress)
+
+
+def episode_path(name: str, number: int, runs_dir: str | Path = files.RUNS) -> Path:
+    """Where an episode of a round of that name is kept."""
+    return Path(runs_dir) / NAME / "picks" / name / f"{number:05}.npz"
 
 
 def record_episodes(
-    players: Mapping[Path, Callable[[], Episode]], n_jobs: int, progress: bool
-) -> None:
-    """Store the episode that each function plays in its file, unless it is there already."""
+    players: Mapping[Path, Callable[[], Episode]], settings: dict, n_jobs: int, progress: bool
+) -> list[Path]:
+    """Store the episode that each function plays in its file, unless it is there already.
+
+    Args:
+        players: file → what plays its episode, all in one folder.
+        settings: on which all of these episodes depend, besides the constants of pick and
+            camera.
+        n_jobs: processes, as in joblib.
+        progress: show a progress bar.
+
+    Raises:
+        ValueError: episodes with other settings are there.
+    """
+    folder = next(iter(players)).parent
+    constants = [*rake.CONSTANTS, *camera.CONSTANTS]
+    same_settings(folder / "settings.json", settings | {"constants": constants})
     missing = {path: player for path, player in players.items() if not path.exists()}
     done = Parallel(n_jobs, return_as="generator")(
         delayed(_record)(path, player) for path, player in missing.items()
     )
     list(tqdm(done, total=len(missing), unit="episode", disable=not progress, ncols=100))
+    return list(players)
 
 
 def _record(path: Path, player: Callable[[], Episode]) -> None:
     torch.set_num_threads(1)
-    files.write_arrays(path, player().arrays())
+    episode, record = measured(player)
+    files.write_json(path.with_suffix(".json"), record)
+    files.write_arrays(path, episode.arrays())
 
 
 def _explored(number: int, round_number: int, physics: str, known: list[Path]) -> Episode:
@@ -144,17 +175,28 @@ def _explored(number: int, round_number: int, physics: str, known: list[Path]) -
         env.close()
 
 
-def read_picks(runs_dir: str | Path = files.RUNS, rounds: Iterable[int] = range(ROUNDS)) -> Picks:
-    """All recorded picks of some rounds.
+def round_name(number: int) -> str:
+    """The folder of a round's episodes."""
+    return f"round{number}"
+
+
+def read_picks(runs_dir: str | Path, rounds: Iterable[str]) -> Picks:
+    """All recorded picks of the rounds of these names.
 
     Raises:
         FileNotFoundError: there are none.
     """
+    paths = _episodes(runs_dir, rounds)
+    return joined([picks_of(episode_from(files.read_arrays(path))) for path in paths])
+
+
+def _episodes(runs_dir: str | Path, rounds: Iterable[str]) -> list[Path]:
+    """The files of recorded episodes."""
     folder = Path(runs_dir) / NAME / "picks"
-    paths = [path for each in rounds for path in sorted((folder / f"round{each}").glob("*.npz"))]
+    paths = [path for each in rounds for path in sorted((folder / each).glob("*.npz"))]
     if not paths:
         raise FileNotFoundError(f"{folder} holds no picks; {COMMAND} heap-learning records them")
-    return joined([picks_of(episode_from(files.read_arrays(path))) for path in paths])
+    return paths
 
 
 def network_path(
@@ -197,28 +239,71 @@ def learn(
         runs_dir: where picks and networks are.
         n_jobs: processes, as in joblib.
         steps: see ``fit``.
+
+    Returns:
+        Where the networks are; beside each stands the ``run_record`` of its computation.
+
+    Raises:
+        FileNotFoundError: there are no picks.
+        ValueError: networks of the round with other settings are there.
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
     for kind, gamma in variants:
         checks.one_of("kind", kind, KINDS)
         checks.real("gamma", gamma, 0, 0.999)
-    jobs = [
-        (network_path(round_number, kind, gamma, seed, runs_dir), kind, gamma, seed)
+    networks = {
+        network_path(round_number, kind, gamma, seed, runs_dir): (kind, gamma, seed)
         for seed, (kind, gamma) in product(range(checks.integer("seeds", seeds, 1)), variants)
-    ]
-    rounds = range(round_number + 1)
+    }
+    rounds = [round_name(number) for number in range(round_number + 1)]
+    return learn_networks(networks, rounds, steps, runs_dir, n_jobs)
+
+
+def learn_networks(
+    networks: Mapping[Path, tuple[str, float, int]],
+    rounds: Sequence[str],
+    steps: int,
+    runs_dir: str | Path,
+    n_jobs: int,
+) -> list[Path]:
+    """Learn those networks that are not there yet, all from the picks of the same rounds.
+
+    Args:
+        networks: file → kind, γ and seed.
+        rounds: names, see ``read_picks``.
+        steps: see ``fit``.
+        runs_dir: where picks are.
+        n_jobs: processes, as in joblib.
+
+    Raises:
+        FileNotFoundError: there are no picks.
+        ValueError: networks from these rounds with other settings are there.
+    """
+    episodes = len(_episodes(runs_dir, rounds))
+    settings = {"steps": checks.integer("steps", steps, 1), "episodes": episodes}
+    same_settings(next(iter(networks)).parent / f"{rounds[-1]}.json", settings)
     Parallel(n_jobs)(
-        delayed(_learn)(*job, runs_dir, rounds, steps) for job in jobs if not job[0].exists()
+        delayed(_learn)(path, *how, runs_dir, rounds, steps)
+        for path, how in networks.items()
+        if not path.exists()
     )
-    return [job[0] for job in jobs]
+    return list(networks)
 
 
 def _learn(
-    path: Path, kind: str, gamma: float, seed: int, runs_dir: Path, rounds: range, steps: int
+    path: Path,
+    kind: str,
+    gamma: float,
+    seed: int,
+    runs_dir: str | Path,
+    rounds: Sequence[str],
+    steps: int,
 ) -> None:
     torch.set_num_threads(1)
     picks = read_picks(runs_dir, rounds)
-    save_network(fit(picks, seed, kind, gamma, steps=steps), path)
+    network, record = measured(partial(fit, picks, seed, kind, gamma, steps=steps))
+    files.write_json(path.with_suffix(".json"), record)
+    save_network(network, path)
 
 
 def weights_digest(paths: Iterable[Path]) -> str:

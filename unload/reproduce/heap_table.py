@@ -3,8 +3,8 @@
     python -m unload.reproduce heap-table
 
 Each episode is kept in ``runs/heap``: a command that was stopped goes on. All policies of a
-condition play the same heaps, so that differences are those of pairs. A pick takes 0.7 s of CPU,
-so that a policy's 30 episodes take 5 minutes; ``plan`` says which of them are worth it.
+condition play the same heaps, so that differences are those of pairs. A pick takes 0.55 s of CPU,
+so that a policy's 30 episodes take 4 minutes; ``plan`` says which of them are worth it.
 """
 
 from collections.abc import Sequence
@@ -16,23 +16,23 @@ import pandas as pd
 
 from unload.heap.env import MAX_PICKS
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
-from unload.heap.rules import RULES, family
+from unload.heap.rules import RULES
 from unload.reproduce.heap import HEAPS, NAME
-from unload.reproduce.heap_episodes import PHYSICS, SIZED_SEED, episode_job
+from unload.reproduce.heap_episodes import PHYSICS, episode_job, varied_job
 from unload.reproduce.heap_learning import (
     ROUNDS,
     VARIANTS,
     WEIGHTS,
     network_paths,
 )
-from unload.reproduce.heap_rules import best_rule
-from unload.reproduce.heap_variation import sized_job, varied_paths
+from unload.reproduce.heap_rules import best_rule, candidates
+from unload.reproduce.heap_variation import varied_paths
 from unload.reproduce.intervals import mean_interval, ratio_interval
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
 from unload.support import checks, files
 
-# Arguments of HeapEnv, and ``scale``, of the boxes: those of the stored heaps if there is none.
-# The networks were trained on none but the first, except those "trained with variation".
+# See ``episode_job``. The networks were trained on none but the first, except those "trained with
+# variation", which know other frictions, masses and sizes, but no camera.
 CONDITIONS: dict[str, dict] = {
     "as trained": {},
     "camera": {"observation": "camera"},
@@ -46,8 +46,11 @@ AS_TRAINED = "as trained"
 REFERENCE = "best rule"
 LEARNED = "learned"
 VARIED = "trained with variation"
-FEW = "random", "highest", REFERENCE, LEARNED, VARIED  # played under all conditions
-ORACLE_HEAPS = 10  # it takes 2.5 minutes of CPU a heap
+LINEAR = f"{LEARNED}, linear"
+BY_PROBABILITY = f"{LEARNED}, by probability"  # of a fall, instead of the number of falls
+FEW = "random", REFERENCE, LEARNED, VARIED  # played under all conditions
+CURVES = REFERENCE, LINEAR, LEARNED  # played at all λ
+ORACLE_HEAPS = 30  # it takes 4 minutes of CPU a heap
 SHOWN_WEIGHT = 1.0  # λ of the table
 MEASURES = "boxes", "falls", "net"
 
@@ -70,7 +73,8 @@ def players(
     """Specifications of the policies to compare at a λ, by name, see ``make_policy``.
 
     The learned ones average the networks of all seeds; the recommended variant's single
-    networks are there too, as ``"learned seed 0"`` and so on.
+    networks are there too, as ``"learned seed 0"`` and so on, and the average that weighs the
+    probability of a fall.
 
     Args:
         rules: of which the best one is the reference, see ``rules_data``.
@@ -81,7 +85,7 @@ def players(
         variation: whether those trained with variation play, see ``heap_variation``.
     """
     chosen = {name: {"rule": name} for name in RULES}
-    chosen[REFERENCE] = {"linear": family()[best_rule(rules, falls_weight)]}
+    chosen[REFERENCE] = candidates()[best_rule(rules, falls_weight)]
     for kind, gamma in variants:
         paths = [str(path) for path in network_paths(round_number, kind, gamma, runs_dir)]
         name = learned_name(kind, gamma)
@@ -90,6 +94,7 @@ def players(
             for seed, path in enumerate(paths):
                 one = {"networks": [path], "falls_weight": falls_weight}
                 chosen[f"{name} seed {seed}"] = one
+            chosen[BY_PROBABILITY] = chosen[name] | {"by_probability": True}
     if variation:
         paths = [str(path) for path in varied_paths(runs_dir)]
         chosen[VARIED] = {"networks": paths, "falls_weight": falls_weight}
@@ -126,14 +131,15 @@ def plan(
     variation: bool = False,
     runs_dir: str | Path = files.RUNS,
 ) -> list[Cell]:
-    """What is played; all pairs of policies and conditions would take 14 hours of CPU.
+    """What is played; all pairs of policies and conditions would take a day of CPU.
 
-    - At the λ of the table, as trained: all policies, the oracle on fewer heaps.
-    - At the other λ, as trained: the best rule for that λ, and the learned one.
+    - At the λ of the table, as trained: all policies.
+    - At the other λ, as trained: the policies in ``CURVES``, of which the best rule is another
+      one for each λ.
     - At the λ of the table, under the other conditions: the policies in ``FEW``.
 
-    Each cell takes 5 minutes of CPU with 30 heaps and "whole" physics: 51 of them 4.3 hours, the
-    oracle 0.4 more, and ``VARIED`` 7 cells more.
+    Each cell takes 4 minutes of CPU with 30 heaps and "whole" physics, all together 4 hours, and
+    the oracle 2 more.
     """
     cells = []
     for weight in dict.fromkeys((SHOWN_WEIGHT, *weights)):
@@ -144,7 +150,7 @@ def plan(
                 if condition != AS_TRAINED:
                     played = heaps if name in FEW else 0
                 elif not shown:
-                    played = heaps if name in (REFERENCE, LEARNED) else 0
+                    played = heaps if name in CURVES else 0
                 else:
                     played = min(oracle_heaps, heaps) if name == "oracle" else heaps
                 if played:
@@ -169,7 +175,7 @@ def table_data(
     """Let policies play the unseen heaps as planned; write ``heap/{episodes,table}.csv``.
 
     Args:
-        heaps: of the test heaps, and of those of each other size.
+        heaps: of the test heaps, and of those of each condition that has its own.
         physics: that judges.
         conditions: names in ``CONDITIONS``.
         weights: λ of the curve of throughput against falls.
@@ -190,18 +196,16 @@ def table_data(
     for name in conditions:
         checks.one_of("a condition", name, CONDITIONS)
     rules = read_table(
-        Path(folder) / NAME / "rules.csv", f"{COMMAND} heap-rules", ["rule", "boxes", "falls"]
+        Path(folder) / NAME / "rules.csv",
+        f"{COMMAND} heap-rules",
+        ["rule", "heaps", "boxes", "falls"],
     )
     cells = plan(
         rules, heaps, conditions, weights, variants, rounds - 1, oracle_heaps, variation, runs_dir
     )
-    sized = [
-        sized_job(SIZED_SEED, number, CONDITIONS[name]["scale"])
-        for name in conditions
-        if "scale" in CONDITIONS[name]
-        for number in range(heaps)
-    ]
-    keep_all(Path(runs_dir) / NAME / "heaps", sized, n_jobs, progress)
+    varied = [varied_job(CONDITIONS[name], n) for name in conditions for n in range(heaps)]
+    varied = [job for job in varied if job is not None]
+    keep_all(Path(runs_dir) / NAME / "heaps", varied, n_jobs, progress)
     places = [(cell, number) for cell in cells for number in range(cell.heaps)]
     jobs = [
         episode_job(cell.player, CONDITIONS[cell.condition], "test", number, physics, runs_dir)
@@ -260,7 +264,8 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
         One row per condition, λ and policy. For each measure its mean, and the 95 % BCa
         bootstrap interval over heaps as ``_low`` and ``_high``. Beside the best rule on the
         same heaps, with intervals of the pairs: ``boxes_ratio`` and ``net_ratio``, the ratios
-        of the means; ``net_more``, the difference.
+        of the means; ``net_more``, the difference. ``net_to_learned`` is the difference to
+        the learned policy, NaN where that has not played.
     """
     rows = []
     for key, group in episodes.groupby(["condition", "falls_weight"], sort=False):
@@ -277,6 +282,10 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
                 ends = ratio_interval(each[measure], reference[measure])
                 row |= _ends(f"{measure}_ratio", *ends)
             row |= _ends("net_more", *mean_interval(each["net"] - reference["net"]))
+            learned = of[LEARNED]["net"].reindex(each.index) if LEARNED in of else pd.Series()
+            to_learned = (each["net"] - learned).dropna()
+            ends = mean_interval(to_learned) if len(to_learned) else (np.nan,) * 3
+            row |= _ends("net_to_learned", *ends)
             rows.append(row)
     return pd.DataFrame(rows)
 

@@ -2,46 +2,47 @@
 
     python -m unload.reproduce heap-variation
 
-A third round of recorded picks, on heaps of other sizes, with another friction and mass in each
-episode. Networks are learned from all rounds. What is there in ``runs/heap`` is not repeated.
-10,000 picks take about 45 minutes of CPU, the heaps 3, and each network as long as one of
-``heap-learning``.
+A third round of recorded picks, on heaps of which each has its own size, friction and mass.
+Networks are learned from all rounds. What is there in ``runs/heap`` is not repeated. 10,000 picks
+take about 45 minutes of CPU, the heaps 5, and each network as long as one of ``heap-learning``.
 """
 
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
-import torch
-from joblib import Parallel, delayed
 
+from unload import task
 from unload.heap.boxes import Heap, package_sizes
 from unload.heap.env import MAX_PICKS, HeapEnv
-from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
-from unload.heap.generate import settled_heap
-from unload.heap.learning import STEPS, Learned, fit, joined, load_network, save_network
-from unload.reproduce.heap import NAME
+from unload.heap.episodes import Episode, exploring, play
+from unload.heap.learning import STEPS, Learned, load_network
+from unload.physics.bullet import FRICTION
+from unload.reproduce.heap import NAME, heap_lists
 from unload.reproduce.heap_learning import (
     PHYSICS,
     ROUNDS,
     SEEDS_LEARNED,
     VARIANTS,
     WEIGHTS,
+    episode_path,
+    learn_networks,
     network_paths,
-    read_picks,
     record_episodes,
+    round_name,
 )
 from unload.reproduce.results import COMMAND, JOBS, keep_all, kept
 from unload.support import checks, files
 
 PICKS = 10_000
-HEAPS = 30  # of a random size each
+HEAPS = 60
 SEED = 6000  # of these heaps and of the episodes; no other data uses it
-# Each is drawn between its ends, of which the test conditions stay within: a size for each heap;
-# for each episode friction and mass on a logarithmic scale.
+# Drawn for each heap, friction and mass on a logarithmic scale. The test conditions lie within.
 SCALES = 0.75, 1.15
 FRICTIONS = 0.3, 0.8
 MASSES = 0.5, 2.5  # kg
+ROUND = "varied"
 KIND, GAMMA = VARIANTS[0]
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record"},
@@ -49,34 +50,46 @@ OPTIONS = JOBS | {
 }
 
 
-def sized_heap(seed: int, number: int, scale: float, runs_dir: str | Path = files.RUNS) -> Heap:
-    """A heap of boxes that are ``scale`` times as large, made once and kept in ``runs/heap``."""
+class Properties(NamedTuple):
+    """What varies between the boxes of heaps.
+
+    Attributes:
+        scale: of the edges of the boxes.
+        friction: of boxes, floor and walls, see ``Rake``.
+        mass: kg, of each box.
+    """
+
+    scale: float = 1.0
+    friction: float = FRICTION
+    mass: float = task.MASS
+
+
+def varied_heap(
+    seed: int, number: int, properties: Properties, runs_dir: str | Path = files.RUNS
+) -> Heap:
+    """A heap of boxes with these properties, made once and kept in ``runs/heap``."""
     folder = Path(runs_dir) / NAME / "heaps"
-    lists = kept(folder, *sized_job(seed, number, scale)).value
+    lists = kept(folder, *heap_job(seed, number, properties)).value
     packages = np.array(lists["packages"])
     return Heap(
         np.array(lists["positions"]),
         np.array(lists["orientations"]),
-        package_sizes(packages, scale),
+        package_sizes(packages, properties.scale),
         packages,
     )
 
 
-def sized_job(seed: int, number: int, scale: float) -> tuple[dict, partial]:
-    """The question of ``sized_heap`` and what answers it, see ``keep_all``."""
-    question = {"heap": [seed, number], "scale": scale}
-    return question, partial(_heap_lists, seed, number, scale)
+def heap_job(seed: int, number: int, properties: Properties) -> tuple[dict, partial]:
+    """The question of ``varied_heap`` and what answers it, see ``keep_all``."""
+    question = {"heap": [seed, number], "scale": properties.scale, "friction": properties.friction}
+    return question, partial(heap_lists, seed, number, properties.scale, properties.friction)
 
 
-def _heap_lists(seed: int, number: int, scale: float) -> dict[str, list]:
-    heap = settled_heap(np.random.default_rng([seed, number]), scale)
-    names = "positions", "orientations", "packages"
-    return {name: getattr(heap, name).tolist() for name in names}
-
-
-def varied_scale(number: int) -> float:
-    """Size of the boxes of a heap to train on."""
-    return round(float(np.random.default_rng([SEED, number]).uniform(*SCALES)), 3)
+def varied_properties(number: int) -> Properties:
+    """The properties of a heap's boxes, to train on."""
+    rng = np.random.default_rng([SEED, number])
+    drawn = rng.uniform(*SCALES), *(np.exp(rng.uniform(*np.log(e))) for e in (FRICTIONS, MASSES))
+    return Properties(*(round(float(value), 3) for value in drawn))
 
 
 def variation_data(
@@ -110,21 +123,22 @@ def variation_data(
     checks.integer("seeds", seeds, 1)
     known = network_paths(rounds - 1, KIND, GAMMA, runs_dir)
     folder = Path(runs_dir) / NAME
-    jobs = [sized_job(SEED, number, varied_scale(number)) for number in range(HEAPS)]
+    jobs = [heap_job(SEED, number, varied_properties(number)) for number in range(HEAPS)]
     keep_all(folder / "heaps", jobs[:episodes], n_jobs, progress)
-    record_episodes(
-        {
-            _episode_path(number, runs_dir): partial(_varied, number, known, runs_dir)
-            for number in range(episodes)
-        },
-        n_jobs,
-        progress,
-    )
+    players = {
+        episode_path(ROUND, number, runs_dir): partial(_varied, number, known, runs_dir)
+        for number in range(episodes)
+    }
+    properties = [varied_properties(number) for number in range(HEAPS)]
+    settings = {"physics": PHYSICS, "properties": properties}
+    record_episodes(players, settings, n_jobs, progress)
     paths = [varied_path(seed, runs_dir) for seed in range(seeds)]
-    Parallel(n_jobs)(
-        delayed(_learn)(path, seed, rounds, episodes, steps, runs_dir)
-        for seed, path in enumerate(paths)
-        if not path.exists()
+    learn_networks(
+        {path: (KIND, GAMMA, seed) for seed, path in enumerate(paths)},
+        [*map(round_name, range(rounds)), ROUND],
+        steps,
+        runs_dir,
+        n_jobs,
     )
     return paths
 
@@ -149,34 +163,18 @@ def varied_paths(runs_dir: str | Path = files.RUNS) -> list[Path]:
     return found
 
 
-def _episode_path(number: int, runs_dir: str | Path) -> Path:
-    return Path(runs_dir) / NAME / "picks" / "varied" / f"{number:05}.npz"
-
-
 def _varied(number: int, known: list[Path], runs_dir: str | Path) -> Episode:
-    """One exploring episode with its own friction and mass."""
+    """One exploring episode on a heap with properties of its own."""
     rng = np.random.default_rng([SEED, HEAPS + number])
-    friction, mass = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in (FRICTIONS, MASSES))
     favourite = Learned([load_network(known[number % len(known)])], float(rng.choice(WEIGHTS)))
     place = number % HEAPS
-    heap = sized_heap(SEED, place, varied_scale(place), runs_dir)
-    env = HeapEnv(heaps=[heap], physics=PHYSICS, friction=friction, mass=mass)
+    properties = varied_properties(place)
+    heap = varied_heap(SEED, place, properties, runs_dir)
+    env = HeapEnv(heaps=[heap], physics=PHYSICS, friction=properties.friction, mass=properties.mass)
     try:
         return play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
     finally:
         env.close()
-
-
-def _learn(
-    path: Path, seed: int, rounds: int, episodes: int, steps: int, runs_dir: str | Path
-) -> None:
-    torch.set_num_threads(1)
-    varied = [
-        picks_of(episode_from(files.read_arrays(_episode_path(number, runs_dir))))
-        for number in range(episodes)
-    ]
-    picks = joined([read_picks(runs_dir, range(rounds)), *varied])
-    save_network(fit(picks, seed, KIND, GAMMA, steps=steps), path)
 
 
 PARTS = {

@@ -94,6 +94,28 @@ def keep_all(
     return list(tqdm(answers, file=sys.stdout, **bar))
 
 
+def same_settings(path: str | Path, settings: dict) -> None:
+    """Write the settings of results beside them, and refuse to go on with others.
+
+    Args:
+        path: of the settings, a JSON file, in the folder of results that are named by a number
+            instead of by all that they depend on.
+        settings: as JSON can hold them.
+
+    Raises:
+        ValueError: results with other settings are there already.
+    """
+    settings = json.loads(json.dumps(settings, sort_keys=True))
+    if not Path(path).exists():
+        files.write_json(path, settings)
+    there = files.read_json(path)
+    if there != settings:
+        raise ValueError(
+            f"{path} says that the results beside it were made with {there}; expected {settings}: "
+            "remove them, or use their settings"
+        )
+
+
 def shared_settings(configs: Mapping[str, TrainConfig]) -> dict:
     """The fields in which all configurations agree, and their value."""
     first, *others = (asdict(config) for config in configs.values())

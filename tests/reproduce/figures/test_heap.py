@@ -90,9 +90,9 @@ def test_conditions_show_few_policies(folder):
     axes = heap.conditions(folder).axes[0]
     assert labels(axes) == ["camera", "as trained"]
     names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert names == ["highest", "best rule", "learned"]
+    assert names == ["best rule", "learned"]
     dots = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 1]
-    assert len(dots) == 6 and sum(value > 7 for value in dots) == 3, "camera"
+    assert len(dots) == 4 and sum(value > 7 for value in dots) == 2, "camera"
 
 
 def test_rules_are_points_and_what_depends_on_the_weight_is_a_curve(folder):
