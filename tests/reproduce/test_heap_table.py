@@ -77,7 +77,7 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
     rules = pd.DataFrame(
         {"rule": list(family())[:2], "heaps": [20, 20], "boxes": [2, 1], "falls": [1, 0]}
     )
-    cells = heap_table.plan(rules, runs_dir=tmp_path)
+    cells = heap_table.plan(rules, variation=False, runs_dir=tmp_path)
     of = {}
     for cell in cells:
         of.setdefault((cell.condition, cell.falls_weight), []).append(cell.policy)
@@ -93,7 +93,7 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
     assert [cell.heaps for cell in cells if cell.policy == "oracle"] == [30]
     assert sum(cell.heaps for cell in cells) / 30 < 60
     with pytest.raises(FileNotFoundError, match="heap-variation makes it"):
-        heap_table.plan(rules, variation=True, runs_dir=tmp_path)
+        heap_table.plan(rules, runs_dir=tmp_path)
 
 
 @pytest.mark.slow

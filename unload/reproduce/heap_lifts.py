@@ -17,6 +17,7 @@ from unload.heap.episodes import play
 from unload.heap.lift import LiftEnv
 from unload.heap.rules import RULES
 from unload.reproduce.heap import HEAPS, NAME
+from unload.reproduce.intervals import mean_interval, share_interval
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
 from unload.support import checks, files
 
@@ -74,4 +75,25 @@ def _lifts(name: str, number: int) -> dict[str, list]:
 
 
 OPTIONS = JOBS | {"--heaps": {"type": int, "default": HEAPS["test"], "help": "heaps to unload"}}
+
+
+def success_rates(lifts: pd.DataFrame) -> pd.DataFrame:
+    """Mean success rate of each rule, ``success``, with the ends of its 95 % interval.
+
+    A BCa bootstrap interval over heaps; where no lift has failed, it would have no width, and
+    the Clopper–Pearson interval of the number of lifts stands for it, as if they were
+    independent.
+
+    Args:
+        lifts: see ``lifts_data``.
+    """
+    rows = {}
+    for name, of in lifts.groupby("policy", sort=False):
+        mean, low, high = mean_interval(of["success_rate"])
+        if mean == 1:
+            low, high = share_interval(of["lifts"].sum(), of["lifts"].sum())
+        rows[name] = {"success": mean, "success_low": low, "success_high": high}
+    return pd.DataFrame(rows).T
+
+
 PARTS = {"heap-lifts": ("single lifts from heaps", lifts_data, OPTIONS)}

@@ -68,7 +68,7 @@ def players(
     variants: Sequence[tuple[str, float]] = VARIANTS,
     round_number: int = ROUNDS - 1,
     runs_dir: str | Path = files.RUNS,
-    variation: bool = False,
+    variation: bool = True,
 ) -> dict[str, dict]:
     """Specifications of the policies to compare at a λ, by name, see ``make_policy``.
 
@@ -128,7 +128,7 @@ def plan(
     variants: Sequence[tuple[str, float]] = VARIANTS,
     round_number: int = ROUNDS - 1,
     oracle_heaps: int = ORACLE_HEAPS,
-    variation: bool = False,
+    variation: bool = True,
     runs_dir: str | Path = files.RUNS,
 ) -> list[Cell]:
     """What is played; all pairs of policies and conditions would take a day of CPU.
@@ -166,7 +166,7 @@ def table_data(
     variants: Sequence[tuple[str, float]] = VARIANTS,
     rounds: int = ROUNDS,
     oracle_heaps: int = ORACLE_HEAPS,
-    variation: bool = False,
+    variation: bool = True,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
@@ -243,11 +243,12 @@ def table_data(
         or rounds < ROUNDS
         or physics != PHYSICS
         or tuple(conditions) != tuple(CONDITIONS)
+        or not variation
     )
     records = [answer.record for answer in answers]
     tables = {"episodes": episodes, "table": table}
     command = f"{COMMAND} heap-table --heaps {heaps} --physics {physics} --rounds {rounds}"
-    command += f" --oracle-heaps {oracle_heaps}" + " --variation" * variation
+    command += f" --oracle-heaps {oracle_heaps}" + " --no-variation" * (not variation)
     publish(Path(folder) / NAME, "table", tables, command, settings, reduced, records)
     return table
 
@@ -301,6 +302,8 @@ OPTIONS = JOBS | {
     "--oracle-heaps": {
         "type": int, "default": ORACLE_HEAPS, "help": "that the oracle plays; 0: none"
     },
-    "--variation": {"action": "store_true", "help": "the networks of heap-variation play, too"},
+    "--no-variation": {
+        "dest": "variation", "action": "store_false", "help": "without heap-variation's networks"
+    },
 }  # fmt: skip
 PARTS = {"heap-table": ("all policies on unseen heaps", table_data, OPTIONS)}

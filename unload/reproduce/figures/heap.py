@@ -14,29 +14,34 @@ from unload.heap.rules import RULES
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.heap import NAME
 from unload.reproduce.heap_learning import VARIANTS
+from unload.reproduce.heap_lifts import success_rates
 from unload.reproduce.heap_table import (
     AS_TRAINED,
+    BY_PROBABILITY,
     FEW,
     LEARNED,
+    LINEAR,
     MEASURES,
     REFERENCE,
     SHOWN_WEIGHT,
     VARIED,
     learned_name,
 )
-from unload.reproduce.intervals import mean_interval
 from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
 
 COLOURS = {
-    REFERENCE: "C1", LEARNED: "C0", VARIED: "C2", "oracle": "0.2", "random": "C5", "highest": "C3"
+    REFERENCE: "C1", LEARNED: "C0", LINEAR: "C4", VARIED: "C2", "oracle": "0.2", "random": "C5"
 }  # fmt: skip
 KEY = "condition", "falls_weight", "policy", "heaps"
 ENDS = "", "_low", "_high"
-COLUMNS = [*KEY, *(measure + end for measure in (*MEASURES, "net_more") for end in ENDS)]
+COLUMNS = [
+    *KEY,
+    *(name + end for name in (*MEASURES, "net_more", "net_to_learned") for end in ENDS),
+]
 UNITS = {
     "boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick",
-    "net_more": "more than the best rule", "success": "share of lifts that succeed",
+    "net_to_learned": "difference to the learned policy", "success": "share of lifts that succeed",
 }  # fmt: skip
 
 
@@ -80,7 +85,9 @@ def policies(folder: str | Path = files.DATA) -> Figure:
     Raises:
         FileNotFoundError: the table is missing; the message names the command.
     """
-    rows = at_shown_weight(read_heap_table(folder), [*RULES, REFERENCE, LEARNED, VARIED, "oracle"])
+    rows = at_shown_weight(
+        read_heap_table(folder), [*RULES, REFERENCE, LINEAR, LEARNED, VARIED, "oracle"]
+    )
     figure, grid = plt.subplots(1, len(MEASURES), figsize=(9, 3.4), sharey=True)
     for axes, measure in zip(grid, MEASURES):
         _dots(axes, rows, measure)
@@ -90,7 +97,7 @@ def policies(folder: str | Path = files.DATA) -> Figure:
 
 @styled
 def ablations(folder: str | Path = files.DATA) -> Figure:
-    """Balance of the variants of the learned agent, and of each seed alone.
+    """Balance of the variants of the learned policy, and of each seed alone.
 
     Args:
         folder: of ``heap/table.csv``.
@@ -102,9 +109,9 @@ def ablations(folder: str | Path = files.DATA) -> Figure:
     names = table["policy"].unique()
     variants = [learned_name(*variant) for variant in VARIANTS]
     seeds = sorted(name for name in names if name.startswith(f"{LEARNED} seed "))
-    rows = at_shown_weight(table, [REFERENCE, *variants, *seeds])
+    rows = at_shown_weight(table, [REFERENCE, *variants, BY_PROBABILITY, *seeds])
     figure, grid = plt.subplots(1, 2, figsize=(8, 3.6), sharey=True)
-    for axes, measure in zip(grid, ("net", "net_more")):
+    for axes, measure in zip(grid, ("net", "net_to_learned")):
         _dots(axes, rows, measure)
     grid[1].axvline(0, color="0.6", lw=1, zorder=0)
     mark_reduced(figure, Path(folder) / NAME, "table")
@@ -145,13 +152,13 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
 
     Args:
         folder: of ``heap/table.csv``; the conditions other than the trained one are left out,
-            and so are the variants and single seeds of the learned agent.
+            and so are single seeds and all variants of the learned policy but the linear one.
 
     Raises:
         FileNotFoundError: the table is missing; the message names the command.
     """
     table = read_heap_table(folder)
-    shown = [*RULES, REFERENCE, LEARNED, VARIED, "oracle"]
+    shown = [*RULES, REFERENCE, LINEAR, LEARNED, VARIED, "oracle"]
     table = table[(table["condition"] == AS_TRAINED) & table["policy"].isin(shown)]
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
     for name, rows in table.groupby("policy", sort=False):
@@ -191,20 +198,20 @@ def lifts_and_picks(folder: str | Path = files.DATA) -> Figure:
     """
     place = Path(folder) / NAME
     lifts = read_table(
-        place / "lifts.csv", f"{COMMAND} heap-lifts", ["policy", "heap", "success_rate", "falls"]
+        place / "lifts.csv",
+        f"{COMMAND} heap-lifts",
+        ["policy", "heap", "lifts", "success_rate", "falls"],
     )
-    rows = {}
-    for name, of in lifts.groupby("policy", sort=False):
-        mean, low, high = mean_interval(of["success_rate"])
-        rows[name] = {"success": mean, "success_low": low, "success_high": high}
-    order = sorted(rows, key=lambda name: -rows[name]["success"])
+    rates = success_rates(lifts).sort_values("success", ascending=False, kind="stable")
+    order = list(rates.index)
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3), sharey=True)
-    _dots(left, pd.DataFrame(rows).T.loc[order], "success")
+    _dots(left, rates, "success")
     left.set(xlim=(0, 1.02))
     _dots(right, at_shown_weight(read_heap_table(folder), order), "net")
     left.set_title("single lifts")
     right.set_title("bulk picks")
-    mark_reduced(figure, place, "table")
+    for data in ("lifts", "table"):
+        mark_reduced(figure, place, data)
     return figure
 
 
