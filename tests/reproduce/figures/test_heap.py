@@ -44,8 +44,8 @@ def folder(tmp_path):
     ]  # fmt: skip
     pd.DataFrame(picks).to_csv(folder / "agreement.csv", index=False)
     lifts = [
-        {"policy": name, "heap": number, "lifts": 15, "falls": 0, "success_rate": rate - number / 10}
-        for name, rate in (("lowest", 0.4), ("highest", 1.0)) for number in range(3)
+        {"policy": name, "heap": n, "lifts": 15, "falls": 0, "success_rate": rate - n / 10}
+        for name, rate in (("lowest", 0.4), ("highest", 1.0)) for n in range(3)
     ]  # fmt: skip
     pd.DataFrame(lifts).to_csv(folder / "lifts.csv", index=False)
     pixels = np.arange(4, 104)
