@@ -17,7 +17,7 @@ from unload.heap.rake import Outcome, Rake
 from unload.physics.bullet import FRICTION
 from unload.support import checks, random_state
 
-MAX_PICKS = 15  # some 25 of 105 boxes: the heap's front is played, not its last boxes
+MAX_PICKS = 15  # they unload some 25 to 40 of 105 boxes, the front of the heap
 OBSERVATIONS = {"truth": true_boxes, "camera": camera_boxes}
 LARGEST = 20.0  # of the observation: twice what a box 10 m away would show
 STATE = ("positions", "orientations", "sizes", "packages", "failed", "counts", "rng")

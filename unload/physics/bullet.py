@@ -70,7 +70,7 @@ def slim(size: np.ndarray) -> np.ndarray:
 
 
 class World:
-    """One PyBullet client (about 28 MB) with gravity, holding axis-aligned boxes.
+    """One PyBullet client (about 28 MB) with gravity, holding boxes.
 
     The client is disconnected by ``close``, or when nothing refers to the world any more.
 

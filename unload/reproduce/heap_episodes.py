@@ -100,8 +100,11 @@ def _play(
         friction=properties.friction,
         mass=properties.mass,
     )
+    policy = make_policy(player, env)
     try:
-        episode = play(env, make_policy(player, env), heap, seed=number)
+        episode = play(env, policy, heap, seed=number)
     finally:
         env.close()
+        if isinstance(policy, Oracle):
+            policy.close()
     return {"boxes": episode.unloaded.tolist(), "falls": episode.falls.tolist()}
