@@ -46,6 +46,10 @@ def ends(cell: str) -> np.ndarray:
     return np.array([100 * end_msr(each) for each in curves_of(cell)])
 
 
+def runs_that_fall(cell: str) -> int:
+    return sum(bool(falls(windows(each)["success_rate"])) for each in curves_of(cell))
+
+
 def runs_done():
     return len(paper_runs()), sum(len(seeds_of(cell)) for cell in PAPER_CELLS)
 
@@ -70,7 +74,7 @@ def unmasked_runs():
 def masked_runs():
     low, high = (100 * end for end in LIKE_THE_PAPER)
     alike = ((low <= ends("paper_mask")) & (ends("paper_mask") <= high)).sum()
-    fell = sum(bool(falls(windows(each)["success_rate"])) for each in curves_of("paper_mask"))
+    fell = runs_that_fall("paper_mask")
     return tops("paper_mask").min(), tops("paper_mask").max(), fell, alike, low, high
 
 
@@ -85,9 +89,10 @@ def large_runs_by_end():
 
 
 def large_masked_runs():
-    assert len(ends("paper_b2048_mask")) == 2
-    assert (tops("paper_b2048_mask") > 99.5).all()
-    return tuple(ends("paper_b2048_mask"))
+    found = ends("paper_b2048_mask")
+    assert (tops("paper_b2048_mask") >= 99).all()
+    assert runs_that_fall("paper_b2048_mask") == len(found)
+    return min(found), max(found)
 
 
 def engines_apart():
@@ -133,7 +138,7 @@ CLAIMS = [
     ("README.md", "rise to {:.0f}–{:.0f} % for a while, and come down again", unmasked_runs),
     ("README.md", "rise to {:.0f}–{:.0f} %; {} fall, {} end at {:.0f}–{:.0f} %", masked_runs),
     ("README.md", "two end at {:.0f} and {:.0f} %, two at {:.0f} and {:.0f} %", large_runs_by_end),
-    ("README.md", "rise to 100 % and fall; end at {:.0f} and {:.0f} %", large_masked_runs),
+    ("README.md", "all rise to 99–100 % and fall, and end at {:.0f}–{:.0f} %", large_masked_runs),
     ("notebooks/03_lifting.ipynb", "within {2:.0f} mm of the threshold", engines_apart),
     (
         "notebooks/08_hyperparameters.ipynb",
