@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -32,6 +34,9 @@ def made_up_picks(rng: np.random.Generator, count: int) -> Picks:
     lane = np.abs(observations[:, :BOXES, 1] - chosen[:, None, 1]) < 0.4
     before = observations[:, :BOXES, 0] < chosen[:, None, 0]
     unloaded = 1 + (lane & before).sum(axis=1)
+    fates = np.zeros((count, ROWS), np.int8)
+    fates[:, :BOXES] = lane & before  # 1: unloaded; what falls is hidden
+    fates[np.arange(count), actions] = 1
     masks = np.zeros((count, ROWS), bool)
     return Picks(
         observations,
@@ -40,14 +45,15 @@ def made_up_picks(rng: np.random.Generator, count: int) -> Picks:
         (chosen[:, 2] > 0.5).astype(np.float32),
         observations,
         masks,
+        fates,
     )
 
 
-@pytest.fixture(scope="module")
-def learned() -> tuple[HeapNetwork, Picks]:
+@pytest.fixture(scope="module", params=["fates", "pairs"])
+def learned(request) -> tuple[HeapNetwork, Picks]:
     """A network of made-up picks, and others that it has not seen."""
     rng = np.random.default_rng(0)
-    return fit(made_up_picks(rng, 3000), 0, steps=480), made_up_picks(rng, 500)
+    return fit(made_up_picks(rng, 3000), 0, request.param, steps=480), made_up_picks(rng, 500)
 
 
 def answers(network: HeapNetwork, picks: Picks) -> tuple[np.ndarray, ...]:
@@ -78,14 +84,22 @@ def test_the_same_seed_gives_the_same_bits():
     assert not torch.equal(first["heads.weight"], other["heads.weight"])
 
 
+def test_fates_with_gamma_are_refused():
+    picks = made_up_picks(np.random.default_rng(1), 10)
+    with pytest.raises(ValueError, match="gamma is 0.5; expected 0 for a network of fates"):
+        fit(picks, 0, "fates", gamma=0.5, steps=2)
+    with pytest.raises(ValueError, match="kind is 'best'; expected one of 'fates', 'pairs'"):
+        fit(picks, 0, "best", steps=2)
+
+
 def test_with_gamma_the_picks_to_come_count():
     """Each pick brings 1 and is followed by another such one: 1 / (1 - γ) in the end."""
     rng = np.random.default_rng(0)
     picks = made_up_picks(rng, 400)
     ones, none = np.ones(400, np.float32), np.zeros(400, np.float32)
     masks = holds_box(torch.from_numpy(picks.observations)).numpy()
-    going_on = Picks(picks.observations, picks.actions, ones, none, picks.observations, masks)
-    ended = Picks(picks.observations, picks.actions, ones, none, picks.observations, masks & False)
+    going_on = replace(picks, unloaded=ones, falls=none, next_masks=masks)
+    ended = replace(going_on, next_masks=masks & False)
     for given, expected in ((going_on, 1 + 0.5 + 0.25 + 0.125), (ended, 1.0)):
         network = fit(given, 0, "own", gamma=0.5, steps=180, rounds=3)
         assert answers(network, given)[0].mean() == pytest.approx(expected, abs=0.15)

@@ -59,8 +59,8 @@ def test_a_policy_on_fewer_heaps_is_compared_on_those(episodes):
 def test_variants_are_named_by_what_they_differ_in():
     names = [heap_table.learned_name(*variant) for variant in heap_table.VARIANTS]
     assert names == [
-        "learned", "learned, γ=0.5", "learned, γ=0.8", "learned, pooled", "learned, own",
-        "learned, linear",
+        "learned", "learned, pairs", "learned, pairs, γ=0.5", "learned, pairs, γ=0.8",
+        "learned, pooled", "learned, own", "learned, linear",
     ]  # fmt: skip
 
 
@@ -82,7 +82,7 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
     for cell in cells:
         of.setdefault((cell.condition, cell.falls_weight), []).append(cell.policy)
     shown = of.pop(("as trained", 1.0))
-    assert len(shown) == len(set(shown)) == 20
+    assert len(shown) == len(set(shown)) == 21
     assert {"oracle", "learned seed 4", "learned, own", *heap_table.RULES} <= set(shown)
     few = {"random", "best rule", "learned"}
     for (condition, weight), policies in of.items():
@@ -113,7 +113,7 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
         "conditions": ["as trained", "camera", "boxes × 0.8"],
         "weights": [0.0],
         "rounds": 2,
-        "variants": [("pairs", 0.0)],
+        "variants": [("fates", 0.0)],
         "oracle_heaps": 0,
         "variation": True,
         "folder": tmp_path,

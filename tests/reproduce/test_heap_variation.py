@@ -57,7 +57,7 @@ def test_episodes_have_the_properties_of_their_heap_and_networks_learn_from_them
     tmp_path, monkeypatch, quick
 ):
     network = HeapNetwork("own", 8, torch.Generator().manual_seed(0))
-    save_network(network, network_path(0, "pairs", 0.0, 0, tmp_path))
+    save_network(network, network_path(0, *heap_learning.VARIANTS[0], 0, tmp_path))
     learned = []
 
     def fit(picks, seed, kind, gamma, steps):
@@ -67,7 +67,7 @@ def test_episodes_have_the_properties_of_their_heap_and_networks_learn_from_them
     monkeypatch.setattr(heap_learning, "fit", fit)
     make = partial(heap_variation.variation_data, 6, 1, 2, 5, tmp_path, progress=False)
     paths = make()
-    assert learned == [(6, 0, "pairs", 0.0, 5), (6, 1, "pairs", 0.0, 5)]
+    assert learned == [(6, 0, "fates", 0.0, 5), (6, 1, "fates", 0.0, 5)]
     assert paths == heap_variation.varied_paths(tmp_path)
     assert load_network(paths[0]).kind == "own"
     for name, (low, high) in (

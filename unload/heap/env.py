@@ -12,7 +12,15 @@ from unload.env.base import AllOrReset, EpisodeEnv
 from unload.heap import generate
 from unload.heap.boxes import Heap, check_heap
 from unload.heap.camera import Camera
-from unload.heap.observation import COLUMNS, ROWS, camera_boxes, features, true_boxes
+from unload.heap.observation import (
+    COLUMNS,
+    FELL,
+    ROWS,
+    UNLOADED,
+    camera_boxes,
+    features,
+    true_boxes,
+)
 from unload.heap.rake import Outcome, Rake
 from unload.physics.bullet import FRICTION
 from unload.support import checks, random_state
@@ -87,7 +95,9 @@ class HeapEnv(EpisodeEnv):
 
     - ``unloaded`` and ``falls``: int, the two parts of the reward;
     - ``box``: int, the dragged box's number in the heap before the pick, -1 if there was none;
-    - ``moved``: float, m, how far it came, and ``came``: bool.
+    - ``moved``: float, m, how far it came, and ``came``: bool;
+    - ``fates``: (96,) int8, what became of the box in each row of the observation before the
+      pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
     Args:
         split: ``"train"`` or ``"test"``, which of the stored heaps are played.
@@ -163,7 +173,10 @@ class HeapEnv(EpisodeEnv):
             action = action.item()  # what a learned policy may return
         row = checks.integer("action", action, 0, ROWS - 1)
         box = int(self.visible[row])
-        pick = {"unloaded": 0, "falls": 0, "box": box, "moved": 0.0, "came": False}
+        fates = np.zeros(ROWS, np.int8)
+        pick = {
+            "unloaded": 0, "falls": 0, "box": box, "moved": 0.0, "came": False, "fates": fates
+        }  # fmt: skip
         with AllOrReset(self):
             self._picks += 1
             if box >= 0:
@@ -174,6 +187,9 @@ class HeapEnv(EpisodeEnv):
                     "moved": outcome.moved,
                     "came": outcome.came,
                 }
+                seen = self.visible >= 0
+                numbers = self.visible[seen]
+                fates[seen] = UNLOADED * outcome.unloaded[numbers] + FELL * outcome.fallen[numbers]
                 self._take(outcome, box)
         reward = pick["unloaded"] - self.falls_weight * pick["falls"]
         terminated, truncated = len(self.heap) == 0, self._picks >= self.max_picks

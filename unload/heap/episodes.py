@@ -28,6 +28,7 @@ class Episode:
         boxes: (t,) int64, dragged boxes, by their numbers in the heap before each pick.
         unloaded, falls: (t,) int64, of each pick.
         moved: (t,) float64, m, how far the dragged box came.
+        fates: (t, 96) int8, what became of the box in each row, see ``HeapEnv``.
         heaps: t + 1 heaps, before each pick and after the last; () if not kept.
     """
 
@@ -38,6 +39,7 @@ class Episode:
     unloaded: np.ndarray
     falls: np.ndarray
     moved: np.ndarray
+    fates: np.ndarray
     heaps: tuple[Heap, ...] = ()
 
     def arrays(self) -> dict[str, np.ndarray]:
@@ -48,10 +50,12 @@ class Episode:
         return stored | {
             "observations": self.observations[:, :rows],
             "masks": self.masks[:, :rows],
+            "fates": self.fates[:, :rows],
         }
 
 
 _STORED = "actions", "boxes", "unloaded", "falls", "moved"
+_TOLD = "box", "unloaded", "falls", "moved", "fates"  # by the environment
 
 
 def episode_from(arrays: dict[str, np.ndarray]) -> Episode:
@@ -61,7 +65,9 @@ def episode_from(arrays: dict[str, np.ndarray]) -> Episode:
     observations[:, :rows] = arrays["observations"]
     masks = np.zeros((count, ROWS), bool)
     masks[:, :rows] = arrays["masks"]
-    return Episode(observations, masks, *(arrays[name] for name in _STORED))
+    fates = np.zeros((count - 1, ROWS), np.int8)
+    fates[:, :rows] = arrays["fates"]
+    return Episode(observations, masks, *(arrays[name] for name in _STORED), fates)
 
 
 def picks_of(episode: Episode) -> Picks:
@@ -73,6 +79,7 @@ def picks_of(episode: Episode) -> Picks:
         episode.falls.astype(np.float32),
         episode.observations[1:],
         episode.masks[1:],
+        episode.fates,
     )
 
 
@@ -96,7 +103,7 @@ def play(
         (action,) = policy(observations[-1][None], masks[-1][None], rng)
         observation, _, terminated, truncated, info = env.step(int(action))
         ended = terminated or truncated
-        picks.append((action, *(info[name] for name in ("box", "unloaded", "falls", "moved"))))
+        picks.append((action, *(info[name] for name in _TOLD)))
         observations.append(observation)
         masks.append(info["action_mask"])
         heaps.append(env.heap)

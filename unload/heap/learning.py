@@ -3,17 +3,21 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from safetensors.torch import load_file, save
 from torch import nn
 
+from unload.heap.fates import FateNetwork, expected_of, fate_loss
 from unload.heap.network import CONTEXTS, FEATURES, HeapNetwork
+from unload.heap.network import KINDS as HEAP_KINDS
 from unload.heap.observation import COLUMN
 from unload.heap.rules import check_batch
 from unload.support import checks, files
 
+KINDS = "fates", *HEAP_KINDS
 BATCH = 256
 LEARNING_RATE = 1e-3
 STEPS = 4000  # 20 times through 50,000 picks; with 5,000, 300 steps are far too few
@@ -32,6 +36,7 @@ class Picks:
         next_observations: (n, 96, 13) float32, after it.
         next_masks: (n, 96) bool, what could be picked next; all False at an episode's end by
             termination.
+        fates: (n, 96) int8, what became of the box in each row, see ``HeapEnv``.
     """
 
     observations: np.ndarray
@@ -40,6 +45,7 @@ class Picks:
     falls: np.ndarray
     next_observations: np.ndarray
     next_masks: np.ndarray
+    fates: np.ndarray
 
     def __len__(self) -> int:
         return len(self.actions)
@@ -65,7 +71,7 @@ def without_empty_rows(observations: torch.Tensor) -> torch.Tensor:
 def fit(
     picks: Picks,
     seed: int,
-    kind: str = "pairs",
+    kind: str = "fates",
     gamma: float = 0.0,
     falls_weight: float = 1.0,
     steps: int = STEPS,
@@ -73,17 +79,18 @@ def fit(
 ) -> HeapNetwork:
     """Learn what dragging a box brings.
 
-    Counts are learned by the Poisson likelihood, the probability of a fall by its own. Each
-    batch is mirrored at the middle of the container with probability 0.5, because the physics
-    is the same. With γ > 0, ``rounds`` of fitted Q iteration follow: both counts are then the
-    discounted sums over the picks to come, of which each is the one with the highest
-    boxes - λ falls by the network of the round before.
+    Counts are learned by the Poisson likelihood, the probability of a fall by its own, and
+    fates, where the network says them, by theirs. Each batch is mirrored at the middle of the
+    container with probability 0.5, because the physics is the same. With γ > 0, ``rounds`` of
+    fitted Q iteration follow: both counts are then the discounted sums over the picks to come,
+    of which each is the one with the highest boxes - λ falls by the network of the round before.
 
     Args:
         picks: the data.
         seed: of weights and batches.
-        kind: of the network, see ``HeapNetwork``.
-        gamma: discount in [0, 1).
+        kind: of the network: ``"fates"``, see ``FateNetwork``, or one of ``HeapNetwork``.
+        gamma: discount in [0, 1); 0 for ``"fates"``, because a later pick's boxes are not those
+            whose fates the network says.
         falls_weight: λ, of the picks to come; without effect if γ = 0.
         steps: of the optimizer, a batch each, in all rounds together.
         rounds: of Q iteration, after the regression that they begin with.
@@ -97,43 +104,75 @@ def fit(
     if not len(picks):
         raise ValueError("picks is empty; expected at least one")
     generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
-    network = HeapNetwork(kind, generator=generator)
-    data = [
-        torch.from_numpy(array)
-        for array in (picks.observations, picks.actions, picks.unloaded, picks.falls)
-    ]
-    fell = (data[3] > 0).float()
+    network = new_network(kind, generator=generator)
+    if gamma and kind == "fates":
+        raise ValueError(f"gamma is {gamma}; expected 0 for a network of fates")
+    arrays = picks.observations, picks.actions, picks.unloaded, picks.falls, picks.fates
+    data = _Batch(*map(torch.from_numpy, arrays), torch.from_numpy(picks.falls > 0).float())
     rounds = rounds if gamma else 0
     share = max(1, steps // (1 + rounds))
-    _descend(network, (*data, fell), share, generator)
+    _descend(network, data, share, generator)
     for _ in range(rounds):
         boxes, falls = _to_come(network, picks, falls_weight)
-        targets = data[2] + gamma * boxes, data[3] + gamma * falls
-        _descend(network, (*data[:2], *targets, fell), share, generator)
+        targets = {"boxes": data.boxes + gamma * boxes, "falls": data.falls + gamma * falls}
+        _descend(network, data._replace(**targets), share, generator)
     return network.eval()
 
 
-def _descend(
-    network: HeapNetwork, data: tuple[torch.Tensor, ...], steps: int, generator: torch.Generator
-) -> None:
-    """Fit a network to observations, actions, boxes, falls and whether anything fell."""
+def new_network(
+    kind: str, n_features: int = FEATURES, generator: torch.Generator | None = None
+) -> HeapNetwork:
+    """An untrained network of a kind, see ``fit``."""
+    checks.one_of("kind", kind, KINDS)
+    if kind == "fates":
+        return FateNetwork(n_features, generator)
+    return HeapNetwork(kind, n_features, generator)
+
+
+class _Batch(NamedTuple):
+    """Recorded picks, or what is to be learned instead of what they have brought."""
+
+    observations: torch.Tensor
+    actions: torch.Tensor
+    boxes: torch.Tensor
+    falls: torch.Tensor
+    fates: torch.Tensor
+    fell: torch.Tensor  # whether anything fell
+
+
+def _descend(network: HeapNetwork, data: _Batch, steps: int, generator: torch.Generator) -> None:
+    """Fit a network to recorded picks."""
     adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
     for rows in _batches(len(data[0]), steps, generator):
-        observations, actions, boxes, falls, fell = (each[rows] for each in data)
+        batch = _Batch(*(each[rows] for each in data))
         if torch.rand((), generator=generator) < 0.5:
-            observations = mirrored(observations)
-        observations = without_empty_rows(observations)
-        expected = network(observations, holds_box(observations), actions)
-        loss = (
-            _poisson(expected.boxes[:, 0], boxes)
-            + _poisson(expected.falls[:, 0], falls)
-            + nn.functional.binary_cross_entropy_with_logits(expected.fall_logits[:, 0], fell)
-        )
+            batch = batch._replace(observations=mirrored(batch.observations))
+        loss = _loss(network, batch)
         adam.zero_grad()
         loss.backward()
         adam.step()
         schedule.step()
+
+
+def _loss(network: HeapNetwork, batch: _Batch) -> torch.Tensor:
+    """Negative log-likelihood of a batch, per pick."""
+    observations = without_empty_rows(batch.observations)
+    present = holds_box(observations)
+    if isinstance(network, FateNetwork):
+        fates = network.fates(observations, present, batch.actions)
+        expected = expected_of(fates, present)
+        found = batch.fates[:, : observations.shape[1]]
+        loss = fate_loss(fates, present, found, batch.boxes, batch.falls)
+    else:
+        expected = network(observations, present, batch.actions)
+        loss = 0.0
+    fell = nn.functional.binary_cross_entropy_with_logits(expected.fall_logits[:, 0], batch.fell)
+    boxes, falls = (
+        nn.functional.poisson_nll_loss(mean[:, 0], count, log_input=False)
+        for mean, count in ((expected.boxes, batch.boxes), (expected.falls, batch.falls))
+    )
+    return loss + boxes + falls + fell
 
 
 def _batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
@@ -142,10 +181,6 @@ def _batches(count: int, steps: int, generator: torch.Generator) -> Iterator[tor
         batches = torch.randperm(count, generator=generator).split(BATCH)[:steps]
         yield from batches
         steps -= len(batches)
-
-
-def _poisson(mean: torch.Tensor, count: torch.Tensor) -> torch.Tensor:
-    return nn.functional.poisson_nll_loss(mean, count, log_input=False)
 
 
 def mirrored(observations: torch.Tensor) -> torch.Tensor:
@@ -238,7 +273,7 @@ def load_network(path: str | Path) -> HeapNetwork:
         raise FileNotFoundError(f"{path} is missing")
     try:
         weights = load_file(path)
-        network = HeapNetwork(*_shape(weights))
+        network = new_network(*_shape(weights))
         network.load_state_dict(weights)
     except Exception as error:
         raise ValueError(f"{path} holds no HeapNetwork: {error}") from error
@@ -250,5 +285,7 @@ def _shape(weights: dict[str, torch.Tensor]) -> tuple[str, int]:
     if "hidden.weight" not in weights:
         return "linear", FEATURES
     n_features, inputs = weights["hidden.weight"].shape
+    if "fate.weight" in weights:
+        return "fates", n_features
     kinds = {context: kind for kind, context in CONTEXTS.items()}
     return kinds[inputs // n_features - 1], n_features

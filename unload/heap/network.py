@@ -4,6 +4,7 @@ It is permutation equivariant, as the paper's (Sec. III-F), but what a box's nei
 matters here: the box that is dragged pushes those before it and drops those on it.
 """
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import torch
@@ -65,12 +66,7 @@ class HeapNetwork(nn.Module):
             self.hidden = nn.Linear(n + CONTEXTS[kind] * n, n)
             self.last = nn.Linear(n, n)
         self.heads = nn.Linear(len(COLUMNS) if kind == "linear" else n, HEADS)
-        for layer in self.modules():
-            if isinstance(layer, nn.Linear):
-                for weight in (layer.weight, layer.bias):
-                    if weight is not None:
-                        bound = layer.in_features**-0.5
-                        nn.init.uniform_(weight, -bound, bound, generator=generator)
+        reset_layers(self.modules(), generator)
 
     def forward(
         self,
@@ -89,33 +85,52 @@ class HeapNetwork(nn.Module):
         Returns:
             (batch, items) each, or (batch, 1) if ``rows`` is given.
         """
-        asked = observations
-        if rows is not None:
-            asked = observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
+        asked = asked_rows(observations, rows)
         if self.kind == "linear":
             return _expected(self.heads(asked))
-        own = torch.relu(self.own(asked))
         if self.kind == "pairs":
-            own = torch.cat([own, self._neighbours(asked, observations, present)], dim=2)
-            own = torch.relu(self.hidden(own))
+            messages = self.messages(asked, observations, present)
+            own = self.with_neighbours(asked, messages)
         elif self.kind == "pooled":
+            own = torch.relu(self.own(asked))
             everything = torch.relu(self.own(observations))
             pooled = maximum_over_items(everything, present)
             own = torch.relu(linear_with_context(self.hidden, own, pooled))
         else:
-            own = torch.relu(self.hidden(own))
+            own = torch.relu(self.hidden(torch.relu(self.own(asked))))
         return _expected(self.heads(torch.relu(self.last(own))))
 
-    def _neighbours(
+    def messages(
         self, asked: torch.Tensor, others: torch.Tensor, present: torch.Tensor
     ) -> torch.Tensor:
-        """What the other boxes mean to each one asked for, (batch, asked, 2 n)."""
+        """What each other box means to each one asked for, (batch, asked, others, n) ≥ 0."""
         relation = pair_columns(asked, others)
         message = self.chosen(asked)[:, :, None] + self.other(others)[:, None]
         message = torch.relu(self.message(torch.relu(message + self.pair(relation))))
         # Messages are >= 0, so that 0 adds nothing to the sum and leaves the maximum.
-        message = message * present[:, None, :, None]
-        return torch.cat([message.sum(dim=2) / 16, message.amax(dim=2)], dim=2)
+        return message * present[:, None, :, None]
+
+    def with_neighbours(self, asked: torch.Tensor, messages: torch.Tensor) -> torch.Tensor:
+        """Features of the boxes asked for and of all that is around them, (batch, asked, n)."""
+        pooled = [messages.sum(dim=2) / 16, messages.amax(dim=2)]
+        return torch.relu(self.hidden(torch.cat([torch.relu(self.own(asked)), *pooled], dim=2)))
+
+
+def reset_layers(modules: Iterable[nn.Module], generator: torch.Generator | None) -> None:
+    """Draw the weights of the linear layers among some modules, U(±1/√inputs)."""
+    for layer in modules:
+        if isinstance(layer, nn.Linear):
+            for weight in (layer.weight, layer.bias):
+                if weight is not None:
+                    bound = layer.in_features**-0.5
+                    nn.init.uniform_(weight, -bound, bound, generator=generator)
+
+
+def asked_rows(observations: torch.Tensor, rows: torch.Tensor | None) -> torch.Tensor:
+    """(batch, items or 1, 13) float32, all rows, or the one that is asked for."""
+    if rows is None:
+        return observations
+    return observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
 
 
 def _expected(heads: torch.Tensor) -> Expected:

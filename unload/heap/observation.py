@@ -13,6 +13,7 @@ COLUMNS = (
     "tilt", "clear_above", "clear_in_front", "pixels",
 )  # fmt: skip
 COLUMN = {name: number for number, name in enumerate(COLUMNS)}
+UNLOADED, FELL = 1, 2  # bits of what a pick has done to a box
 PIXEL_UNIT = 1000.0  # of the last column, so that all columns are of the order of 1
 
 

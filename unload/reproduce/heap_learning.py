@@ -21,8 +21,16 @@ from tqdm import tqdm
 from unload.heap import camera, rake
 from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
-from unload.heap.learning import STEPS, Learned, Picks, fit, joined, load_network, save_network
-from unload.heap.network import KINDS
+from unload.heap.learning import (
+    KINDS,
+    STEPS,
+    Learned,
+    Picks,
+    fit,
+    joined,
+    load_network,
+    save_network,
+)
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
 from unload.reproduce.heap import NAME, SEEDS
 from unload.reproduce.results import COMMAND, JOBS, measured, same_settings
@@ -36,8 +44,10 @@ ROUNDS = 2
 SEEDS_LEARNED = 5
 # What is learned: kind of network and γ; the recommended one first.
 VARIANTS = (
-    ("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0), ("linear", 0.0)
+    ("fates", 0.0), ("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0),
+    ("linear", 0.0),
 )  # fmt: skip
+EXPLORER = "pairs", 0.0  # the networks around which the second round explores
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record, in all rounds"},
@@ -64,7 +74,7 @@ def learning_data(
     made = []
     for round_number in range(checks.integer("rounds", rounds, 1, ROUNDS)):
         made += record_picks(picks // rounds, round_number, physics, runs_dir, n_jobs, progress)
-        variants = VARIANTS if round_number == rounds - 1 else VARIANTS[:1]
+        variants = VARIANTS if round_number == rounds - 1 else [EXPLORER]
         made += learn(round_number, seeds, variants, runs_dir, n_jobs, steps)
     paths = network_paths(rounds - 1, *VARIANTS[0], runs_dir)
     for seed, path in enumerate(paths):
@@ -111,7 +121,7 @@ def record_picks(
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
     episodes = -(-checks.integer("picks", picks, 1) // MAX_PICKS)
-    known = network_paths(round_number - 1, *VARIANTS[0], runs_dir) if round_number else []
+    known = network_paths(round_number - 1, *EXPLORER, runs_dir) if round_number else []
     players = {
         episode_path(round_name(round_number), number, runs_dir): partial(
             _explored, number, round_number, physics, known
@@ -233,9 +243,9 @@ def learn(
     """Learn networks from the picks of a round and of those before it.
 
     Args:
-        round_number: 0 or 1; to record the next round, the recommended variant is enough.
+        round_number: 0 or 1; to record the next round, ``EXPLORER`` is enough.
         seeds: networks of each variant.
-        variants: pairs of ``HeapNetwork`` kind and γ.
+        variants: pairs of kind and γ, see ``fit``.
         runs_dir: where picks and networks are.
         n_jobs: processes, as in joblib.
         steps: see ``fit``.
