@@ -8,6 +8,7 @@ import pytest
 from unload.heap.env import HeapEnv
 from unload.heap.learning import load_network
 from unload.reproduce import heap_learning
+from unload.reproduce.heap_learning import Variant
 from unload.support.provenance import read_provenance
 
 
@@ -15,7 +16,8 @@ from unload.support.provenance import read_provenance
 def short_episodes(monkeypatch):
     monkeypatch.setattr(heap_learning, "MAX_PICKS", 3)
     monkeypatch.setattr(heap_learning, "HeapEnv", partial(HeapEnv, max_picks=3))
-    monkeypatch.setattr(heap_learning, "VARIANTS", (("pairs", 0.0), ("own", 0.5)))
+    variants = {"learned": Variant(n_features=8), "γ = 0.5": Variant("own", 0.5, 8)}
+    monkeypatch.setattr(heap_learning, "VARIANTS", variants)
 
 
 @pytest.mark.slow
@@ -28,7 +30,7 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path):
     written = [path.stat().st_mtime_ns for path in episodes]
     kept = sorted((tmp_path / "data" / "heap" / "networks").glob("*.safetensors"))
     assert len(episodes) == 4 and len(kept) == 2
-    assert {load_network(path).kind for path in kept} == {"pairs"}
+    assert {load_network(path).kind for path in kept} == {"fates"}
     provenance = read_provenance(tmp_path / "data" / "heap", "networks")
     assert provenance["reduced"] and provenance["runs"] == 4 + 2 + 4
     assert provenance["wall_time_s"] > 0
@@ -58,7 +60,7 @@ def test_missing_rounds_are_refused(tmp_path):
     with pytest.raises(ValueError, match="round_number is 2"):
         heap_learning.record_picks(3, 2, "near", tmp_path, progress=False)
     with pytest.raises(ValueError, match="kind is 'best'"):
-        heap_learning.learn(0, 1, [("best", 0.0)], tmp_path)
+        heap_learning.learn(0, 1, [Variant("best")], tmp_path)
 
 
 def test_results_with_other_settings_are_not_mixed(tmp_path):
@@ -66,9 +68,9 @@ def test_results_with_other_settings_are_not_mixed(tmp_path):
     heap_learning.record_picks(3, 0, "near", tmp_path, progress=False)
     with pytest.raises(ValueError, match="'physics': 'near'.*expected.*'physics': 'coarse'"):
         heap_learning.record_picks(3, 0, "coarse", tmp_path, progress=False)
-    heap_learning.learn(0, 1, [("linear", 0.0)], tmp_path, steps=2)
+    heap_learning.learn(0, 1, [Variant("linear")], tmp_path, steps=2)
     with pytest.raises(ValueError, match="'steps': 2.*expected.*'steps': 3"):
-        heap_learning.learn(0, 1, [("linear", 0.0)], tmp_path, steps=3)
+        heap_learning.learn(0, 1, [Variant("linear")], tmp_path, steps=3)
     heap_learning.record_picks(6, 0, "near", tmp_path, progress=False)
     with pytest.raises(ValueError, match="'episodes': 1.*expected.*'episodes': 2"):
-        heap_learning.learn(0, 2, [("linear", 0.0)], tmp_path, steps=2)
+        heap_learning.learn(0, 2, [Variant("linear")], tmp_path, steps=2)

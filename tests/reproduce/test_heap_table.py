@@ -11,7 +11,7 @@ from unload.heap.learning import save_network
 from unload.heap.network import HeapNetwork
 from unload.heap.rules import family
 from unload.reproduce import heap, heap_episodes, heap_rules, heap_table
-from unload.reproduce.heap_learning import network_path
+from unload.reproduce.heap_learning import VARIANTS, network_path
 from unload.reproduce.heap_variation import varied_path
 
 
@@ -56,19 +56,11 @@ def test_a_policy_on_fewer_heaps_is_compared_on_those(episodes):
     assert row["boxes_ratio"] == pytest.approx(2.0 / 1.5) and row["net_more"] == 0.5
 
 
-def test_variants_are_named_by_what_they_differ_in():
-    names = [heap_table.learned_name(*variant) for variant in heap_table.VARIANTS]
-    assert names == [
-        "learned", "learned, pairs", "learned, pairs, γ=0.5", "learned, pairs, γ=0.8",
-        "learned, pooled", "learned, own", "learned, linear",
-    ]  # fmt: skip
-
-
 def save_networks(folder, count=2):
     for seed in range(count):
         network = HeapNetwork("own", 8, torch.Generator().manual_seed(seed))
-        for kind, gamma in heap_table.VARIANTS:
-            save_network(network, network_path(1, kind, gamma, seed, folder))
+        for variant in VARIANTS.values():
+            save_network(network, network_path(1, variant, seed, folder))
 
 
 def test_the_plan_plays_what_is_worth_it(tmp_path):
@@ -82,11 +74,11 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
     for cell in cells:
         of.setdefault((cell.condition, cell.falls_weight), []).append(cell.policy)
     shown = of.pop(("as trained", 1.0))
-    assert len(shown) == len(set(shown)) == 21
-    assert {"oracle", "learned seed 4", "learned, own", *heap_table.RULES} <= set(shown)
+    assert len(shown) == len(set(shown)) == 22
+    assert {"oracle", "seed 4", *VARIANTS, *heap_table.RULES} <= set(shown)
     few = {"random", "best rule", "learned"}
     for (condition, weight), policies in of.items():
-        wanted = {"best rule", "learned, linear", "learned"} if condition == "as trained" else few
+        wanted = {"best rule", "linear", "learned"} if condition == "as trained" else few
         assert set(policies) == wanted and len(policies) == len(wanted), (condition, weight)
     assert len(of) == 11
     assert {cell.heaps for cell in cells if cell.policy != "oracle"} == {30}
@@ -113,7 +105,7 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
         "conditions": ["as trained", "camera", "boxes × 0.8"],
         "weights": [0.0],
         "rounds": 2,
-        "variants": [("fates", 0.0)],
+        "variants": {"learned": VARIANTS["learned"]},
         "oracle_heaps": 0,
         "variation": True,
         "folder": tmp_path,
@@ -122,12 +114,12 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     }
     table = heap_table.table_data(**arguments)
     trained = table[(table["condition"] == "as trained") & (table["falls_weight"] == 1.0)]
-    learned = ["learned", "learned seed 0", "learned seed 1"]
+    learned = ["learned", "seed 0", "seed 1"]
     assert set(trained["policy"]) == {
         *rules,
         "best rule",
         *learned,
-        "learned, by probability",
+        "by probability",
         "trained with variation",
     }
     for condition in ("camera", "boxes × 0.8"):

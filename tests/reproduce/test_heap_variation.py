@@ -57,17 +57,17 @@ def test_episodes_have_the_properties_of_their_heap_and_networks_learn_from_them
     tmp_path, monkeypatch, quick
 ):
     network = HeapNetwork("own", 8, torch.Generator().manual_seed(0))
-    save_network(network, network_path(0, *heap_learning.VARIANTS[0], 0, tmp_path))
+    save_network(network, network_path(0, heap_variation.VARIANT, 0, tmp_path))
     learned = []
 
-    def fit(picks, seed, kind, gamma, steps):
-        learned.append((len(picks), seed, kind, gamma, steps))
+    def fit(picks, seed, steps, **variant):
+        learned.append((len(picks), seed, steps, variant["kind"]))
         return network
 
     monkeypatch.setattr(heap_learning, "fit", fit)
     make = partial(heap_variation.variation_data, 6, 1, 2, 5, tmp_path, progress=False)
     paths = make()
-    assert learned == [(6, 0, "fates", 0.0, 5), (6, 1, "fates", 0.0, 5)]
+    assert learned == [(6, 0, 5, "fates"), (6, 1, 5, "fates")]
     assert paths == heap_variation.varied_paths(tmp_path)
     assert load_network(paths[0]).kind == "own"
     for name, (low, high) in (

@@ -76,6 +76,7 @@ def fit(
     falls_weight: float = 1.0,
     steps: int = STEPS,
     rounds: int = 4,
+    n_features: int = FEATURES,
 ) -> HeapNetwork:
     """Learn what dragging a box brings.
 
@@ -94,6 +95,7 @@ def fit(
         falls_weight: λ, of the picks to come; without effect if γ = 0.
         steps: of the optimizer, a batch each, in all rounds together.
         rounds: of Q iteration, after the regression that they begin with.
+        n_features: of the network's layers.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
@@ -104,7 +106,7 @@ def fit(
     if not len(picks):
         raise ValueError("picks is empty; expected at least one")
     generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
-    network = new_network(kind, generator=generator)
+    network = new_network(kind, n_features, generator)
     if gamma and kind == "fates":
         raise ValueError(f"gamma is {gamma}; expected 0 for a network of fates")
     arrays = picks.observations, picks.actions, picks.unloaded, picks.falls, picks.fates

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -31,6 +32,7 @@ from unload.heap.learning import (
     load_network,
     save_network,
 )
+from unload.heap.network import FEATURES
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
 from unload.reproduce.heap import NAME, SEEDS
 from unload.reproduce.results import COMMAND, JOBS, measured, same_settings
@@ -42,18 +44,39 @@ PICKS = 50_000  # of both rounds
 PHYSICS = "coarse"
 ROUNDS = 2
 SEEDS_LEARNED = 5
-# What is learned: kind of network and γ; the recommended one first.
-VARIANTS = (
-    ("fates", 0.0), ("pairs", 0.0), ("pairs", 0.5), ("pairs", 0.8), ("pooled", 0.0), ("own", 0.0),
-    ("linear", 0.0),
-)  # fmt: skip
-EXPLORER = "pairs", 0.0  # the networks around which the second round explores
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record, in all rounds"},
     "--rounds": {"type": int, "default": ROUNDS, "help": "of recording and learning"},
     "--physics": {"default": PHYSICS, "choices": PHYSICS_KINDS, "help": "that records"},
 }
+
+
+class Variant(NamedTuple):
+    """What is learned.
+
+    Attributes:
+        kind, gamma, n_features: see ``unload.heap.learning.fit``.
+    """
+
+    kind: str = "fates"
+    gamma: float = 0.0
+    n_features: int = FEATURES
+
+
+# By name; the recommended one first, of which the others are simplifications.
+LEARNED = "learned"
+VARIANTS = {
+    LEARNED: Variant(n_features=128),
+    "64 features": Variant(),
+    "sums only": Variant("pairs"),
+    "γ = 0.5": Variant("pairs", 0.5),
+    "γ = 0.8": Variant("pairs", 0.8),
+    "pooled": Variant("pooled"),
+    "own row": Variant("own"),
+    "linear": Variant("linear"),
+}
+EXPLORER = Variant("pairs")  # the networks around which the second round explores
 
 
 def learning_data(
@@ -74,9 +97,9 @@ def learning_data(
     made = []
     for round_number in range(checks.integer("rounds", rounds, 1, ROUNDS)):
         made += record_picks(picks // rounds, round_number, physics, runs_dir, n_jobs, progress)
-        variants = VARIANTS if round_number == rounds - 1 else [EXPLORER]
+        variants = VARIANTS.values() if round_number == rounds - 1 else [EXPLORER]
         made += learn(round_number, seeds, variants, runs_dir, n_jobs, steps)
-    paths = network_paths(rounds - 1, *VARIANTS[0], runs_dir)
+    paths = network_paths(rounds - 1, VARIANTS[LEARNED], runs_dir)
     for seed, path in enumerate(paths):
         target = Path(folder) / NAME / "networks" / f"seed{seed}.safetensors"
         save_network(load_network(path), target)
@@ -121,7 +144,7 @@ def record_picks(
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
     episodes = -(-checks.integer("picks", picks, 1) // MAX_PICKS)
-    known = network_paths(round_number - 1, *EXPLORER, runs_dir) if round_number else []
+    known = network_paths(round_number - 1, EXPLORER, runs_dir) if round_number else []
     players = {
         episode_path(round_name(round_number), number, runs_dir): partial(
             _explored, number, round_number, physics, known
@@ -210,22 +233,23 @@ def _episodes(runs_dir: str | Path, rounds: Iterable[str]) -> list[Path]:
 
 
 def network_path(
-    round_number: int, kind: str, gamma: float, seed: int, runs_dir: str | Path = files.RUNS
+    round_number: int, variant: Variant, seed: int, runs_dir: str | Path = files.RUNS
 ) -> Path:
     """Where a learned network is kept."""
-    name = f"round{round_number}_{kind}_gamma{gamma:g}_seed{seed}.safetensors"
+    kind, gamma, n_features = variant
+    name = f"round{round_number}_{kind}_gamma{gamma:g}_{n_features}_seed{seed}.safetensors"
     return Path(runs_dir) / NAME / "networks" / name
 
 
 def network_paths(
-    round_number: int, kind: str, gamma: float, runs_dir: str | Path = files.RUNS
+    round_number: int, variant: Variant, runs_dir: str | Path = files.RUNS
 ) -> list[Path]:
     """The networks of all seeds that are there, at least one.
 
     Raises:
         FileNotFoundError: there is none.
     """
-    pattern = network_path(round_number, kind, gamma, 0, runs_dir)
+    pattern = network_path(round_number, variant, 0, runs_dir)
     found = sorted(pattern.parent.glob(pattern.name.replace("seed0", "seed*")))
     if not found:
         raise FileNotFoundError(f"{pattern} is missing; {COMMAND} heap-learning makes it")
@@ -235,7 +259,7 @@ def network_paths(
 def learn(
     round_number: int = ROUNDS - 1,
     seeds: int = SEEDS_LEARNED,
-    variants: Sequence[tuple[str, float]] = VARIANTS,
+    variants: Iterable[Variant] = tuple(VARIANTS.values()),
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
     steps: int = STEPS,
@@ -245,7 +269,7 @@ def learn(
     Args:
         round_number: 0 or 1; to record the next round, ``EXPLORER`` is enough.
         seeds: networks of each variant.
-        variants: pairs of kind and γ, see ``fit``.
+        variants: of networks.
         runs_dir: where picks and networks are.
         n_jobs: processes, as in joblib.
         steps: see ``fit``.
@@ -258,19 +282,20 @@ def learn(
         ValueError: networks of the round with other settings are there.
     """
     checks.integer("round_number", round_number, 0, ROUNDS - 1)
-    for kind, gamma in variants:
-        checks.one_of("kind", kind, KINDS)
-        checks.real("gamma", gamma, 0, 0.999)
+    variants = list(variants)
+    for variant in variants:
+        checks.one_of("kind", variant.kind, KINDS)
+        checks.real("gamma", variant.gamma, 0, 0.999)
     networks = {
-        network_path(round_number, kind, gamma, seed, runs_dir): (kind, gamma, seed)
-        for seed, (kind, gamma) in product(range(checks.integer("seeds", seeds, 1)), variants)
+        network_path(round_number, variant, seed, runs_dir): (variant, seed)
+        for seed, variant in product(range(checks.integer("seeds", seeds, 1)), variants)
     }
     rounds = [round_name(number) for number in range(round_number + 1)]
     return learn_networks(networks, rounds, steps, runs_dir, n_jobs)
 
 
 def learn_networks(
-    networks: Mapping[Path, tuple[str, float, int]],
+    networks: Mapping[Path, tuple[Variant, int]],
     rounds: Sequence[str],
     steps: int,
     runs_dir: str | Path,
@@ -279,7 +304,7 @@ def learn_networks(
     """Learn those networks that are not there yet, all from the picks of the same rounds.
 
     Args:
-        networks: file → kind, γ and seed.
+        networks: file → variant and seed.
         rounds: names, see ``read_picks``.
         steps: see ``fit``.
         runs_dir: where picks are.
@@ -302,8 +327,7 @@ def learn_networks(
 
 def _learn(
     path: Path,
-    kind: str,
-    gamma: float,
+    variant: Variant,
     seed: int,
     runs_dir: str | Path,
     rounds: Sequence[str],
@@ -311,7 +335,7 @@ def _learn(
 ) -> None:
     torch.set_num_threads(1)
     picks = read_picks(runs_dir, rounds)
-    network, record = measured(partial(fit, picks, seed, kind, gamma, steps=steps))
+    network, record = measured(partial(fit, picks, seed, steps=steps, **variant._asdict()))
     files.write_json(path.with_suffix(".json"), record)
     save_network(network, path)
 

@@ -7,7 +7,7 @@ condition play the same heaps, so that differences are those of pairs. A pick ta
 so that a policy's 30 episodes take 4 minutes; ``plan`` says which of them are worth it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,9 +20,11 @@ from unload.heap.rules import RULES
 from unload.reproduce.heap import HEAPS, NAME
 from unload.reproduce.heap_episodes import PHYSICS, episode_job, varied_job
 from unload.reproduce.heap_learning import (
+    LEARNED,
     ROUNDS,
     VARIANTS,
     WEIGHTS,
+    Variant,
     network_paths,
 )
 from unload.reproduce.heap_rules import best_rule, candidates
@@ -44,10 +46,10 @@ CONDITIONS: dict[str, dict] = {
 }
 AS_TRAINED = "as trained"
 REFERENCE = "best rule"
-LEARNED = "learned"
 VARIED = "trained with variation"
-LINEAR = f"{LEARNED}, linear"
-BY_PROBABILITY = f"{LEARNED}, by probability"  # of a fall, instead of the number of falls
+LINEAR = "linear"
+SEED = "seed "  # and its number: one network of the learned policy
+BY_PROBABILITY = "by probability"  # of a fall, instead of the number of falls
 FEW = "random", REFERENCE, LEARNED, VARIED  # played under all conditions
 CURVES = REFERENCE, LINEAR, LEARNED  # played at all λ
 ORACLE_HEAPS = 30  # it takes 4 minutes of CPU a heap
@@ -55,17 +57,10 @@ SHOWN_WEIGHT = 1.0  # λ of the table
 MEASURES = "boxes", "falls", "net"
 
 
-def learned_name(kind: str, gamma: float) -> str:
-    """Name of a variant in the table: what it differs in from the recommended one."""
-    best_kind, best_gamma = VARIANTS[0]
-    changed = [kind] * (kind != best_kind) + [f"γ={gamma:g}"] * (gamma != best_gamma)
-    return ", ".join([LEARNED, *changed])
-
-
 def players(
     rules: pd.DataFrame,
     falls_weight: float,
-    variants: Sequence[tuple[str, float]] = VARIANTS,
+    variants: Mapping[str, Variant] = VARIANTS,
     round_number: int = ROUNDS - 1,
     runs_dir: str | Path = files.RUNS,
     variation: bool = True,
@@ -73,27 +68,26 @@ def players(
     """Specifications of the policies to compare at a λ, by name, see ``make_policy``.
 
     The learned ones average the networks of all seeds; the recommended variant's single
-    networks are there too, as ``"learned seed 0"`` and so on, and the average that weighs the
+    networks are there too, as ``"seed 0"`` and so on, and the average that weighs the
     probability of a fall.
 
     Args:
         rules: of which the best one is the reference, see ``rules_data``.
         falls_weight: λ.
-        variants: learned ones, see ``VARIANTS``.
+        variants: learned ones, by name.
         round_number: of the networks.
         runs_dir: where they are.
         variation: whether those trained with variation play, see ``heap_variation``.
     """
     chosen = {name: {"rule": name} for name in RULES}
     chosen[REFERENCE] = candidates()[best_rule(rules, falls_weight)]
-    for kind, gamma in variants:
-        paths = [str(path) for path in network_paths(round_number, kind, gamma, runs_dir)]
-        name = learned_name(kind, gamma)
+    for name, variant in variants.items():
+        paths = [str(path) for path in network_paths(round_number, variant, runs_dir)]
         chosen[name] = {"networks": paths, "falls_weight": falls_weight}
         if name == LEARNED:
             for seed, path in enumerate(paths):
                 one = {"networks": [path], "falls_weight": falls_weight}
-                chosen[f"{name} seed {seed}"] = one
+                chosen[f"{SEED}{seed}"] = one
             chosen[BY_PROBABILITY] = chosen[name] | {"by_probability": True}
     if variation:
         paths = [str(path) for path in varied_paths(runs_dir)]
@@ -125,7 +119,7 @@ def plan(
     heaps: int = HEAPS["test"],
     conditions: Sequence[str] = tuple(CONDITIONS),
     weights: Sequence[float] = WEIGHTS,
-    variants: Sequence[tuple[str, float]] = VARIANTS,
+    variants: Mapping[str, Variant] = VARIANTS,
     round_number: int = ROUNDS - 1,
     oracle_heaps: int = ORACLE_HEAPS,
     variation: bool = True,
@@ -163,7 +157,7 @@ def table_data(
     physics: str = PHYSICS,
     conditions: Sequence[str] = tuple(CONDITIONS),
     weights: Sequence[float] = WEIGHTS,
-    variants: Sequence[tuple[str, float]] = VARIANTS,
+    variants: Mapping[str, Variant] = VARIANTS,
     rounds: int = ROUNDS,
     oracle_heaps: int = ORACLE_HEAPS,
     variation: bool = True,
@@ -179,7 +173,7 @@ def table_data(
         physics: that judges.
         conditions: names in ``CONDITIONS``.
         weights: λ of the curve of throughput against falls.
-        variants: learned ones, see ``VARIANTS``.
+        variants: learned ones, by name.
         rounds: of ``heap-learning`` that were made.
         oracle_heaps: that the oracle plays.
         variation: whether the networks of ``heap-variation`` play.

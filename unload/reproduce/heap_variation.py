@@ -21,6 +21,7 @@ from unload.heap.learning import STEPS, Learned, load_network
 from unload.physics.bullet import FRICTION
 from unload.reproduce.heap import NAME, heap_lists
 from unload.reproduce.heap_learning import (
+    LEARNED,
     PHYSICS,
     ROUNDS,
     SEEDS_LEARNED,
@@ -43,7 +44,7 @@ SCALES = 0.75, 1.15
 FRICTIONS = 0.3, 0.8
 MASSES = 0.5, 2.5  # kg
 ROUND = "varied"
-KIND, GAMMA = VARIANTS[0]
+VARIANT = VARIANTS[LEARNED]
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record"},
     "--rounds": {"type": int, "default": ROUNDS, "help": "of heap-learning that were made"},
@@ -121,7 +122,7 @@ def variation_data(
     episodes = -(-checks.integer("picks", picks, 1) // MAX_PICKS)
     checks.integer("rounds", rounds, 1, ROUNDS)
     checks.integer("seeds", seeds, 1)
-    known = network_paths(rounds - 1, KIND, GAMMA, runs_dir)
+    known = network_paths(rounds - 1, VARIANT, runs_dir)
     folder = Path(runs_dir) / NAME
     jobs = [heap_job(SEED, number, varied_properties(number)) for number in range(HEAPS)]
     keep_all(folder / "heaps", jobs[:episodes], n_jobs, progress)
@@ -134,7 +135,7 @@ def variation_data(
     record_episodes(players, settings, n_jobs, progress)
     paths = [varied_path(seed, runs_dir) for seed in range(seeds)]
     learn_networks(
-        {path: (KIND, GAMMA, seed) for seed, path in enumerate(paths)},
+        {path: (VARIANT, seed) for seed, path in enumerate(paths)},
         [*map(round_name, range(rounds)), ROUND],
         steps,
         runs_dir,

@@ -23,9 +23,9 @@ from unload.reproduce.heap_table import (
     LINEAR,
     MEASURES,
     REFERENCE,
+    SEED,
     SHOWN_WEIGHT,
     VARIED,
-    learned_name,
 )
 from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
@@ -67,9 +67,9 @@ def _dots(axes: Axes, rows: pd.DataFrame, measure: str) -> None:
     """A dot with its interval for each policy, the first one on top."""
     places = np.arange(len(rows))[::-1]
     for place, (name, row) in zip(places, rows.iterrows()):
-        kind = LEARNED if str(name).startswith(LEARNED) else name
+        is_learned = name in VARIANTS or str(name).startswith(SEED)
         low, value, high = row[f"{measure}_low"], row[measure], row[f"{measure}_high"]
-        colour = COLOURS.get(kind, "0.55")
+        colour = COLOURS.get(name, COLOURS[LEARNED] if is_learned else "0.55")
         axes.plot([low, high], [place, place], color=colour, lw=2)
         axes.plot(value, place, "o", color=colour, ms=5)
     axes.set(yticks=places, yticklabels=list(rows.index), xlabel=UNITS[measure])
@@ -107,9 +107,8 @@ def ablations(folder: str | Path = files.DATA) -> Figure:
     """
     table = read_heap_table(folder)
     names = table["policy"].unique()
-    variants = [learned_name(*variant) for variant in VARIANTS]
-    seeds = sorted(name for name in names if name.startswith(f"{LEARNED} seed "))
-    rows = at_shown_weight(table, [REFERENCE, *variants, BY_PROBABILITY, *seeds])
+    seeds = sorted(name for name in names if name.startswith(SEED))
+    rows = at_shown_weight(table, [REFERENCE, *VARIANTS, BY_PROBABILITY, *seeds])
     figure, grid = plt.subplots(1, 2, figsize=(8, 3.6), sharey=True)
     for axes, measure in zip(grid, ("net", "net_to_learned")):
         _dots(axes, rows, measure)
