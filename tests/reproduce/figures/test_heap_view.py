@@ -55,10 +55,27 @@ def test_a_pick_gives_each_box_its_meaning(outcome):
     assert [names[n] for n in numbers] == ["is dragged", "falls", "comes along", "stays"]
 
 
+def test_a_foretold_fate_is_the_share_of_its_colour(heap, outcome):
+    """Box 0 is dragged, 3 hidden; 1 falls for certain, and 2 comes in half of the cases."""
+    chances = np.array([[1.0, 0], [0, 1], [0.5, 0]])
+    figure = heap_view.foretold(heap, 0, np.array([0, 1, 2]), chances, outcome)
+    left, right = (
+        {tuple(np.round(c[:3] / c[:3].max(), 2)) for c in axes.collections[0].get_facecolors()}
+        for axes in figure.axes[:2]
+    )
+
+    def tint(colour):
+        return tuple(np.round(colour / colour.max(), 2))
+
+    stays, comes, falls, dragged = heap_view.colours_of(np.arange(4))
+    assert left == {tint(c) for c in (dragged, falls, (stays + comes) / 2, stays)}
+    assert right == {tint(c) for c in (dragged, falls, comes, stays)}
+
+
 def test_nearer_boxes_are_painted_later(heap):
     """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
     axes = plt.figure().add_subplot()
-    heap_view.draw_heap(axes, heap.only(np.array([2, 0])), np.array([1, 3]))
+    heap_view.draw_heap(axes, heap.only(np.array([2, 0])), heap_view.colours_of(np.array([1, 3])))
     painted = axes.collections[0].get_facecolors()[:, :3]
     assert len(painted) == 6, "three faces of a box are turned to the eye"
     dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))

@@ -52,16 +52,20 @@ def meanings(outcome: Outcome, box: int) -> np.ndarray:
     return numbers
 
 
-def draw_heap(axes: Axes, heap: Heap, numbers: np.ndarray, title: str = "") -> None:
+def colours_of(numbers: np.ndarray) -> np.ndarray:
+    """(n, 3) float, the colours of meanings that are given by their places in ``MEANINGS``."""
+    return np.array(list(MEANINGS.values()))[numbers]
+
+
+def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray, title: str = "") -> None:
     """Draw a heap as seen from outside the door, the conveyor's edge as a line on the floor.
 
     Args:
         axes: where.
         heap: the boxes.
-        numbers: (n,) int, the meaning of each, a place in ``MEANINGS``.
+        colours: (n, 3) float in [0, 1], red, green and blue of each box.
         title: of the picture.
     """
-    palette = np.array(list(MEANINGS.values()))
     for line in _room(heap.edge()):
         axes.plot(*project(line).T, color="0.6", lw=0.8, zorder=0)
     faces = corners(heap)[:, FACES].reshape(-1, 4, 3)
@@ -75,7 +79,7 @@ def draw_heap(axes: Axes, heap: Heap, numbers: np.ndarray, title: str = "") -> N
     order = np.argsort(-np.linalg.norm(middle - EYE, axis=1), kind="stable")
     order = order[towards[order]]
     shade = 0.72 + 0.28 * (normals[order] @ LIGHT)
-    colours = palette[np.repeat(numbers, len(FACES))[order]] * shade[:, None]
+    colours = np.repeat(colours, len(FACES), axis=0)[order] * shade[:, None]
     axes.add_collection(
         PolyCollection(
             project(faces[order]),
@@ -120,11 +124,37 @@ def one_pick(before: Heap, box: int, outcome: Outcome) -> Figure:
     """
     numbers = meanings(outcome, box)
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
-    draw_heap(left, before, numbers, "before the pick")
+    draw_heap(left, before, colours_of(numbers), "before the pick")
     kept = numbers[outcome.left]
     kept[kept == 1] = 0
     count, falls = int(outcome.unloaded.sum()), int(outcome.fallen.sum())
-    draw_heap(right, outcome.heap, kept, f"after it: {count} unloaded, {falls} fallen")
+    draw_heap(right, outcome.heap, colours_of(kept), f"after it: {count} unloaded, {falls} fallen")
+    _add_legend(figure)
+    return figure
+
+
+@styled
+def foretold(
+    before: Heap, box: int, visible: np.ndarray, chances: np.ndarray, outcome: Outcome
+) -> Figure:
+    """What a network expects of each visible box when one is dragged, and what happens.
+
+    Args:
+        before: the heap.
+        box: that is dragged.
+        visible: (m,) int, the numbers of the visible boxes.
+        chances: (m, 2) float, probabilities that each of them is unloaded, and that it falls:
+            the share of these colours in the box's own.
+        outcome: of the pick.
+    """
+    stays, comes, falls, dragged = colours_of(np.arange(len(MEANINGS)))
+    share = chances / np.maximum(chances.sum(axis=1, keepdims=True), 1)
+    colours = np.tile(stays, (len(before), 1))
+    colours[visible] += share[:, :1] * (comes - stays) + share[:, 1:] * (falls - stays)
+    colours[box] = dragged
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+    draw_heap(left, before, colours, "foretold")
+    draw_heap(right, before, colours_of(meanings(outcome, box)), "what happens")
     _add_legend(figure)
     return figure
 
@@ -326,7 +356,7 @@ def _still(states: Mapping[str, tuple[Heap, np.ndarray]]) -> bytes:
         for axes, (title, (heap, numbers)) in zip(
             np.ravel(figure.subplots(1, len(states))), states.items()
         ):
-            draw_heap(axes, heap, numbers, title)
+            draw_heap(axes, heap, colours_of(numbers), title)
         _add_legend(figure)
         file = io.BytesIO()
         figure.savefig(file, format="png", dpi=100, metadata={"Software": None})
