@@ -132,6 +132,24 @@ def test_policy_picks_only_what_is_allowed(learned, rng):
         assert (policy(unseen.observations, masks, rng) == 4).all()
 
 
+def test_policy_tells_the_fates_of_all_boxes_for_one_pick(learned):
+    """They are learned: those before it in its lane come along, and nothing visible falls."""
+    network, unseen = learned
+    policy = Learned([network, network])
+    if network.kind != "fates":
+        with pytest.raises(ValueError, match="a network is of kind 'pairs'; expected 'fates'"):
+            policy.fates(unseen.observations[0], 0)
+        return
+    chances = np.array([
+        policy.fates(unseen.observations[k], int(unseen.actions[k])) for k in range(100)
+    ])  # fmt: skip
+    assert chances.shape == (100, ROWS, 2) and (chances[:, BOXES:] == 0).all()
+    guessed, found = chances[:, :BOXES, 0] > 0.5, unseen.fates[:100, :BOXES] > 0
+    assert (guessed == found).mean() > 0.9 and chances[..., 1].max() < 0.1
+    with pytest.raises(ValueError, match="row is 96"):
+        policy.fates(unseen.observations[0], 96)
+
+
 def test_several_networks_are_averaged(learned):
     network, unseen = learned
     other = HeapNetwork("own", generator=torch.Generator().manual_seed(1))

@@ -13,7 +13,7 @@ from torch import nn
 from unload.heap.fates import FateNetwork, expected_of, fate_loss
 from unload.heap.network import CONTEXTS, FEATURES, HeapNetwork
 from unload.heap.network import KINDS as HEAP_KINDS
-from unload.heap.observation import COLUMN
+from unload.heap.observation import COLUMN, COLUMNS, ROWS
 from unload.heap.rules import check_batch
 from unload.support import checks, files
 
@@ -257,6 +257,28 @@ class Learned:
             parts = torch.stack([boxes, falls, logits.sigmoid()]).mean(dim=1)
             whole[:, start : start + AT_ONCE, : rows.shape[1]] = parts.numpy()
         return tuple(whole)
+
+    @torch.no_grad()
+    def fates(self, observation: np.ndarray, row: int) -> np.ndarray:
+        """(96, 2) float32, probabilities that each visible box is unloaded, and that it falls.
+
+        Args:
+            observation: (96, 13), of one heap.
+            row: of the box that is dragged.
+
+        Raises:
+            TypeError, ValueError: an argument is not as described, or a network is no
+                ``FateNetwork``.
+        """
+        observation = checks.finite_array("observation", observation, (ROWS, len(COLUMNS)))
+        asked = torch.tensor([checks.integer("row", row, 0, ROWS - 1)])
+        for network in self.networks:
+            if not isinstance(network, FateNetwork):
+                raise ValueError(f"a network is of kind {network.kind!r}; expected 'fates'")
+        rows = torch.from_numpy(observation[None].astype(np.float32))
+        logits = [network.fates(rows, holds_box(rows), asked).logits for network in self.networks]
+        chances = torch.stack(logits).sigmoid().mean(dim=0)[0, 0]
+        return (chances * holds_box(rows)[0, :, None]).numpy()
 
 
 def save_network(network: HeapNetwork, path: str | Path) -> None:
