@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from unload.heap.env import HeapEnv
-from unload.heap.learning import load_network
+from unload.heap.learning import load_network, save_network
+from unload.heap.network import HeapNetwork
 from unload.reproduce import heap_learning
-from unload.reproduce.heap_learning import Variant
+from unload.reproduce.heap_learning import Variant, network_path
 from unload.support.provenance import read_provenance
 
 
@@ -71,6 +72,13 @@ def test_results_with_other_settings_are_not_mixed(tmp_path):
     heap_learning.learn(0, 1, [Variant("linear")], tmp_path, steps=2)
     with pytest.raises(ValueError, match="'steps': 2.*expected.*'steps': 3"):
         heap_learning.learn(0, 1, [Variant("linear")], tmp_path, steps=3)
+    for weights in (1, 2):
+        network = network_path(0, heap_learning.EXPLORER, 0, tmp_path)
+        save_network(HeapNetwork(n_features=weights), network)
+        if weights == 1:
+            heap_learning.record_picks(3, 1, "near", tmp_path, progress=False)
+    with pytest.raises(ValueError, match="expected.*'explorers'"):
+        heap_learning.record_picks(3, 1, "near", tmp_path, progress=False)
     heap_learning.record_picks(6, 0, "near", tmp_path, progress=False)
     with pytest.raises(ValueError, match="'episodes': 1.*expected.*'episodes': 2"):
         heap_learning.learn(0, 2, [Variant("linear")], tmp_path, steps=2)

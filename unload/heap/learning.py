@@ -22,7 +22,9 @@ BATCH = 256
 LEARNING_RATE = 1e-3
 STEPS = 4000  # 20 times through 50,000 picks; with 5,000, 300 steps are far too few
 WEIGHT_DECAY = 1e-4
-AT_ONCE = 32  # observations of which all rows are asked for: their pairs take 40 MB
+AT_ONCE = (
+    32  # observations of which all rows are asked for: pairs take 50 MB a layer of 128 features
+)
 
 
 @dataclass(frozen=True, eq=False)

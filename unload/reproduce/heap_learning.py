@@ -152,7 +152,8 @@ def record_picks(
         for number in range(episodes)
     }
     heaps = [heap.digest() for heap in stored_heaps("train")]
-    return record_episodes(players, {"physics": physics, "heaps": heaps}, n_jobs, progress)
+    settings = {"physics": physics, "heaps": heaps, "explorers": weights_digest(known)}
+    return record_episodes(players, settings, n_jobs, progress)
 
 
 def episode_path(name: str, number: int, runs_dir: str | Path = files.RUNS) -> Path:

@@ -32,6 +32,7 @@ from unload.reproduce.heap_learning import (
     network_paths,
     record_episodes,
     round_name,
+    weights_digest,
 )
 from unload.reproduce.results import COMMAND, JOBS, keep_all, kept
 from unload.support import checks, files
@@ -124,14 +125,16 @@ def variation_data(
     checks.integer("seeds", seeds, 1)
     known = network_paths(rounds - 1, VARIANT, runs_dir)
     folder = Path(runs_dir) / NAME
-    jobs = [heap_job(SEED, number, varied_properties(number)) for number in range(HEAPS)]
+    properties = [varied_properties(number) for number in range(HEAPS)]
+    jobs = [heap_job(SEED, number, each) for number, each in enumerate(properties)]
     keep_all(folder / "heaps", jobs[:episodes], n_jobs, progress)
     players = {
         episode_path(ROUND, number, runs_dir): partial(_varied, number, known, runs_dir)
         for number in range(episodes)
     }
-    properties = [varied_properties(number) for number in range(HEAPS)]
-    settings = {"physics": PHYSICS, "properties": properties}
+    settings = {
+        "physics": PHYSICS, "properties": properties, "explorers": weights_digest(known)
+    }  # fmt: skip
     record_episodes(players, settings, n_jobs, progress)
     paths = [varied_path(seed, runs_dir) for seed in range(seeds)]
     learn_networks(
