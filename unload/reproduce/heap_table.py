@@ -277,9 +277,9 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
                 ends = ratio_interval(each[measure], reference[measure])
                 row |= _ends(f"{measure}_ratio", *ends)
             row |= _ends("net_more", *mean_interval(each["net"] - reference["net"]))
-            learned = of[LEARNED]["net"].reindex(each.index) if LEARNED in of else pd.Series()
-            to_learned = (each["net"] - learned).dropna()
-            ends = mean_interval(to_learned) if len(to_learned) else (np.nan,) * 3
+            ends = (np.nan,) * 3
+            if LEARNED in of:
+                ends = mean_interval((each["net"] - of[LEARNED]["net"]).dropna())
             row |= _ends("net_to_learned", *ends)
             rows.append(row)
     return pd.DataFrame(rows)
