@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,13 +19,11 @@ from unload.heap.rules import check_batch
 from unload.support import checks, files
 
 KINDS = "fates", *HEAP_KINDS
-BATCH = 256
-LEARNING_RATE = 1e-3
-STEPS = 4000  # 20 times through 50,000 picks; with 5,000, 300 steps are far too few
+BATCH = 128
+LEARNING_RATE = 5e-3  # with 0.001, STEPS are far too few; with 0.01 it learns less again
+STEPS = 4000  # 10 times through 50,000 picks
 WEIGHT_DECAY = 1e-4
-AT_ONCE = (
-    32  # observations of which all rows are asked for: pairs take 50 MB a layer of 128 features
-)
+AT_ONCE = 32  # observations of which all rows are asked for: pairs take 25 MB a layer
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +78,8 @@ def fit(
     steps: int = STEPS,
     rounds: int = 4,
     n_features: int = FEATURES,
+    batch_size: int = BATCH,
+    learning_rate: float = LEARNING_RATE,
 ) -> HeapNetwork:
     """Learn what dragging a box brings.
 
@@ -98,11 +99,15 @@ def fit(
         steps: of the optimizer, a batch each, in all rounds together.
         rounds: of Q iteration, after the regression that they begin with.
         n_features: of the network's layers.
+        batch_size: picks per step.
+        learning_rate: of AdamW, at first; it falls along a cosine to 0.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
     checks.real("gamma", gamma, 0, 0.999)
+    checks.integer("batch_size", batch_size, 1)
+    checks.real("learning_rate", learning_rate, 0)
     checks.real("falls_weight", falls_weight, 0)
     checks.integer("steps", steps, 1)
     if not len(picks):
@@ -115,11 +120,19 @@ def fit(
     data = _Batch(*map(torch.from_numpy, arrays), torch.from_numpy(picks.falls > 0).float())
     rounds = rounds if gamma else 0
     share = max(1, steps // (1 + rounds))
-    _descend(network, data, share, generator)
+    descend = partial(
+        _descend,
+        network,
+        steps=share,
+        batch_size=batch_size,
+        learning_rate=learning_rate,
+        generator=generator,
+    )
+    descend(data)
     for _ in range(rounds):
         boxes, falls = _to_come(network, picks, falls_weight)
         targets = {"boxes": data.boxes + gamma * boxes, "falls": data.falls + gamma * falls}
-        _descend(network, data._replace(**targets), share, generator)
+        descend(data._replace(**targets))
     return network.eval()
 
 
@@ -144,11 +157,18 @@ class _Batch(NamedTuple):
     fell: torch.Tensor  # whether anything fell
 
 
-def _descend(network: HeapNetwork, data: _Batch, steps: int, generator: torch.Generator) -> None:
+def _descend(
+    network: HeapNetwork,
+    data: _Batch,
+    steps: int,
+    batch_size: int,
+    learning_rate: float,
+    generator: torch.Generator,
+) -> None:
     """Fit a network to recorded picks."""
-    adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    adam = torch.optim.AdamW(network.parameters(), learning_rate, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
-    for rows in _batches(len(data[0]), steps, generator):
+    for rows in _batches(len(data.actions), batch_size, steps, generator):
         batch = _Batch(*(each[rows] for each in data))
         if torch.rand((), generator=generator) < 0.5:
             batch = batch._replace(observations=mirrored(batch.observations))
@@ -179,10 +199,12 @@ def _loss(network: HeapNetwork, batch: _Batch) -> torch.Tensor:
     return loss + boxes + falls + fell
 
 
-def _batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
+def _batches(
+    count: int, size: int, steps: int, generator: torch.Generator
+) -> Iterator[torch.Tensor]:
     """Rows of each batch: all of them in random order, again and again."""
     while steps > 0:
-        batches = torch.randperm(count, generator=generator).split(BATCH)[:steps]
+        batches = torch.randperm(count, generator=generator).split(size)[:steps]
         yield from batches
         steps -= len(batches)
 

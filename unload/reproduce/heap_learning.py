@@ -23,7 +23,9 @@ from unload.heap import camera, rake
 from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
 from unload.heap.learning import (
+    BATCH,
     KINDS,
+    LEARNING_RATE,
     STEPS,
     Learned,
     Picks,
@@ -56,19 +58,21 @@ class Variant(NamedTuple):
     """What is learned.
 
     Attributes:
-        kind, gamma, n_features: see ``unload.heap.learning.fit``.
+        kind, gamma, n_features, batch_size, learning_rate: see ``unload.heap.learning.fit``.
     """
 
     kind: str = "fates"
     gamma: float = 0.0
     n_features: int = FEATURES
+    batch_size: int = BATCH
+    learning_rate: float = LEARNING_RATE
 
 
-# By name; the recommended one first, of which the others are simplifications.
+# By name; the recommended one first.
 LEARNED = "learned"
 VARIANTS = {
-    LEARNED: Variant(n_features=128),
-    "64 features": Variant(),
+    LEARNED: Variant(),
+    "128 features": Variant(n_features=128),
     "sums only": Variant("pairs"),
     "γ = 0.5": Variant("pairs", 0.5),
     "γ = 0.8": Variant("pairs", 0.8),
@@ -76,7 +80,8 @@ VARIANTS = {
     "own row": Variant("own"),
     "linear": Variant("linear"),
 }
-EXPLORER = Variant("pairs")  # the networks around which the second round explores
+# The networks around which the second round explores, of a first choice of batch and rate.
+EXPLORER = Variant("pairs", batch_size=256, learning_rate=1e-3)
 
 
 def learning_data(
@@ -237,9 +242,8 @@ def network_path(
     round_number: int, variant: Variant, seed: int, runs_dir: str | Path = files.RUNS
 ) -> Path:
     """Where a learned network is kept."""
-    kind, gamma, n_features = variant
-    name = f"round{round_number}_{kind}_gamma{gamma:g}_{n_features}_seed{seed}.safetensors"
-    return Path(runs_dir) / NAME / "networks" / name
+    name = "_".join(f"{value}" for value in (f"round{round_number}", *variant, f"seed{seed}"))
+    return Path(runs_dir) / NAME / "networks" / f"{name}.safetensors"
 
 
 def network_paths(
