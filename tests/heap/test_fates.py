@@ -30,10 +30,8 @@ def test_what_is_expected_is_the_sum_of_fates(network, observations):
     fates = network.fates(observations, present)
     boxes, falls, logits = network(observations, present)
     chance = fates.logits.sigmoid()
-    assert fates.logits.shape == (2, 5, 5, 2) and boxes.shape == falls.shape == logits.shape == (
-        2,
-        5,
-    )
+    assert fates.logits.shape == (2, 5, 5, 2)
+    assert boxes.shape == falls.shape == logits.shape == (2, 5)
     torch.testing.assert_close(boxes[1], chance[1, :, :3, 0].sum(1) + fates.hidden[1, :, 0])
     torch.testing.assert_close(falls[0], chance[0, :, :, 1].sum(1) + fates.hidden[0, :, 1])
 

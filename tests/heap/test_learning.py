@@ -178,6 +178,10 @@ def test_bad_input_is_refused(tmp_path, rng):
     picks = made_up_picks(rng, 3)
     with pytest.raises(ValueError, match="gamma is 1"):
         fit(picks, 0, gamma=1.0)
+    with pytest.raises(ValueError, match="batch_size is 0"):
+        fit(picks, 0, batch_size=0)
+    with pytest.raises(ValueError, match="learning_rate is -1"):
+        fit(picks, 0, learning_rate=-1)
     with pytest.raises(ValueError, match="picks is empty"):
         fit(Picks(*(getattr(picks, name)[:0] for name in Picks.__dataclass_fields__)), 0)
     with pytest.raises(ValueError, match="networks is empty"):
