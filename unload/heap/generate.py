@@ -23,6 +23,24 @@ ROUNDS = 8  # of settling and clearing at most, after the barrier is gone
 FEWEST, HIGHEST, FASTEST = 80, float(task.CONTAINER[2]), 0.1  # boxes, m, m/s: see ``settled_heap``
 SPLITS = "train", "test"
 
+# What a heap depends on besides the arguments of ``settled_heap``.
+CONSTANTS = (
+    BOXES,
+    LAYER,
+    BARRIER,
+    MARGIN,
+    SPACING,
+    LAYER_TIME,
+    SETTLE,
+    PAUSE,
+    ROUNDS,
+    FEWEST,
+    HIGHEST,
+    FASTEST,
+    task.MASS,
+    *PHYSICS.values(),
+)
+
 
 def settled_heap(
     rng: np.random.Generator,
@@ -42,7 +60,7 @@ def settled_heap(
     Args:
         rng: makes it.
         scale: of all edges of the boxes. If it is above 1, fewer boxes are dropped, and must
-            be left, so that their volume stays the same.
+            be left, so that their volume stays the same; below 1 the heap is smaller.
         friction: of boxes, floor and walls; a heap that has settled at another one would
             slump at the first pick.
         tries: heaps made at most.

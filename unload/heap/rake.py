@@ -13,7 +13,7 @@ SPEED = 1.0  # m/s, a slow conveyor's
 FORCE = 60.0  # N: six boxes' weight, enough for several boxes, too little for half of the heap
 REACH = 0.7  # m: the longest edge of a box, so that the box is past the place that it held
 TIME = 1.0  # s, 1.4 times what the reach takes at full speed
-CAME = 0.9 * REACH  # m: moved as far, the dragged box counts as unloaded, and its fall does not
+CAME = 0.9 * REACH  # m: moved as far, the dragged box counts as unloaded, wherever it lies
 REST = 0.5  # s: free fall from 1.2 m
 RESTS = 4  # at most, as long as boxes are unloaded or move
 STILL = 0.2  # m/s; a toppling box is faster, a creeping one slower
@@ -44,6 +44,9 @@ CONSTANTS = (
     NEAR,
     SUPPORT,
     FARTHEST_EDGE,
+    FRICTION,
+    task.MASS,
+    *PHYSICS.values(),
 )
 
 
@@ -55,7 +58,8 @@ class Outcome:
         heap: what is left.
         left: (m,) int64, the numbers that its boxes had before.
         unloaded: (n,) bool, of the boxes before.
-        fallen: (n,) bool, others than the dragged one that dropped by more than ``FALL``.
+        fallen: (n,) bool, others than the dragged one that dropped by more than ``FALL``,
+            whether they were unloaded or not.
         moved: m, how far the dragged box came along x.
         came: whether that was at least ``CAME``.
     """

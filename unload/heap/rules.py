@@ -81,10 +81,9 @@ RULES = {
     "clear above": best(_clear_above),
 }
 # A box near the front takes many along if others lie before it and on it; how much each of these
-# counts is what the family varies. Whether others lie before it counts most: in a linear regression
-# of the boxes that recorded picks have brought, it weighs as much as 1.5 m behind the edge.
+# counts is what the family varies.
 FAMILY_COLUMNS = {
-    "behind": (-1.0, -0.5, 0.0),
+    "behind": (-1.0, -0.5, 0.0, 0.5),
     "z": (-1.0, -0.5, 0.0, 0.5),
     "clear_in_front": (-1.0, -0.5, 0.0),
     "clear_above": (-0.5, 0.0, 0.5),
@@ -92,10 +91,16 @@ FAMILY_COLUMNS = {
 
 
 def family() -> dict[str, dict[str, float]]:
-    """All linear rules of the family, 107, by name: the weight of each column."""
-    rules = {}
+    """All linear rules of the family by name: the weight of each column.
+
+    Of rules that pick the same, because they are multiples of one another, one is there.
+    """
+    rules, directions = {}, set()
     for values in product(*FAMILY_COLUMNS.values()):
-        weights = {name: value for name, value in zip(FAMILY_COLUMNS, values) if value}
-        if weights:
+        largest = max(map(abs, values))
+        direction = tuple(value / largest for value in values) if largest else None
+        if direction and direction not in directions:
+            directions.add(direction)
+            weights = {name: value for name, value in zip(FAMILY_COLUMNS, values) if value}
             rules[" ".join(f"{value:+g} {name}" for name, value in weights.items())] = weights
     return rules

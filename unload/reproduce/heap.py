@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from unload.heap import camera, generate, rake
 from unload.heap.boxes import Heap, package_sizes
-from unload.heap.camera import Camera
 from unload.heap.env import HeapEnv, stored_heaps
 from unload.heap.episodes import play
 from unload.heap.generate import BOXES, settled_heap, write_heaps
@@ -32,6 +32,8 @@ HEAPS = {"train": 70, "test": 30}
 SEEDS = {"train": 3000, "test": 4000}  # of the heaps; of recorded picks, the first with more
 AGREEMENT_PICKS = 300
 AGREEMENT_SEED = 5000
+# What an episode depends on besides heap, policy and the arguments of the environment.
+CONSTANTS = *rake.CONSTANTS, *camera.CONSTANTS
 
 
 def heaps_data(
@@ -51,10 +53,7 @@ def heaps_data(
         for split, count in counts.items()
         if number < count
     ]
-    jobs = [
-        ({"heap": [SEEDS[split], number]}, partial(heap_lists, SEEDS[split], number))
-        for split, number in names
-    ]
+    jobs = [heap_job(SEEDS[split], number) for split, number in names]
     answers = keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs, progress)
     heaps: dict[str, list[Heap]] = {split: [] for split in counts}
     for (split, _), answer in zip(names, answers):
@@ -67,9 +66,16 @@ def heaps_data(
     write_provenance(folder, "heaps", f"{COMMAND} heaps", settings, reduced, record)
 
 
-def heap_lists(
+def heap_job(
     seed: int, number: int, scale: float = 1.0, friction: float = FRICTION
-) -> dict[str, list]:
+) -> tuple[dict, partial]:
+    """The question of a new heap and what makes it, see ``keep_all``."""
+    question = {"heap": [seed, number], "scale": scale, "friction": friction}
+    question["constants"] = generate.CONSTANTS
+    return question, partial(_heap_lists, seed, number, scale, friction)
+
+
+def _heap_lists(seed: int, number: int, scale: float, friction: float) -> dict[str, list]:
     """A new heap as lists that can be kept: ``positions``, ``orientations`` and ``packages``."""
     heap = settled_heap(np.random.default_rng([seed, number]), scale, friction)
     names = "positions", "orientations", "packages"
@@ -93,7 +99,19 @@ def agreement_data(
         ``moved`` (m) and ``cpu_ms``.
     """
     checks.integer("picks", picks, 1)
-    jobs = [({"agreement": number}, partial(_agreement, number)) for number in range(picks)]
+    heaps = [heap.digest() for heap in stored_heaps("train")]
+    jobs = [
+        (
+            {
+                "agreement": number,
+                "heap": heaps[number % len(heaps)],
+                "seed": AGREEMENT_SEED,
+                "constants": CONSTANTS,
+            },
+            partial(_agreement, number),
+        )
+        for number in range(picks)
+    ]
     answers = keep_all(Path(runs_dir) / NAME / "agreement", jobs, n_jobs, progress)
     rows = [
         {"pick": number, "physics": physics} | row
@@ -153,8 +171,14 @@ def camera_data(
         ``centre_error`` (m, length), ``extent_error`` (m, mean over the axes, < 0 where too
         small) and ``tilt_error`` (rad).
     """
-    heaps = range(len(stored_heaps(split)))
-    jobs = [({"camera": [split, number]}, partial(_camera_rows, split, number)) for number in heaps]
+    heaps = stored_heaps(split)
+    jobs = [
+        (
+            {"camera": heap.digest(), "constants": camera.CONSTANTS},
+            partial(_camera_rows, split, number),
+        )
+        for number, heap in enumerate(heaps)
+    ]
     answers = keep_all(Path(runs_dir) / NAME / "camera", jobs, n_jobs, progress)
     frame = pd.DataFrame([row for answer in answers for row in answer.value])
     settings = {"split": split, "heaps": len(heaps)}
@@ -166,9 +190,9 @@ def camera_data(
 
 def _camera_rows(split: str, number: int) -> list[dict]:
     """Errors of every visible box of one heap."""
-    heap, camera = stored_heaps(split)[number], Camera()
-    scan = camera.scan(heap)
-    camera.close()
+    heap, scanner = stored_heaps(split)[number], camera.Camera()
+    scan = scanner.scan(heap)
+    scanner.close()
     true, seen = true_boxes(heap, scan), camera_boxes(heap, scan)
     order = [seen.numbers.tolist().index(box) for box in true.numbers.tolist()]
     columns = {

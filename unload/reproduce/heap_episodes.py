@@ -6,13 +6,13 @@ from pathlib import Path
 
 import torch
 
-from unload.heap import camera, rake
 from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
-from unload.heap.episodes import Oracle, play
+from unload.heap.episodes import TRIED_AGAIN, Oracle, play
 from unload.heap.learning import Learned, load_network
 from unload.heap.rules import RULES, best, linear
+from unload.reproduce.heap import CONSTANTS, heap_job
 from unload.reproduce.heap_learning import weights_digest
-from unload.reproduce.heap_variation import Properties, heap_job, varied_heap
+from unload.reproduce.heap_variation import Properties, varied_heap
 
 PHYSICS = "whole"  # that judges
 VARIED_SEED = 7000  # of the heaps of boxes with other properties; no other data uses it
@@ -44,7 +44,8 @@ def varied_job(condition: Mapping, number: int) -> tuple[dict, Callable] | None:
     """
     if not {"scale", "friction"} & set(condition):
         return None
-    return heap_job(VARIED_SEED, number, _properties(condition))
+    properties = _properties(condition)
+    return heap_job(VARIED_SEED, number, properties.scale, properties.friction)
 
 
 def episode_job(
@@ -72,7 +73,7 @@ def episode_job(
         "heap": stored_heaps(split)[number].digest() if varied is None else varied[0],
         "number": number,
         "physics": physics,
-        "constants": [*rake.CONSTANTS, *camera.CONSTANTS],
+        "constants": [*CONSTANTS, TRIED_AGAIN],
         "picks": MAX_PICKS,
     }
     if "networks" in player:  # named by what is in them, wherever they are

@@ -19,7 +19,6 @@ import torch
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
-from unload.heap import camera, rake
 from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from unload.heap.episodes import Episode, episode_from, exploring, picks_of, play
 from unload.heap.learning import (
@@ -36,7 +35,7 @@ from unload.heap.learning import (
 )
 from unload.heap.network import FEATURES
 from unload.heap.rake import PHYSICS as PHYSICS_KINDS
-from unload.reproduce.heap import NAME, SEEDS
+from unload.reproduce.heap import CONSTANTS, NAME, SEEDS
 from unload.reproduce.results import COMMAND, JOBS, measured, same_settings
 from unload.support import checks, files
 from unload.support.provenance import joined as joined_records
@@ -182,8 +181,7 @@ def record_episodes(
         ValueError: episodes with other settings are there.
     """
     folder = next(iter(players)).parent
-    constants = [*rake.CONSTANTS, *camera.CONSTANTS]
-    same_settings(folder / "settings.json", settings | {"constants": constants})
+    same_settings(folder / "settings.json", settings | {"constants": CONSTANTS})
     missing = {path: player for path, player in players.items() if not path.exists()}
     done = Parallel(n_jobs, return_as="generator")(
         delayed(_record)(path, player) for path, player in missing.items()

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from unload import task
 from unload.heap.env import MAX_PICKS, stored_heaps
 from unload.heap.episodes import play
 from unload.heap.lift import LiftEnv
 from unload.heap.rules import RULES
-from unload.reproduce.heap import HEAPS, NAME
+from unload.reproduce.heap import CONSTANTS, HEAPS, NAME
 from unload.reproduce.intervals import mean_interval, share_interval
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
 from unload.support import checks, files
@@ -39,9 +40,18 @@ def lifts_data(
     """
     checks.integer("heaps", heaps, 1, HEAPS["test"])
     places = [(name, number) for name in RULES for number in range(heaps)]
+    stored = stored_heaps("test")
+    lift = task.PICK_FORCE, task.LIFT_TIME, task.LIFT_THRESHOLD
     jobs = [
         (
-            {"lifts": name, "heap": ["test", number], "physics": PHYSICS, "picks": MAX_PICKS},
+            {
+                "lifts": name,
+                "heap": stored[number].digest(),
+                "number": number,
+                "physics": PHYSICS,
+                "constants": [*CONSTANTS, *lift],
+                "picks": MAX_PICKS,
+            },
             partial(_lifts, name, number),
         )
         for name, number in places

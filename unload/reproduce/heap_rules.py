@@ -2,7 +2,7 @@
 
     python -m unload.reproduce heap-rules
 
-All rules play a few heaps, and the best of them more. It takes 45 minutes of CPU.
+All rules play a few heaps, and the best of them more. It takes 1.5 hours of CPU.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from unload.reproduce.results import COMMAND, JOBS, Result, keep_all, publish
 from unload.support import checks, files
 
 FIRST_HEAPS, RULE_HEAPS = 4, 20  # training heaps that all rules play, and that the best play
-KEPT = 4  # rules for each price of a fall that play all of these heaps
+KEPT = 10  # rules for each price of a fall that play all of these heaps
 PHYSICS = "coarse"  # the rules are many; "near" would favour those that make boxes fall
 OPTIONS = JOBS | {
     "--heaps": {"type": int, "default": RULE_HEAPS, "help": "heaps that the best rules play"}

@@ -19,7 +19,7 @@ from unload.heap.env import MAX_PICKS, HeapEnv
 from unload.heap.episodes import Episode, exploring, play
 from unload.heap.learning import STEPS, Learned, load_network
 from unload.physics.bullet import FRICTION
-from unload.reproduce.heap import NAME, heap_lists
+from unload.reproduce.heap import NAME, heap_job
 from unload.reproduce.heap_learning import (
     LEARNED,
     PHYSICS,
@@ -71,7 +71,7 @@ def varied_heap(
 ) -> Heap:
     """A heap of boxes with these properties, made once and kept in ``runs/heap``."""
     folder = Path(runs_dir) / NAME / "heaps"
-    lists = kept(folder, *heap_job(seed, number, properties)).value
+    lists = kept(folder, *heap_job(seed, number, properties.scale, properties.friction)).value
     packages = np.array(lists["packages"])
     return Heap(
         np.array(lists["positions"]),
@@ -79,12 +79,6 @@ def varied_heap(
         package_sizes(packages, properties.scale),
         packages,
     )
-
-
-def heap_job(seed: int, number: int, properties: Properties) -> tuple[dict, partial]:
-    """The question of ``varied_heap`` and what answers it, see ``keep_all``."""
-    question = {"heap": [seed, number], "scale": properties.scale, "friction": properties.friction}
-    return question, partial(heap_lists, seed, number, properties.scale, properties.friction)
 
 
 def varied_properties(number: int) -> Properties:
@@ -126,7 +120,9 @@ def variation_data(
     known = network_paths(rounds - 1, VARIANT, runs_dir)
     folder = Path(runs_dir) / NAME
     properties = [varied_properties(number) for number in range(HEAPS)]
-    jobs = [heap_job(SEED, number, each) for number, each in enumerate(properties)]
+    jobs = [
+        heap_job(SEED, number, each.scale, each.friction) for number, each in enumerate(properties)
+    ]
     keep_all(folder / "heaps", jobs[:episodes], n_jobs, progress)
     players = {
         episode_path(ROUND, number, runs_dir): partial(_varied, number, known, runs_dir)
