@@ -45,6 +45,17 @@ def test_compared_gives_means_and_ratios_over_pairs(episodes):
     assert learned["net_ratio"] == pytest.approx(2.0 / 1.5)
     assert learned["boxes_low"] < 2.5 < learned["boxes_high"]
     assert learned[["net_more", "net_more_low", "net_more_high"]].tolist() == [0.5, 0.5, 0.5]
+    rule = table.loc["best rule"]
+    assert rule["base"] == "learned" and rule["net_to_base"] == -0.5
+
+
+def test_a_variant_is_compared_with_the_one_that_it_differs_from_in_one_thing(episodes):
+    names = {"learned": "own row", "best rule": "linear"}
+    table = heap_table.compared(
+        pd.concat([episodes, episodes.replace({"policy": names}), episodes]).drop_duplicates()
+    ).set_index("policy")
+    assert table.loc["linear", "base"] == "own row" and table.loc["linear", "net_to_base"] == -0.5
+    assert table.loc["own row", "base"] == "pooled" and table["net_to_base"].isna()["own row"]
 
 
 def test_a_policy_on_fewer_heaps_is_compared_on_those(episodes):

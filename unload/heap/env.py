@@ -25,7 +25,7 @@ from unload.heap.rake import Outcome, Rake
 from unload.physics.bullet import FRICTION
 from unload.support import checks, random_state
 
-MAX_PICKS = 15  # they unload some 25 to 40 of 105 boxes, the front of the heap
+MAX_PICKS = 15  # they unload some 25 to 40 of 100 boxes, the front of the heap
 OBSERVATIONS = {"truth": true_boxes, "camera": camera_boxes}
 LARGEST = 20.0  # of the observation: twice what a box 10 m away would show
 STATE = ("positions", "orientations", "sizes", "packages", "failed", "counts", "rng")
@@ -35,7 +35,7 @@ class HeapEnv(EpisodeEnv):
     """Unload a heap by choosing, at each step, the box that a rake drags.
 
     ## Description
-    About 105 boxes of the paper's 13 packages lie in any orientation in the last 3 m of the
+    About 100 boxes of the paper's 13 packages lie in any orientation in the last 3 m of the
     container, between the rear wall at x = 4 m and the door at 7 m. The rake drags the chosen
     box towards the door, at 1 m/s, with at most 60 N (the weight of six boxes), for 0.7 m (the
     longest edge of a box) or 1 s. The box came if it moved 0.63 m, nine tenths of that. Other

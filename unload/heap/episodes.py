@@ -160,17 +160,17 @@ def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Ca
 class Oracle:
     """Policy that tries every allowed box of an environment's heap, and picks the best.
 
-    It is greedy: no other policy gains more by its next pick, in the physics that it asks, but
-    one that looks farther ahead could gain more in an episode. No rule or network may know what
-    it knows.
+    It is greedy: one that looks farther ahead could gain more in an episode. By its next pick
+    no other policy gains more in the physics that it asks, if it asks one. No rule or network
+    may know what it knows.
 
     Args:
         env: whose heap it is.
         falls_weight: λ of what it maximizes, boxes - λ falls.
         physics: that it asks, see ``Rake``; other than the environment's, it may err.
         again: physics in which it tries the ``TRIED_AGAIN`` best of these again, None: not at
-            all. With the environment's it does not err about them, and takes half of the time
-            that all boxes would take in that.
+            all. With the environment's it does not err about them, but the best box of all
+            may not be among them; it takes half of the time of trying all of them in that.
     """
 
     def __init__(

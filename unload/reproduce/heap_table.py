@@ -52,6 +52,14 @@ SEED = "seed "  # and its number: one network of the learned policy
 BY_PROBABILITY = "by probability"  # of a fall, instead of the number of falls
 FEW = "random", REFERENCE, LEARNED, VARIED  # played under all conditions
 CURVES = REFERENCE, LINEAR, LEARNED  # played at all λ
+# Variants that lack two things that the learned policy has, and the one that lacks only the first.
+BASES = {
+    "γ = 0.5": "sums only",
+    "γ = 0.8": "sums only",
+    "pooled": "sums only",
+    "own row": "pooled",
+    LINEAR: "own row",
+}
 ORACLE_HEAPS = 30  # it takes 4 minutes of CPU a heap
 SHOWN_WEIGHT = 1.0  # λ of the table
 MEASURES = "boxes", "falls", "net"
@@ -238,6 +246,8 @@ def table_data(
         or physics != PHYSICS
         or tuple(conditions) != tuple(CONDITIONS)
         or not variation
+        or tuple(weights) != tuple(WEIGHTS)
+        or dict(variants) != VARIANTS
     )
     records = [answer.record for answer in answers]
     tables = {"episodes": episodes, "table": table}
@@ -259,8 +269,9 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
         One row per condition, λ and policy. For each measure its mean, and the 95 % BCa
         bootstrap interval over heaps as ``_low`` and ``_high``. Beside the best rule on the
         same heaps, with intervals of the pairs: ``boxes_ratio`` and ``net_ratio``, the ratios
-        of the means; ``net_more``, the difference. ``net_to_learned`` is the difference to
-        the learned policy, NaN where that has not played.
+        of the means; ``net_more``, the difference. ``net_to_base`` is the difference to
+        ``base``, from which the policy differs in one thing: by ``BASES``, or else the learned
+        policy; NaN where that has not played.
     """
     rows = []
     for key, group in episodes.groupby(["condition", "falls_weight"], sort=False):
@@ -277,10 +288,10 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
                 ends = ratio_interval(each[measure], reference[measure])
                 row |= _ends(f"{measure}_ratio", *ends)
             row |= _ends("net_more", *mean_interval(each["net"] - reference["net"]))
-            ends = (np.nan,) * 3
-            if LEARNED in of:
-                ends = mean_interval((each["net"] - of[LEARNED]["net"]).dropna())
-            row |= _ends("net_to_learned", *ends)
+            base, ends = BASES.get(name, LEARNED), (np.nan,) * 3
+            if base in of:
+                ends = mean_interval((each["net"] - of[base]["net"]).dropna())
+            row |= {"base": base} | _ends("net_to_base", *ends)
             rows.append(row)
     return pd.DataFrame(rows)
 

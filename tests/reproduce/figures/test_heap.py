@@ -24,7 +24,7 @@ BOXES = {"lowest": 1.2, "highest": 1.0, "best rule": 1.8, "learned": 2.4}
 def folder(tmp_path):
     """Made-up tables: four policies and a seed on three heaps, two λ, two conditions."""
     rng = np.random.default_rng(0)
-    cells = [("as trained", 1.0, name) for name in (*BOXES, "seed 0", "own row")]
+    cells = [("as trained", 1.0, name) for name in (*BOXES, "seed 0", "pooled", "own row")]
     cells += [("as trained", 0.0, name) for name in ("best rule", "learned")]
     cells += [("camera", 1.0, name) for name in ("best rule", "highest", "learned")]
     rows = []
@@ -82,9 +82,10 @@ def test_policies_are_rows_with_intervals_as_trained(folder):
 
 def test_ablations_have_variants_and_seeds(folder):
     axes = heap.ablations(folder).axes
-    assert labels(axes[0]) == ["best rule", "learned", "own row", "seed 0"]
-    learned = axes[1].lines[3].get_xdata()
-    assert learned == pytest.approx([0.0]), "no difference to itself"
+    assert labels(axes[0]) == ["learned", "pooled", "own row", "seed 0"]
+    assert labels(axes[1]) == ["pooled − sums only", "own row − pooled", "seed 0 − learned"]
+    table = heap.at_shown_weight(heap.read_heap_table(folder), ["pooled", "own row"])
+    assert axes[1].lines[3].get_xdata() == pytest.approx([table["net"].diff().iloc[1]])
 
 
 def test_conditions_show_few_policies(folder):

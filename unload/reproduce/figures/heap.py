@@ -33,15 +33,15 @@ from unload.support import files
 COLOURS = {
     REFERENCE: "C1", LEARNED: "C0", LINEAR: "C4", VARIED: "C2", "oracle": "0.2", "random": "C5"
 }  # fmt: skip
-KEY = "condition", "falls_weight", "policy", "heaps"
+KEY = "condition", "falls_weight", "policy", "heaps", "base"
 ENDS = "", "_low", "_high"
 COLUMNS = [
     *KEY,
-    *(name + end for name in (*MEASURES, "net_more", "net_to_learned") for end in ENDS),
+    *(name + end for name in (*MEASURES, "net_more", "net_to_base") for end in ENDS),
 ]
 UNITS = {
     "boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick",
-    "net_to_learned": "difference to the learned policy", "success": "share of lifts that succeed",
+    "net_to_base": "difference to its base", "success": "share of lifts that succeed",
 }  # fmt: skip
 
 
@@ -99,6 +99,8 @@ def policies(folder: str | Path = files.DATA) -> Figure:
 def ablations(folder: str | Path = files.DATA) -> Figure:
     """Balance of the variants of the learned policy, and of each seed alone.
 
+    Right: the difference to the policy from which each differs in one thing.
+
     Args:
         folder: of ``heap/table.csv``.
 
@@ -108,10 +110,12 @@ def ablations(folder: str | Path = files.DATA) -> Figure:
     table = read_heap_table(folder)
     names = table["policy"].unique()
     seeds = sorted(name for name in names if name.startswith(SEED))
-    rows = at_shown_weight(table, [REFERENCE, *VARIANTS, BY_PROBABILITY, *seeds])
-    figure, grid = plt.subplots(1, 2, figsize=(8, 3.6), sharey=True)
-    for axes, measure in zip(grid, ("net", "net_to_learned")):
-        _dots(axes, rows, measure)
+    rows = at_shown_weight(table, [*VARIANTS, BY_PROBABILITY, *seeds])
+    figure, grid = plt.subplots(1, 2, figsize=(9, 3.8))
+    _dots(grid[0], rows, "net")
+    compared = rows.drop(index=LEARNED)
+    pairs = [f"{name} − {base}" for name, base in compared["base"].items()]
+    _dots(grid[1], compared.set_axis(pairs), "net_to_base")
     grid[1].axvline(0, color="0.6", lw=1, zorder=0)
     mark_reduced(figure, Path(folder) / NAME, "table")
     return figure
