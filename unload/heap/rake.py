@@ -110,7 +110,8 @@ class Rake:
     (``Heap.edge``); at the foremost centre, boxes that creep by millimetres would count. Since
     unloading takes supports away, and boxes may still be toppling, this is repeated until
     nothing is unloaded and nothing is faster than ``STILL``, at most ``RESTS`` times, so that
-    what falls counts for the pick that has caused it.
+    what falls counts for the pick that has caused it. Of 160 random picks 14 % used up all
+    rests; what still moves then stands where it is, at rest, when the next pick begins.
 
     Every pick builds the world anew from the heap, so that it depends on nothing else, to the
     bit: not on earlier picks, of which PyBullet would remember contacts.

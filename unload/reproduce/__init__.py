@@ -5,8 +5,9 @@ Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the p
 ``changes``, ``interventions``, ``verdict``, ``survival`` and ``questions`` (why 60 %);
 ``comparison`` and ``robustness`` (policies compared); ``lifts``, ``full_lifts`` and ``agreement``
 (the physics); ``heap``, ``heap_lifts``, ``heap_learning``, ``heap_variation``, ``heap_episodes``,
-``heap_rules`` and ``heap_table`` (the unordered load); ``paper_numbers`` (the paper compared with
-all this). ``fingerprint`` says whether the code still trains as it did, ``intervals`` how sure a
-mean is, ``resampling`` how far few runs mislead, ``exercise`` whether a reader's answer is right.
+``heap_rules``, ``heap_table`` and ``heap_limits`` (the unordered load); ``paper_numbers`` (the
+paper compared with all this). ``fingerprint`` says whether the code still trains as it did,
+``intervals`` how sure a mean is, ``resampling`` how far few runs mislead, ``exercise`` whether a
+reader's answer is right.
 ``__main__`` is the command line, and ``figures`` draws.
 """

@@ -11,6 +11,7 @@ from unload.reproduce import (
     heap,
     heap_learning,
     heap_lifts,
+    heap_limits,
     heap_rules,
     heap_table,
     heap_variation,
@@ -57,6 +58,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     **heap_variation.PARTS,
     **heap_rules.PARTS,
     **heap_table.PARTS,
+    **heap_limits.PARTS,
 }  # fmt: skip
 
 

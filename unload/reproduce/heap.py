@@ -127,8 +127,15 @@ def agreement_data(
     return frame
 
 
-def _agreement(number: int) -> dict[str, dict]:
-    """One pick in every physics."""
+def random_pick(number: int) -> tuple[Heap, int, np.random.Generator]:
+    """A training heap after 0, 3, 6 or 9 random picks, and a random visible box of it.
+
+    Args:
+        number: of the pick, which seeds it.
+
+    Returns:
+        The heap, the box, and the generator that has drawn them.
+    """
     heaps = stored_heaps("train")
     heap = heaps[number % len(heaps)]
     rng = np.random.default_rng([AGREEMENT_SEED, number])
@@ -138,9 +145,14 @@ def _agreement(number: int) -> dict[str, dict]:
         if before:
             heap = play(env, random, heap, int(rng.integers(2**32)), keep_heaps=True).heaps[-1]
         env.reset(options={"heap": heap})
-        box = int(rng.choice(env.visible[env.visible >= 0]))
+        return heap, int(rng.choice(env.visible[env.visible >= 0])), rng
     finally:
         env.close()
+
+
+def _agreement(number: int) -> dict[str, dict]:
+    """One pick in every physics."""
+    heap, box, _ = random_pick(number)
     rows = {}
     for physics in PHYSICS:
         rake = Rake(physics)

@@ -8,7 +8,7 @@ that was stopped goes on, and seeds make an episode the same in whatever order i
 """
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -45,6 +45,7 @@ PICKS = 50_000  # of both rounds
 PHYSICS = "coarse"
 ROUNDS = 2
 SEEDS_LEARNED = 5
+SETTINGS = "settings.json"  # beside recorded episodes
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record, in all rounds"},
@@ -181,13 +182,25 @@ def record_episodes(
         ValueError: episodes with other settings are there.
     """
     folder = next(iter(players)).parent
-    same_settings(folder / "settings.json", settings | {"constants": CONSTANTS})
+    same_settings(folder / SETTINGS, settings | {"constants": CONSTANTS})
     missing = {path: player for path, player in players.items() if not path.exists()}
     done = Parallel(n_jobs, return_as="generator")(
         delayed(_record)(path, player) for path, player in missing.items()
     )
     list(tqdm(done, total=len(missing), unit="episode", disable=not progress, ncols=100))
     return list(players)
+
+
+def recorded_settings(name: str, runs_dir: str | Path = files.RUNS) -> dict:
+    """On what the recorded episodes of a round of that name depend.
+
+    Raises:
+        FileNotFoundError: none are there.
+    """
+    path = episode_path(name, 0, runs_dir).with_name(SETTINGS)
+    if not path.exists():
+        raise FileNotFoundError(f"{path} is missing; {COMMAND} heap-learning records picks")
+    return files.read_json(path)
 
 
 def _record(path: Path, player: Callable[[], Episode]) -> None:
@@ -217,14 +230,28 @@ def round_name(number: int) -> str:
     return f"round{number}"
 
 
-def read_picks(runs_dir: str | Path, rounds: Iterable[str]) -> Picks:
+def read_picks(
+    runs_dir: str | Path, rounds: Iterable[str], heaps: Container[int] | None = None
+) -> Picks:
     """All recorded picks of the rounds of these names.
+
+    Args:
+        runs_dir: where they are.
+        rounds: names.
+        heaps: numbers of the training heaps that they are from; all if None.
 
     Raises:
         FileNotFoundError: there are none.
     """
     paths = _episodes(runs_dir, rounds)
+    if heaps is not None:
+        paths = [path for path in paths if _heap_number(path) in heaps]
     return joined([picks_of(episode_from(files.read_arrays(path))) for path in paths])
+
+
+def _heap_number(path: Path) -> int:
+    """Of the training heap that a recorded episode is from."""
+    return int(path.stem) % len(stored_heaps("train"))
 
 
 def _episodes(runs_dir: str | Path, rounds: Iterable[str]) -> list[Path]:

@@ -1,0 +1,58 @@
+"""What limits a learned policy on heaps."""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from unload.reproduce.figures.style import mark_reduced, styled
+from unload.reproduce.heap import NAME
+from unload.reproduce.results import COMMAND, read_table
+from unload.support import files
+
+
+def repeatability(disturbed: pd.DataFrame) -> pd.Series:
+    """Correlation of boxes - falls with those of the same pick undisturbed, by distance (m).
+
+    Args:
+        disturbed: see ``unload.reproduce.heap_limits.limits_data``.
+    """
+    net = (disturbed["boxes"] - disturbed["falls"]).to_numpy()
+    by = disturbed.assign(net=net).pivot(index="pick", columns="distance", values="net")
+    return by.drop(columns=0.0).corrwith(by[0.0])
+
+
+@styled
+def limits(folder: str | Path = files.DATA) -> Figure:
+    """How well picks are foretold, by the heaps learned from; lines: the same picks made again.
+
+    Args:
+        folder: of ``heap/limits.csv`` and ``heap/disturbed.csv``.
+
+    Raises:
+        FileNotFoundError: a table is missing; the message names the command.
+    """
+    place, command = Path(folder) / NAME, f"{COMMAND} heap-limits"
+    learned = read_table(place / "limits.csv", command, ["heaps", "seed", "correlation"])
+    picks = read_table(place / "disturbed.csv", command, ["pick", "distance", "boxes", "falls"])
+    figure, axes = plt.subplots(figsize=(6, 3.6))
+    axes.plot(learned["heaps"], learned["correlation"], "o", ms=5, label="learned, one network")
+    means = learned.groupby("heaps")["correlation"].mean()
+    axes.plot(means.index, means, lw=1.6, color="C0")
+    for number, (distance, value) in enumerate(repeatability(picks).items()):
+        label = f"made again, boxes moved by {1000 * distance:g} mm"
+        axes.axhline(value, color="0.3", ls=("--", ":")[number % 2], label=label)
+    axes.set(
+        xscale="log",
+        xticks=list(means.index),
+        xticklabels=list(means.index),
+        xlabel="heaps learned from",
+        ylabel="correlation of boxes − falls",
+        ylim=(np.floor(10 * learned["correlation"].min() - 1) / 10, 1),
+    )
+    axes.minorticks_off()
+    axes.legend(fontsize=8, loc="lower right")
+    mark_reduced(figure, place, "limits")
+    return figure
