@@ -17,7 +17,9 @@ def recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(heap_learning, "MAX_PICKS", 3)
     monkeypatch.setattr(heap_learning, "HeapEnv", partial(HeapEnv, max_picks=3))
     monkeypatch.setattr(heap_limits, "HELD_OUT", range(2, 4))
-    monkeypatch.setattr(heap_limits, "VARIANT", Variant(n_features=8))
+    variants = {"learned": Variant(n_features=8), "own row": Variant("own", n_features=8)}
+    monkeypatch.setattr(heap_limits, "VARIANTS", variants)
+    monkeypatch.setattr(heap_limits, "OTHERS", ["own row"])
     heap_learning.record_picks(12, 0, "near", tmp_path, progress=False)
     return tmp_path
 
@@ -35,13 +37,14 @@ def test_networks_learn_from_some_heaps_and_are_judged_on_others(recorded, monke
         "folder": recorded, "runs_dir": recorded, "progress": False,
     }  # fmt: skip
     limits, disturbed = heap_limits.limits_data(**arguments)
-    assert limits["picks"].tolist() == [3, 6] == [len(picks) for picks in learned_from]
+    assert limits["picks"].tolist() == [3, 6, 6] == [len(picks) for picks in learned_from]
+    assert limits["variant"].tolist() == ["learned", "learned", "own row"]
     assert limits["correlation"].between(-1, 1).all()
     assert disturbed["distance"].tolist() == [0.0, 0.001, 0.005] * 3
     assert (disturbed[["boxes", "falls"]] >= 0).all(axis=None)
     assert read_provenance(recorded / "heap", "limits")["reduced"]
     again, _ = heap_limits.limits_data(**arguments)
-    assert again.equals(limits) and len(learned_from) == 2, "kept"
+    assert again.equals(limits) and len(learned_from) == 3, "kept"
 
 
 def test_the_heaps_that_are_held_out_cannot_be_learned_from(recorded):

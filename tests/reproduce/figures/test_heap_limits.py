@@ -24,7 +24,12 @@ def folder(tmp_path, disturbed):
     place = tmp_path / "heap"
     place.mkdir()
     disturbed.to_csv(place / "disturbed.csv", index=False)
-    table = {"heaps": [7, 7, 14, 14], "seed": [0, 1] * 2, "correlation": [0.6, 0.62, 0.7, 0.7]}
+    table = {
+        "variant": ["learned"] * 4 + ["own row"],
+        "heaps": [7, 7, 14, 14, 14],
+        "seed": [0, 1, 0, 1, 0],
+        "correlation": [0.6, 0.62, 0.7, 0.7, 0.5],
+    }
     pd.DataFrame(table).to_csv(place / "limits.csv", index=False)
     write_provenance(place, "limits", "made up", {"runs": 7}, True, run_record(1.0))
     return tmp_path
@@ -37,7 +42,8 @@ def test_repeatability_compares_with_the_pick_that_was_not_disturbed(disturbed):
 def test_the_figure_has_the_means_and_a_line_for_each_distance(folder):
     axes = limits(folder).axes[0]
     assert axes.lines[1].get_ydata() == pytest.approx([0.61, 0.7])
-    assert [line.get_ydata()[0] for line in axes.lines[2:]] == pytest.approx([1.0, -1.0])
+    assert [line.get_ydata()[0] for line in axes.lines[2:]] == pytest.approx([0.5, 1.0, -1.0])
+    assert [text.get_text() for text in axes.texts] == ["own row"]
 
 
 def test_figure_is_saved_as_the_same_bytes(folder, saved_twice):

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.heap import NAME
+from unload.reproduce.heap_learning import LEARNED
 from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
 
@@ -35,12 +36,20 @@ def limits(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: a table is missing; the message names the command.
     """
     place, command = Path(folder) / NAME, f"{COMMAND} heap-limits"
-    learned = read_table(place / "limits.csv", command, ["heaps", "seed", "correlation"])
+    columns = ["variant", "heaps", "seed", "correlation"]
+    table = read_table(place / "limits.csv", command, columns)
+    learned = table[table["variant"] == LEARNED]
     picks = read_table(place / "disturbed.csv", command, ["pick", "distance", "boxes", "falls"])
     figure, axes = plt.subplots(figsize=(6, 3.6))
     axes.plot(learned["heaps"], learned["correlation"], "o", ms=5, label="learned, one network")
     means = learned.groupby("heaps")["correlation"].mean()
     axes.plot(means.index, means, lw=1.6, color="C0")
+    for name, of in table[table["variant"] != LEARNED].groupby("variant", sort=False):
+        mean, most = of["correlation"].mean(), of["heaps"].max()
+        axes.plot(of["heaps"], of["correlation"], "o", color="0.6", ms=3)
+        axes.annotate(
+            name, (most, mean), xytext=(6, 0), textcoords="offset points", va="center", fontsize=8
+        )
     for number, (distance, value) in enumerate(repeatability(picks).items()):
         label = f"made again, boxes moved by {1000 * distance:g} mm"
         axes.axhline(value, color="0.3", ls=("--", ":")[number % 2], label=label)
@@ -50,7 +59,8 @@ def limits(folder: str | Path = files.DATA) -> Figure:
         xticklabels=list(means.index),
         xlabel="heaps learned from",
         ylabel="correlation of boxes − falls",
-        ylim=(np.floor(10 * learned["correlation"].min() - 1) / 10, 1),
+        ylim=(np.floor(10 * table["correlation"].min()) / 10, 1),
+        xlim=(means.index.min() / 1.2, means.index.max() * 1.8),
     )
     axes.minorticks_off()
     axes.legend(fontsize=8, loc="lower right")
