@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import torch
 
-from unload.heap.boxes import Heap
+from unload.heap.boxes import FARTHEST_EDGE, Heap
 from unload.heap.learning import STEPS, Picks, fit, holds_box
 from unload.heap.rake import Rake
 from unload.reproduce.heap import CONSTANTS, NAME, random_pick
@@ -163,6 +163,7 @@ def _disturbed(number: int) -> list[dict]:
     rake, rows = Rake(PHYSICS), []
     for distance in (0.0, *DISTANCES):
         moved = heap.positions + distance * rng.normal(size=heap.positions.shape)
+        moved[:, 0] = np.minimum(moved[:, 0], FARTHEST_EDGE)  # none is beyond it before a pick
         outcome = rake.pick(Heap(moved, heap.orientations, heap.sizes, heap.packages), box)
         counts = {"boxes": int(outcome.unloaded.sum()), "falls": int(outcome.fallen.sum())}
         rows.append({"pick": number, "distance": distance} | counts)
