@@ -4,9 +4,8 @@
 
 Networks of the recommended variant learn from the recorded picks of ever more heaps, and foretell
 those of heaps that none of them has seen; other variants, from the most heaps. Beside them
-stand picks that are made twice, the second time with all boxes moved by about a millimetre: nobody
-who sees the heap no more exactly than that can foretell a pick much better than the first time
-foretells the second. It takes 30 minutes of CPU.
+stand picks that are made twice, the second time with all boxes moved by about a millimetre, which
+bounds what anybody can foretell who sees the heap no more exactly. It takes 30 minutes of CPU.
 """
 
 from functools import partial

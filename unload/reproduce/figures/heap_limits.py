@@ -27,7 +27,11 @@ def repeatability(disturbed: pd.DataFrame) -> pd.Series:
 
 @styled
 def limits(folder: str | Path = files.DATA) -> Figure:
-    """How well picks are foretold, by the heaps learned from; lines: the same picks made again.
+    """How well picks are foretold, by the heaps learned from, and bounds.
+
+    A bound is the square root of ``repeatability``: if two outcomes of one heap, up to so small
+    a distance, correlate by ρ, their mean over many repetitions, which is the best forecast,
+    correlates with each of them by √ρ.
 
     Args:
         folder: of ``heap/limits.csv`` and ``heap/disturbed.csv``.
@@ -51,8 +55,8 @@ def limits(folder: str | Path = files.DATA) -> Figure:
             name, (most, mean), xytext=(6, 0), textcoords="offset points", va="center", fontsize=8
         )
     for number, (distance, value) in enumerate(repeatability(picks).items()):
-        label = f"made again, boxes moved by {1000 * distance:g} mm"
-        axes.axhline(value, color="0.3", ls=("--", ":")[number % 2], label=label)
+        label = f"bound if boxes are known to {1000 * distance:g} mm"
+        axes.axhline(value**0.5, color="0.3", ls=("--", ":")[number % 2], label=label)
     axes.set(
         xscale="log",
         xticks=list(means.index),
@@ -63,6 +67,6 @@ def limits(folder: str | Path = files.DATA) -> Figure:
         xlim=(means.index.min() / 1.2, means.index.max() * 1.8),
     )
     axes.minorticks_off()
-    axes.legend(fontsize=8, loc="lower right")
+    axes.legend(fontsize=8, loc="lower left")
     mark_reduced(figure, place, "limits")
     return figure
