@@ -15,7 +15,7 @@ from unload.reproduce.answer import PAPER_CELLS, paper_runs, seeds_of
 from unload.reproduce.figures.heap import at_shown_weight, read_heap_table
 from unload.reproduce.figures.tuning import read_curves
 from unload.reproduce.heap_rules import candidates
-from unload.reproduce.heap_table import LEARNED, REFERENCE
+from unload.reproduce.heap_table import AS_TRAINED, LEARNED, REFERENCE
 from unload.reproduce.measure import POLICY_LOADS
 from unload.reproduce.study import read_study
 from unload.reproduce.tuning import greedy_msr, greedy_reached, reached_at, running_mean
@@ -144,9 +144,11 @@ def heap_policies():
     return len(candidates()), *rows[["boxes", "falls"]].to_numpy().ravel()
 
 
-def heap_gain():
-    row = at_shown_weight(read_heap_table(), [LEARNED]).iloc[0]
-    return tuple(row[["net_ratio", "net_ratio_low", "net_ratio_high"]])
+def heap_gains():
+    table = read_heap_table()
+    rows = table[(table["condition"] == AS_TRAINED) & (table["policy"] == LEARNED)]
+    rows = rows.set_index("falls_weight").loc[[1.0, 2.0]]
+    return tuple(rows[["net_ratio", "net_ratio_low", "net_ratio_high"]].to_numpy().ravel())
 
 
 # File, words with places for numbers, and what fills these from data/.
@@ -165,7 +167,12 @@ CLAIMS = [
         "other heaps, {3:.2f} and {4:.2f}",
         heap_policies,
     ),
-    ("README.md", "are {:.2f} times the rule's (95 % interval {:.2f}–{:.2f})", heap_gain),
+    (
+        "README.md",
+        "are {:.2f} times the rule's (95 % interval {:.2f}–{:.2f}). That is a win, but a small "
+        "one; if a fall costs two boxes, it is {:.2f} times ({:.2f}–{:.2f})",
+        heap_gains,
+    ),
     ("notebooks/03_lifting.ipynb", "within {2:.0f} mm of the threshold", engines_apart),
     (
         "notebooks/08_hyperparameters.ipynb",
