@@ -52,7 +52,7 @@ SEED = "seed "  # and its number: one network of the learned policy
 BY_PROBABILITY = "by probability"  # of a fall, instead of the number of falls
 FEW = "random", REFERENCE, LEARNED, VARIED  # played under all conditions
 CURVES = REFERENCE, LINEAR, LEARNED  # played at all λ
-# Variants that lack two things that the learned policy has, and the one that lacks only the first.
+# Variants that differ from the learned policy in more than one thing, each with one nearer to it.
 BASES = {
     "γ = 0.5": "sums only",
     "γ = 0.8": "sums only",
