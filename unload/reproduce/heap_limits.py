@@ -16,9 +16,10 @@ import pandas as pd
 import torch
 
 from unload.heap.boxes import FARTHEST_EDGE, Heap
+from unload.heap.env import stored_heaps
 from unload.heap.learning import STEPS, Picks, fit, holds_box
 from unload.heap.rake import Rake
-from unload.reproduce.heap import CONSTANTS, NAME, random_pick
+from unload.reproduce.heap import AGREEMENT_SEED, CONSTANTS, NAME, random_pick
 from unload.reproduce.heap_learning import (
     LEARNED,
     PHYSICS,
@@ -94,9 +95,17 @@ def limits_data(
         for seed in range(checks.integer("seeds", seeds, 1))
     ]
     learned = keep_all(kept, jobs, n_jobs, progress)
+    train = stored_heaps("train")
     jobs = [
         (
-            {"pick": number, "distances": DISTANCES, "constants": CONSTANTS},
+            {
+                "pick": number,
+                "heap": train[number % len(train)].digest(),
+                "seed": AGREEMENT_SEED,
+                "distances": DISTANCES,
+                "physics": PHYSICS,
+                "constants": CONSTANTS,
+            },
             partial(_disturbed, number),
         )
         for number in range(checks.integer("picks", picks, 1))

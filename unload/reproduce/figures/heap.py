@@ -31,7 +31,13 @@ from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
 
 COLOURS = {
-    REFERENCE: "C1", LEARNED: "C0", LINEAR: "C4", VARIED: "C2", "oracle": "0.2", "random": "C5"
+    REFERENCE: "C1", LEARNED: "C0", LINEAR: "C4", VARIED: "C2", "oracle": "0.2", "random": "C5",
+    BY_PROBABILITY: "C0",
+}  # fmt: skip
+# Where the names of rules stand that lie close together: offset in points, and alignment.
+NAME_PLACES = {
+    "clear above": ((-2, 9), "center"), "nearest": ((0, -13), "center"),
+    "highest": ((5, -12), "left"), "random": ((5, -12), "left"),
 }  # fmt: skip
 KEY = "condition", "falls_weight", "policy", "heaps", "base"
 ENDS = "", "_low", "_high"
@@ -178,11 +184,13 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
         if name not in RULES:
             marks = [(f"λ = {row['falls_weight']:g}", row) for _, row in rows.iterrows()]
         for text, row in marks if name in (*RULES, LEARNED) else []:
+            usual = ((5, 4), "left") if name in RULES else ((-4, 5), "right")
+            place, side = NAME_PLACES.get(text, usual)
             axes.annotate(
-                text, (row["falls"], row["boxes"]), xytext=(5, 4), textcoords="offset points",
-                fontsize=8, color="0.4" if name in RULES else colour,
+                text, (row["falls"], row["boxes"]), xytext=place, textcoords="offset points",
+                ha=side, fontsize=8, color="0.4" if name in RULES else colour,
             )  # fmt: skip
-    axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"], ylim=(0, None))
+    axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"])
     axes.set_xlim(left=0)
     axes.legend(loc="lower right", fontsize=8)
     mark_reduced(figure, Path(folder) / NAME, "table")
