@@ -80,7 +80,7 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
     rules = pd.DataFrame(
         {"rule": list(family())[:2], "heaps": [20, 20], "boxes": [2, 1], "falls": [1, 0]}
     )
-    cells = heap_table.plan(rules, variation=False, runs_dir=tmp_path)
+    cells = heap_table.plan(rules, runs_dir=tmp_path)
     of = {}
     for cell in cells:
         of.setdefault((cell.condition, cell.falls_weight), []).append(cell.policy)
@@ -96,7 +96,7 @@ def test_the_plan_plays_what_is_worth_it(tmp_path):
     assert [cell.heaps for cell in cells if cell.policy == "oracle"] == [30]
     assert sum(cell.heaps for cell in cells) / 30 < 60
     with pytest.raises(FileNotFoundError, match="heap-variation makes it"):
-        heap_table.plan(rules, runs_dir=tmp_path)
+        heap_table.plan(rules, varied_rules=rules, runs_dir=tmp_path)
 
 
 @pytest.mark.slow
@@ -106,10 +106,10 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(heap_table, "RULES", rules)
     some = dict(list(family().items())[:2])
     monkeypatch.setattr(heap_rules, "family", lambda: some)
+    monkeypatch.setattr(heap, "settled_heap", lambda *given: stored_heaps("train")[0])
     heap_rules.rules_data(1, tmp_path, tmp_path, progress=False)
     save_networks(tmp_path)
     save_network(HeapNetwork("own", 8), varied_path(0, tmp_path))
-    monkeypatch.setattr(heap, "settled_heap", lambda *given: stored_heaps("train")[0])
     arguments = {
         "heaps": 2,
         "physics": "near",
@@ -124,6 +124,7 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
         "progress": False,
     }
     table = heap_table.table_data(**arguments)
+    varied = ["rule chosen with variation", "trained with variation"]
     trained = table[(table["condition"] == "as trained") & (table["falls_weight"] == 1.0)]
     learned = ["learned", "seed 0", "seed 1"]
     assert set(trained["policy"]) == {
@@ -131,13 +132,13 @@ def test_the_table_has_every_policy_and_is_kept(tmp_path, monkeypatch):
         "best rule",
         *learned,
         "by probability",
-        "trained with variation",
+        *varied,
     }
     for condition in ("camera", "boxes × 0.8"):
-        few = {"random", "best rule", "learned", "trained with variation"}
+        few = {"random", "best rule", "learned", *varied}
         assert set(table["policy"][table["condition"] == condition]) == few
-    varied = table[table["falls_weight"] == 0.0]
-    assert set(varied["policy"]) == {"best rule", "learned"}
+    curve = table[table["falls_weight"] == 0.0]
+    assert set(curve["policy"]) == {"best rule", "learned"}
     assert (table["heaps"] == 2).all()
     episodes = pd.read_csv(tmp_path / "heap" / "episodes.csv")
     boxes = episodes[(episodes["policy"] == "random")].groupby("condition")["boxes"].sum()

@@ -15,7 +15,7 @@ from unload.reproduce.heap_learning import weights_digest
 from unload.reproduce.heap_variation import Properties, varied_heap
 
 PHYSICS = "whole"  # that judges
-VARIED_SEED = 7000  # of the heaps of boxes with other properties; no other data uses it
+VARIED_SEED = 7000  # of the heaps of boxes with other properties to test on
 
 
 def make_policy(player: Mapping, env: HeapEnv) -> Callable:
@@ -36,7 +36,9 @@ def make_policy(player: Mapping, env: HeapEnv) -> Callable:
     return Oracle(env, player["oracle"], again=PHYSICS)
 
 
-def varied_job(condition: Mapping, number: int) -> tuple[dict, Callable] | None:
+def varied_job(
+    condition: Mapping, number: int, seed: int = VARIED_SEED
+) -> tuple[dict, Callable] | None:
     """What makes the heap of a condition, see ``keep_all``; None if it is a stored one.
 
     A heap is one that has settled with the condition's size and friction; at another friction
@@ -45,7 +47,7 @@ def varied_job(condition: Mapping, number: int) -> tuple[dict, Callable] | None:
     if not {"scale", "friction"} & set(condition):
         return None
     properties = _properties(condition)
-    return heap_job(VARIED_SEED, number, properties.scale, properties.friction)
+    return heap_job(seed, number, properties.scale, properties.friction)
 
 
 def episode_job(
@@ -55,6 +57,7 @@ def episode_job(
     number: int,
     physics: str,
     runs_dir: str | Path,
+    seed: int = VARIED_SEED,
 ) -> tuple[dict, Callable]:
     """The question of one episode and what answers it, see ``keep_all``.
 
@@ -65,8 +68,9 @@ def episode_job(
         number: of the heap.
         physics: see ``Rake``.
         runs_dir: where heaps of boxes with other properties are.
+        seed: of these heaps.
     """
-    varied = varied_job(condition, number)
+    varied = varied_job(condition, number, seed)
     question = {
         "player": dict(player),
         "condition": dict(condition),
@@ -78,7 +82,8 @@ def episode_job(
     }
     if "networks" in player:  # named by what is in them, wherever they are
         question["player"]["networks"] = weights_digest(player["networks"])
-    return question, partial(_play, dict(player), dict(condition), split, number, physics, runs_dir)
+    place = dict(condition), split, number, physics, runs_dir, seed
+    return question, partial(_play, dict(player), *place)
 
 
 def _properties(condition: Mapping) -> Properties:
@@ -86,14 +91,20 @@ def _properties(condition: Mapping) -> Properties:
 
 
 def _play(
-    player: dict, condition: dict, split: str, number: int, physics: str, runs_dir: str | Path
+    player: dict,
+    condition: dict,
+    split: str,
+    number: int,
+    physics: str,
+    runs_dir: str | Path,
+    seed: int,
 ) -> dict:
     torch.set_num_threads(1)
     properties = _properties(condition)
     if varied_job(condition, number) is None:
         heap = stored_heaps(split)[number]
     else:
-        heap = varied_heap(VARIED_SEED, number, properties, runs_dir)
+        heap = varied_heap(seed, number, properties, runs_dir)
     env = HeapEnv(
         heaps=[heap],
         physics=physics,

@@ -47,6 +47,7 @@ ROUNDS = 2
 SEEDS_LEARNED = 5
 SETTINGS = "settings.json"  # beside recorded episodes
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, of the curve of throughput against falls
+SHOWN_WEIGHT = 1.0  # λ of the table
 OPTIONS = JOBS | {
     "--picks": {"type": int, "default": PICKS, "help": "picks to record, in all rounds"},
     "--rounds": {"type": int, "default": ROUNDS, "help": "of recording and learning"},

@@ -2,10 +2,11 @@
 
     python -m unload.reproduce heap-rules
 
-All rules play a few heaps, and the best of them more. It takes 1.5 hours of CPU.
+All rules play a few heaps, and the best of them more; then the same on heaps of varied friction,
+mass and size, those of ``heap-variation``. It takes 2 hours of CPU.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ import pandas as pd
 from unload.heap.env import MAX_PICKS
 from unload.heap.rules import RULES, family
 from unload.reproduce.heap import HEAPS, NAME
-from unload.reproduce.heap_episodes import episode_job
-from unload.reproduce.heap_learning import WEIGHTS
+from unload.reproduce.heap_episodes import episode_job, varied_job
+from unload.reproduce.heap_learning import SHOWN_WEIGHT, WEIGHTS
+from unload.reproduce.heap_variation import SEED, varied_properties
 from unload.reproduce.results import COMMAND, JOBS, Result, keep_all, publish
 from unload.support import checks, files
 
@@ -40,37 +42,52 @@ def rules_data(
     n_jobs: int = 1,
     progress: bool = True,
 ) -> pd.DataFrame:
-    """Let the rules play training heaps; write ``heap/rules.csv``.
+    """Let the rules play training heaps; write ``heap/{rules,rules_varied}.csv``.
 
     Returns:
-        One row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and ``falls`` per
-        pick.
+        ``rules.csv``, one row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and
+        ``falls`` per pick. ``rules_varied.csv`` holds the same for heaps of which each has its
+        own friction, mass and size; its best rules are those for the λ of the table.
     """
     checks.integer("heaps", heaps, 1, HEAPS["train"])
     first = min(FIRST_HEAPS, heaps)
-    answers = _played(list(candidates()), first, runs_dir, n_jobs, progress)
-    frame = _means(answers)
-    chosen = {name: None for weight in WEIGHTS for name in _ranked(frame, weight)[:KEPT]}
-    answers |= _played(list(chosen), heaps, runs_dir, n_jobs, progress)
-    frame = _means(answers)
+    usual = [{}] * heaps
+    varied = [varied_properties(number)._asdict() for number in range(heaps)]
+    jobs = [varied_job(condition, number, SEED) for number, condition in enumerate(varied)]
+    keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs, progress)
+    tables, records = {}, []
+    for name, conditions, weights in (
+        ("rules", usual, WEIGHTS),
+        ("rules_varied", varied, (SHOWN_WEIGHT,)),
+    ):
+        answers = _played(candidates(), conditions[:first], runs_dir, n_jobs, progress)
+        frame = _means(answers)
+        chosen = {rule: None for weight in weights for rule in _ranked(frame, weight)[:KEPT]}
+        answers |= _played(chosen, conditions, runs_dir, n_jobs, progress)
+        tables[name] = _means(answers)
+        records += [answer.record for of in answers.values() for answer in of]
     settings = {
-        "heaps": [first, heaps], "split": "train", "physics": PHYSICS, "picks": MAX_PICKS
+        "heaps": [first, heaps], "split": "train", "varied": varied, "physics": PHYSICS,
+        "picks": MAX_PICKS,
     }  # fmt: skip
-    records = [answer.record for of in answers.values() for answer in of]
     command, reduced = f"{COMMAND} heap-rules --heaps {heaps}", heaps < RULE_HEAPS
-    publish(Path(folder) / NAME, "rules", {"rules": frame}, command, settings, reduced, records)
-    return frame
+    publish(Path(folder) / NAME, "rules", tables, command, settings, reduced, records)
+    return tables["rules"]
 
 
 def _played(
-    names: Sequence[str], heaps: int, runs_dir: str | Path, n_jobs: int, progress: bool
+    names: Iterable[str],
+    conditions: Sequence[dict],
+    runs_dir: str | Path,
+    n_jobs: int,
+    progress: bool,
 ) -> dict[str, list[Result]]:
-    """The episodes of rules on the first heaps, by rule."""
-    players = candidates()
+    """The episodes of rules on the first heaps, each under its condition, by rule."""
+    players, names, heaps = candidates(), list(names), len(conditions)
     jobs = [
-        episode_job(players[name], {}, "train", number, PHYSICS, runs_dir)
+        episode_job(players[name], condition, "train", number, PHYSICS, runs_dir, SEED)
         for name in names
-        for number in range(heaps)
+        for number, condition in enumerate(conditions)
     ]
     answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs, progress)
     return {name: answers[place * heaps : (place + 1) * heaps] for place, name in enumerate(names)}

@@ -22,6 +22,7 @@ from unload.reproduce.heap_episodes import PHYSICS, episode_job, varied_job
 from unload.reproduce.heap_learning import (
     LEARNED,
     ROUNDS,
+    SHOWN_WEIGHT,
     VARIANTS,
     WEIGHTS,
     Variant,
@@ -47,10 +48,11 @@ CONDITIONS: dict[str, dict] = {
 AS_TRAINED = "as trained"
 REFERENCE = "best rule"
 VARIED = "trained with variation"
+VARIED_RULE = "rule chosen with variation"
 LINEAR = "linear"
 SEED = "seed "  # and its number: one network of the learned policy
 BY_PROBABILITY = "by probability"  # of a fall, instead of the number of falls
-FEW = "random", REFERENCE, LEARNED, VARIED  # played under all conditions
+FEW = "random", REFERENCE, VARIED_RULE, LEARNED, VARIED  # played under all conditions
 CURVES = REFERENCE, LINEAR, LEARNED  # played at all λ
 # Variants that differ from the learned policy in more than one thing, each with one nearer to it.
 BASES = {
@@ -61,7 +63,6 @@ BASES = {
     LINEAR: "own row",
 }
 ORACLE_HEAPS = 30  # it takes 4 minutes of CPU a heap
-SHOWN_WEIGHT = 1.0  # λ of the table
 MEASURES = "boxes", "falls", "net"
 
 
@@ -71,7 +72,7 @@ def players(
     variants: Mapping[str, Variant] = VARIANTS,
     round_number: int = ROUNDS - 1,
     runs_dir: str | Path = files.RUNS,
-    variation: bool = True,
+    varied_rules: pd.DataFrame | None = None,
 ) -> dict[str, dict]:
     """Specifications of the policies to compare at a λ, by name, see ``make_policy``.
 
@@ -85,7 +86,8 @@ def players(
         variants: learned ones, by name.
         round_number: of the networks.
         runs_dir: where they are.
-        variation: whether those trained with variation play, see ``heap_variation``.
+        varied_rules: on heaps of varied friction, mass and size. If they are given, the best of
+            them plays, and so do the networks of ``heap_variation``.
     """
     chosen = {name: {"rule": name} for name in RULES}
     chosen[REFERENCE] = candidates()[best_rule(rules, falls_weight)]
@@ -97,7 +99,8 @@ def players(
                 one = {"networks": [path], "falls_weight": falls_weight}
                 chosen[f"{SEED}{seed}"] = one
             chosen[BY_PROBABILITY] = chosen[name] | {"by_probability": True}
-    if variation:
+    if varied_rules is not None:
+        chosen[VARIED_RULE] = candidates()[best_rule(varied_rules, falls_weight)]
         paths = [str(path) for path in varied_paths(runs_dir)]
         chosen[VARIED] = {"networks": paths, "falls_weight": falls_weight}
     chosen["oracle"] = {"oracle": falls_weight}
@@ -130,7 +133,7 @@ def plan(
     variants: Mapping[str, Variant] = VARIANTS,
     round_number: int = ROUNDS - 1,
     oracle_heaps: int = ORACLE_HEAPS,
-    variation: bool = True,
+    varied_rules: pd.DataFrame | None = None,
     runs_dir: str | Path = files.RUNS,
 ) -> list[Cell]:
     """What is played; all pairs of policies and conditions would take a day of CPU.
@@ -146,7 +149,7 @@ def plan(
     cells = []
     for weight in dict.fromkeys((SHOWN_WEIGHT, *weights)):
         shown = weight == SHOWN_WEIGHT
-        chosen = players(rules, weight, variants, round_number, runs_dir, variation)
+        chosen = players(rules, weight, variants, round_number, runs_dir, varied_rules)
         for condition in conditions if shown else [AS_TRAINED]:
             for name, player in chosen.items():
                 if condition != AS_TRAINED:
@@ -184,7 +187,8 @@ def table_data(
         variants: learned ones, by name.
         rounds: of ``heap-learning`` that were made.
         oracle_heaps: that the oracle plays.
-        variation: whether the networks of ``heap-variation`` play.
+        variation: whether the networks of ``heap-variation`` play, and the rule that was chosen
+            on its heaps.
         folder: of the data.
         runs_dir: where networks and episodes are.
         n_jobs: processes, as in joblib.
@@ -197,13 +201,18 @@ def table_data(
     checks.integer("oracle_heaps", oracle_heaps, 0, HEAPS["test"])
     for name in conditions:
         checks.one_of("a condition", name, CONDITIONS)
-    rules = read_table(
-        Path(folder) / NAME / "rules.csv",
-        f"{COMMAND} heap-rules",
-        ["rule", "heaps", "boxes", "falls"],
-    )
+    rules = _read_rules(folder, "rules")
+    varied_rules = _read_rules(folder, "rules_varied") if variation else None
     cells = plan(
-        rules, heaps, conditions, weights, variants, rounds - 1, oracle_heaps, variation, runs_dir
+        rules,
+        heaps,
+        conditions,
+        weights,
+        variants,
+        rounds - 1,
+        oracle_heaps,
+        varied_rules,
+        runs_dir,
     )
     varied = [varied_job(CONDITIONS[name], n) for name in conditions for n in range(heaps)]
     varied = [job for job in varied if job is not None]
@@ -239,6 +248,8 @@ def table_data(
         "conditions": {name: CONDITIONS[name] for name in conditions},
         "best rules": {str(weight): best_rule(rules, weight) for weight in weights},
     }
+    if variation:
+        settings[VARIED_RULE] = best_rule(varied_rules, SHOWN_WEIGHT)
     reduced = (
         heaps < HEAPS["test"]
         or oracle_heaps < ORACLE_HEAPS
@@ -255,6 +266,11 @@ def table_data(
     command += f" --oracle-heaps {oracle_heaps}" + " --no-variation" * (not variation)
     publish(Path(folder) / NAME, "table", tables, command, settings, reduced, records)
     return table
+
+
+def _read_rules(folder: str | Path, name: str) -> pd.DataFrame:
+    path = Path(folder) / NAME / f"{name}.csv"
+    return read_table(path, f"{COMMAND} heap-rules", ["rule", "heaps", "boxes", "falls"])
 
 
 def compared(episodes: pd.DataFrame) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from unload.heap.rake import PHYSICS
 from unload.heap.rules import RULES
 from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.heap import NAME
-from unload.reproduce.heap_learning import VARIANTS
+from unload.reproduce.heap_learning import SHOWN_WEIGHT, VARIANTS
 from unload.reproduce.heap_lifts import success_rates
 from unload.reproduce.heap_table import (
     AS_TRAINED,
@@ -24,15 +24,15 @@ from unload.reproduce.heap_table import (
     MEASURES,
     REFERENCE,
     SEED,
-    SHOWN_WEIGHT,
     VARIED,
+    VARIED_RULE,
 )
 from unload.reproduce.results import COMMAND, read_table
 from unload.support import files
 
 COLOURS = {
     REFERENCE: "C1", LEARNED: "C0", LINEAR: "C4", VARIED: "C2", "oracle": "0.2", "random": "C5",
-    BY_PROBABILITY: "C0",
+    BY_PROBABILITY: "C0", VARIED_RULE: "C3",
 }  # fmt: skip
 # Where the names of rules stand that lie close together: offset in points, and alignment.
 NAME_PLACES = {
@@ -92,7 +92,7 @@ def policies(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: the table is missing; the message names the command.
     """
     rows = at_shown_weight(
-        read_heap_table(folder), [*RULES, REFERENCE, LINEAR, LEARNED, VARIED, "oracle"]
+        read_heap_table(folder), [*RULES, REFERENCE, VARIED_RULE, LINEAR, LEARNED, VARIED, "oracle"]
     )
     figure, grid = plt.subplots(1, len(MEASURES), figsize=(9, 3.4), sharey=True)
     for axes, measure in zip(grid, MEASURES):
@@ -167,7 +167,7 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
         FileNotFoundError: the table is missing; the message names the command.
     """
     table = read_heap_table(folder)
-    shown = [*RULES, REFERENCE, LINEAR, LEARNED, VARIED, "oracle"]
+    shown = [*RULES, REFERENCE, VARIED_RULE, LINEAR, LEARNED, VARIED, "oracle"]
     table = table[(table["condition"] == AS_TRAINED) & table["policy"].isin(shown)]
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
     for name, rows in table.groupby("policy", sort=False):
