@@ -26,7 +26,8 @@ def folder(tmp_path):
     rng = np.random.default_rng(0)
     cells = [("as trained", 1.0, name) for name in (*BOXES, "seed 0", "pooled", "own row")]
     cells += [("as trained", 0.0, name) for name in ("best rule", "learned")]
-    cells += [("camera", 1.0, name) for name in ("best rule", "highest", "learned")]
+    camera = "best rule", "rule chosen with variation", "highest", "learned"
+    cells += [("camera", 1.0, name) for name in camera]
     rows = []
     for condition, weight, name in cells:
         boxes = BOXES.get(name, 2.2) - weight / 5 + 7 * (condition == "camera")
@@ -66,6 +67,17 @@ def test_missing_data_names_the_command_that_makes_it(draw, names_its_command):
     names_its_command(draw)
 
 
+def test_leads_are_differences_on_the_same_heaps(folder):
+    table = heap.read_heap_table(folder)
+    net = heap.at_shown_weight(table, BOXES | {heap.VARIED_RULE: 0}, "camera")["net"]
+    leads = heap.leads(folder).loc["camera"]
+    for name in ("best rule", heap.VARIED_RULE):
+        value, ends = leads[f"more than the {name}"].split(" ", 1)
+        low, high = map(float, ends.strip("()").split(" to "))
+        assert float(value) == pytest.approx(net["learned"] - net[name], abs=0.006)
+        assert low <= float(value) <= high
+
+
 def labels(axes) -> list[str]:
     return [text.get_text() for text in axes.get_yticklabels()]
 
@@ -92,9 +104,9 @@ def test_conditions_show_few_policies(folder):
     axes = heap.conditions(folder).axes[0]
     assert labels(axes) == ["camera", "as trained"]
     names = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert names == ["best rule", "learned"]
+    assert names == ["best rule", "rule chosen with variation", "learned"]
     dots = [line.get_xdata()[0] for line in axes.lines if len(line.get_xdata()) == 1]
-    assert len(dots) == 4 and sum(value > 7 for value in dots) == 2, "camera"
+    assert len(dots) == 5 and sum(value > 7 for value in dots) == 3, "camera"
 
 
 def test_rules_are_points_and_what_depends_on_the_weight_is_a_curve(folder):

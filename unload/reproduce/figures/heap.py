@@ -155,6 +155,37 @@ def conditions(folder: str | Path = files.DATA) -> Figure:
     return figure
 
 
+def leads(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """How far the learned policy is ahead of both rules under each condition, as text.
+
+    Args:
+        folder: of ``heap/table.csv``.
+
+    Returns:
+        One row per condition: its boxes - falls a pick, and those that it has more than each
+        rule on the same heaps, with the 95 % interval.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    table, rows = read_heap_table(folder), {}
+    for condition in dict.fromkeys(table["condition"]):
+        of = at_shown_weight(table, [LEARNED, VARIED_RULE], condition)
+        more = of.loc[LEARNED, ["net_more", "net_more_low", "net_more_high"]]
+        rows[condition] = {
+            "boxes − falls": f"{of.loc[LEARNED, 'net']:.2f}",
+            f"more than the {REFERENCE}": _with_interval(*more),
+        }
+        if VARIED_RULE in of.index:  # its base is the learned policy, so that the signs turn
+            less = of.loc[VARIED_RULE, ["net_to_base", "net_to_base_high", "net_to_base_low"]]
+            rows[condition][f"more than the {VARIED_RULE}"] = _with_interval(*-less)
+    return pd.DataFrame(rows).T
+
+
+def _with_interval(value: float, low: float, high: float) -> str:
+    return f"{value:+.2f} ({low:+.2f} to {high:+.2f})"
+
+
 @styled
 def throughput_falls(folder: str | Path = files.DATA) -> Figure:
     """Boxes and falls per pick on unseen heaps: a point for each rule, a curve over λ for others.
