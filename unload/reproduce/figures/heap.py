@@ -286,10 +286,10 @@ def camera_errors(folder: str | Path = files.DATA) -> Figure:
     place = Path(folder) / NAME
     columns = ["pixels", "centre_error", "extent_error"]
     frame = read_table(place / "camera.csv", f"{COMMAND} heap-camera", columns)
-    figure, grid = plt.subplots(1, 2, figsize=(8, 3.2), sharex=True)
+    figure, grid = plt.subplots(1, 2, figsize=(7, 2.8), sharex=True)
     named = {"centre_error": "error of the centre (m)", "extent_error": "error of the extents (m)"}
     for axes, (column, label) in zip(grid, named.items()):
-        axes.scatter(frame["pixels"], frame[column], s=5, alpha=0.35, color="C0", lw=0)
+        axes.scatter(frame["pixels"], frame[column], s=3, alpha=0.35, color="C0", lw=0)
         parts = frame.groupby(pd.qcut(frame["pixels"], 8, duplicates="drop"), observed=True)
         middle = parts[["pixels", column]].median()
         axes.plot(middle["pixels"], middle[column], "o-", color="C1", label="median")
