@@ -143,7 +143,7 @@ def plan(
       one for each λ.
     - At the λ of the table, under the other conditions: the policies in ``FEW``.
 
-    Each cell takes 4 minutes of CPU with 30 heaps and "whole" physics, all together 4 hours, and
+    Each cell takes 4 minutes of CPU with 30 heaps and "whole" physics, all together 4.5 hours, and
     the oracle 2 more.
     """
     cells = []
