@@ -332,6 +332,7 @@ def test_a_run_from_before_a_setting_had_its_default(tmp_path):
         {"staggered": True, "replay_size": 30},
         {"literal": True},
         {"drift": "settled"},
+        {"failures_kept": 0.3},
     ],
     ids=str,
 )

@@ -96,6 +96,10 @@ def test_runs_that_fit_into_no_memory_are_refused_by_name(field):
         ("drift", "wind", ValueError),
         ("staggered", 1, TypeError),
         ("literal", "yes", TypeError),
+        ("failures_kept", -0.1, ValueError),
+        ("failures_kept", float("nan"), ValueError),
+        ("failures_kept", "half", TypeError),
+        ("failures_kept", 1.0, ValueError),  # leaves no room for the agent's own picks
     ],
 )
 def test_bad_values_of_later_settings_are_refused_by_name(field, value, error):

@@ -22,7 +22,7 @@ MOST = {
 }
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 # Settings that older runs do not name: they had the defaults.
-ADDED = ("position_noise", "drift", "staggered", "literal")
+ADDED = ("position_noise", "drift", "staggered", "literal", "failures_kept")
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,8 @@ class TrainConfig:
     learning_rate: float = 1e-3  # μ
     batch_size: int = 2048  # b
     replay_size: int = 2**20
+    # * share of the replay that holds failed picks of a random policy for good
+    failures_kept: float = 0.0
     epsilon_init: float = 1.0
     epsilon_final: float = 0.0
     epsilon_fraction: float = 0.5  # K_ε / K
@@ -77,7 +79,8 @@ class TrainConfig:
         for name in ("seed", "gradient_steps", "snapshots"):
             self._set(name, checks.integer(name, getattr(self, name), 0))
         for name in (
-            "epsilon_init", "epsilon_final", "epsilon_fraction", "gamma", "height_reward"
+            "epsilon_init", "epsilon_final", "epsilon_fraction", "gamma", "height_reward",
+            "failures_kept",
         ):  # fmt: skip
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
@@ -102,6 +105,12 @@ class TrainConfig:
             raise ValueError(
                 f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
             )
+        size, kept = self.memory()
+        if size - kept < self.num_envs:
+            raise ValueError(
+                f"failures_kept is {self.failures_kept}; expected a share that leaves at least "
+                f"num_envs={self.num_envs} of {size} picks in the replay to the agent's own"
+            )
 
     def _set(self, name: str, value: object) -> None:
         """Keep a checked value as one of Python's own types, which JSON can hold."""
@@ -113,10 +122,15 @@ class TrainConfig:
         progress = min(1.0, picks / span) if span else 1.0
         return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
 
-    def seeds(self) -> tuple[int, int, int]:
-        """Return the seeds of the environments, of exploration and batches, and of the weights.
+    def memory(self) -> tuple[int, int]:
+        """Return how many picks the replay holds, and how many of them are failures kept."""
+        size = min(self.replay_size, self.picks)
+        return size, int(self.failures_kept * size)
+
+    def seeds(self) -> tuple[int, int, int, int]:
+        """Return the seeds of environments, exploration and batches, weights, and failures kept.
 
         The key keeps the loads apart from those that ``unload.evaluate`` draws with the same
         seed.
         """
-        return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(3).tolist())
+        return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(4).tolist())

@@ -10,10 +10,8 @@ from functools import cache
 import numpy as np
 
 from unload import task
-from unload.agent.config import TrainConfig
-from unload.agent.policies import any_allowed
+from unload.agent.kept import KeptPicks, random_picks
 from unload.agent.replay import ReplayBuffer
-from unload.agent.rollout import Rollout
 from unload.agent.training import Training
 from unload.env import observation
 from unload.load.boxes import Load
@@ -25,7 +23,6 @@ MEMORY = 2**23  # picks of the enlarged replay
 MOST_LOST = 400  # boxes of a replaced container
 EXPLORATION = 0.05
 SLOWER = 10  # divisor of the learning rate
-OTHER_LOADS = 1_000_000  # is added to the seed where random picks are made
 ROWS_AT_ONCE = 2**14  # picks that are moved together
 
 
@@ -41,13 +38,28 @@ def _refilled(run: Training) -> None:
     """Once: the next picks overwrite the failures as they overwrite other picks."""
     count = len(run.replay)
     slots = run.rng.permutation(count)[: count // 2]
-    run.replay.overwrite(slots, **random_failures(run.config, count // 2, run.rng))
+    filled = 0
+    for batch in random_picks(run.config, count // 2, run.rng):
+        more = len(batch["rewards"])
+        run.replay.overwrite(slots[filled : filled + more], **batch)
+        filled += more
 
 
 def _kept_failures(run: Training) -> None:
     """For good: the next picks overwrite those of the other half only."""
-    failures = random_failures(run.config, run.replay.size // 2, run.rng)
-    run.replay = FailuresKept(run.replay, failures)
+    _keep(run, succeeded=False)
+
+
+def _kept_successes(run: Training) -> None:
+    """The same with picks that teach nothing about failures."""
+    _keep(run, succeeded=True)
+
+
+def _keep(run: Training, succeeded: bool) -> None:
+    old = run.replay
+    kept = random_picks(run.config, old.size // 2, run.rng, succeeded)
+    new = KeptPicks(old.size, task.N_VISIBLE, old.size // 2, kept, equalized=old.equalized)
+    run.replay = moved(old, new)
 
 
 def _replaced_containers(run: Training) -> None:
@@ -75,6 +87,7 @@ CHANGES: dict[str, Callable[[Training], None]] = {
     "memory_23": _larger_memory,
     "failures_refilled": _refilled,
     "failures_kept": _kept_failures,
+    "successes_kept": _kept_successes,
     "containers_replaced": _replaced_containers,
     "exploration_held": _exploration,
     "learning_rate_lowered": _slower_learning,
@@ -91,51 +104,6 @@ def moved(replay: ReplayBuffer, empty: ReplayBuffer) -> ReplayBuffer:
     for part in np.array_split(rows, len(rows) // ROWS_AT_ONCE + 1):
         empty.add(**replay.rows(part))
     return empty
-
-
-class FailuresKept(ReplayBuffer):
-    """A memory that holds the last picks and, for good, failed ones.
-
-    Args:
-        replay: the picks so far, at least as many as there is room for.
-        failures: arrays as ``ReplayBuffer.add`` takes them.
-
-    Raises:
-        ValueError: there are fewer picks.
-    """
-
-    def __init__(self, replay: ReplayBuffer, failures: dict[str, np.ndarray]) -> None:
-        super().__init__(replay.size, task.N_VISIBLE, equalized=replay.equalized)
-        self.size = replay.size - len(failures["rewards"])
-        if len(replay) < self.size:
-            raise ValueError(f"replay holds {len(replay)} picks; expected at least {self.size}")
-        self.overwrite(np.arange(self.size, replay.size), **failures)
-        moved(replay, self)
-
-    def __len__(self) -> int:
-        return len(self.arrays["rewards"])
-
-
-def random_failures(config: TrainConfig, count: int, rng: np.random.Generator) -> dict:
-    """Failed picks of a random policy in containers of their own.
-
-    Args:
-        config: of the containers; the loads are drawn with another seed.
-        count: how many.
-        rng: draws the picks.
-
-    Returns:
-        What ``ReplayBuffer.add`` takes.
-    """
-    rollout = Rollout(replace(config, seed=config.seed + OTHER_LOADS), 1)
-    found: list[dict[str, np.ndarray]] = []
-    failures = 0
-    while failures < count:
-        rewards, transitions = rollout.pick(any_allowed(rollout.allowed, rng))
-        found.append({name: values[rewards < 0] for name, values in transitions.items()})
-        failures += len(found[-1]["rewards"])
-    rollout.close()
-    return {name: np.concatenate([each[name] for each in found])[:count] for name in found[0]}
 
 
 def partly_unloaded(rng: np.random.Generator) -> Load:
