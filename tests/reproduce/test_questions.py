@@ -148,8 +148,34 @@ def test_the_smallest_change_is_asked_of_ten_runs():
     assert questions.smallest_change([]).status == "still running"
 
 
+@pytest.mark.parametrize(
+    ("failures", "successes", "status"),
+    [
+        (KEPT, LATE_FALL, "shown"),
+        (KEPT, KEPT, "refuted"),
+        (LATE_FALL, LATE_FALL, "refuted"),
+        (KEPT, None, "shown so far"),
+    ],
+)
+def test_whether_failures_are_what_matters(failures, successes, status):
+    runs = changed("nothing", LATE_FALL) + changed("failures_kept", failures)
+    runs += changed("successes_kept", successes) if successes else []
+    assert questions.failures_matter(runs).status == status
+    assert questions.failures_matter([]).status == "still running"
+
+
+def test_failures_kept_from_the_beginning_hold_every_run():
+    name, high = "failures_kept_mask", [0.25, 1.05, 1.05, 1.05]
+    assert questions.kept_from_the_beginning(cell(name, high)).status == "shown"
+    assert questions.kept_from_the_beginning(cell(name, high, 4)).status == "shown so far"
+    one_low = cell(name, high, 9) + cell(name, LATE_FALL, 1)
+    answer = questions.kept_from_the_beginning(one_low)
+    assert answer.status == "refuted" and "9 of 10 runs" in answer.so_far
+    assert questions.kept_from_the_beginning([]).status == "still running"
+
+
 def test_all_questions_are_answered_by_the_data():
     found = questions.answers(read_answer(), read_interventions())
-    assert len(found) == 8
+    assert len(found) == 10
     assert all(each.status.removesuffix(" so far") in questions.STATUSES for each in found)
     assert all(each.so_far.endswith(".") for each in found)

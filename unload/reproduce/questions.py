@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from unload.reproduce.answer import CELLS, PAPER_CELLS, seeds_of
-from unload.reproduce.interventions import FAILURES
+from unload.reproduce.interventions import FAILURES, START
 from unload.reproduce.verdict import (
     LIKE_THE_PAPER,
     PAPER_MSR,
@@ -22,6 +22,7 @@ from unload.reproduce.verdict import (
 )
 
 MEMORIES = [cell for cell in CELLS if cell.startswith("memory")]  # replays of 2²² and 2²³ picks
+KEPT = "failures_kept_mask"  # the cell that deviation 8 of the plan adds
 FEW, MANY = 0.01, 0.03  # shares of failures in the replay that hypothesis 6 speaks of
 FEWEST = 5  # runs of an intervention that count as a result
 HELD, HELD_FROM = 0.99, 12_000_000  # MSR that hypothesis 7 asks for, and after how many picks
@@ -64,6 +65,8 @@ def answers(runs: Iterable[Run], interventions: Iterable[Run] = ()) -> list[Answ
         distinct_ranks(cells),
         forgetting(runs, interventions),
         smallest_change(runs),
+        failures_matter(interventions),
+        kept_from_the_beginning(runs),
     ]
 
 
@@ -213,12 +216,7 @@ def forgetting(runs: list[Run], interventions: list[Run] = ()) -> Answer:
 
 def smallest_change(runs: list[Run]) -> Answer:
     """Question 7."""
-    held: dict[str, list[bool]] = {}
-    for cell, _, curve in runs:
-        if cell in MEMORIES:
-            msr = windows(curve)["success_rate"]
-            late = msr[msr.index * WINDOW_PICKS >= HELD_FROM]
-            held.setdefault(cell, []).append(bool((late > HELD).all()))
+    held = _held(runs, MEMORIES)
     best = max(map(sum, held.values()), default=0)
     enough = any(len(each) >= 10 and all(each) for each in held.values())
     failed = all(not all(held.get(cell, [True])) for cell in MEMORIES)
@@ -233,6 +231,54 @@ def smallest_change(runs: list[Run]) -> Answer:
         else "None of the runs with a larger replay is there.",
         "a run of each of the cells with a larger replay does not",
     )
+
+
+def failures_matter(interventions: list[Run]) -> Answer:
+    """Question 6 as deviation 8 of the plan asks it anew."""
+    table = intervention_table(interventions).set_index("change")
+    names = "failures_kept", "successes_kept"
+    there = [name for name in names if name in table.index and table.loc[name, "runs"] >= FEWEST]
+    prevents = {name: bool(table.loc[name, "p"] <= 0.05) for name in there}
+    refuted = not prevents.get(names[0], True) or prevents.get(names[1], False)
+    parts = [
+        f"{name.replace('_', ' ')}: {table.loc[name, 'fell']} of {table.loc[name, 'runs']} fall "
+        f"(p = {table.loc[name, 'p']:.2g})"
+        for name in there
+    ]
+    sentence = f"In half of the replay, after {START / 1e6:.0f} million picks: {'; '.join(parts)}."
+    return Answer(
+        "Failures that stay in the replay keep a run up, and other picks that stay do not.",
+        _status("refuted" if refuted else "shown", len(there) == len(names), bool(there)),
+        sentence if there else "None of these interventions is there.",
+        "as many runs fall with failures kept as in the control, or fewer with successes kept, too",
+    )
+
+
+def kept_from_the_beginning(runs: list[Run]) -> Answer:
+    """Question 7 for the cell that deviation 8 of the plan adds."""
+    held = _held(runs, [KEPT]).get(KEPT, [])
+    planned = len(seeds_of(KEPT))
+    status = "shown" if all(held) else "refuted"
+    return Answer(
+        "With failures in half of the replay from the first pick on, every window after "
+        f"{HELD_FROM / 1e6:.0f} million picks is above {HELD:.0%} on each of {planned} seeds.",
+        _status(status, len(held) >= planned or not all(held), bool(held)),
+        f"Above it throughout: {sum(held)} of {len(held)} runs."
+        if held
+        else "None of these runs is there.",
+        "a run does not",
+    )
+
+
+def _held(runs: list[Run], cells: Iterable[str]) -> dict[str, list[bool]]:
+    """Of each run of some cells, whether question 7's criterion is met."""
+    held: dict[str, list[bool]] = {}
+    for cell, _, curve in runs:
+        if cell in cells:
+            msr = windows(curve)["success_rate"]
+            late = msr[msr.index * WINDOW_PICKS >= HELD_FROM]
+            held.setdefault(cell, []).append(bool((late > HELD).all()))
+    return held
 
 
 def paper_falls(runs: Iterable[Run]) -> pd.DataFrame:

@@ -5,6 +5,7 @@ import pytest
 
 from unload.reproduce.answer import read_answer
 from unload.reproduce.figures import answer
+from unload.reproduce.interventions import read_interventions
 from unload.reproduce.verdict import end_msr
 
 RUNS = [(cell, seed, curve) for cell, seed, curve in read_answer() if cell in answer.PAPER_CELLS]
@@ -24,6 +25,14 @@ def test_every_run_is_a_dot():
 def test_every_run_is_a_curve():
     figure = answer.cell_curves()
     assert sum(len(axes.lines) - 1 for axes in figure.axes if axes.get_visible()) == len(RUNS)
+
+
+def test_every_changed_run_is_a_curve(saved_twice):
+    changes = {"nothing": "control", "failures_kept": "kept"}
+    panels = answer.intervention_curves(changes).axes
+    runs = [change for change, _, _ in read_interventions() if change in changes]
+    assert len(panels) == 2 and sum(len(axes.lines) - 2 for axes in panels) == len(runs) >= 10
+    saved_twice(lambda: answer.intervention_curves(changes))
 
 
 def test_the_replay_holds_the_failures_of_the_latest_picks():
@@ -47,6 +56,10 @@ def test_bad_input_is_refused(tmp_path):
         answer.cells_msr({"neither": ""})
     with pytest.raises(ValueError, match="none has a run"):
         answer.cell_curves(folder=tmp_path)
+    with pytest.raises(ValueError, match="changes is 'tea'"):
+        answer.intervention_curves({"tea": ""})
+    with pytest.raises(ValueError, match="none has a run"):
+        answer.intervention_curves({"nothing": ""}, folder=tmp_path)
     with pytest.raises(ValueError, match="seeds is 99"):
         answer.falls_and_replay("paper_mask", [99], 2**20)
     with pytest.raises(ValueError, match="before is empty"):

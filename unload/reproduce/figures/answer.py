@@ -5,11 +5,14 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.answer import CELLS, PAPER_CELLS, read_answer
+from unload.reproduce.changes import CHANGES
 from unload.reproduce.figures.style import styled
+from unload.reproduce.interventions import START, read_interventions
 from unload.reproduce.survival import constant_chance, surviving
 from unload.reproduce.verdict import PAPER_MSR, WINDOW_PICKS, cell_table, end_msr, windows
 from unload.support import checks, files
@@ -80,11 +83,49 @@ def cell_curves(
     Raises:
         ValueError: an unknown cell, or no cell has a run.
     """
-    checks.integer("columns", columns, 1)
     runs = _chosen(cells, folder)
     if not runs:
         raise ValueError(f"cells is {list(cells)}, of which none has a run; expected data of one")
-    columns = min(columns, len(runs))
+    return _courses({cells[cell]: found for cell, found in runs.items()}, columns)
+
+
+@styled
+def intervention_curves(
+    changes: Mapping[str, str], columns: int = 3, folder: str | Path = files.DATA
+) -> Figure:
+    """MSR while training of the runs that were changed on the way, as in ``cell_curves``.
+
+    The dashed line is the time of the change.
+
+    Args:
+        changes: names in ``unload.reproduce.changes.CHANGES`` → text; those without a run are
+            left out.
+        columns: panels in a line.
+        folder: of the data.
+
+    Raises:
+        ValueError: an unknown change, or no change has a run.
+    """
+    for change in changes:
+        checks.one_of("changes", change, CHANGES)
+    runs = {change: [] for change in changes}
+    for run in read_interventions(folder):
+        if run[0] in runs:
+            runs[run[0]].append(run)
+    found = {changes[change]: each for change, each in runs.items() if each}
+    if not found:
+        raise ValueError(
+            f"changes is {list(changes)}, of which none has a run; expected data of one"
+        )
+    figure = _courses(found, columns)
+    for axes in filter(Axes.get_visible, figure.axes):
+        axes.axvline(START / 1e6, color="0.4", linestyle="--", linewidth=0.8)
+    return figure
+
+
+def _courses(runs: Mapping[str, Sequence[tuple]], columns: int) -> Figure:
+    """MSR of runs, ``(…, seed, curve)``, over windows; a panel for each title."""
+    columns = min(checks.integer("columns", columns, 1), len(runs))
     lines = -(-len(runs) // columns)
     figure, grid = plt.subplots(
         lines, columns, figsize=(3.8 * columns, 0.5 + 1.9 * lines), sharex=True, sharey=True,
@@ -92,14 +133,14 @@ def cell_curves(
     )  # fmt: skip
     for axes in grid.flat[len(runs) :]:
         axes.set_visible(False)
-    for axes, (cell, found) in zip(grid.flat, runs.items()):
+    for axes, (title, found) in zip(grid.flat, runs.items()):
         for _, seed, curve in found:
             msr = windows(curve)["success_rate"]
             middles = (msr.index + 0.5) * WINDOW_PICKS / 1e6
             colour = plt.get_cmap("viridis")(seed / 10)
             axes.plot(middles, msr, color=colour, linewidth=1, label=seed)
         axes.axhline(PAPER_MSR, color="C1", linestyle=":")
-        axes.set_title(f"{cells[cell]} ({len(found)} runs)", fontsize=9)
+        axes.set_title(f"{title} ({len(found)} runs)", fontsize=9)
     for axes in grid[:, 0]:
         axes.set(ylabel="MSR while training", ylim=(0, 1.02))
         axes.yaxis.set_major_formatter(PercentFormatter(1))
