@@ -21,6 +21,7 @@ from unload.reproduce import (
     random_picks,
     robustness,
     study,
+    trained,
     training,
     tuning,
 )
@@ -38,6 +39,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "study": ("why 60 %: the controlled experiments", study.studies_data, study.OPTIONS),
     "drift": ("how the boxes of settled walls move", drift.drift_data, drift.OPTIONS),
     "answer": ("why 60 %: the runs of the plan", answer.answer_data, answer.OPTIONS),
+    "trained": ("why 60 %: what those runs have learned", trained.trained_data, trained.OPTIONS),
     "interventions": (
         "why 60 %: runs changed on the way",
         interventions.interventions_data,

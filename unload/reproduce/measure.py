@@ -40,7 +40,7 @@ def measure_run(config: TrainConfig, folder: str | Path) -> tuple[dict, pd.DataF
     """
     policy, training = RunFolder(folder).result(config)
     curve = _curve(training, sorted((Path(folder) / "snapshots").glob("*.safetensors")))
-    masked, unmasked = (_unload(policy, POLICY_LOADS, mask) for mask in (True, False))
+    masked, unmasked = (on_fresh_loads(policy, POLICY_LOADS, mask) for mask in (True, False))
     end = training[training["picks"] > 0.9 * config.picks]
     row = {
         **asdict(config),
@@ -66,14 +66,16 @@ def _curve(training: pd.DataFrame, snapshots: list[Path]) -> pd.DataFrame:
         since = training[(training["picks"] > start) & (training["picks"] <= picks)]
         point = {"picks": picks, **since[["success_rate", "deadlocked", "loss"]].mean()}
         for name, mask in (("mask", True), ("no_mask", False)):
-            point[f"msr_{name}"] = _unload(policy, SNAPSHOT_LOADS, mask)["success_rate"].mean()
+            point[f"msr_{name}"] = on_fresh_loads(policy, SNAPSHOT_LOADS, mask)[
+                "success_rate"
+            ].mean()
         points.append(point)
         start = picks
     return pd.DataFrame(points)
 
 
-def _unload(policy: Greedy, loads: int, mask: bool) -> pd.DataFrame:
-    """Evaluate on fresh loads; the environment equalizes, faster than the policy would."""
+def on_fresh_loads(policy: Greedy, loads: int, mask: bool) -> pd.DataFrame:
+    """Evaluate a policy, see ``unload.evaluate``; the environment equalizes, which is faster."""
     ready = Greedy(policy.network, equalize=False)
     seen = {"equalize": policy.equalize, "ties": policy.ties}
     return evaluate(ready, loads, LOADS_SEED, mask=mask, **seen)
