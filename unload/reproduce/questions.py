@@ -195,12 +195,9 @@ def forgetting(runs: list[Run], interventions: list[Run] = ()) -> Answer:
         if name in table.index and table.loc[name, "runs"] >= FEWEST
     ]
     for name in tested:
-        row = table.loc[name]
-        prevents = row["p"] <= 0.05
+        prevents = table.loc[name, "p"] <= 0.05
         reasons.append(prevents if name == "containers_replaced" else not prevents)
-        sentence += (
-            f" {name.replace('_', ' ')}: {row['fell']} of {row['runs']} fall (p = {row['p']:.2g})."
-        )
+        sentence += f" {_changed(table, name)}."
     if len(tested) < 3:
         sentence += f" Interventions with at least {FEWEST} runs: {len(tested)} of 3."
     complete = len(tested) == 3 and _complete(cells, PAPER_CELLS)
@@ -240,12 +237,8 @@ def failures_matter(interventions: list[Run]) -> Answer:
     there = [name for name in names if name in table.index and table.loc[name, "runs"] >= FEWEST]
     prevents = {name: bool(table.loc[name, "p"] <= 0.05) for name in there}
     refuted = not prevents.get(names[0], True) or prevents.get(names[1], False)
-    parts = [
-        f"{name.replace('_', ' ')}: {table.loc[name, 'fell']} of {table.loc[name, 'runs']} fall "
-        f"(p = {table.loc[name, 'p']:.2g})"
-        for name in there
-    ]
-    sentence = f"In half of the replay, after {START / 1e6:.0f} million picks: {'; '.join(parts)}."
+    parts = "; ".join(_changed(table, name) for name in there)
+    sentence = f"In half of the replay, after {START / 1e6:.0f} million picks: {parts}."
     return Answer(
         "Failures that stay in the replay keep a run up, and other picks that stay do not.",
         _status("refuted" if refuted else "shown", len(there) == len(names), bool(there)),
@@ -328,6 +321,12 @@ def intervention_table(interventions: Iterable[Run]) -> pd.DataFrame:
         for change, each in fell.items()
     ]
     return pd.DataFrame(rows, columns=["change", "runs", "fell", "p"])
+
+
+def _changed(table: pd.DataFrame, change: str) -> str:
+    """What became of the runs with a change, by ``intervention_table`` indexed by change."""
+    fell, runs, p = (table.loc[change, name] for name in ("fell", "runs", "p"))
+    return f"{change.replace('_', ' ')}: {fell} of {runs} fall (p = {p:.2g})"
 
 
 def _complete(cells: dict[str, pd.DataFrame], names: Iterable[str]) -> bool:
