@@ -10,6 +10,7 @@ from unload.reproduce import changes
 from unload.reproduce.changes import CHANGES
 from unload.reproduce.interventions import failure_share
 
+KEPT_FEW = 1 / changes.FEW
 STEPS = 300  # before the change; the last of an episode and a half
 CONFIG = TrainConfig(
     picks=64 * 1000,
@@ -43,6 +44,8 @@ def test_memories_hold_what_their_names_say(runs):
     for name in ("failures_refilled", "failures_kept"):
         assert len(runs[name].replay) == size
         assert failure_share(runs[name].replay) == pytest.approx((1 + share) / 2, abs=0.1)
+    few = KEPT_FEW + (1 - KEPT_FEW) * share
+    assert failure_share(runs["few_failures_kept"].replay) == pytest.approx(few, abs=0.05)
     successes = runs["successes_kept"].replay
     assert failure_share(successes) == pytest.approx(share / 2, abs=0.1)
 

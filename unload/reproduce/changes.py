@@ -22,6 +22,7 @@ from unload.physics.choose import make_physics
 MEMORY = 2**23  # picks of the enlarged replay
 MOST_LOST = 400  # boxes of a replaced container
 EXPLORATION = 0.05
+FEW = 16  # the share of failures where few are kept is one in so many
 SLOWER = 10  # divisor of the learning rate
 ROWS_AT_ONCE = 2**14  # picks that are moved together
 
@@ -47,18 +48,23 @@ def _refilled(run: Training) -> None:
 
 def _kept_failures(run: Training) -> None:
     """For good: the next picks overwrite those of the other half only."""
-    _keep(run, succeeded=False)
+    _keep(run, run.replay.size // 2, succeeded=False)
+
+
+def _few_kept_failures(run: Training) -> None:
+    """As few as there are in the replay with exploration held."""
+    _keep(run, run.replay.size // FEW, succeeded=False)
 
 
 def _kept_successes(run: Training) -> None:
-    """The same with picks that teach nothing about failures."""
-    _keep(run, succeeded=True)
+    """As many, of picks that teach nothing about failures."""
+    _keep(run, run.replay.size // 2, succeeded=True)
 
 
-def _keep(run: Training, succeeded: bool) -> None:
+def _keep(run: Training, count: int, succeeded: bool) -> None:
     old = run.replay
-    kept = random_picks(run.config, old.size // 2, run.rng, succeeded)
-    new = KeptPicks(old.size, task.N_VISIBLE, old.size // 2, kept, equalized=old.equalized)
+    kept = random_picks(run.config, count, run.rng, succeeded)
+    new = KeptPicks(old.size, task.N_VISIBLE, count, kept, equalized=old.equalized)
     run.replay = moved(old, new)
 
 
@@ -87,6 +93,7 @@ CHANGES: dict[str, Callable[[Training], None]] = {
     "memory_23": _larger_memory,
     "failures_refilled": _refilled,
     "failures_kept": _kept_failures,
+    "few_failures_kept": _few_kept_failures,
     "successes_kept": _kept_successes,
     "containers_replaced": _replaced_containers,
     "exploration_held": _exploration,
