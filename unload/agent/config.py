@@ -22,7 +22,7 @@ MOST = {
 }
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 # Settings that older runs do not name: they had the defaults.
-ADDED = ("position_noise", "drift", "staggered", "literal", "failures_kept")
+ADDED = ("position_noise", "drift", "staggered", "literal", "failures_kept", "adam_epsilon")
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class TrainConfig:
     epsilon_fraction: float = 0.5  # K_ε / K
     gamma: float = 0.0  # Sec. III-E
     beta: float = 1.0  # Sec. III-G
+    adam_epsilon: float = 1e-8  # * Adam itself is our choice, too; see unload.DQN
     # h of Sec. V-A: a failed pick is learned from as -1 + h (z + 1) / 2, z as observed.
     height_reward: float = 0.0
     # Sec. III-G; the others, in unload.network.variants, take padded rows for items in training.
@@ -83,7 +84,7 @@ class TrainConfig:
             "failures_kept",
         ):  # fmt: skip
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
-        for name in ("learning_rate", "beta", "checkpoint_interval"):
+        for name in ("learning_rate", "beta", "adam_epsilon", "checkpoint_interval"):
             self._set(name, checks.real(name, getattr(self, name), 0))
         self._set(
             "position_noise", checks.real("position_noise", self.position_noise, 0, MOST_NOISE)

@@ -23,6 +23,7 @@ MEMORY = 2**23  # picks of the enlarged replay
 MOST_LOST = 400  # boxes of a replaced container
 EXPLORATION = 0.05
 FEW = 16  # the share of failures where few are kept is one in so many
+ADAM_EPSILON = 1.5e-4  # of Rainbow (Hessel et al. 2018)
 SLOWER = 10  # divisor of the learning rate
 ROWS_AT_ONCE = 2**14  # picks that are moved together
 
@@ -82,6 +83,10 @@ def _slower_learning(run: Training) -> None:
     run.agent.learner.optimizer.learning_rate /= SLOWER
 
 
+def _larger_adam_epsilon(run: Training) -> None:
+    run.agent.learner.optimizer.epsilon = ADAM_EPSILON
+
+
 def _ties_averaged(run: Training) -> None:
     run.config = replace(run.config, ties="average")
     run.rollout.reopen(run.config)
@@ -98,6 +103,7 @@ CHANGES: dict[str, Callable[[Training], None]] = {
     "containers_replaced": _replaced_containers,
     "exploration_held": _exploration,
     "learning_rate_lowered": _slower_learning,
+    "adam_epsilon_raised": _larger_adam_epsilon,
     "ties_averaged": _ties_averaged,
 }
 

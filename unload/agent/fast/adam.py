@@ -10,7 +10,7 @@ import numpy as np
 
 from unload.support.compiled import compiled
 
-BETAS, EPSILON = (0.9, 0.999), 1e-8  # PyTorch's defaults
+BETAS = 0.9, 0.999  # PyTorch's defaults
 
 
 class Adam:
@@ -19,11 +19,14 @@ class Adam:
     Args:
         weights: (k,) float32 each.
         learning_rate: the step size.
+        epsilon: is added to the root mean square of the gradients, by which a step is divided.
     """
 
-    def __init__(self, weights: Sequence[np.ndarray], learning_rate: float) -> None:
+    def __init__(
+        self, weights: Sequence[np.ndarray], learning_rate: float, epsilon: float = 1e-8
+    ) -> None:
         self.weights = tuple(weights)
-        self.learning_rate = learning_rate
+        self.learning_rate, self.epsilon = learning_rate, epsilon
         self.steps = 0
         count = sum(map(len, self.weights))
         # Running means of the gradients and of their squares.
@@ -44,7 +47,8 @@ class Adam:
             )
         self.steps += 1
         corrections = [1 - beta**self.steps for beta in BETAS]
-        _step(self.weights, gradients, self.moments, self.learning_rate, *corrections)
+        settings = self.learning_rate, self.epsilon, *corrections
+        _step(self.weights, gradients, self.moments, *settings)
 
     def state(self) -> dict[str, np.ndarray]:
         """What ``load_state`` needs to go on from here."""
@@ -57,7 +61,7 @@ class Adam:
 
 
 @compiled
-def _step(weights, gradients, moments, learning_rate, correction, correction2):
+def _step(weights, gradients, moments, learning_rate, epsilon, correction, correction2):
     mean, square = moments
     i = 0
     for part in weights:
@@ -65,6 +69,6 @@ def _step(weights, gradients, moments, learning_rate, correction, correction2):
             gradient = gradients[i]
             mean[i] += (1 - BETAS[0]) * (gradient - mean[i])
             square[i] += (1 - BETAS[1]) * (gradient * gradient - square[i])
-            size = np.sqrt(square[i] / correction2) + EPSILON
+            size = np.sqrt(square[i] / correction2) + epsilon
             part[place] -= learning_rate * (mean[i] / correction) / size
             i += 1
