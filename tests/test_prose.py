@@ -108,11 +108,9 @@ def falls_after_changes():
 
 
 def runs_with_failures_kept():
-    found = [curve for cell, _, curve in read_answer() if cell == KEPT]
-    for curve in found:
-        msr = windows(curve)["success_rate"]
-        assert (msr[msr.index * WINDOW_PICKS >= HELD_FROM] > HELD).all()
-    return len(found), len(seeds_of(KEPT)), 100 * HELD, HELD_FROM / 1e6
+    found = [windows(curve)["success_rate"] for cell, _, curve in read_answer() if cell == KEPT]
+    held = sum((msr[msr.index * WINDOW_PICKS >= HELD_FROM] > HELD).all() for msr in found)
+    return held, len(found), 100 * HELD, HELD_FROM / 1e6
 
 
 def engines_apart():
@@ -231,7 +229,7 @@ CLAIMS = [
     ),
     (
         "README.md",
-        "all {} runs that are done, of {} planned, stay above {:.0f} % from {:.0f} million picks",
+        "{} of {} runs stay above {:.0f} % from {:.0f} million picks to the end",
         runs_with_failures_kept,
     ),
     ("README.md", "it in {} single lifts from heaps", highest_lifts),

@@ -100,6 +100,7 @@ def test_runs_that_fit_into_no_memory_are_refused_by_name(field):
         ("failures_kept", float("nan"), ValueError),
         ("failures_kept", "half", TypeError),
         ("failures_kept", 1.0, ValueError),  # leaves no room for the agent's own picks
+        ("failures_kept", 1e-9, ValueError),  # keeps none
     ],
 )
 def test_bad_values_of_later_settings_are_refused_by_name(field, value, error):

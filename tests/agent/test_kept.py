@@ -26,10 +26,11 @@ def numbers(replay, rng):
 def test_kept_picks_stay_while_others_come_and_go(rng):
     kept = [picks(100, 2, -1.0), picks(102, 1, -1.0)]
     replay = KeptPicks(8, 128, 3, kept)
-    assert (len(replay), replay.size) == (3, 5)
+    assert (len(replay), replay.size) == (3, 5) and replay.filled().tolist() == [5, 6, 7]
     assert numbers(replay, rng) == {100, 101, 102}
     replay.add(**picks(0, 2, 1.0))
     assert len(replay) == 5 and numbers(replay, rng) == {0, 1, 100, 101, 102}
+    assert replay.filled().tolist() == [0, 1, 5, 6, 7]
     replay.add(**picks(2, 8, 1.0))
     replay.add(**picks(10, 4, 1.0))
     assert len(replay) == 8 and numbers(replay, rng) == {*range(9, 14), 100, 101, 102}
@@ -46,6 +47,8 @@ def test_all_picks_are_drawn_alike(rng):
 def test_a_wrong_number_of_kept_picks_is_refused():
     with pytest.raises(ValueError, match="kept holds 2 picks; expected count=3"):
         KeptPicks(8, 128, 3, [picks(0, 2, -1.0)])
+    with pytest.raises(ValueError, match="count is 8; expected an integer >= 0 and <= 7"):
+        KeptPicks(8, 128, 8, [picks(0, 8, -1.0)])
 
 
 @pytest.mark.parametrize("succeeded", (False, True))
@@ -65,6 +68,11 @@ def test_picks_that_never_come_are_reported(monkeypatch):
     monkeypatch.setattr("unload.agent.kept.MOST_PICKS", 1)
     with pytest.raises(ValueError, match="of 64064 random picks too few succeed; [0-9]+ are miss"):
         list(random_picks(CONFIG, 64_000, np.random.default_rng(0), succeeded=True))
+
+
+def test_all_random_picks_come_in_their_order():
+    (first, *_) = random_picks(CONFIG, 100, np.random.default_rng(0), succeeded=None)
+    assert len(first["rewards"]) == 64 and set(first["rewards"].tolist()) == {1.0, -1.0}
 
 
 @pytest.mark.parametrize("gamma", (0.0, 0.5))

@@ -46,6 +46,9 @@ def test_memories_hold_what_their_names_say(runs):
         assert failure_share(runs[name].replay) == pytest.approx((1 + share) / 2, abs=0.1)
     few = KEPT_FEW + (1 - KEPT_FEW) * share
     assert failure_share(runs["few_failures_kept"].replay) == pytest.approx(few, abs=0.05)
+    assert failure_share(runs["all_called_failures"].replay) == pytest.approx(
+        (1 + share) / 2, abs=0.1
+    )
     successes = runs["successes_kept"].replay
     assert failure_share(successes) == pytest.approx(share / 2, abs=0.1)
 
@@ -91,6 +94,11 @@ def test_moved_picks_are_the_same_in_their_order():
     numbers = [replay.arrays["observations"][:, 0, 0].tolist() for replay in (wide, narrow)]
     assert numbers[0][:10] == list(range(14, 24)) and len(wide) == 10
     assert set(numbers[1]) == set(range(18, 24)) and narrow.total == 10
+
+
+def test_kept_picks_are_not_moved(runs):
+    with pytest.raises(ValueError, match="replay keeps picks for good"):
+        changes.moved(runs["failures_kept"].replay, ReplayBuffer(10, 128))
 
 
 def test_a_partly_unloaded_container_has_lost_up_to_400_boxes():

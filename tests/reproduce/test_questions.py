@@ -162,6 +162,8 @@ def test_whether_failures_are_what_matters(failures, successes, status):
     runs += changed("successes_kept", successes) if successes else []
     assert questions.failures_matter(runs).status == status
     assert questions.failures_matter([]).status == "still running"
+    without_control = [run for run in runs if run[0] != "nothing"]
+    assert questions.failures_matter(without_control).status == "still running"
 
 
 def test_failures_kept_from_the_beginning_hold_every_run():
@@ -171,6 +173,10 @@ def test_failures_kept_from_the_beginning_hold_every_run():
     one_low = cell(name, high, 9) + cell(name, LATE_FALL, 1)
     answer = questions.kept_from_the_beginning(one_low)
     assert answer.status == "refuted" and "9 of 10 runs" in answer.so_far
+    short = cell(name, high)
+    for *_, curve_of_2m in short:
+        curve_of_2m["picks"] //= 10
+    assert questions.kept_from_the_beginning(short).status == "still running"
     assert questions.kept_from_the_beginning([]).status == "still running"
 
 

@@ -22,7 +22,7 @@ MOST = {
 }
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 # Settings that older runs do not name: they had the defaults.
-ADDED = ("position_noise", "drift", "staggered", "literal", "failures_kept", "adam_epsilon")
+ADDED = ("position_noise", "drift", "staggered", "literal", "failures_kept")
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,13 @@ class TrainConfig:
     learning_rate: float = 1e-3  # μ
     batch_size: int = 2048  # b
     replay_size: int = 2**20
-    # * share of the replay that holds failed picks of a random policy for good
+    # * share of the replay that holds failed picks of a random policy for good, from the start on
     failures_kept: float = 0.0
     epsilon_init: float = 1.0
     epsilon_final: float = 0.0
     epsilon_fraction: float = 0.5  # K_ε / K
     gamma: float = 0.0  # Sec. III-E
     beta: float = 1.0  # Sec. III-G
-    adam_epsilon: float = 1e-8  # * Adam itself is our choice, too; see unload.DQN
     # h of Sec. V-A: a failed pick is learned from as -1 + h (z + 1) / 2, z as observed.
     height_reward: float = 0.0
     # Sec. III-G; the others, in unload.network.variants, take padded rows for items in training.
@@ -84,7 +83,7 @@ class TrainConfig:
             "failures_kept",
         ):  # fmt: skip
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
-        for name in ("learning_rate", "beta", "adam_epsilon", "checkpoint_interval"):
+        for name in ("learning_rate", "beta", "checkpoint_interval"):
             self._set(name, checks.real(name, getattr(self, name), 0))
         self._set(
             "position_noise", checks.real("position_noise", self.position_noise, 0, MOST_NOISE)
@@ -107,6 +106,11 @@ class TrainConfig:
                 f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
             )
         size, kept = self.memory()
+        if self.failures_kept and not kept:
+            raise ValueError(
+                f"failures_kept is {self.failures_kept}; expected 0 or a share that keeps at least "
+                f"one of {size} picks"
+            )
         if size - kept < self.num_envs:
             raise ValueError(
                 f"failures_kept is {self.failures_kept}; expected a share that leaves at least "

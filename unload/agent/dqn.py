@@ -30,7 +30,6 @@ class DQN:
             ``unload.agent.fast``; wherever it applies if None.
         literal: take tanh in single precision, and choose by the values after it; PyTorch does
             so anyway, the fused update only if it is asked for, see ``FusedLearner``.
-        adam_epsilon: what Adam adds to the root mean square of the gradients; PyTorch's default.
 
     Attributes:
         learner: the ``PlainLearner`` or ``FusedLearner`` that chooses and updates.
@@ -49,7 +48,6 @@ class DQN:
         beta: float = 1.0,
         fused_update: bool | None = None,
         literal: bool = False,
-        adam_epsilon: float = 1e-8,
     ) -> None:
         self.network = check_network(network)
         applies = fused.applies(network)
@@ -63,12 +61,11 @@ class DQN:
         learning_rate = checks.real("learning_rate", learning_rate, 0)
         beta = checks.real("beta", beta, 0)
         literal = checks.boolean("literal", literal)
-        adam_epsilon = checks.real("adam_epsilon", adam_epsilon, 0)
         self.learner: FusedLearner | PlainLearner
         if fused_update:
-            self.learner = FusedLearner(network, learning_rate, beta, literal, adam_epsilon)
+            self.learner = FusedLearner(network, learning_rate, beta, literal)
         else:
-            self.learner = PlainLearner(network, learning_rate, beta, adam_epsilon)
+            self.learner = PlainLearner(network, learning_rate, beta)
         self.update_target()
 
     def act(

@@ -12,6 +12,7 @@ from unload.agent.config import TrainConfig
 from unload.agent.policies import any_allowed
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
+from unload.support import checks
 
 OTHER_LOADS = 1_000_000  # is added to the seed where random picks are made
 MOST_PICKS = 100  # random picks per wanted one
@@ -43,6 +44,8 @@ class KeptPicks(ReplayBuffer):
         next_state: bool = False,
         equalized: bool = False,
     ) -> None:
+        size = checks.integer("size", size, 1)
+        count = checks.integer("count", count, 0, size - 1)
         super().__init__(size, items, next_state, equalized)
         self.size = filled = size - count
         for batch in kept:
@@ -55,9 +58,14 @@ class KeptPicks(ReplayBuffer):
     def __len__(self) -> int:
         return super().__len__() + len(self.arrays["rewards"]) - self.size
 
+    def filled(self) -> np.ndarray:
+        return self._passing_over(super().filled())
+
     def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
-        """As in ``ReplayBuffer``; the slots that are not filled yet are passed over."""
-        rows = super().sample_rows(batch_size, rng)
+        return self._passing_over(super().sample_rows(batch_size, rng))
+
+    def _passing_over(self, rows: np.ndarray) -> np.ndarray:
+        """Slots by their place among those that hold a pick."""
         others = min(self.total, self.size)
         return np.where(rows < others, rows, rows + self.size - others)
 
@@ -66,16 +74,16 @@ def random_picks(
     config: TrainConfig,
     count: int,
     rng: np.random.Generator,
-    succeeded: bool = False,
+    succeeded: bool | None = False,
     stack: Callable | None = None,
 ) -> Iterator[dict[str, np.ndarray]]:
-    """Failed or successful picks of a random policy in containers of their own.
+    """Picks of a random policy in containers of their own, by default those that failed.
 
     Args:
         config: of the containers; the loads are drawn with another seed.
         count: how many.
         rng: draws the picks.
-        succeeded: whether they are the picks that succeeded or those that failed.
+        succeeded: whether they are the picks that succeeded or those that failed; all if None.
         stack: makes the loads, see ``unload.train``.
 
     Yields:
@@ -85,7 +93,7 @@ def random_picks(
         ValueError: such picks are so rare that ``MOST_PICKS`` picks for each are not enough.
     """
     most = config.num_envs * (MOST_PICKS * count // config.num_envs + 1)
-    config = replace(config, seed=config.seed + OTHER_LOADS, picks=most)
+    config = replace(config, seed=config.seed + OTHER_LOADS, picks=most, failures_kept=0.0)
     rollout = Rollout(config, 1, stack)
     try:
         while count:
@@ -95,7 +103,10 @@ def random_picks(
                     f"{count} are missing"
                 )
             rewards, transitions = rollout.pick(any_allowed(rollout.allowed, rng))
-            wanted = np.flatnonzero((rewards > 0) == succeeded)[:count]
+            chosen = (
+                np.ones(len(rewards), bool) if succeeded is None else (rewards > 0) == succeeded
+            )
+            wanted = np.flatnonzero(chosen)[:count]
             count -= len(wanted)
             yield {name: values[wanted] for name, values in transitions.items()}
     finally:

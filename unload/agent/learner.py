@@ -21,14 +21,11 @@ class PlainLearner:
         network: (batch, items, 3) → (batch, items) action values; changed in place.
         learning_rate: of Adam.
         beta: threshold of the smooth-L1 loss.
-        epsilon: of Adam.
     """
 
-    def __init__(
-        self, network: torch.nn.Module, learning_rate: float, beta: float, epsilon: float = 1e-8
-    ) -> None:
+    def __init__(self, network: torch.nn.Module, learning_rate: float, beta: float) -> None:
         self.network, self.beta = network, beta
-        self.optimizer = torch.optim.Adam(network.parameters(), learning_rate, eps=epsilon)
+        self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         """Return the allowed action of the highest value, (batch,) int64."""

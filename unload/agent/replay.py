@@ -99,6 +99,10 @@ class ReplayBuffer:
     def __len__(self) -> int:
         return min(self.total, self.size)
 
+    def filled(self) -> np.ndarray:
+        """Return the slots that hold a pick, (len,) int64."""
+        return np.arange(len(self))
+
     def add(self, **batch: np.ndarray) -> None:
         """Add a batch of picks; the names are those of ``arrays``, the first axis the batch.
 

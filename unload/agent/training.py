@@ -48,12 +48,7 @@ class Training:
         generator = torch.Generator().manual_seed(weights_seed)
         network = NETWORKS[config.network](config.n_features, generator)
         self.agent = DQN(
-            network,
-            config.learning_rate,
-            config.gamma,
-            config.beta,
-            literal=config.literal,
-            adam_epsilon=config.adam_epsilon,
+            network, config.learning_rate, config.gamma, config.beta, literal=config.literal
         )
         self.replay = self._memory(stack)
         self.curve = Curve()

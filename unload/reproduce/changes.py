@@ -62,7 +62,13 @@ def _kept_successes(run: Training) -> None:
     _keep(run, run.replay.size // 2, succeeded=True)
 
 
-def _keep(run: Training, count: int, succeeded: bool) -> None:
+def _all_called_failures(run: Training) -> None:
+    """As many, of all random picks, each with the reward of a failure."""
+    _keep(run, run.replay.size // 2, succeeded=None)
+    run.replay.arrays["rewards"][run.replay.size :] = -1
+
+
+def _keep(run: Training, count: int, succeeded: bool | None) -> None:
     old = run.replay
     kept = random_picks(run.config, count, run.rng, succeeded)
     new = KeptPicks(old.size, task.N_VISIBLE, count, kept, equalized=old.equalized)
@@ -100,6 +106,7 @@ CHANGES: dict[str, Callable[[Training], None]] = {
     "failures_kept": _kept_failures,
     "few_failures_kept": _few_kept_failures,
     "successes_kept": _kept_successes,
+    "all_called_failures": _all_called_failures,
     "containers_replaced": _replaced_containers,
     "exploration_held": _exploration,
     "learning_rate_lowered": _slower_learning,
@@ -112,7 +119,12 @@ def moved(replay: ReplayBuffer, empty: ReplayBuffer) -> ReplayBuffer:
     """Move the picks of a memory, the oldest first, to an empty one; return that.
 
     If it has less room, the latest picks are in it then.
+
+    Raises:
+        ValueError: a part of the memory is kept for good and has no place in that order.
     """
+    if isinstance(replay, KeptPicks):
+        raise ValueError("replay keeps picks for good; expected a plain ReplayBuffer to move")
     rows = np.arange(replay.total - len(replay), replay.total) % replay.size
     for part in np.array_split(rows, len(rows) // ROWS_AT_ONCE + 1):
         empty.add(**replay.rows(part))

@@ -198,7 +198,7 @@ def _train(
 
 def failure_share(replay: ReplayBuffer) -> float:
     """The share of failed picks in a replay memory."""
-    return float((replay.arrays["rewards"][: len(replay)] < 0).mean())
+    return float((replay.arrays["rewards"][replay.filled()] < 0).mean())
 
 
 def _save(run: Training, shares: list[float], path: Path, start: int) -> None:

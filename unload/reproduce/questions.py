@@ -189,11 +189,7 @@ def forgetting(runs: list[Run], interventions: list[Run] = ()) -> Answer:
     )
     reasons = [bool(len(found) and many >= len(found) / 4)]
     table = intervention_table(interventions).set_index("change")
-    tested = [
-        name
-        for name in ("memory_23", "failures_refilled", "containers_replaced")
-        if name in table.index and table.loc[name, "runs"] >= FEWEST
-    ]
+    tested = _compared(table, ("memory_23", "failures_refilled", "containers_replaced"))
     for name in tested:
         prevents = table.loc[name, "p"] <= 0.05
         reasons.append(prevents if name == "containers_replaced" else not prevents)
@@ -234,7 +230,7 @@ def failures_matter(interventions: list[Run]) -> Answer:
     """Question 6 as deviation 8 of the plan asks it anew."""
     table = intervention_table(interventions).set_index("change")
     names = "failures_kept", "successes_kept"
-    there = [name for name in names if name in table.index and table.loc[name, "runs"] >= FEWEST]
+    there = _compared(table, names)
     prevents = {name: bool(table.loc[name, "p"] <= 0.05) for name in there}
     refuted = not prevents.get(names[0], True) or prevents.get(names[1], False)
     parts = "; ".join(_changed(table, name) for name in there)
@@ -270,7 +266,8 @@ def _held(runs: list[Run], cells: Iterable[str]) -> dict[str, list[bool]]:
         if cell in cells:
             msr = windows(curve)["success_rate"]
             late = msr[msr.index * WINDOW_PICKS >= HELD_FROM]
-            held.setdefault(cell, []).append(bool((late > HELD).all()))
+            if len(late):
+                held.setdefault(cell, []).append(bool((late > HELD).all()))
     return held
 
 
@@ -321,6 +318,12 @@ def intervention_table(interventions: Iterable[Run]) -> pd.DataFrame:
         for change, each in fell.items()
     ]
     return pd.DataFrame(rows, columns=["change", "runs", "fell", "p"])
+
+
+def _compared(table: pd.DataFrame, changes: Iterable[str]) -> list[str]:
+    """Those changes of which there are enough runs, if there are enough of the control, too."""
+    enough = table.index[table["runs"] >= FEWEST]
+    return [name for name in changes if name in enough and "nothing" in enough]
 
 
 def _changed(table: pd.DataFrame, change: str) -> str:

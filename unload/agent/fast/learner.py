@@ -16,23 +16,17 @@ class FusedLearner:
     threads while the caller does something else.
 
     Args:
-        network, learning_rate, beta, epsilon: see ``PlainLearner``.
+        network, learning_rate, beta: see ``PlainLearner``.
         literal: take tanh in single precision, as ``PlainLearner`` does. By default the update
             takes it in double precision, where its slope does not become 0 so soon, and the
             choice compares what stands before it, which never ties.
     """
 
     def __init__(
-        self,
-        network: PEQNetwork,
-        learning_rate: float,
-        beta: float,
-        literal: bool = False,
-        epsilon: float = 1e-8,
+        self, network: PEQNetwork, learning_rate: float, beta: float, literal: bool = False
     ) -> None:
         self.weights, self.beta, self.literal = fused.weights_of(network), beta, literal
-        flat = [array.reshape(-1) for array in self.weights]
-        self.optimizer = Adam(flat, learning_rate, epsilon)
+        self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         return fused.best_actions(self.weights, observations, allowed, self.literal)
