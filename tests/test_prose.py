@@ -101,9 +101,8 @@ def large_masked_runs():
     return min(found), max(found)
 
 
-def falls_after_changes():
+def falls_after(*names):
     table = intervention_table(read_interventions()).set_index("change")
-    names = "failures_kept", "successes_kept", "nothing", "all_called_failures"
     return tuple(int(table.loc[name, each]) for name in names for each in ("fell", "runs"))
 
 
@@ -223,10 +222,15 @@ CLAIMS = [
     ("README.md", "all rise to 99–100 % and fall, and end at {:.0f}–{:.0f} %", large_masked_runs),
     (
         "README.md",
-        "{} of {} runs fall; with successful random picks in their place {} of {} do, and with "
-        "nothing changed {} of {}. But with random picks of both kinds that are all called "
-        "failures {} of {} fall, too",
-        falls_after_changes,
+        "{} of {} runs fall; with successful random picks in their place {} of {} do. But with "
+        "random picks of both kinds that are all called failures {} of {} fall, too.",
+        partial(falls_after, "failures_kept", "successes_kept", "all_called_failures"),
+    ),
+    ("README.md", "with nothing changed {} of {} runs fall", partial(falls_after, "nothing")),
+    (
+        "README.md",
+        "if equal coordinates share their rank, {} of {} fall",
+        partial(falls_after, "ties_averaged"),
     ),
     (
         "README.md",
