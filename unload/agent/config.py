@@ -132,10 +132,17 @@ class TrainConfig:
         size = min(self.replay_size, self.picks)
         return size, int(self.failures_kept * size)
 
-    def seeds(self) -> tuple[int, int, int, int]:
-        """Return the seeds of environments, exploration and batches, weights, and failures kept.
+    def seeds(self) -> tuple[int, int, int]:
+        """Return the seeds of the environments, of exploration and batches, and of the weights.
 
         The key keeps the loads apart from those that ``unload.evaluate`` draws with the same
         seed.
         """
+        return self._seeds()[:3]
+
+    def failures_seed(self) -> int:
+        """Return the seed of the failures that are kept."""
+        return self._seeds()[3]
+
+    def _seeds(self) -> tuple[int, ...]:
         return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(4).tolist())

@@ -43,7 +43,7 @@ class Training:
 
     def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
         self.config = config
-        _, rng_seed, weights_seed, _ = config.seeds()
+        _, rng_seed, weights_seed = config.seeds()
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
         network = NETWORKS[config.network](config.n_features, generator)
@@ -64,7 +64,7 @@ class Training:
         }
         if not kept:
             return ReplayBuffer(size, task.N_VISIBLE, **kinds)
-        rng = np.random.default_rng(config.seeds()[-1])
+        rng = np.random.default_rng(config.failures_seed())
         failures = random_picks(config, kept, rng, stack=stack)
         return KeptPicks(size, task.N_VISIBLE, kept, failures, **kinds)
 
