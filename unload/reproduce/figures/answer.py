@@ -1,6 +1,6 @@
 """Why 60 %: the runs of the plan, each of them shown."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -20,13 +20,18 @@ from unload.support import checks, files
 
 def _chosen(cells: Mapping[str, str], folder: str | Path) -> dict[str, list]:
     """The runs of some cells, as ``(cell, seed, curve)``; cells without any are left out."""
-    for cell in cells:
-        checks.one_of("cells", cell, CELLS)
-    runs = {cell: [] for cell in cells}
-    for run in read_answer(folder):
-        if run[0] in runs:
-            runs[run[0]].append(run)
-    return {cell: found for cell, found in runs.items() if found}
+    return _grouped("cells", cells, CELLS, read_answer(folder))
+
+
+def _grouped(argument: str, names: Iterable[str], known: Iterable[str], runs: Iterable) -> dict:
+    """Runs by their first entry, in the order of ``names``, which must be known ones."""
+    for name in names:
+        checks.one_of(argument, name, known)
+    groups = {name: [] for name in names}
+    for run in runs:
+        if run[0] in groups:
+            groups[run[0]].append(run)
+    return {name: found for name, found in groups.items() if found}
 
 
 @styled
@@ -106,13 +111,8 @@ def intervention_curves(
     Raises:
         ValueError: an unknown change, or no change has a run.
     """
-    for change in changes:
-        checks.one_of("changes", change, CHANGES)
-    runs = {change: [] for change in changes}
-    for run in read_interventions(folder):
-        if run[0] in runs:
-            runs[run[0]].append(run)
-    found = {changes[change]: each for change, each in runs.items() if each}
+    runs = _grouped("changes", changes, CHANGES, read_interventions(folder))
+    found = {changes[change]: each for change, each in runs.items()}
     if not found:
         raise ValueError(
             f"changes is {list(changes)}, of which none has a run; expected data of one"
