@@ -22,7 +22,7 @@ from unload.physics.choose import make_physics
 MEMORY = 2**23  # picks of the enlarged replay
 MOST_LOST = 400  # boxes of a replaced container
 EXPLORATION = 0.05
-FEW = 16  # the share of failures where few are kept is one in so many
+FEW = 16  # where few failures are kept, they are one pick in so many of the replay
 ADAM_EPSILON = 1.5e-4  # of Rainbow (Hessel et al. 2018)
 SLOWER = 10  # divisor of the learning rate
 ROWS_AT_ONCE = 2**14  # picks that are moved together
@@ -53,7 +53,7 @@ def _kept_failures(run: Training) -> None:
 
 
 def _few_kept_failures(run: Training) -> None:
-    """As few as there are in the replay with exploration held."""
+    """The same in a sixteenth of the replay."""
     _keep(run, run.replay.size // FEW, succeeded=False)
 
 
