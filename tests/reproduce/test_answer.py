@@ -16,7 +16,7 @@ def published(tmp_path_factory):
     """The data folder after one short run of one cell."""
     folder = tmp_path_factory.mktemp("data")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(answer, "SEEDS", {"paper": 1})
+        patch.setattr(answer, "SEEDS", {"paper_mask": 1})
         for _ in range(2):  # the second time, nothing is trained
             answer.answer_data(
                 ["paper_mask"], PICKS, folder, folder / "runs", n_jobs=1, progress=False
@@ -54,7 +54,7 @@ def test_a_run_is_published_at_its_end_and_whatever_others_do(tmp_path, monkeypa
         return train_all(configs, *args, **kwargs)
 
     published, train_all = [], answer.run_all
-    monkeypatch.setattr(answer, "SEEDS", {"paper": 3})
+    monkeypatch.setattr(answer, "SEEDS", {"paper_mask": 3})
     monkeypatch.setattr(answer, "run_all", run_all)
     with pytest.raises(RuntimeError, match="^runs failed:\npaper_mask/seed_1 broke$"):
         answer.answer_data(

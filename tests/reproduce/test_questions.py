@@ -166,22 +166,23 @@ def test_whether_failures_are_what_matters(failures, successes, status):
     assert questions.failures_matter(without_control).status == "still running"
 
 
-def test_failures_kept_from_the_beginning_hold_every_run():
-    name, high = "failures_kept_mask", [0.25, 1.05, 1.05, 1.05]
-    assert questions.kept_from_the_beginning(cell(name, high)).status == "shown"
-    assert questions.kept_from_the_beginning(cell(name, high, 4)).status == "shown so far"
+@pytest.mark.parametrize("name", questions.FROM_THE_BEGINNING)
+def test_what_is_changed_from_the_beginning_holds_every_run(name):
+    high = [0.25, 1.05, 1.05, 1.05]
+    assert questions.held_from_the_beginning(cell(name, high), name).status == "shown"
+    assert questions.held_from_the_beginning(cell(name, high, 4), name).status == "shown so far"
     one_low = cell(name, high, 9) + cell(name, LATE_FALL, 1)
-    answer = questions.kept_from_the_beginning(one_low)
+    answer = questions.held_from_the_beginning(one_low, name)
     assert answer.status == "refuted" and "9 of 10 runs" in answer.so_far
     short = cell(name, high)
     for *_, curve_of_2m in short:
         curve_of_2m["picks"] //= 10
-    assert questions.kept_from_the_beginning(short).status == "still running"
-    assert questions.kept_from_the_beginning([]).status == "still running"
+    assert questions.held_from_the_beginning(short, name).status == "still running"
+    assert questions.held_from_the_beginning([], name).status == "still running"
 
 
 def test_all_questions_are_answered_by_the_data():
     found = questions.answers(read_answer(), read_interventions())
-    assert len(found) == 10
+    assert len(found) == 11
     assert all(each.status.removesuffix(" so far") in questions.STATUSES for each in found)
     assert all(each.so_far.endswith(".") for each in found)

@@ -62,7 +62,15 @@ PAPER_CELLS = {
     "paper_b2048_mask": "with the mask, b = 2048",
 }
 # Planned seeds of a cell; of those that are not listed, 5.
-SEEDS = {"paper": 10, "paper_b2048": 8, "failures_kept": 10}
+SEEDS = {
+    "paper_no_mask": 10,
+    "paper_mask": 10,
+    "paper_b2048_no_mask": 8,
+    "paper_b2048_mask": 8,
+    "failures_kept_no_mask": 10,
+    "failures_kept_mask": 10,
+    "ties_averaged_mask": 10,
+}
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)},
     **JOBS,
@@ -71,7 +79,7 @@ OPTIONS = {
 
 def seeds_of(cell: str) -> range:
     """Return the planned seeds of a cell."""
-    return range(SEEDS.get(cell.removesuffix("_mask").removesuffix("_no"), 5))
+    return range(SEEDS.get(cell, 5))
 
 
 def answer_data(

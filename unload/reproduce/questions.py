@@ -22,7 +22,12 @@ from unload.reproduce.verdict import (
 )
 
 MEMORIES = [cell for cell in CELLS if cell.startswith("memory")]  # replays of 2²² and 2²³ picks
-KEPT = "failures_kept_mask"  # the cell that deviation 8 of the plan adds
+# Cells that deviations 8 and 13 of the plan add to question 7.
+KEPT, AVERAGED = "failures_kept_mask", "ties_averaged_mask"
+FROM_THE_BEGINNING = {
+    KEPT: "With failures in half of the replay from the first pick on",
+    AVERAGED: "With the mask and equal coordinates that share their mean rank",
+}
 FEW, MANY = 0.01, 0.03  # shares of failures in the replay that hypothesis 6 speaks of
 FEWEST = 5  # runs of an intervention that count as a result
 HELD, HELD_FROM = 0.99, 12_000_000  # MSR that hypothesis 7 asks for, and after how many picks
@@ -66,7 +71,7 @@ def answers(runs: Iterable[Run], interventions: Iterable[Run] = ()) -> list[Answ
         forgetting(runs, interventions),
         smallest_change(runs),
         failures_matter(interventions),
-        kept_from_the_beginning(runs),
+        *(held_from_the_beginning(runs, cell) for cell in FROM_THE_BEGINNING),
     ]
 
 
@@ -243,14 +248,14 @@ def failures_matter(interventions: list[Run]) -> Answer:
     )
 
 
-def kept_from_the_beginning(runs: list[Run]) -> Answer:
-    """Question 7 for the cell that deviation 8 of the plan adds."""
-    held = _held(runs, [KEPT]).get(KEPT, [])
-    planned = len(seeds_of(KEPT))
+def held_from_the_beginning(runs: list[Run], cell: str) -> Answer:
+    """Question 7 for a cell that deviation 8 or 13 of the plan adds."""
+    held = _held(runs, [cell]).get(cell, [])
+    planned = len(seeds_of(cell))
     status = "shown" if all(held) else "refuted"
     return Answer(
-        "With failures in half of the replay from the first pick on, every window after "
-        f"{HELD_FROM / 1e6:.0f} million picks is above {HELD:.0%} on each of {planned} seeds.",
+        f"{FROM_THE_BEGINNING[cell]}, every window after {HELD_FROM / 1e6:.0f} million picks is "
+        f"above {HELD:.0%} on each of {planned} seeds.",
         _status(status, len(held) >= planned or not all(held), bool(held)),
         f"Above it throughout: {sum(held)} of {len(held)} runs."
         if held
