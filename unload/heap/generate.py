@@ -1,5 +1,7 @@
 """Heaps: boxes dropped behind a barrier that is then taken away."""
 
+from fractions import Fraction
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -100,13 +102,25 @@ def _dropped(rng: np.random.Generator, scale: float, friction: float, count: int
                 rng.uniform(MARGIN, WIDTH - MARGIN),
                 top + SPACING * (1 + number - first),
             )
-            turn /= np.linalg.norm(turn)
+            turn /= _length(turn)
             bodies.append(world.add_box(place, sizes[number], task.MASS, turn, friction))
         world.step(LAYER_TIME)
     world.step(SETTLE)
     positions, orientations = (np.array(part) for part in zip(*map(world.pose, bodies)))
     world.close()
     return Heap(positions, orientations, sizes, packages)
+
+
+def _length(vector: np.ndarray) -> float:
+    """The Euclidean length, with the same bits on every processor.
+
+    ``np.linalg.norm`` leaves the rounding to BLAS, which has other kernels for other
+    processors, and a falling heap magnifies the last bit.
+    """
+    total = 0.0
+    for value in vector.tolist():
+        total = float(Fraction(value) ** 2 + Fraction(total))  # one rounding for each term
+    return sqrt(total)
 
 
 def _settled(heap: Heap, friction: float) -> tuple[Heap, float]:
