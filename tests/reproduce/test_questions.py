@@ -82,10 +82,14 @@ def test_ties_by_order(msr, status):
     assert questions.random_ties(table).status == status
 
 
-@pytest.mark.parametrize(("msr", "status"), [(KEPT, "shown"), (STEADY, "refuted")])
-def test_distinct_ranks(msr, status):
+@pytest.mark.parametrize(
+    ("positions", "ordered", "status"),
+    [(KEPT, STEADY, "shown"), (STEADY, STEADY, "refuted"), (KEPT, KEPT, "refuted")],
+)
+def test_distinct_ranks(positions, ordered, status):
     names = "ties_averaged_no_mask", "ties_averaged_mask", "positions_no_mask", "positions_mask"
-    table = cells(**dict.fromkeys(names, KEPT) | {"positions_mask": msr})
+    changes = {"positions_mask": positions} | dict.fromkeys(questions.ORDERED, ordered)
+    table = cells(**dict.fromkeys(names, KEPT) | changes)
     assert questions.distinct_ranks(table).status == status
     assert questions.distinct_ranks({}).status == "still running"
 
