@@ -76,9 +76,17 @@ def test_the_batch_is_judged_for_each_setting_of_the_mask():
     assert float(low) < float(high) < -30
 
 
-@pytest.mark.parametrize(("msr", "status"), [(KEPT, "shown"), (FALLEN, "refuted")])
-def test_ties_by_order(msr, status):
-    table = cells(ties_by_order_mask=KEPT, ties_by_order_no_mask=msr)
+@pytest.mark.parametrize(
+    ("ordered", "averaged", "status"),
+    [(KEPT, KEPT, "shown"), (FALLEN, KEPT, "refuted"), (KEPT, FALLEN, "refuted")],
+)
+def test_random_ties(ordered, averaged, status):
+    table = cells(
+        ties_by_order_mask=KEPT,
+        ties_by_order_no_mask=ordered,
+        ties_averaged_mask=KEPT,
+        ties_averaged_no_mask=averaged,
+    )
     assert questions.random_ties(table).status == status
 
 

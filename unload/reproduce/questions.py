@@ -156,14 +156,20 @@ def batch_matters(cells: dict[str, pd.DataFrame], mask: str) -> Answer:
 
 
 def random_ties(cells: dict[str, pd.DataFrame]) -> Answer:
-    """Question 4."""
-    known = [cell for cell in ORDERED if cell in cells]
-    refuted = any(not _stays_up(cells[cell]) for cell in known)
+    """Question 4, with deviation 15 of the plan."""
+    averaged = [cell for cell in CELLS if cell.startswith("ties_averaged")]
+    names = [*ORDERED, *averaged]
+    known = [cell for cell in names if cell in cells]
+    refuted = any(
+        not _stays_up(table) if cell in ORDERED else (table["falls"] > 0).any()
+        for cell, table in ((cell, cells[cell]) for cell in known)
+    )
     return Answer(
         "Ties must be broken at random to keep a run down.",
-        _status("refuted" if refuted else "shown", _complete(cells, ORDERED), bool(known)),
-        _fell_and_ended(cells, ORDERED),
-        "with ties broken by order half of the runs fall, or their mean lies below 90 %",
+        _status("refuted" if refuted else "shown", _complete(cells, names), bool(known)),
+        _fell_and_ended(cells, names),
+        "with ties broken by order half of the runs fall, or their mean lies below 90 %; or a run "
+        "with averaged ties falls",
     )
 
 
