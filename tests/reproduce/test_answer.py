@@ -15,12 +15,10 @@ PICKS = 64_000  # two episodes of all environments
 def published(tmp_path_factory):
     """The data folder after one short run of one cell."""
     folder = tmp_path_factory.mktemp("data")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(answer, "SEEDS", {"paper_mask": 1})
-        for _ in range(2):  # the second time, nothing is trained
-            answer.answer_data(
-                ["paper_mask"], PICKS, folder, folder / "runs", n_jobs=1, progress=False
-            )
+    for _ in range(2):  # the second time, nothing is trained
+        answer.answer_data(
+            ["paper_mask"], [0], PICKS, folder, folder / "runs", n_jobs=1, progress=False
+        )
     return folder
 
 
@@ -54,11 +52,10 @@ def test_a_run_is_published_at_its_end_and_whatever_others_do(tmp_path, monkeypa
         return train_all(configs, *args, **kwargs)
 
     published, train_all = [], answer.run_all
-    monkeypatch.setattr(answer, "SEEDS", {"paper_mask": 3})
     monkeypatch.setattr(answer, "run_all", run_all)
     with pytest.raises(RuntimeError, match="^runs failed:\npaper_mask/seed_1 broke$"):
         answer.answer_data(
-            ["paper_mask"], PICKS // 2, tmp_path, tmp_path / "runs", n_jobs=1, progress=False
+            ["paper_mask"], range(3), PICKS // 2, tmp_path, tmp_path / "runs", 1, progress=False
         )
     assert published == [[], ["seed_0.csv"], ["seed_0.csv"]]
     assert [seed for _, seed, _ in answer.read_answer(tmp_path)] == [0, 2]

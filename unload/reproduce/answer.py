@@ -73,6 +73,7 @@ SEEDS = {
 }
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)},
+    "--seeds": {"nargs": "+", "type": int, "help": "those of the plan if none are given"},
     **JOBS,
 }
 
@@ -84,6 +85,7 @@ def seeds_of(cell: str) -> range:
 
 def answer_data(
     cells: Sequence[str] = tuple(CELLS),
+    seeds: Sequence[int] | None = None,
     picks: int = BASE.picks,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
@@ -94,6 +96,7 @@ def answer_data(
 
     Args:
         cells: names in ``CELLS``.
+        seeds: of the runs; those of the plan if None.
         picks: of each run.
         folder: of the data.
         runs_dir: where the runs are kept, apart from those of code that trained otherwise.
@@ -110,7 +113,7 @@ def answer_data(
     configs = {
         f"{cell}/seed_{seed}": replace(CELLS[cell], picks=picks, seed=seed)
         for cell in cells
-        for seed in seeds_of(cell)
+        for seed in (seeds_of(cell) if seeds is None else seeds)
     }
     fingerprint = training_fingerprint()
     kept, folder = Path(runs_dir) / "answer" / fingerprint, Path(folder) / "answer"
