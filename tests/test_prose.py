@@ -5,7 +5,7 @@ the test names the sentence that has to be written anew.
 """
 
 import json
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -38,8 +38,17 @@ def text_of(name: str) -> str:
     return " ".join(text.replace("*", "").split())
 
 
+@cache
+def curves_by_cell() -> dict[str, list[pd.DataFrame]]:
+    """The curves of the runs of each cell of the plan, in the order of their seeds."""
+    found = {}
+    for cell, _, curve in read_answer():
+        found.setdefault(cell, []).append(curve)
+    return found
+
+
 def curves_of(cell: str) -> list[pd.DataFrame]:
-    return [curve for each, _, curve in paper_runs() if each == cell]
+    return curves_by_cell()[cell]
 
 
 def tops(cell: str) -> np.ndarray:
@@ -67,10 +76,10 @@ def recommended_picks():
 
 
 def unmasked_runs():
-    courses = [windows(each)["success_rate"] for each in curves_of("paper_no_mask")]
-    rising = sum(msr.iloc[-1] == msr.max() for msr in courses)
-    tops_found = tops("paper_no_mask")
-    return tops_found.min(), tops_found.max(), len(courses) - rising, rising
+    highest = tops("paper_no_mask")
+    last = [100 * windows(each)["success_rate"].iloc[-1] for each in curves_of("paper_no_mask")]
+    rising = (last == highest).sum()
+    return highest.min(), highest.max(), len(highest) - rising, rising
 
 
 def masked_runs():
@@ -106,40 +115,35 @@ def means_by_ties():
 
     After that of averaged ties without the mask stand the ends that it is the mean of.
     """
-    ends = pd.DataFrame([(cell, 100 * end_msr(curve)) for cell, _, curve in read_answer()])
-    counts, means = (getattr(ends.groupby(0)[1], name)() for name in ("size", "mean"))
     cells = [
         f"{name}_{mask}"
         for name in ("paper", "ties_by_drift", "ties_by_order", "ties_averaged", "positions")
         for mask in ("no_mask", "mask")
     ]
-    assert set(counts[cells]) == {5, 10}
+    assert {len(curves_of(cell)) for cell in cells} == {5, 10}
+    means = [ends(cell).mean() for cell in cells]
     apart = "ties_averaged_no_mask"
-    single = ", ".join(f"{end:.0f}" for end in sorted(ends[1][ends[0] == apart]))
-    after = cells.index(apart) + 1
-    return *means[cells[:after]], single, *means[cells[after:]]
+    single = ", ".join(f"{end:.0f}" for end in np.sort(ends(apart)))
+    means.insert(cells.index(apart) + 1, single)
+    return tuple(means)
 
 
 def falls_by_ties():
     """Runs with the mask that fall, by noise and by drift, of how many; and runs otherwise."""
-    fell = {}
-    for cell, _, curve in read_answer():
-        fell.setdefault(cell, []).append(bool(falls(windows(curve)["success_rate"])))
-    others = [fell[f"{name}_mask"] for name in ("ties_by_order", "ties_averaged", "positions")]
-    assert not any(map(any, others))
-    broken = (fell[cell] for cell in ("paper_mask", "ties_by_drift_mask"))
-    counts = [number for found in broken for number in (sum(found), len(found))]
-    return *counts, sum(map(len, others))
+    others = [f"{name}_mask" for name in ("ties_by_order", "ties_averaged", "positions")]
+    assert not any(map(runs_that_fall, others))
+    broken = "paper_mask", "ties_by_drift_mask"
+    counts = [count for cell in broken for count in (runs_that_fall(cell), len(curves_of(cell)))]
+    return *counts, sum(len(curves_of(cell)) for cell in others)
 
 
 def averaged_ties_that_fall():
-    runs = [curve for cell, _, curve in read_answer() if cell == "ties_averaged_no_mask"]
-    fell = sum(bool(falls(windows(curve)["success_rate"])) for curve in runs)
-    return COUNTS[fell], COUNTS[len(runs)]
+    cell = "ties_averaged_no_mask"
+    return COUNTS[runs_that_fall(cell)], COUNTS[len(curves_of(cell))]
 
 
 def held_with_averaged_ties():
-    msr = [windows(curve)["success_rate"] for cell, _, curve in read_answer() if cell == AVERAGED]
+    msr = [windows(curve)["success_rate"] for curve in curves_of(AVERAGED)]
     assert all((each[each.index * WINDOW_PICKS >= HELD_FROM] > HELD).all() for each in msr)
     return COUNTS[len(msr)], 100 * HELD, HELD_FROM / 1e6
 
