@@ -191,6 +191,6 @@ def test_what_is_changed_from_the_beginning_holds_every_run(name):
 
 def test_all_questions_are_answered_by_the_data():
     found = questions.answers(read_answer(), read_interventions())
-    assert len(found) == 11
+    assert len(found) == 12
     assert all(each.status.removesuffix(" so far") in questions.STATUSES for each in found)
     assert all(each.so_far.endswith(".") for each in found)

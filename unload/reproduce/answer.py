@@ -53,6 +53,7 @@ CELLS: dict[str, TrainConfig] = {
     **_both("literal", literal=True),
     **_both("staggered", staggered=True),
     **_both("failures_kept", failures_kept=0.5),
+    "b2048_ties_averaged_mask": replace(BASE, mask=True, batch_size=2048, ties="average"),
 }
 # The paper's cells, as text and figures name them.
 PAPER_CELLS = {

@@ -22,11 +22,13 @@ from unload.reproduce.verdict import (
 )
 
 MEMORIES = [cell for cell in CELLS if cell.startswith("memory")]  # replays of 2²² and 2²³ picks
-# Cells that deviations 8 and 13 of the plan add to question 7.
+# Cells that deviations 8, 13 and 16 of the plan add to question 7.
 KEPT, AVERAGED = "failures_kept_mask", "ties_averaged_mask"
+AVERAGED_2048 = "b2048_ties_averaged_mask"
 FROM_THE_BEGINNING = {
     KEPT: "With failures in half of the replay from the first pick on",
     AVERAGED: "With the mask and equal coordinates that share their mean rank",
+    AVERAGED_2048: "With these ties, the mask and the paper's batch",
 }
 FEW, MANY = 0.01, 0.03  # shares of failures in the replay that hypothesis 6 speaks of
 FEWEST = 5  # runs of an intervention that count as a result
@@ -260,7 +262,7 @@ def failures_matter(interventions: list[Run]) -> Answer:
 
 
 def held_from_the_beginning(runs: list[Run], cell: str) -> Answer:
-    """Question 7 for a cell that deviation 8 or 13 of the plan adds."""
+    """Question 7 for a cell that deviation 8, 13 or 16 of the plan adds."""
     held = _held(runs, [cell]).get(cell, [])
     planned = len(seeds_of(cell))
     status = "shown" if all(held) else "refuted"
