@@ -19,6 +19,7 @@ from unload.reproduce import (
     lifts,
     observation,
     random_picks,
+    random_share,
     robustness,
     study,
     trained,
@@ -47,6 +48,9 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     ),
     "offline": (
         "what random picks alone teach", random_picks.offline_data, random_picks.OPTIONS
+    ),
+    "random-share": (
+        "what a share of own picks changes", random_share.random_share_data, random_share.OPTIONS
     ),
     "comparison": (
         "policies under other conditions", comparison.comparison_data, comparison.OPTIONS

@@ -26,6 +26,7 @@ from unload.reproduce.study import BASE
 from unload.support import checks, files
 
 COLUMNS = ["picks", "success_rate", "deadlocked", "loss"]
+MASKED = replace(BASE, mask=True)
 
 
 def _both(name: str, **changes) -> dict[str, TrainConfig]:
@@ -46,14 +47,15 @@ CELLS: dict[str, TrainConfig] = {
     **_both("positions", equalize=False),
     **_both("ties_by_order", position_noise=0.0),
     **_both("ties_by_drift", drift="settled"),
-    **_both("updates_4", gradient_steps=4),  # one per 16 picks
-    **_both("updates_16", gradient_steps=16),  # one per 4 picks
-    **_both("features_16", n_features=16),
-    **_both("features_256", n_features=256),
-    **_both("literal", literal=True),
-    **_both("staggered", staggered=True),
     **_both("failures_kept", failures_kept=0.5),
-    "b2048_ties_averaged_mask": replace(BASE, mask=True, batch_size=2048, ties="average"),
+    # What the paper leaves open: with the mask, whose cell comes nearer to 60 %.
+    "updates_4_mask": replace(MASKED, gradient_steps=4),  # one per 16 picks
+    "updates_16_mask": replace(MASKED, gradient_steps=16),  # one per 4 picks
+    "features_16_mask": replace(MASKED, n_features=16),
+    "features_256_mask": replace(MASKED, n_features=256),
+    "literal_mask": replace(MASKED, literal=True),
+    "staggered_mask": replace(MASKED, staggered=True),
+    "b2048_ties_averaged_mask": replace(MASKED, batch_size=2048, ties="average"),
 }
 # The paper's cells, as text and figures name them.
 PAPER_CELLS = {

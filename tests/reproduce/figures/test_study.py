@@ -62,32 +62,6 @@ def test_other_columns_of_the_fits_are_refused(tmp_path):
         study.offline_msr(tmp_path)
 
 
-def test_the_highest_of_128_items_has_rank_1():
-    equalized = (2 * np.arange(128) - 127) / 127
-    assert study.rank_from_top(equalized).tolist() == list(range(128, 0, -1))
-
-
-def test_trainings_are_shown_by_their_own_picks_and_features():
-    trials = pd.DataFrame(
-        {
-            "features": ["noisy ranks"] * 3 + ["positions"],
-            "epsilon": [1, 0.5, 0.5, 0.5],
-            "msr_no_mask": [0.9, 0.2, 0.4, 1],
-        }
-    )
-    left, right = study.own_picks(trials).axes
-    assert left.lines[0].get_ydata() == pytest.approx([0.3, 0.9])  # means, by the random share
-    assert left.lines[1].get_xdata().tolist() == [0, 0.5, 0.5]
-    assert [line.get_ydata().tolist() for line in right.lines] == [[0.2, 0.4], [1]]
-
-
-def test_success_is_counted_for_each_rank():
-    z = np.array([1, 1, 125 / 127])  # the highest item twice, and the second
-    probes = np.column_stack([np.zeros(3), np.zeros(3), z, [1, 0, 1]])
-    axes = study.success_by_height({"random picks": probes}, ranks=2).axes[0]
-    assert axes.lines[0].get_ydata().tolist() == [0.5, 1]
-
-
 def test_shares_of_picks_add_up():
     axes = study.ranks_of_picks({"one": np.array([3, 1, 1, 2])}).axes[0]
     assert axes.lines[0].get_xdata().tolist() == [1, 1, 2, 3]

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, PercentFormatter
 
-from unload import task
 from unload.reproduce.figures.style import styled
 from unload.reproduce.intervals import bootstrap_interval, with_intervals
 from unload.reproduce.results import COMMAND, read_table
@@ -133,57 +132,6 @@ def factorial_curves(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def own_picks(trials: pd.DataFrame) -> Figure:
-    """MSR without the mask of small trainings: by the share of own picks, and by the features.
-
-    Left are the paper's features, the noisy ranks; right all features with half of the picks
-    the agent's own. A dot is a training, the line runs through the means.
-
-    Args:
-        trials: ``features``, ``epsilon`` (share of random picks) and ``msr_no_mask`` of each.
-    """
-    figure, (left, right) = plt.subplots(
-        1, 2, figsize=(8.4, 2.8), sharey=True, width_ratios=(1, 1.6)
-    )
-    noisy = trials[trials["features"] == "noisy ranks"]
-    means = noisy.groupby("epsilon")["msr_no_mask"].mean()
-    left.plot(1 - means.index, means, color="C1")
-    left.plot(1 - noisy["epsilon"], noisy["msr_no_mask"], "o", color="C1", alpha=0.6)
-    left.set(xlabel="share of the agent's own picks", title="noisy ranks", ylim=(0, 1.03))
-    left.set_ylabel("MSR, without the mask")
-    left.xaxis.set_major_formatter(PercentFormatter(1))
-    left.yaxis.set_major_formatter(PercentFormatter(1))
-    groups = dict(list(trials[trials["epsilon"] == 0.5].groupby("features", sort=False)))
-    for place, (features, group) in enumerate(groups.items()):
-        colour = "C1" if "noisy" in features else "C0"
-        right.plot([place] * len(group), group["msr_no_mask"], "o", color=colour, alpha=0.6)
-    names = [name.replace(" of", "\nof").replace(" ", "\n", 1) for name in groups]
-    right.set_xticks(range(len(groups)), names, fontsize=8)
-    right.set(xlim=(-0.5, len(groups) - 0.5), title="half of the picks its own")
-    return figure
-
-
-@styled
-def success_by_height(probes: Mapping[str, np.ndarray], ranks: int = 24) -> Figure:
-    """Share of random picks that succeed, by the rank of the height.
-
-    Args:
-        probes: who has made the containers → (k, 4) picks, see ``random_share.Learned``.
-        ranks: how many from the top.
-    """
-    figure, axes = plt.subplots(figsize=(5, 2.8))
-    for number, (makers, picks) in enumerate(probes.items()):
-        rank = rank_from_top(picks[:, 2])
-        share = [picks[rank == each, 3].mean() for each in range(1, ranks + 1)]
-        axes.plot(range(1, ranks + 1), share, "os"[number % 2] + "-", markersize=3, label=makers)
-    axes.set(xlabel="rank of the height, from the top", ylabel="share that succeeds")
-    axes.set_ylim(0, 1.03)
-    axes.yaxis.set_major_formatter(PercentFormatter(1))
-    axes.legend(title="containers made by", loc="lower left")
-    return figure
-
-
-@styled
 def ranks_of_picks(ranks: Mapping[str, np.ndarray]) -> Figure:
     """Share of picks up to each rank of the height, counted from the top.
 
@@ -203,11 +151,6 @@ def ranks_of_picks(ranks: Mapping[str, np.ndarray]) -> Figure:
     axes.minorticks_off()
     axes.legend(fontsize=8)
     return figure
-
-
-def rank_from_top(z: np.ndarray) -> np.ndarray:
-    """Return the rank, 1 for the highest of 128 items, of an equalized height in [-1, 1]."""
-    return task.N_VISIBLE - np.round((task.N_VISIBLE - 1) * (z + 1) / 2)
 
 
 def _one_panel(names: Sequence[str], cells: Sequence[pd.DataFrame]) -> Figure:
