@@ -53,6 +53,6 @@ def test_trainings_are_shown_by_their_own_picks_and_features(folder):
 
 
 def test_success_is_shown_for_each_rank(folder):
-    by_random, by_agent = random_share.success_by_height(2, folder).axes[0].lines
+    by_random, by_agent = random_share.success_by_height(folder, ranks=2).axes[0].lines
     assert by_random.get_ydata().tolist() == [1, 0.75]
     assert by_agent.get_ydata().tolist() == [0.75, 0.25]

@@ -54,14 +54,14 @@ def own_picks(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def success_by_height(ranks: int = 24, folder: str | Path = files.DATA) -> Figure:
+def success_by_height(folder: str | Path = files.DATA, ranks: int = 24) -> Figure:
     """Share of random picks that succeed, by the noisy rank of the height.
 
     The bands are 95 % bootstrap intervals over the trainings.
 
     Args:
-        ranks: how many from the top.
         folder: of the data.
+        ranks: how many from the top.
 
     Raises:
         FileNotFoundError, ValueError: see ``read_random_share``.
