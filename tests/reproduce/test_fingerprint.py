@@ -22,13 +22,9 @@ STALE = {
     "comparison": PLAYER,
     "robustness": PLAYER,
     "study/attention": DRAWS,
-    "study/factorial": DRAWS,
     "study/long": DRAWS,
-    "study/networks": DRAWS,
     "study/offline": DRAWS,
     "study/recommended": DRAWS,
-    "study/rewards": DRAWS,
-    "study/search": DRAWS,
     "tuning": DRAWS,
 }
 
