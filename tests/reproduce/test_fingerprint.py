@@ -22,8 +22,6 @@ STALE = {
     "comparison": PLAYER,
     "robustness": PLAYER,
     "study/attention": DRAWS,
-    "study/long": DRAWS,
-    "study/offline": DRAWS,
     "study/recommended": DRAWS,
     "tuning": DRAWS,
 }
