@@ -46,11 +46,13 @@ def test_memories_hold_what_their_names_say(runs):
         assert failure_share(runs[name].replay) == pytest.approx((1 + share) / 2, abs=0.1)
     few = KEPT_FEW + (1 - KEPT_FEW) * share
     assert failure_share(runs["few_failures_kept"].replay) == pytest.approx(few, abs=0.05)
-    assert failure_share(runs["all_called_failures"].replay) == pytest.approx(
-        (1 + share) / 2, abs=0.1
-    )
+    for name in ("all_called_failures", "successes_called_failures"):
+        assert failure_share(runs[name].replay) == pytest.approx((1 + share) / 2, abs=0.1)
     successes = runs["successes_kept"].replay
     assert failure_share(successes) == pytest.approx(share / 2, abs=0.1)
+    called = runs["successes_called_failures"].replay.arrays
+    for name in ("observations", "actions"):
+        assert np.array_equal(called[name], successes.arrays[name])
 
 
 def test_settings_are_what_their_names_say(runs):

@@ -68,6 +68,12 @@ def _all_called_failures(run: Training) -> None:
     run.replay.arrays["rewards"][run.replay.size :] = -1
 
 
+def _successes_called_failures(run: Training) -> None:
+    """As many, of successful picks, each with the reward of a failure: none of them is true."""
+    _kept_successes(run)
+    run.replay.arrays["rewards"][run.replay.size :] = -1
+
+
 def _keep(run: Training, count: int, succeeded: bool | None) -> None:
     old = run.replay
     kept = random_picks(run.config, count, run.rng, succeeded)
@@ -107,6 +113,7 @@ CHANGES: dict[str, Callable[[Training], None]] = {
     "few_failures_kept": _few_kept_failures,
     "successes_kept": _kept_successes,
     "all_called_failures": _all_called_failures,
+    "successes_called_failures": _successes_called_failures,
     "containers_replaced": _replaced_containers,
     "exploration_held": _exploration,
     "learning_rate_lowered": _slower_learning,
