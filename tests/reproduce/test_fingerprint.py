@@ -23,7 +23,6 @@ STALE = {
     "robustness": PLAYER,
     "study/attention": DRAWS,
     "study/recommended": DRAWS,
-    "tuning": DRAWS,
 }
 
 
