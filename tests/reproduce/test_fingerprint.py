@@ -21,7 +21,6 @@ PLAYER = "the recommended policy, which plays in it, is of earlier code"
 STALE = {
     "comparison": PLAYER,
     "robustness": PLAYER,
-    "study/attention": DRAWS,
     "study/recommended": DRAWS,
 }
 
