@@ -350,6 +350,11 @@ CLAIMS = [
         "replay memory {} of {}, and with successful ones {} of {}.",
         partial(falls_after, "nothing", "failures_kept", "successes_kept"),
     ),
+    (
+        "README.md",
+        "said to have failed, {} of {} fall",
+        partial(falls_after, "successes_called_failures"),
+    ),
     ("README.md", "it in {} single lifts from heaps", highest_lifts),
     (
         "README.md",

@@ -174,6 +174,14 @@ def test_whether_failures_are_what_matters(failures, successes, status):
     assert questions.failures_matter(without_control).status == "still running"
 
 
+@pytest.mark.parametrize(("called", "status"), [(KEPT, "shown"), (LATE_FALL, "not shown")])
+def test_whether_a_pull_is_enough(called, status):
+    runs = changed("nothing", LATE_FALL) + changed("successes_kept", LATE_FALL)
+    assert questions.pull_is_enough(runs).status == "still running"
+    runs += changed("successes_called_failures", called)
+    assert questions.pull_is_enough(runs).status == status
+
+
 @pytest.mark.parametrize("name", questions.FROM_THE_BEGINNING)
 def test_what_is_changed_from_the_beginning_holds_every_run(name):
     high = [0.25, 1.05, 1.05, 1.05]
@@ -191,6 +199,6 @@ def test_what_is_changed_from_the_beginning_holds_every_run(name):
 
 def test_all_questions_are_answered_by_the_data():
     found = questions.answers(read_answer(), read_interventions())
-    assert len(found) == 12
+    assert len(found) == 13
     assert all(each.status.removesuffix(" so far") in questions.STATUSES for each in found)
     assert all(each.so_far.endswith(".") for each in found)

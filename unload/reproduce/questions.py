@@ -74,6 +74,7 @@ def answers(runs: Iterable[Run], interventions: Iterable[Run] = ()) -> list[Answ
         smallest_change(runs),
         failures_matter(interventions),
         *(held_from_the_beginning(runs, cell) for cell in FROM_THE_BEGINNING),
+        pull_is_enough(interventions),
     ]
 
 
@@ -258,6 +259,24 @@ def failures_matter(interventions: list[Run]) -> Answer:
         _status("refuted" if refuted else "shown", len(there) == len(names), bool(there)),
         sentence if there else "None of these interventions is there.",
         "as many runs fall with failures kept as in the control, or fewer with successes kept, too",
+    )
+
+
+def pull_is_enough(interventions: list[Run]) -> Answer:
+    """Question of deviation 17 of the plan."""
+    table = intervention_table(interventions).set_index("change")
+    there = _compared(table, ["successes_called_failures", "successes_kept"])
+    called = there[:1] == ["successes_called_failures"]
+    prevents = called and table.loc[there[0], "p"] <= 0.05
+    parts = "; ".join(_changed(table, name) for name in there)
+    return Answer(
+        "A pull of values towards −1 is enough to keep a run up, even if none of the failures that "
+        "stay in the replay is true.",
+        _status("shown" if prevents else "not shown", True, called),
+        f"In half of the replay, after {START / 1e6:.0f} million picks: {parts}."
+        if called
+        else "This intervention is not there.",
+        "more than one of five runs falls with successes called failures",
     )
 
 
