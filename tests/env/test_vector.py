@@ -40,6 +40,23 @@ def test_64_containers_for_whole_episodes_and_beyond():
     play_both(CONTAINER, 64, 520, equalize=True)
 
 
+def test_what_can_be_lifted_is_that_of_the_single_environments():
+    array, side_by_side = make_pair(CONTAINER, 3)
+    with pytest.raises(ResetNeeded):
+        array.liftable()
+    observed, _ = array.reset(seed=4)
+    side_by_side.reset(seed=4)
+    for _ in range(40):
+        expected = np.stack([env.unwrapped.liftable() for env in side_by_side.envs])
+        assert_same(array.liftable(), expected)
+        actions = observed[:, :, 2].argmax(axis=1)
+        observed = array.step(actions)[0]
+        side_by_side.step(actions)
+    assert 0 < expected.sum() < expected.size
+    array.close()
+    side_by_side.close()
+
+
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 @pytest.mark.parametrize(
     "kwargs",

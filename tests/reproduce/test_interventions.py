@@ -22,7 +22,7 @@ CONFIG = TrainConfig(
 def control(tmp_path_factory):
     """The folder of a control run after ``START`` picks."""
     folder = tmp_path_factory.mktemp("runs") / "control"
-    interventions._make_control(CONFIG, START, folder.parent)
+    interventions.make_control(CONFIG, START, folder.parent)
     return RunFolder(folder)
 
 

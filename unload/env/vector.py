@@ -80,6 +80,13 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._check_started()
         return self._containers.masks.astype(bool)
 
+    def liftable(self) -> np.ndarray:
+        """(num_envs, 128) bool, which rows of the observations can be unloaded now."""
+        self._check_started()
+        rows = (np.full(self.num_envs, row) for row in range(task.N_VISIBLE))
+        distances = np.stack([self._look_up(actions)[1] for actions in rows], axis=1)
+        return distances >= task.LIFT_THRESHOLD
+
     def _draw(self, rngs: list[np.random.Generator]) -> list[tuple[Load, np.ndarray]]:
         drawn = []
         for rng in rngs:
@@ -136,15 +143,19 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _pick(self, actions: np.ndarray) -> np.ndarray:
         state = self._containers
-        items, distances = containers.look_up(state, actions, *self._physics.table.slots)
-        if distances.min() == containers.UNKNOWN:
-            for env in np.flatnonzero(distances == containers.UNKNOWN):
-                distances[env] = self._lift(env, int(items[env]))
-        self._items, self._distances = items, distances
+        self._items, self._distances = items, distances = self._look_up(actions)
         rewards = containers.pick(state, actions, distances, *self._features)
         if self.drift == "settled":
             settling.relieve(state, self._settling, items, rewards, *self._features)
         return rewards
+
+    def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
+        items, distances = containers.look_up(self._containers, actions, *self._physics.table.slots)
+        if distances.min() == containers.UNKNOWN:
+            for env in np.flatnonzero(distances == containers.UNKNOWN):
+                distances[env] = self._lift(env, int(items[env]))
+        return items, distances
 
     def _lift(self, env: int, item: int) -> float:
         """Lift an item whose situation the table does not know; return the distance in m."""

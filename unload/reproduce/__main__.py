@@ -25,6 +25,7 @@ from unload.reproduce import (
     trained,
     training,
     tuning,
+    values,
 )
 from unload.reproduce.results import COMMAND, JOBS
 
@@ -46,6 +47,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         interventions.interventions_data,
         interventions.OPTIONS,
     ),
+    "values": ("why 60 %: values before a fall", values.values_data, values.OPTIONS),
     "offline": (
         "what random picks alone teach", random_picks.offline_data, random_picks.OPTIONS
     ),

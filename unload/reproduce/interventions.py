@@ -82,9 +82,10 @@ def interventions_data(
     if checks.integer("start", start, 1, config.picks) % config.num_envs:
         raise ValueError(f"start is {start}; expected a multiple of num_envs={config.num_envs}")
     fingerprint = training_fingerprint()
-    kept = Path(runs_dir) / "interventions" / fingerprint / f"after_{start}"
-    places = {replace(config, seed=seed): kept / f"seed_{seed}" for seed in seeds}
-    jobs = [(_make_control, each, start, place) for each, place in places.items()]
+    places = {
+        replace(config, seed=seed): place_of(runs_dir, fingerprint, start, seed) for seed in seeds
+    }
+    jobs = [(make_control, each, start, place) for each, place in places.items()]
     _all(jobs, n_jobs, progress)
     jobs = [
         (_make_change, each, start, place, change, Path(folder), fingerprint)
@@ -115,8 +116,13 @@ def _error_of(function: Callable, config: TrainConfig, start: int, place: Path, 
     return ""
 
 
-def _make_control(config: TrainConfig, start: int, place: Path) -> None:
-    """Train a control run as far as its change."""
+def place_of(runs_dir: str | Path, fingerprint: str, start: int, seed: int) -> Path:
+    """The folder of a control run and of its changes after ``start`` picks."""
+    return Path(runs_dir) / FOLDER / fingerprint / f"after_{start}" / f"seed_{seed}"
+
+
+def make_control(config: TrainConfig, start: int, place: Path) -> None:
+    """Train a control run as far as its change, in ``place``, or leave it as it is there."""
     folder = RunFolder(place / CONTROL_FOLDER)
     with folder.locked():
         run = Training(config)

@@ -1,0 +1,195 @@
+"""Which values runs give to liftable and to blocked items, before a fall and after it.
+
+    python -m unload.reproduce values
+
+Control runs of the plan go on after 12 million picks, with one change or none (deviation 19 of the
+plan). The containers of the first episode are kept at five moments, with what would become of each
+visible item if it were picked; the values of these items are followed, episode by episode.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import torch
+from joblib import Parallel, delayed
+
+from unload.agent.checkpoint import RunFolder
+from unload.agent.config import TrainConfig
+from unload.agent.greedy import greedy_actions
+from unload.agent.sweep import one_thread
+from unload.agent.training import Training
+from unload.reproduce.changes import CHANGES
+from unload.reproduce.fingerprint import training_fingerprint
+from unload.reproduce.interventions import (
+    CONTROL,
+    CONTROL_FOLDER,
+    FAILURES,
+    START,
+    changed,
+    failure_share,
+    make_control,
+    place_of,
+)
+from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
+from unload.support import checks, files
+
+NAME = "values"
+TRACED = (
+    "nothing", "successes_kept", "failures_kept", "successes_called_failures", "ties_averaged"
+)  # fmt: skip
+SEEDS = (0, 2, 3, 4, 5)  # of the control runs that have not fallen by 12 million picks
+UNTIL = 15_000_000  # picks
+MOMENTS = 5  # of an episode
+MEASURES = ["liftable", "blocked", "wrong"]
+COLUMNS = [
+    "change", "seed", "picks", "success_rate", FAILURES,
+    *MEASURES, *(f"own_{name}" for name in MEASURES),
+]  # fmt: skip
+OPTIONS = JOBS
+
+
+def values_data(
+    changes: Sequence[str] = TRACED,
+    seeds: Sequence[int] = SEEDS,
+    start: int = START,
+    until: int = UNTIL,
+    config: TrainConfig = CONTROL,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    progress: bool = True,
+) -> None:
+    """Trace the values in control runs with and without changes; write ``answer/values.csv``.
+
+    A row is an episode, see ``trace``.
+
+    Args:
+        changes: names in ``CHANGES``.
+        seeds: of the control runs.
+        start: picks before the change.
+        until: picks at which a trace ends, at most ``config.picks``.
+        config: of the control with seed 0.
+        folder: of the data.
+        runs_dir: where the control runs and finished traces are kept.
+        n_jobs: processes, as in joblib.
+        progress: show a progress bar.
+
+    Raises:
+        ValueError: an unknown change, or ``until`` lies outside the run.
+    """
+    for change in changes:
+        checks.one_of("changes", change, CHANGES)
+    checks.integer("until", until, start + config.num_envs * config.max_picks, config.picks)
+    fingerprint = training_fingerprint()
+    places = {seed: place_of(runs_dir, fingerprint, start, seed) for seed in seeds}
+    Parallel(n_jobs)(
+        delayed(make_control)(replace(config, seed=seed), start, place)
+        for seed, place in places.items()
+    )
+    settings = {"start": start, "until": until, "moments": MOMENTS}
+    jobs = []
+    for change, seed in product(changes, seeds):
+        traced = replace(config, seed=seed)
+        question = {"change": change, **asdict(traced), **settings, "fingerprint": fingerprint}
+        jobs.append((question, partial(_trace, traced, start, until, places[seed], change)))
+    answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
+    tables = [
+        pd.DataFrame(answer.value).assign(change=change, seed=seed)
+        for answer, (change, seed) in zip(answers, product(changes, seeds))
+    ]
+    publish(
+        Path(folder) / "answer",
+        NAME,
+        {NAME: pd.concat(tables)[COLUMNS]},
+        f"{COMMAND} {NAME}",
+        asdict(config) | settings | {"changes": list(changes), "seeds": list(seeds)},
+        until < UNTIL or len(seeds) < len(SEEDS) or set(changes) < set(TRACED),
+        [answer.record for answer in answers],
+        fingerprint,
+        "%.5g",
+    )
+
+
+def _trace(config: TrainConfig, start: int, until: int, place: Path, change: str) -> list[dict]:
+    with one_thread():
+        run = changed(config, start, RunFolder(place / CONTROL_FOLDER), change)
+        try:
+            return trace(run, until)
+        finally:
+            run.rollout.close()
+
+
+def trace(run: Training, until: int) -> list[dict[str, float]]:
+    """Train on to ``until`` picks or a little more; return one row per episode.
+
+    Args:
+        run: at the beginning of an episode, the same one in all its containers.
+        until: picks.
+
+    Returns:
+        ``picks`` at the episode's end, its ``success_rate``, and ``failures``, their share in the
+        replay memory. Of the network at its end, on the states of the first episode: the mean
+        values of ``liftable`` and of ``blocked`` items, and ``wrong``, the share of states in
+        which the highest value is a blocked item's. The same on the episode's own states:
+        ``own_liftable``, ``own_blocked``, ``own_wrong``.
+
+    Raises:
+        ValueError: ``run`` stands within an episode.
+    """
+    length, first, rows = run.config.max_picks, None, []
+    if run.rollout.steps % length:
+        raise ValueError(f"run has made {run.rollout.steps} steps; expected whole episodes")
+    while run.rollout.picks < until:
+        begin, moments = run.rollout.picks, []
+        for step in range(length):
+            if step % (length // MOMENTS) == length // MOMENTS // 2:
+                moments.append((run.rollout.observations, run.rollout.envs.liftable()))
+            run.step()
+        own = [np.concatenate(parts) for parts in zip(*moments)]
+        first = first or own
+        curve = run.curve.table()
+        row = {
+            "picks": run.rollout.picks,
+            "success_rate": curve.loc[curve["picks"] > begin, "success_rate"].mean(),
+            FAILURES: failure_share(run.replay),
+            **measures(run.agent.network, *first),
+        }
+        found = measures(run.agent.network, *own)
+        rows.append(row | {f"own_{name}": value for name, value in found.items()})
+    return rows
+
+
+def measures(
+    network: torch.nn.Module, observations: np.ndarray, liftable: np.ndarray
+) -> dict[str, float]:
+    """Return what a network says about some states.
+
+    Args:
+        network: action values of observations.
+        observations: (k, items, 3) float32, with an item in each row.
+        liftable: (k, items) bool, which items would be unloaded if picked.
+
+    Returns:
+        ``liftable``, ``blocked`` and ``wrong``, see ``trace``.
+    """
+    with torch.no_grad():
+        values = network(torch.from_numpy(observations)).numpy().astype(float)
+    best = greedy_actions(network, observations, np.ones_like(liftable))
+    wrong = ~liftable[np.arange(len(best)), best]
+    found = values[liftable].mean(), values[~liftable].mean(), wrong.mean()
+    return dict(zip(MEASURES, map(float, found)))
+
+
+def read_values(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """The table that ``values_data`` has written.
+
+    Raises:
+        FileNotFoundError: it has not been made.
+        ValueError: it has other columns.
+    """
+    return read_table(Path(folder) / "answer" / f"{NAME}.csv", f"{COMMAND} {NAME}", COLUMNS)
