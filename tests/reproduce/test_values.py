@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 
@@ -75,3 +76,18 @@ def test_bad_arguments_are_refused_before_anything_is_trained(tmp_path):
     with pytest.raises(ValueError, match="until is 12000000"):
         values.values_data(until=12_000_000, folder=tmp_path, runs_dir=tmp_path)
     assert not any(tmp_path.iterdir())
+
+
+def test_the_rise_ends_before_the_first_fall():
+    picks = 12_000_000 + 500_000 * np.arange(1, 6)
+    fallen = {"success_rate": [1, 1, 0.96, 0.9, 0.7], "blocked": [-0.5, 0, 0.25, 0.75, 1]}
+    held = {"success_rate": [1, 0.97, 0.9, 0.9, 0.96], "blocked": [0, 0.5, -0.75, -0.5, -1]}
+    table = pd.concat(
+        pd.DataFrame(run).assign(change="nothing", seed=seed, picks=picks)
+        for seed, run in enumerate((fallen, held))
+    )
+    found = values.rises(table).set_index("seed")
+    assert found["fell"].tolist() == [True, False]
+    assert found["before"].tolist() == [13_500_000, 14_500_000]
+    assert found["rise"].tolist() == [0.75, -1]
+    assert found["highest"].tolist() == [1, -0.5]  # from 13.5 million picks on

@@ -36,6 +36,7 @@ from unload.reproduce.interventions import (
     place_of,
 )
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
+from unload.reproduce.verdict import HIGH, LOW
 from unload.support import checks, files
 
 NAME = "values"
@@ -183,6 +184,41 @@ def measures(
     wrong = ~liftable[np.arange(len(best)), best]
     found = values[liftable].mean(), values[~liftable].mean(), wrong.mean()
     return dict(zip(MEASURES, map(float, found)))
+
+
+def rises(table: pd.DataFrame) -> pd.DataFrame:
+    """How far the value of blocked items rises before the first fall (deviation 19 of the plan).
+
+    Args:
+        table: see ``values_data``.
+
+    Returns:
+        One row per change and seed: ``before``, the last of the episodes of at least 95 % before
+        the first of at most 80 %, in picks, or the last episode if there is no such fall;
+        ``fell``; ``blocked`` on the states of the first episode, at ``first`` and at ``last``, that
+        of ``before``; their difference ``rise``; and ``highest`` from a million picks after the
+        first episode on.
+    """
+    rows = []
+    for (change, seed), episodes in table.groupby(["change", "seed"], sort=False):
+        rate, blocked = (episodes[name].to_numpy() for name in ("success_rate", "blocked"))
+        fell = bool((rate <= LOW).any())
+        until = int((rate <= LOW).argmax()) if fell else len(rate)
+        before = np.flatnonzero(rate[:until] >= HIGH)[-1]
+        late = blocked[episodes["picks"] >= episodes["picks"].iloc[0] + 1_000_000]
+        rows.append(
+            {
+                "change": change,
+                "seed": seed,
+                "before": episodes["picks"].iloc[before],
+                "fell": fell,
+                "first": blocked[0],
+                "last": blocked[before],
+                "rise": blocked[before] - blocked[0],
+                "highest": late.max(),
+            }
+        )
+    return pd.DataFrame(rows)
 
 
 def read_values(folder: str | Path = files.DATA) -> pd.DataFrame:
