@@ -194,7 +194,8 @@ def rises(table: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         One row per change and seed: ``before``, the last of the episodes of at least 95 % before
-        the first of at most 80 %, in picks, or the last episode if there is no such fall;
+        the first of at most 80 %, in picks, or of all if there is no such fall (the first episode if
+        there is none);
         ``fell``; ``blocked`` on the states of the first episode, at ``first`` and at ``last``, that
         of ``before``; their difference ``rise``; and ``highest`` from a million picks after the
         first episode on.
@@ -204,7 +205,7 @@ def rises(table: pd.DataFrame) -> pd.DataFrame:
         rate, blocked = (episodes[name].to_numpy() for name in ("success_rate", "blocked"))
         fell = bool((rate <= LOW).any())
         until = int((rate <= LOW).argmax()) if fell else len(rate)
-        before = np.flatnonzero(rate[:until] >= HIGH)[-1]
+        before = max(np.flatnonzero(rate[:until] >= HIGH), default=0)
         late = blocked[episodes["picks"] >= episodes["picks"].iloc[0] + 1_000_000]
         rows.append(
             {
