@@ -37,8 +37,9 @@ def test_values_are_read_off_the_network():
 def test_traces_are_those_of_the_runs(tmp_path):
     changes = ["nothing", "successes_called_failures"]
     for _ in range(2):  # the second time, nothing is trained
+        runs = [(change, 3) for change in changes]
         values.values_data(
-            changes, [3], START, UNTIL, CONFIG, tmp_path, tmp_path / "runs", 1, progress=False
+            runs, START, UNTIL, CONFIG, tmp_path, tmp_path / "runs", 1, progress=False
         )
     table = values.read_values(tmp_path)
     assert table["change"].tolist() == np.repeat(changes, 2).tolist()
@@ -59,7 +60,7 @@ def test_traces_are_those_of_the_runs(tmp_path):
 
     provenance = read_provenance(tmp_path / "answer", "values")
     assert provenance["reduced"] and provenance["fingerprint"] == training_fingerprint()
-    assert provenance["settings"]["seeds"] == [3]
+    assert provenance["settings"]["runs"] == [[change, 3] for change in changes]
 
 
 def test_a_trace_begins_with_an_episode():
@@ -71,23 +72,36 @@ def test_a_trace_begins_with_an_episode():
 
 
 def test_bad_arguments_are_refused_before_anything_is_trained(tmp_path):
-    with pytest.raises(ValueError, match="changes is 'everything'"):
-        values.values_data(["everything"], folder=tmp_path, runs_dir=tmp_path)
+    with pytest.raises(ValueError, match="runs is 'everything'"):
+        values.values_data([("everything", 0)], folder=tmp_path, runs_dir=tmp_path)
     with pytest.raises(ValueError, match="until is 12000000"):
         values.values_data(until=12_000_000, folder=tmp_path, runs_dir=tmp_path)
     assert not any(tmp_path.iterdir())
 
 
-def test_the_rise_ends_before_the_first_fall():
-    picks = 12_000_000 + 500_000 * np.arange(1, 6)
-    fallen = {"success_rate": [1, 1, 0.96, 0.9, 0.7], "blocked": [-0.5, 0, 0.25, 0.75, 1]}
-    held = {"success_rate": [1, 0.97, 0.9, 0.9, 0.96], "blocked": [0, 0.5, -0.75, -0.5, -1]}
+def test_what_is_asked_of_first_falls():
+    picks = 12_000_000 + 250_000 * np.arange(1, 7)
+    fallen = {
+        "success_rate": [1, 0.96, 0.9, 0.8, 0.7, 1],
+        "blocked": [-0.5, 0, 0.25, 0.75, 1, 0.5],
+        "wrong": [0, 0, 0, 0.25, 0, 0.5],
+        "own_wrong": [0, 0, 0, 1, 0.5, 0],
+    }
+    held = {
+        "success_rate": [1, 0.97, 0.9, 0.9, 0.96, 0.9],
+        "blocked": [0, 0.5, -0.75, -0.5, -1, -0.75],
+        "wrong": 0,
+        "own_wrong": 0,
+    }
+    at_once = fallen | {"success_rate": 0.5}
     table = pd.concat(
         pd.DataFrame(run).assign(change="nothing", seed=seed, picks=picks)
-        for seed, run in enumerate((fallen, held))
+        for seed, run in enumerate((fallen, held, at_once))
     )
-    found = values.rises(table).set_index("seed")
-    assert found["fell"].tolist() == [True, False]
-    assert found["before"].tolist() == [13_500_000, 14_500_000]
-    assert found["rise"].tolist() == [0.75, -1]
-    assert found["highest"].tolist() == [1, -0.5]  # from 13.5 million picks on
+    found = values.first_falls(table).set_index("seed")
+    assert found["fall"].tolist()[::2] == [13_000_000, 12_250_000] and np.isnan(found["fall"][1])
+    assert found["last"].tolist()[:2] == [0, -1] and np.isnan(found["last"][2])
+    assert found["first"].tolist() == [-0.5, 0, -0.5]
+    assert found["highest"].tolist() == [1, -0.75, 1]  # from 13.25 million picks on
+    assert found["wrong"].tolist()[::2] == [0.25, 0]
+    assert found["own_wrong"].tolist()[::2] == [0.5, 0]

@@ -36,14 +36,22 @@ from unload.reproduce.interventions import (
     place_of,
 )
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
-from unload.reproduce.verdict import HIGH, LOW
+from unload.reproduce.verdict import HIGH, LOW, WINDOW_PICKS, falls, windows
 from unload.support import checks, files
 
 NAME = "values"
 TRACED = (
     "nothing", "successes_kept", "failures_kept", "successes_called_failures", "ties_averaged"
 )  # fmt: skip
-SEEDS = (0, 2, 3, 4, 5)  # of the control runs that have not fallen by 12 million picks
+SEEDS = (
+    0,
+    2,
+    3,
+    4,
+    5,
+)  # of the plan's control runs, those that have not fallen by 12 million picks
+FRESH = range(10, 18)  # of control runs that deviation 20 of the plan adds
+RUNS = [*product(TRACED, SEEDS), *(("nothing", seed) for seed in FRESH)]
 UNTIL = 15_000_000  # picks
 MOMENTS = 5  # of an episode
 MEASURES = ["liftable", "blocked", "wrong"]
@@ -55,8 +63,7 @@ OPTIONS = JOBS
 
 
 def values_data(
-    changes: Sequence[str] = TRACED,
-    seeds: Sequence[int] = SEEDS,
+    runs: Sequence[tuple[str, int]] = RUNS,
     start: int = START,
     until: int = UNTIL,
     config: TrainConfig = CONTROL,
@@ -67,11 +74,10 @@ def values_data(
 ) -> None:
     """Trace the values in control runs with and without changes; write ``answer/values.csv``.
 
-    A row is an episode, see ``trace``.
+    A row is an episode, see ``trace``. Runs that have fallen before the change are left out.
 
     Args:
-        changes: names in ``CHANGES``.
-        seeds: of the control runs.
+        runs: pairs of a change, a name in ``CHANGES``, and the seed of a control run.
         start: picks before the change.
         until: picks at which a trace ends, at most ``config.picks``.
         config: of the control with seed 0.
@@ -83,33 +89,34 @@ def values_data(
     Raises:
         ValueError: an unknown change, or ``until`` lies outside the run.
     """
-    for change in changes:
-        checks.one_of("changes", change, CHANGES)
+    for change, _ in runs:
+        checks.one_of("runs", change, CHANGES)
     checks.integer("until", until, start + config.num_envs * config.max_picks, config.picks)
     fingerprint = training_fingerprint()
-    places = {seed: place_of(runs_dir, fingerprint, start, seed) for seed in seeds}
+    places = {seed: place_of(runs_dir, fingerprint, start, seed) for _, seed in runs}
     Parallel(n_jobs)(
         delayed(make_control)(replace(config, seed=seed), start, place)
         for seed, place in places.items()
     )
     settings = {"start": start, "until": until, "moments": MOMENTS}
     jobs = []
-    for change, seed in product(changes, seeds):
+    for change, seed in runs:
         traced = replace(config, seed=seed)
         question = {"change": change, **asdict(traced), **settings, "fingerprint": fingerprint}
         jobs.append((question, partial(_trace, traced, start, until, places[seed], change)))
     answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
     tables = [
         pd.DataFrame(answer.value).assign(change=change, seed=seed)
-        for answer, (change, seed) in zip(answers, product(changes, seeds))
+        for answer, (change, seed) in zip(answers, runs)
+        if answer.value
     ]
     publish(
         Path(folder) / "answer",
         NAME,
         {NAME: pd.concat(tables)[COLUMNS]},
         f"{COMMAND} {NAME}",
-        asdict(config) | settings | {"changes": list(changes), "seeds": list(seeds)},
-        until < UNTIL or len(seeds) < len(SEEDS) or set(changes) < set(TRACED),
+        asdict(config) | settings | {"runs": list(runs)},
+        until < UNTIL or set(runs) < set(RUNS),
         [answer.record for answer in answers],
         fingerprint,
         "%.5g",
@@ -120,7 +127,8 @@ def _trace(config: TrainConfig, start: int, until: int, place: Path, change: str
     with one_thread():
         run = changed(config, start, RunFolder(place / CONTROL_FOLDER), change)
         try:
-            return trace(run, until)
+            fallen = falls(windows(run.curve.table())["success_rate"])
+            return [] if fallen else trace(run, until)
         finally:
             run.rollout.close()
 
@@ -186,37 +194,35 @@ def measures(
     return dict(zip(MEASURES, map(float, found)))
 
 
-def rises(table: pd.DataFrame) -> pd.DataFrame:
-    """How far the value of blocked items rises before the first fall (deviation 19 of the plan).
+def first_falls(table: pd.DataFrame) -> pd.DataFrame:
+    """What deviations 19 and 20 of the plan ask of each run.
 
     Args:
         table: see ``values_data``.
 
     Returns:
-        One row per change and seed: ``before``, the last of the episodes of at least 95 % before
-        the first of at most 80 %, in picks, or of all if there is no such fall (the first episode if
-        there is none);
-        ``fell``; ``blocked`` on the states of the first episode, at ``first`` and at ``last``, that
-        of ``before``; their difference ``rise``; and ``highest`` from a million picks after the
-        first episode on.
+        One row per change and seed: ``fall``, the picks after the first episode of at most 80 %
+        (NaN without one); the value of ``blocked`` items in the ``first`` episode, in the ``last``
+        of at least 95 % before the fall, and at its ``highest`` from a million picks on; ``wrong``
+        and ``own_wrong``, the means over the half million picks from the fall on.
     """
     rows = []
-    for (change, seed), episodes in table.groupby(["change", "seed"], sort=False):
-        rate, blocked = (episodes[name].to_numpy() for name in ("success_rate", "blocked"))
-        fell = bool((rate <= LOW).any())
-        until = int((rate <= LOW).argmax()) if fell else len(rate)
-        before = max(np.flatnonzero(rate[:until] >= HIGH), default=0)
-        late = blocked[episodes["picks"] >= episodes["picks"].iloc[0] + 1_000_000]
+    for (change, seed), run in table.groupby(["change", "seed"], sort=False):
+        low = run["success_rate"] <= LOW
+        fall = run.loc[low, "picks"].min()
+        high = run[(run["success_rate"] >= HIGH) & ~(run["picks"] >= fall)]
+        late = run["picks"] >= run["picks"].iloc[0] + 1_000_000
+        after = run[run["picks"].between(fall, fall + WINDOW_PICKS)]
         rows.append(
             {
                 "change": change,
                 "seed": seed,
-                "before": episodes["picks"].iloc[before],
-                "fell": fell,
-                "first": blocked[0],
-                "last": blocked[before],
-                "rise": blocked[before] - blocked[0],
-                "highest": late.max(),
+                "fall": fall,
+                "first": run["blocked"].iloc[0],
+                "last": high["blocked"].iloc[-1] if len(high) else np.nan,
+                "highest": run.loc[late, "blocked"].max(),
+                "wrong": after["wrong"].mean(),
+                "own_wrong": after["own_wrong"].mean(),
             }
         )
     return pd.DataFrame(rows)
