@@ -413,7 +413,7 @@ CLAIMS = [
     ),
     (
         "notebooks/08_hyperparameters.ipynb",
-        "{} of these {} runs get there",
+        "{} of {} runs get there",
         fast_enough_at_a_high_rate,
     ),
     (
