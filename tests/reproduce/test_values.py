@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 import torch
 
@@ -77,31 +76,3 @@ def test_bad_arguments_are_refused_before_anything_is_trained(tmp_path):
     with pytest.raises(ValueError, match="until is 12000000"):
         values.values_data(until=12_000_000, folder=tmp_path, runs_dir=tmp_path)
     assert not any(tmp_path.iterdir())
-
-
-def test_what_is_asked_of_first_falls():
-    picks = 12_000_000 + 250_000 * np.arange(1, 7)
-    fallen = {
-        "success_rate": [1, 0.96, 0.9, 0.8, 0.7, 1],
-        "blocked": [-0.5, 0, 0.25, 0.75, 1, 0.5],
-        "wrong": [0, 0, 0, 0.25, 0, 0.5],
-        "own_wrong": [0, 0, 0, 1, 0.5, 0],
-    }
-    held = {
-        "success_rate": [1, 0.97, 0.9, 0.9, 0.96, 0.9],
-        "blocked": [0, 0.5, -0.75, -0.5, -1, -0.75],
-        "wrong": 0,
-        "own_wrong": 0,
-    }
-    at_once = fallen | {"success_rate": 0.5}
-    table = pd.concat(
-        pd.DataFrame(run).assign(change="nothing", seed=seed, picks=picks)
-        for seed, run in enumerate((fallen, held, at_once))
-    )
-    found = values.first_falls(table).set_index("seed")
-    assert found["fall"].tolist()[::2] == [13_000_000, 12_250_000] and np.isnan(found["fall"][1])
-    assert found["last"].tolist()[:2] == [0, -1] and np.isnan(found["last"][2])
-    assert found["first"].tolist() == [-0.5, 0, -0.5]
-    assert found["highest"].tolist() == [1, -0.75, 1]  # from 13.25 million picks on
-    assert found["wrong"].tolist()[::2] == [0.25, 0]
-    assert found["own_wrong"].tolist()[::2] == [0.5, 0]

@@ -36,7 +36,7 @@ from unload.reproduce.interventions import (
     place_of,
 )
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
-from unload.reproduce.verdict import HIGH, LOW, WINDOW_PICKS, falls, windows
+from unload.reproduce.verdict import falls, windows
 from unload.support import checks, files
 
 NAME = "values"
@@ -186,40 +186,6 @@ def measures(
     wrong = ~liftable[np.arange(len(best)), best]
     found = values[liftable].mean(), values[~liftable].mean(), wrong.mean()
     return dict(zip(MEASURES, map(float, found)))
-
-
-def first_falls(table: pd.DataFrame) -> pd.DataFrame:
-    """What deviations 19 and 20 of the plan ask of each run.
-
-    Args:
-        table: see ``values_data``.
-
-    Returns:
-        One row per change and seed: ``fall``, the picks after the first episode of at most 80 %
-        (NaN without one); the value of ``blocked`` items in the ``first`` episode, in the ``last``
-        of at least 95 % before the fall, and at its ``highest`` from a million picks on; ``wrong``
-        and ``own_wrong``, the means over the half million picks from the fall on.
-    """
-    rows = []
-    for (change, seed), run in table.groupby(["change", "seed"], sort=False):
-        low = run["success_rate"] <= LOW
-        fall = run.loc[low, "picks"].min()
-        high = run[(run["success_rate"] >= HIGH) & ~(run["picks"] >= fall)]
-        late = run["picks"] >= run["picks"].iloc[0] + 1_000_000
-        after = run[run["picks"].between(fall, fall + WINDOW_PICKS)]
-        rows.append(
-            {
-                "change": change,
-                "seed": seed,
-                "fall": fall,
-                "first": run["blocked"].iloc[0],
-                "last": high["blocked"].iloc[-1] if len(high) else np.nan,
-                "highest": run.loc[late, "blocked"].max(),
-                "wrong": after["wrong"].mean(),
-                "own_wrong": after["own_wrong"].mean(),
-            }
-        )
-    return pd.DataFrame(rows)
 
 
 def read_values(folder: str | Path = files.DATA) -> pd.DataFrame:

@@ -128,7 +128,7 @@ def _courses(runs: Mapping[str, Sequence[tuple]], columns: int) -> Figure:
     columns = min(checks.integer("columns", columns, 1), len(runs))
     lines = -(-len(runs) // columns)
     figure, grid = plt.subplots(
-        lines, columns, figsize=(3.8 * columns, 0.5 + 1.9 * lines), sharex=True, sharey=True,
+        lines, columns, figsize=(7.8, 0.6 + 1.4 * lines), sharex=True, sharey=True,
         squeeze=False,
     )  # fmt: skip
     for axes in grid.flat[len(runs) :]:
@@ -141,11 +141,10 @@ def _courses(runs: Mapping[str, Sequence[tuple]], columns: int) -> Figure:
             axes.plot(middles, msr, color=colour, linewidth=1, label=seed)
         axes.axhline(PAPER_MSR, color="C1", linestyle=":")
         axes.set_title(f"{title} ({len(found)} runs)", fontsize=9)
-    for axes in grid[:, 0]:
-        axes.set(ylabel="MSR while training", ylim=(0, 1.02))
-        axes.yaxis.set_major_formatter(PercentFormatter(1))
-    for axes in grid[-1]:
-        axes.set_xlabel("picks (millions)")
+    grid[0, 0].set_ylim(0, 1.02)
+    grid[0, 0].yaxis.set_major_formatter(PercentFormatter(1))
+    figure.supxlabel("picks (millions)", fontsize=9)
+    figure.supylabel("MSR while training", fontsize=9)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""The values of blocked items before a fall and after it."""
+"""What networks think of items, and where they are wrong, before a fall and after it."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.figures.style import styled
-from unload.reproduce.values import TRACED, read_values
+from unload.reproduce.values import FRESH, SEEDS, TRACED, read_values
 from unload.support import checks, files
 
 
@@ -16,7 +16,8 @@ from unload.support import checks, files
 def value_traces(changes: Mapping[str, str], folder: str | Path = files.DATA) -> Figure:
     """MSR while training, and mean value of blocked items: a line for each run, by change.
 
-    The values are those of the items in the containers of the first episode after the change.
+    The runs are those in which every change was made. The values are those of the items in the
+    kept states, which are those of the first episode after the change.
 
     Args:
         changes: names in ``unload.reproduce.values.TRACED`` → text.
@@ -31,6 +32,7 @@ def value_traces(changes: Mapping[str, str], folder: str | Path = files.DATA) ->
     if not changes:
         raise ValueError("changes is empty; expected at least one")
     table = read_values(folder)
+    table = table[table["seed"].isin(SEEDS)]
     figure, grid = plt.subplots(
         2, len(changes), figsize=(0.6 + 1.75 * len(changes), 3.6), sharex=True, sharey="row",
         squeeze=False,
@@ -43,5 +45,38 @@ def value_traces(changes: Mapping[str, str], folder: str | Path = files.DATA) ->
     grid[0, 0].set(ylim=(0, 1.02), ylabel="MSR while\ntraining")
     grid[0, 0].yaxis.set_major_formatter(PercentFormatter(1))
     grid[1, 0].set(ylim=(-1.05, 1.05), ylabel="mean value of\nblocked items")
-    figure.supxlabel("million picks", fontsize=9)
+    figure.supxlabel("picks (millions)", fontsize=9)
+    return figure
+
+
+@styled
+def wrong_states(folder: str | Path = files.DATA) -> Figure:
+    """Share of states in which a blocked item has the highest value: a panel for each fresh run.
+
+    Of the kept states, which are those of the first episode, and of those of each episode itself.
+
+    Args:
+        folder: of the data.
+
+    Raises:
+        FileNotFoundError: the data have not been made.
+    """
+    table = read_values(folder)
+    runs = table[(table["change"] == "nothing") & table["seed"].isin(FRESH)].groupby("seed")
+    figure, grid = plt.subplots(
+        -(-len(runs) // 4), 4, figsize=(7.6, 3.6), sharex=True, sharey=True, squeeze=False
+    )
+    for axes, (seed, run) in zip(grid.flat, runs):
+        for name, text in (("own_wrong", "states of each episode"), ("wrong", "kept states")):
+            axes.plot(run["picks"] / 1e6, run[name], linewidth=1, label=text)
+        axes.set_title(f"seed {seed}", fontsize=9)
+    for above, axes in zip(grid.flat[len(runs) - 4 :], grid.flat[len(runs) :]):
+        axes.axis("off")
+        above.tick_params(labelbottom=True)
+    axes = grid[0, 0]
+    axes.set_ylim(0, 1)
+    axes.yaxis.set_major_formatter(PercentFormatter(1))
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    figure.supxlabel("picks (millions)", fontsize=9)
+    figure.supylabel("a blocked item has\nthe highest value", fontsize=9)
     return figure

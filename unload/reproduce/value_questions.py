@@ -1,0 +1,106 @@
+"""What the traces of values answer, by deviations 19 and 20 of the plan."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from unload.reproduce.questions import Answer
+from unload.reproduce.values import FRESH
+from unload.reproduce.verdict import HIGH, LOW, WINDOW_PICKS
+
+FORETOLD = (3, 4, 5)  # the seeds that deviation 19 speaks of
+RISE, HELD_DOWN = 0.3, -0.9
+CLEARLY_FEWER = 1 / 4  # of the share of wrong states
+
+
+def value_answers(table: pd.DataFrame) -> list[Answer]:
+    """Return the answers to the questions that deviations 19 and 20 add.
+
+    Args:
+        table: see ``unload.reproduce.values.values_data``, with all its runs.
+    """
+    found = first_falls(table)
+    return [values_rise(found), values_held_down(found), other_states(found)]
+
+
+def values_rise(found: pd.DataFrame) -> Answer:
+    """First question of deviation 19, of ``first_falls``."""
+    rise = _of(found, "nothing", FORETOLD).eval("last - first")
+    return Answer(
+        "Before a fall the values of blocked items rise.",
+        "shown" if (rise >= RISE).all() else "refuted",
+        f"By {', '.join(f'{value:+.2f}' for value in rise)} in the runs of seeds "
+        f"{', '.join(map(str, FORETOLD))}.",
+        f"they rise by less than {RISE} in one of these runs, between {HIGH:.0%} and {LOW:.0%}",
+    )
+
+
+def values_held_down(found: pd.DataFrame) -> Answer:
+    """Second question of deviation 19, of ``first_falls``."""
+    highest = {
+        change: _of(found, change, FORETOLD)["highest"].max()
+        for change in ("failures_kept", "successes_called_failures")
+    }
+    parts = (f"{change.replace('_', ' ')}: {value:.2f}" for change, value in highest.items())
+    return Answer(
+        "Failures that stay in the replay, true or not, hold these values down.",
+        "shown" if max(highest.values()) < HELD_DOWN else "refuted",
+        f"The highest, a million picks after the change and later: {'; '.join(parts)}.",
+        f"they rise above {HELD_DOWN} in one of the runs of seeds {', '.join(map(str, FORETOLD))}",
+    )
+
+
+def other_states(found: pd.DataFrame) -> Answer:
+    """Question of deviation 20, of ``first_falls``."""
+    fallen = _of(found, "nothing", FRESH).dropna(subset="fall")
+    fewer = fallen["wrong"] <= CLEARLY_FEWER * fallen["own_wrong"]
+    return Answer(
+        "After a fall the network is still right in the states of before, and wrong in those that "
+        "it comes into.",
+        "refuted" if (~fewer).sum() >= 2 else "shown",
+        f"In {fewer.sum()} of {len(fallen)} falls of fresh seeds. A blocked item has the highest "
+        f"value in {fallen['wrong'].mean():.1%} of the states of before, and in "
+        f"{fallen['own_wrong'].mean():.0%} of those that the run comes into.",
+        f"in two of these falls or more the first share is larger than {CLEARLY_FEWER} of the "
+        "second",
+    )
+
+
+def first_falls(table: pd.DataFrame) -> pd.DataFrame:
+    """What deviations 19 and 20 of the plan ask of each run.
+
+    Args:
+        table: see ``values_data``.
+
+    Returns:
+        One row per change and seed: ``fall``, the picks after the first episode of at most 80 %
+        (NaN without one); the value of ``blocked`` items in the ``first`` episode, in the ``last``
+        of at least 95 % before the fall, and at its ``highest`` from a million picks on; ``wrong``
+        and ``own_wrong``, the means over the half million picks from the fall on.
+    """
+    rows = []
+    for (change, seed), run in table.groupby(["change", "seed"], sort=False):
+        low = run["success_rate"] <= LOW
+        fall = run.loc[low, "picks"].min()
+        high = run[(run["success_rate"] >= HIGH) & ~(run["picks"] >= fall)]
+        late = run["picks"] >= run["picks"].iloc[0] + 1_000_000
+        after = run[run["picks"].between(fall, fall + WINDOW_PICKS)]
+        rows.append(
+            {
+                "change": change,
+                "seed": seed,
+                "fall": fall,
+                "first": run["blocked"].iloc[0],
+                "last": high["blocked"].iloc[-1] if len(high) else np.nan,
+                "highest": run.loc[late, "blocked"].max(),
+                "wrong": after["wrong"].mean(),
+                "own_wrong": after["own_wrong"].mean(),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _of(found: pd.DataFrame, change: str, seeds: Iterable[int]) -> pd.DataFrame:
+    """The rows of ``first_falls`` for a change and some seeds."""
+    return found[(found["change"] == change) & found["seed"].isin(seeds)]
