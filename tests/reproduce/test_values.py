@@ -47,6 +47,7 @@ def test_traces_are_those_of_the_runs(tmp_path):
     for name in values.MEASURES:  # the first episode's own states are the kept ones
         assert (table.loc[first, name] == table.loc[first, f"own_{name}"]).all()
     assert (table.loc[~first, "blocked"] != table.loc[~first, "own_blocked"]).all()
+    assert table["past_wrong"].isna().all()  # two episodes only
 
     run = Training(replace(CONFIG, seed=3))
     while run.rollout.picks < UNTIL:
@@ -76,3 +77,25 @@ def test_bad_arguments_are_refused_before_anything_is_trained(tmp_path):
     with pytest.raises(ValueError, match="until is 12000000"):
         values.values_data(until=12_000_000, folder=tmp_path, runs_dir=tmp_path)
     assert not any(tmp_path.iterdir())
+
+
+def test_which_network_is_asked_about_which_states(monkeypatch):
+    monkeypatch.setattr(values, "PAST", 1)
+    asked, share = [], values.wrong_share
+
+    def noted(network, observations, liftable):
+        asked.append((network, observations))
+        return share(network, observations, liftable)
+
+    monkeypatch.setattr(values, "wrong_share", noted)
+    run = Training(CONFIG)
+    begin = run.agent.network.state_dict()["scorer.weight"].clone()
+    rows = values.trace(run, 3 * EPISODE)
+    run.rollout.close()
+    networks, states = zip(*asked)
+    one, two, three = (states[k] for k in (1, 4, 8))  # the episodes' own states
+    expected = [one, one, one, one, two, two, one, one, three, three, two]
+    assert all(found is each for found, each in zip(states, expected, strict=True))
+    start = [k for k, network in enumerate(networks) if network is not run.agent.network]
+    assert start == [2, 5, 9] and networks[2].state_dict()["scorer.weight"].equal(begin)
+    assert np.isnan([row["past_wrong"] for row in rows]).tolist() == [True, False, False]

@@ -2,12 +2,14 @@
 
     python -m unload.reproduce values
 
-Control runs of the plan go on after 12 million picks, with one change or none (deviation 19 of the
-plan). The containers of the first episode are kept at five moments, with what would become of each
+Control runs of the plan go on after 12 million picks, with one change or none (deviations 19 to 21
+of the plan). The containers of the first episode are kept at five moments, with what would become of each
 visible item if it were picked; the values of these items are followed, episode by episode.
 """
 
+from collections import deque
 from collections.abc import Sequence
+from copy import deepcopy
 from dataclasses import asdict, replace
 from functools import partial
 from itertools import product
@@ -45,13 +47,15 @@ TRACED = (
 )  # fmt: skip
 SEEDS = (0, 2, 3, 4, 5)  # of control runs that have not fallen by 12 million picks
 FRESH = range(10, 18)  # of control runs that deviation 20 of the plan adds
-RUNS = [*product(TRACED, SEEDS), *(("nothing", seed) for seed in FRESH)]
+FRESHER = (18, 19, 20, 22, 23)  # of those that deviation 21 adds
+RUNS = [*product(TRACED, SEEDS), *(("nothing", seed) for seed in (*FRESH, *FRESHER))]
 UNTIL = 15_000_000  # picks
 MOMENTS = 5  # of an episode
+PAST = 8  # episodes, a quarter of a million picks
 MEASURES = ["liftable", "blocked", "wrong"]
 COLUMNS = [
     "change", "seed", "picks", "success_rate", FAILURES,
-    *MEASURES, *(f"own_{name}" for name in MEASURES),
+    *MEASURES, *(f"own_{name}" for name in MEASURES), "start_wrong", "past_wrong",
 ]  # fmt: skip
 OPTIONS = JOBS
 
@@ -92,7 +96,7 @@ def values_data(
         delayed(make_control)(replace(config, seed=seed), start, place)
         for seed, place in places.items()
     )
-    settings = {"start": start, "until": until, "moments": MOMENTS}
+    settings = {"start": start, "until": until, "moments": MOMENTS, "past": PAST}
     jobs = []
     for change, seed in runs:
         traced = replace(config, seed=seed)
@@ -139,12 +143,15 @@ def trace(run: Training, until: int) -> list[dict[str, float]]:
         replay memory. Of the network at its end, on the states of the first episode: the mean
         values of ``liftable`` and of ``blocked`` items, and ``wrong``, the share of states in
         which the highest value is a blocked item's. The same on the episode's own states:
-        ``own_liftable``, ``own_blocked``, ``own_wrong``.
+        ``own_liftable``, ``own_blocked``, ``own_wrong``. Of the network with which ``run`` came,
+        on the episode's own states: ``start_wrong``. Of the network at the episode's end, on the
+        states of the episode a quarter of a million picks ago: ``past_wrong``, NaN before that.
 
     Raises:
         ValueError: ``run`` stands within an episode.
     """
     length, first, rows = run.config.max_picks, None, []
+    start, past = deepcopy(run.agent.network), deque(maxlen=PAST + 1)
     if run.rollout.steps % length:
         raise ValueError(f"run has made {run.rollout.steps} steps; expected whole episodes")
     while run.rollout.picks < until:
@@ -155,6 +162,7 @@ def trace(run: Training, until: int) -> list[dict[str, float]]:
             run.step()
         own = [np.concatenate(parts) for parts in zip(*moments)]
         first = first or own
+        past.append(own)
         curve = run.curve.table()
         row = {
             "picks": run.rollout.picks,
@@ -163,7 +171,11 @@ def trace(run: Training, until: int) -> list[dict[str, float]]:
             **measures(run.agent.network, *first),
         }
         found = measures(run.agent.network, *own)
-        rows.append(row | {f"own_{name}": value for name, value in found.items()})
+        row |= {f"own_{name}": value for name, value in found.items()}
+        row["start_wrong"] = wrong_share(start, *own)
+        full = len(past) > PAST
+        row["past_wrong"] = wrong_share(run.agent.network, *past[0]) if full else np.nan
+        rows.append(row)
     return rows
 
 
@@ -182,10 +194,21 @@ def measures(
     """
     with torch.no_grad():
         values = network(torch.from_numpy(observations)).numpy().astype(float)
+    return {
+        "liftable": float(values[liftable].mean()),
+        "blocked": float(values[~liftable].mean()),
+        "wrong": wrong_share(network, observations, liftable),
+    }
+
+
+def wrong_share(network: torch.nn.Module, observations: np.ndarray, liftable: np.ndarray) -> float:
+    """Return the share of states in which a network's highest value is a blocked item's.
+
+    Args:
+        network, observations, liftable: see ``measures``.
+    """
     best = greedy_actions(network, observations, np.ones_like(liftable))
-    wrong = ~liftable[np.arange(len(best)), best]
-    found = values[liftable].mean(), values[~liftable].mean(), wrong.mean()
-    return dict(zip(MEASURES, map(float, found)))
+    return float((~liftable[np.arange(len(best)), best]).mean())
 
 
 def read_values(folder: str | Path = files.DATA) -> pd.DataFrame:
