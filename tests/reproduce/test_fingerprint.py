@@ -1,4 +1,4 @@
-"""Results that rest on training are of today's training, or are listed here with the reason."""
+"""Results that rest on training are of today's training."""
 
 import pytest
 import torch
@@ -14,15 +14,6 @@ from unload.support import files
 NOT_TRAINED = {
     "benchmarks", "heap", "heaps", "lift_agreement", "lifts", "obs_hist_equal", "settled"
 }  # fmt: skip
-# Data that today's training does not give, by the reason. They are to be made again; no other
-# data may be added to them.
-DRAWS = "of earlier code, which drew other loads and picks from the same seeds"
-PLAYER = "the recommended policy, which plays in it, is of earlier code"
-STALE = {
-    "comparison": PLAYER,
-    "robustness": PLAYER,
-    "study/recommended": DRAWS,
-}
 
 
 def networks_of(name: str) -> set[str]:
@@ -31,7 +22,7 @@ def networks_of(name: str) -> set[str]:
     return {config.network for config in experiment().values()} if experiment else {"peq"}
 
 
-def test_data_is_of_todays_training_or_listed():
+def test_data_is_of_todays_training():
     suffix = ".provenance.json"
     of_today = {}
     for path in files.DATA.rglob(f"*{suffix}"):
@@ -41,8 +32,7 @@ def test_data_is_of_todays_training_or_listed():
             of_today[name] = files.read_json(path).get("fingerprint") == wanted
     differing = {name for name, same in of_today.items() if not same}
     assert len(of_today) >= 13
-    assert differing <= set(STALE), "made by code that trained otherwise: make it again"
-    assert differing >= set(STALE), "of today's training, or no data any more: take it off the list"
+    assert not differing, "made by code that trained otherwise: make it again"
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from unload.reproduce import value_questions
-from unload.reproduce.values import FRESH, read_values
+from unload.reproduce.values import FRESH, FRESHER, read_values
 
 
 def test_what_is_asked_of_first_falls():
@@ -13,12 +13,16 @@ def test_what_is_asked_of_first_falls():
         "blocked": [-0.5, 0, 0.25, 0.75, 1, 0.5],
         "wrong": [0, 0, 0, 0.25, 0, 0.5],
         "own_wrong": [0, 0, 0, 1, 0.5, 0],
+        "start_wrong": [0, 0, 0, 0.5, 0, 0.25],
+        "past_wrong": [np.nan, 0, 0, 0, 0.25, 0.75],
     }
     held = {
         "success_rate": [1, 0.97, 0.9, 0.9, 0.96, 0.9],
         "blocked": [0, 0.5, -0.75, -0.5, -1, -0.75],
         "wrong": 0,
         "own_wrong": 0,
+        "start_wrong": 0,
+        "past_wrong": 0,
     }
     at_once = fallen | {"success_rate": 0.5}
     table = pd.concat(
@@ -32,6 +36,8 @@ def test_what_is_asked_of_first_falls():
     assert found["highest"].tolist() == [1, -0.75, 1]  # from 13.25 million picks on
     assert found["wrong"].tolist()[::2] == [0.25, 0]
     assert found["own_wrong"].tolist()[::2] == [0.5, 0]
+    assert found["start_wrong"].tolist()[::2] == [0.25, 0]
+    assert found["past_wrong"].tolist()[0] == 0.75  # 256,000 picks after the others
 
 
 def found(change, seeds, **columns):
@@ -59,17 +65,25 @@ def test_values_must_stay_low_in_each_run(highest, status):
     assert value_questions.values_held_down(pd.concat(table)).status == status
 
 
-@pytest.mark.parametrize(
-    ("wrong", "status"), [([0.1, 0.1, 0.2], "shown"), ([0.1, 0.2, 0.2], "refuted")]
-)
-def test_one_fall_may_be_otherwise(wrong, status):
-    fresh = found("nothing", FRESH[:3], fall=12e6, wrong=wrong, own_wrong=0.4)
-    held = found("nothing", FRESH[3:4], fall=np.nan, wrong=np.nan, own_wrong=np.nan)
-    seen_before = found("nothing", [3], fall=12e6, wrong=0.4, own_wrong=0.4)
-    answer = value_questions.other_states(pd.concat([fresh, held, seen_before]))
-    assert answer.status == status and "of 3 falls" in answer.so_far
+QUESTIONS = {
+    value_questions.right_before: ("wrong", FRESH, 0.1),
+    value_questions.known_before: ("start_wrong", FRESHER, 0.2),
+    value_questions.learned_again: ("past_wrong", FRESHER, 0.2),
+}
 
 
-def test_the_data_answer_what_deviations_19_and_20_ask():
+@pytest.mark.parametrize("question", QUESTIONS)
+@pytest.mark.parametrize(("above", "status"), [(1, "shown"), (2, "refuted")])
+def test_one_fall_may_be_otherwise(question, above, status):
+    name, seeds, most = QUESTIONS[question]
+    shares = [most] * (4 - above) + [most + 0.01] * above
+    fell = found("nothing", seeds[:4], fall=12e6, own_wrong=0.4, **{name: shares})
+    held = found("nothing", seeds[4:5], fall=np.nan, own_wrong=np.nan, **{name: np.nan})
+    others = found("nothing", [3], fall=12e6, own_wrong=0.4, **{name: 0.4})
+    answer = question(pd.concat([fell, held, others]))
+    assert answer.status == status and f"in {4 - above} of 4 falls" in answer.so_far
+
+
+def test_the_data_answer_what_the_deviations_ask():
     found = value_questions.value_answers(read_values())
-    assert [each.status for each in found] == ["refuted", "shown", "shown"]
+    assert [each.status for each in found] == ["refuted"] + 4 * ["shown"]

@@ -2,8 +2,8 @@
 
 Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the paper's own);
 ``measure``, ``study``, ``random_picks``, ``random_share``, ``drift``, ``answer``,
-``trained``, ``changes``, ``interventions``, ``values``, ``verdict``, ``survival``, ``questions``
-and ``value_questions`` (why 60 %);
+``trained``, ``changes``, ``interventions``, ``values``, ``verdict``, ``survival``, ``mistakes``,
+``questions`` and ``value_questions`` (why 60 %);
 ``comparison`` and ``robustness`` (policies compared); ``lifts``, ``full_lifts`` and ``agreement``
 (the physics); ``heap``, ``heap_lifts``, ``heap_learning``, ``heap_variation``, ``heap_episodes``,
 ``heap_rules``, ``heap_table`` and ``heap_limits`` (the unordered load); ``paper_numbers`` (the

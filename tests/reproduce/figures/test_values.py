@@ -1,7 +1,7 @@
 import pytest
 
 from unload.reproduce.figures.values import value_traces, wrong_states
-from unload.reproduce.values import FRESH, SEEDS, read_values
+from unload.reproduce.values import FRESH, FRESHER, SEEDS, read_values
 
 
 def test_a_line_for_each_run(saved_twice, names_its_command):
@@ -22,12 +22,11 @@ def test_bad_changes_are_refused():
 
 def test_a_panel_for_each_fresh_run(saved_twice, names_its_command):
     table = read_values()
-    fresh = table[(table["change"] == "nothing") & table["seed"].isin(FRESH)]
+    fresh = table[(table["change"] == "nothing") & table["seed"].isin([*FRESH, *FRESHER])]
     panels = [axes for axes in wrong_states().axes if axes.lines]
     assert [axes.get_title() for axes in panels] == [f"seed {n}" for n in fresh["seed"].unique()]
     for axes, (_, run) in zip(panels, fresh.groupby("seed")):
-        drawn = {line.get_label(): line.get_ydata().tolist() for line in axes.lines}
-        assert drawn["kept states"] == run["wrong"].tolist()
-        assert drawn["states of each episode"] == run["own_wrong"].tolist()
+        drawn = [line.get_ydata().tolist() for line in axes.lines]
+        assert drawn == [run[name].tolist() for name in ("own_wrong", "start_wrong", "wrong")]
     saved_twice(wrong_states)
     names_its_command(wrong_states)

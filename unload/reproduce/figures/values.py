@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.figures.style import styled
-from unload.reproduce.values import FRESH, SEEDS, TRACED, read_values
+from unload.reproduce.values import FRESH, FRESHER, SEEDS, TRACED, read_values
 from unload.support import checks, files
 
 
@@ -53,7 +53,8 @@ def value_traces(changes: Mapping[str, str], folder: str | Path = files.DATA) ->
 def wrong_states(folder: str | Path = files.DATA) -> Figure:
     """Share of states in which a blocked item has the highest value: a panel for each fresh run.
 
-    Of the kept states, which are those of the first episode, and of those of each episode itself.
+    Of the run's network on the states of each episode and on the kept ones, which are those of the
+    first episode, and of the network of before on the states of each episode.
 
     Args:
         folder: of the data.
@@ -61,13 +62,20 @@ def wrong_states(folder: str | Path = files.DATA) -> Figure:
     Raises:
         FileNotFoundError: the data have not been made.
     """
+    lines = {
+        "own_wrong": "the run's network in the states that it comes into",
+        "start_wrong": "the network of 12 million picks in the same states",
+        "wrong": "the run's network in the states of 12 million picks",
+    }
     table = read_values(folder)
-    runs = table[(table["change"] == "nothing") & table["seed"].isin(FRESH)].groupby("seed")
+    fresh = table["seed"].isin([*FRESH, *FRESHER])
+    runs = table[(table["change"] == "nothing") & fresh].groupby("seed")
+    rows = -(-len(runs) // 4)
     figure, grid = plt.subplots(
-        -(-len(runs) // 4), 4, figsize=(7.6, 3.6), sharex=True, sharey=True, squeeze=False
+        rows, 4, figsize=(7.8, 0.9 + 1.3 * rows), sharex=True, sharey=True, squeeze=False
     )
     for axes, (seed, run) in zip(grid.flat, runs):
-        for name, text in (("own_wrong", "states of each episode"), ("wrong", "kept states")):
+        for name, text in lines.items():
             axes.plot(run["picks"] / 1e6, run[name], linewidth=1, label=text)
         axes.set_title(f"seed {seed}", fontsize=9)
     for above, axes in zip(grid.flat[len(runs) - 4 :], grid.flat[len(runs) :]):
@@ -76,7 +84,8 @@ def wrong_states(folder: str | Path = files.DATA) -> Figure:
     axes = grid[0, 0]
     axes.set_ylim(0, 1)
     axes.yaxis.set_major_formatter(PercentFormatter(1))
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    handles = axes.get_legend_handles_labels()
+    figure.legend(*handles, loc="outside upper center", fontsize=8)
     figure.supxlabel("picks (millions)", fontsize=9)
-    figure.supylabel("a blocked item has\nthe highest value", fontsize=9)
+    figure.supylabel("a blocked item has the highest value", fontsize=9)
     return figure
