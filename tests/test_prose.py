@@ -27,6 +27,7 @@ from unload.reproduce.questions import (
     HELD_FROM,
     KEPT,
     intervention_table,
+    runs_held,
 )
 from unload.reproduce.study import read_study
 from unload.reproduce.trained import read_trained
@@ -36,7 +37,6 @@ from unload.reproduce.values import FRESH, FRESHER, read_values
 from unload.reproduce.verdict import (
     LIKE_THE_PAPER,
     PAPER_MSR,
-    WINDOW_PICKS,
     cell_table,
     end_msr,
     falls,
@@ -193,20 +193,15 @@ def averaged_ties_that_fall():
     return COUNTS[runs_that_fall(cell)], COUNTS[len(curves_of(cell))]
 
 
-def runs_held(cell: str) -> list[bool]:
-    """Of each run of a cell, whether it stays as high as question 7 asks for."""
-    msr = [windows(curve)["success_rate"] for curve in curves_of(cell)]
-    return [bool((each[each.index * WINDOW_PICKS >= HELD_FROM] > HELD).all()) for each in msr]
-
-
 def held_with_averaged_ties():
-    held, small = runs_held(AVERAGED_2048), runs_held(AVERAGED)
+    found = runs_held(read_answer(), [AVERAGED_2048, AVERAGED])
+    held, small = found[AVERAGED_2048], found[AVERAGED]
     assert all(held) and all(small)
     return COUNTS[len(held)], 100 * HELD, HELD_FROM / 1e6, COUNTS[len(small)]
 
 
 def held_with_failures_kept():
-    held = runs_held(KEPT)
+    held = runs_held(read_answer(), [KEPT])[KEPT]
     return COUNTS[sum(held)], COUNTS[len(held)]
 
 

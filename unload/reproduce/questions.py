@@ -228,7 +228,7 @@ def forgetting(runs: list[Run], interventions: list[Run] = ()) -> Answer:
 
 def smallest_change(runs: list[Run]) -> Answer:
     """Question 7."""
-    held = _held(runs, MEMORIES)
+    held = runs_held(runs, MEMORIES)
     best = max(map(sum, held.values()), default=0)
     enough = any(len(each) >= 10 and all(each) for each in held.values())
     failed = all(not all(held.get(cell, [True])) for cell in MEMORIES)
@@ -282,7 +282,7 @@ def pull_is_enough(interventions: list[Run]) -> Answer:
 
 def held_from_the_beginning(runs: list[Run], cell: str) -> Answer:
     """Question 7 for a cell that deviation 8, 13 or 16 of the plan adds."""
-    held = _held(runs, [cell]).get(cell, [])
+    held = runs_held(runs, [cell]).get(cell, [])
     planned = len(seeds_of(cell))
     status = "shown" if all(held) else "refuted"
     return Answer(
@@ -296,8 +296,8 @@ def held_from_the_beginning(runs: list[Run], cell: str) -> Answer:
     )
 
 
-def _held(runs: list[Run], cells: Iterable[str]) -> dict[str, list[bool]]:
-    """Of each run of some cells, whether question 7's criterion is met."""
+def runs_held(runs: list[Run], cells: Iterable[str]) -> dict[str, list[bool]]:
+    """Return, of each run of some cells, whether question 7's criterion is met."""
     held: dict[str, list[bool]] = {}
     for cell, _, curve in runs:
         if cell in cells:
