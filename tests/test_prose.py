@@ -437,9 +437,9 @@ CLAIMS = [
     ),
     (
         "README.md",
-        "in all {} falls of fresh seeds that were traced, a blocked item is its favourite in "
-        "{:.1f} to {:.1f} % of these, and in {:.0f} to {:.0f} % of the states into which its own "
-        "picks lead",
+        "In all {} falls of fresh seeds that were traced, a blocked item is its favourite in "
+        "{:.1f} to {:.1f} % of the states of before, and in {:.0f} to {:.0f} % of the states into "
+        "which its own picks lead",
         traced_falls,
     ),
     ("README.md", "stand beside the data add up to {:.0f} hours of one core", recorded_hours),
