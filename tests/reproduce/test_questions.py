@@ -175,11 +175,11 @@ def test_whether_failures_are_what_matters(failures, successes, status):
 
 
 @pytest.mark.parametrize(("called", "status"), [(KEPT, "shown"), (LATE_FALL, "not shown")])
-def test_whether_a_pull_is_enough(called, status):
+def test_whether_false_failures_are_enough(called, status):
     runs = changed("nothing", LATE_FALL) + changed("successes_kept", LATE_FALL)
-    assert questions.pull_is_enough(runs).status == "still running"
+    assert questions.false_failures_are_enough(runs).status == "still running"
     runs += changed("successes_called_failures", called)
-    assert questions.pull_is_enough(runs).status == status
+    assert questions.false_failures_are_enough(runs).status == status
 
 
 @pytest.mark.parametrize("name", questions.FROM_THE_BEGINNING)

@@ -66,9 +66,9 @@ def test_values_must_stay_low_in_each_run(highest, status):
 
 
 QUESTIONS = {
-    value_questions.right_before: ("wrong", FRESH, 0.1),
-    value_questions.known_before: ("start_wrong", FRESHER, 0.2),
-    value_questions.learned_again: ("past_wrong", FRESHER, 0.2),
+    value_questions.earlier_states: ("wrong", FRESH, 0.1),
+    value_questions.earlier_network: ("start_wrong", FRESHER, 0.2),
+    value_questions.later_network: ("past_wrong", FRESHER, 0.2),
 }
 
 

@@ -74,7 +74,7 @@ def answers(runs: Iterable[Run], interventions: Iterable[Run] = ()) -> list[Answ
         smallest_change(runs),
         failures_matter(interventions),
         *(held_from_the_beginning(runs, cell) for cell in FROM_THE_BEGINNING),
-        pull_is_enough(interventions),
+        false_failures_are_enough(interventions),
     ]
 
 
@@ -262,7 +262,7 @@ def failures_matter(interventions: list[Run]) -> Answer:
     )
 
 
-def pull_is_enough(interventions: list[Run]) -> Answer:
+def false_failures_are_enough(interventions: list[Run]) -> Answer:
     """Question of deviation 17 of the plan."""
     table = intervention_table(interventions).set_index("change")
     there = _compared(table, ["successes_called_failures", "successes_kept"])
@@ -270,8 +270,8 @@ def pull_is_enough(interventions: list[Run]) -> Answer:
     prevents = called and table.loc[there[0], "p"] <= 0.05
     parts = "; ".join(_changed(table, name) for name in there)
     return Answer(
-        "A pull of values towards −1 is enough to keep a run up, even if none of the failures that "
-        "stay in the replay is true.",
+        "Picks that stay in the replay with a reward of −1 keep a run up, even if none of them has "
+        "failed.",
         _status("shown" if prevents else "not shown", True, called),
         f"In half of the replay, after {START / 1e6:.0f} million picks: {parts}."
         if called

@@ -26,9 +26,9 @@ def value_answers(table: pd.DataFrame) -> list[Answer]:
     return [
         values_rise(found),
         values_held_down(found),
-        right_before(found),
-        known_before(found),
-        learned_again(found),
+        earlier_states(found),
+        earlier_network(found),
+        later_network(found),
     ]
 
 
@@ -60,39 +60,39 @@ def values_held_down(found: pd.DataFrame) -> Answer:
     )
 
 
-def right_before(found: pd.DataFrame) -> Answer:
+def earlier_states(found: pd.DataFrame) -> Answer:
     """Question of deviation 20, of ``first_falls``."""
     return _fewer(
         found,
         FRESH,
         "wrong",
         CLEARLY_FEWER,
-        "After a fall the network is still right in the states of before.",
-        "in {:.1%} of the states of before",
+        "Just after a fall the network errs clearly less often in the earlier states.",
+        "in {:.1%} of the states of 12 million picks",
     )
 
 
-def known_before(found: pd.DataFrame) -> Answer:
+def earlier_network(found: pd.DataFrame) -> Answer:
     """First question of deviation 21, of ``first_falls``."""
     return _fewer(
         found,
         FRESHER,
         "start_wrong",
         FEWER,
-        "The network of before the fall is right in most of the states that the run comes into.",
+        "The network of before the fall errs less often in the states that the run comes into.",
         "by that network in {:.1%} of the states that the run comes into",
     )
 
 
-def learned_again(found: pd.DataFrame) -> Answer:
+def later_network(found: pd.DataFrame) -> Answer:
     """Second question of deviation 21, of ``first_falls``."""
     return _fewer(
         found,
         FRESHER,
         "past_wrong",
         FEWER,
-        "A quarter of a million picks later the network is right in most of the states that the "
-        "run has come into.",
+        "A quarter of a million picks later the network errs less often in the states that the run "
+        "has come into.",
         "in {:.1%} of the states of a quarter of a million picks ago",
     )
 
