@@ -182,6 +182,21 @@ def test_whether_false_failures_are_enough(called, status):
     assert questions.false_failures_are_enough(runs).status == status
 
 
+@pytest.mark.parametrize(
+    ("falling", "status"), [(0, "shown"), (1, "shown"), (2, "not shown"), (4, "not shown")]
+)
+def test_whether_more_updates_prevent_falls(falling, status):
+    name = "updates_16_mask"
+    runs = [(name, 0, curve(LATE_FALL))]  # had been seen, and does not count
+    assert questions.update_answers(runs)[1].status == "still running"
+    runs += cell("paper_mask", LATE_FALL)
+    runs += [(name, seed, curve(LATE_FALL if seed <= falling else KEPT)) for seed in range(1, 5)]
+    few, many = questions.update_answers(runs)
+    assert few.status == "still running"
+    assert many.status == status and many.so_far.startswith(f"{falling} of 4 fresh runs fall")
+    assert questions.update_answers(runs[:-1])[1].status.endswith("so far")
+
+
 @pytest.mark.parametrize("name", questions.FROM_THE_BEGINNING)
 def test_what_is_changed_from_the_beginning_holds_every_run(name):
     high = [0.25, 1.05, 1.05, 1.05]

@@ -30,6 +30,8 @@ FROM_THE_BEGINNING = {
     AVERAGED: "With the mask and equal coordinates that share their mean rank",
     AVERAGED_2048: "With these ties, the mask and the paper's batch",
 }
+# Cells of deviation 22 of the plan → picks per update, and seeds that had been seen before it.
+UPDATES = {"updates_4_mask": (16, ()), "updates_16_mask": (4, (0,))}
 FEW, MANY = 0.01, 0.03  # shares of failures in the replay that hypothesis 6 speaks of
 FEWEST = 5  # runs of an intervention that count as a result
 HELD, HELD_FROM = 0.99, 12_000_000  # MSR that hypothesis 7 asks for, and after how many picks
@@ -76,6 +78,17 @@ def answers(runs: Iterable[Run], interventions: Iterable[Run] = ()) -> list[Answ
         *(held_from_the_beginning(runs, cell) for cell in FROM_THE_BEGINNING),
         false_failures_are_enough(interventions),
     ]
+
+
+def update_answers(runs: Iterable[Run]) -> list[Answer]:
+    """Return the answers to the questions that deviation 22 adds.
+
+    Args:
+        runs: see ``unload.reproduce.answer.read_answer``.
+    """
+    seen = {(cell, seed) for cell, (_, seeds) in UPDATES.items() for seed in seeds}
+    cells = measured(run for run in runs if run[:2] not in seen)
+    return [more_updates(cells, cell) for cell in UPDATES]
 
 
 def measured(runs: Iterable[Run]) -> dict[str, pd.DataFrame]:
@@ -293,6 +306,31 @@ def held_from_the_beginning(runs: list[Run], cell: str) -> Answer:
         if held
         else "None of these runs is there.",
         "a run does not",
+    )
+
+
+def more_updates(cells: dict[str, pd.DataFrame], cell: str) -> Answer:
+    """Question of deviation 22, for the fresh runs of one of ``UPDATES``."""
+    picks, seen = UPDATES[cell]
+    known = cell in cells and "paper_mask" in cells
+    so_far, prevents, complete = "Runs are missing.", False, False
+    if known:
+        fell, runs, control_fell, control_runs = (
+            number
+            for table in (cells[cell], cells["paper_mask"])
+            for number in ((table["falls"] > 0).sum(), len(table))
+        )
+        p = fisher_p(fell, runs, control_fell, control_runs)
+        prevents, complete = p <= 0.05, runs >= len(seeds_of(cell)) - len(seen)
+        so_far = (
+            f"{fell} of {runs} fresh runs fall, with an update for every 64 picks {control_fell} "
+            f"of {control_runs} (p = {p:.2g})."
+        )
+    return Answer(
+        f"With the mask an update for every {picks} picks prevents falls.",
+        _status("shown" if prevents else "not shown", complete, known),
+        so_far,
+        "not clearly fewer of its fresh runs fall",
     )
 
 
