@@ -38,6 +38,16 @@ def test_greedy_equalizes_what_its_network_expects(observations, rng):
     assert (raw != expected).any()
 
 
+@pytest.mark.parametrize("equalized", [True, False])
+def test_values_are_those_of_the_network(observations, equalized):
+    network = peq()
+    seen = equalize(observations).astype(np.float32) if equalized else observations
+    expected = network(torch.from_numpy(seen)).detach().numpy()
+    assert (Greedy(network, equalized).values(observations.astype(float)) == expected).all()
+    with pytest.raises(ValueError, match="observations"):
+        Greedy(network, equalized).values(observations[0])
+
+
 @pytest.mark.parametrize("name", [name for name in NETWORKS if name != "peq"])
 def test_rows_without_an_item_have_no_part_in_the_choice(observations, name, rng):
     network = NETWORKS[name](16, torch.Generator().manual_seed(2))

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from unload.agent.fast import fused
-from unload.agent.learner import highest_values
+from unload.agent.learner import action_values, highest_values
 from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
@@ -70,7 +70,25 @@ class Greedy:
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
+        observations, present = self._seen(observations)
+        return greedy_actions(self.network, observations, masks, present)
+
+    def values(self, observations: np.ndarray) -> np.ndarray:
+        """Return the network's action values of all items, (batch, items) float32.
+
+        Args:
+            observations: (batch, items, 3) float, not equalized.
+
+        Raises:
+            TypeError, ValueError: ``observations`` is not as described.
+        """
+        observations = checks.finite_array("observations", observations, (None, None, 3))
+        observations, present = self._seen(observations)
+        return action_values(self.network, observations.astype(np.float32), present).numpy()
+
+    def _seen(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the network sees of observations, and which of their rows hold an item."""
         present = holds_item(observations)
         if self.equalize:
             observations = equalize(observations, self.ties, present=present)
-        return greedy_actions(self.network, observations, masks, present)
+        return observations, present

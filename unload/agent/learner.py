@@ -84,6 +84,21 @@ class PlainLearner:
 
 
 @torch.no_grad()
+def action_values(
+    network: torch.nn.Module, observations: np.ndarray, present: np.ndarray | None = None
+) -> torch.Tensor:
+    """Return a network's action values, (batch, items), in plain PyTorch.
+
+    Args:
+        network, observations, present: see ``highest_values``.
+    """
+    arguments = [torch.from_numpy(observations)]
+    if present is not None and not present.all():  # other modules need not know of padding
+        arguments.append(torch.from_numpy(present))
+    return network(*arguments)
+
+
+@torch.no_grad()
 def highest_values(
     network: torch.nn.Module,
     observations: np.ndarray,
@@ -105,10 +120,8 @@ def highest_values(
         FloatingPointError: a row has no allowed action, or an allowed action's value is not
             finite.
     """
-    arguments = [torch.from_numpy(observations)]
-    if present is not None and not present.all():  # other modules need not know of padding
-        arguments.append(torch.from_numpy(present))
-    values = network(*arguments).masked_fill(torch.from_numpy(~allowed), -torch.inf)
+    values = action_values(network, observations, present)
+    values = values.masked_fill(torch.from_numpy(~allowed), -torch.inf)
     actions = values.argmax(dim=1)  # NaN counts as the highest
     finite = values.gather(1, actions[:, None]).isfinite()
     if not finite.all():

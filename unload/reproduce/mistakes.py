@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from unload.agent.evaluation import Policy
+from unload.agent.greedy import Greedy
 from unload.env.vector import ContainerVectorEnv
 from unload.support import checks
 
@@ -23,7 +24,9 @@ def mistakes(policy: Policy, episodes: int, seed: int) -> pd.Series:
     Returns:
         ``failed``, the share of picks that fail; ``first_failed``, the same of the first picks in
         a state, which are those of an episode and those after a success; ``repeated``, the share
-        of failed picks whose box has failed before in the episode, NaN without a failure.
+        of failed picks whose box has failed before in the episode, NaN without a failure; and
+        ``value_failed``, the median of the values that the network of a trained policy gave to
+        the picks that failed, NaN without a failure or a network.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
@@ -35,22 +38,25 @@ def mistakes(policy: Policy, episodes: int, seed: int) -> pd.Series:
     observations, infos = envs.reset(seed=loads)
     tried = [set() for _ in rows]  # boxes that have failed
     first, steps = np.ones(episodes, bool), []
+    learned, unknown = isinstance(policy, Greedy), np.full(episodes, np.nan)
     for _ in range(envs.max_picks - 1):  # the last pick would begin the next episode
         actions = policy(observations, infos["action_mask"].astype(bool), rng)
         boxes = envs.visible[rows, actions].tolist()
+        values = policy.values(observations)[rows, actions] if learned else unknown
         observations, rewards, *_, infos = envs.step(actions)
         failed = rewards < 0
         known = [box in each for box, each in zip(boxes, tried)]
-        steps.append((failed, first, known))
+        steps.append((failed, first, known, values))
         for row in np.flatnonzero(failed):
             tried[row].add(boxes[row])
         first = ~failed
     envs.close()
-    failed, first, known = map(np.array, zip(*steps))
+    failed, first, known, values = map(np.array, zip(*steps))
     return pd.Series(
         {
             "failed": failed.mean(),
             "first_failed": failed[first].mean(),
             "repeated": known[failed].mean() if failed.any() else np.nan,
+            "value_failed": np.median(values[failed]) if failed.any() else np.nan,
         }
     )
