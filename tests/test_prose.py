@@ -598,8 +598,8 @@ CLAIMS = [
     ),
     (
         "notebooks/11_why_60_percent.ipynb",
-        "With n = 256 {} of {} fall, and the fifth has no window below 95 % after 12 million picks; "
-        "they end at {:.0f} to {:.0f} %",
+        "With n = 256 {} of {} fall, and the fifth has no window below 95 % after 12 million "
+        "picks; they end at {:.0f} to {:.0f} %",
         partial(falls_and_ends, "features_256_mask"),
     ),
     (
