@@ -615,9 +615,9 @@ CLAIMS = [
     ),
     (
         "notebooks/11_why_60_percent.ipynb",
-        "with an update for every 4 picks {} of {} runs fall. But they rise again. They end at "
+        "with an update for every 4 picks {} of {} runs fall. They end at "
         "{:.0f} to {:.0f} %, on average {:.0f} points above the runs with an update for every 64 "
-        "picks (95 % Welch interval {:.0f} to {:.0f};",
+        "picks (95 % Welch interval {:.0f} to {:.0f})",
         lambda: (
             *falls_and_ends("updates_16_mask"),
             *gain("updates_16_mask", "paper_mask"),
