@@ -128,7 +128,7 @@ def _courses(runs: Mapping[str, Sequence[tuple]], columns: int) -> Figure:
     columns = min(checks.integer("columns", columns, 1), len(runs))
     lines = -(-len(runs) // columns)
     figure, grid = plt.subplots(
-        lines, columns, figsize=(7.8, 0.6 + 1.4 * lines), sharex=True, sharey=True,
+        lines, columns, figsize=(7.8, 0.6 + 1.25 * lines), sharex=True, sharey=True,
         squeeze=False,
     )  # fmt: skip
     for axes in grid.flat[len(runs) :]:
