@@ -59,10 +59,16 @@ def text_of(name: str) -> str:
 
 
 @cache
+def published_runs() -> list[tuple[str, int, pd.DataFrame]]:
+    """Cell, seed and curve of each run of the plan."""
+    return list(read_answer())
+
+
+@cache
 def curves_by_cell() -> dict[str, list[pd.DataFrame]]:
     """The curves of the runs of each cell of the plan, in the order of their seeds."""
     found = {}
-    for cell, _, curve in read_answer():
+    for cell, _, curve in published_runs():
         found.setdefault(cell, []).append(curve)
     return found
 
@@ -198,14 +204,14 @@ def averaged_ties_that_fall():
 
 
 def held_with_averaged_ties():
-    found = runs_held(read_answer(), [AVERAGED_2048, AVERAGED])
+    found = runs_held(published_runs(), [AVERAGED_2048, AVERAGED])
     held, small = found[AVERAGED_2048], found[AVERAGED]
     assert all(held) and all(small)
     return COUNTS[len(held)], 100 * HELD, HELD_FROM / 1e6, COUNTS[len(small)]
 
 
 def held_with_failures_kept():
-    held = runs_held(read_answer(), [KEPT])[KEPT]
+    held = runs_held(published_runs(), [KEPT])[KEPT]
     return COUNTS[sum(held)], COUNTS[len(held)]
 
 

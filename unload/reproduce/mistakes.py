@@ -37,26 +37,27 @@ def mistakes(policy: Policy, episodes: int, seed: int) -> pd.Series:
     loads = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     observations, infos = envs.reset(seed=loads)
     tried = [set() for _ in rows]  # boxes that have failed
-    first, steps = np.ones(episodes, bool), []
-    learned, unknown = isinstance(policy, Greedy), np.full(episodes, np.nan)
+    first, steps, values = np.ones(episodes, bool), [], []
     for _ in range(envs.max_picks - 1):  # the last pick would begin the next episode
         actions = policy(observations, infos["action_mask"].astype(bool), rng)
         boxes = envs.visible[rows, actions].tolist()
-        values = policy.values(observations)[rows, actions] if learned else unknown
+        seen = observations
         observations, rewards, *_, infos = envs.step(actions)
         failed = rewards < 0
+        if isinstance(policy, Greedy) and failed.any():
+            values += policy.values(seen[failed])[np.arange(failed.sum()), actions[failed]].tolist()
         known = [box in each for box, each in zip(boxes, tried)]
-        steps.append((failed, first, known, values))
+        steps.append((failed, first, known))
         for row in np.flatnonzero(failed):
             tried[row].add(boxes[row])
         first = ~failed
     envs.close()
-    failed, first, known, values = map(np.array, zip(*steps))
+    failed, first, known = map(np.array, zip(*steps))
     return pd.Series(
         {
             "failed": failed.mean(),
             "first_failed": failed[first].mean(),
             "repeated": known[failed].mean() if failed.any() else np.nan,
-            "value_failed": np.median(values[failed]) if failed.any() else np.nan,
+            "value_failed": np.median(values) if values else np.nan,
         }
     )

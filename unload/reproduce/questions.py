@@ -315,11 +315,8 @@ def more_updates(cells: dict[str, pd.DataFrame], cell: str) -> Answer:
     known = cell in cells and "paper_mask" in cells
     so_far, prevents, complete = "Runs are missing.", False, False
     if known:
-        fell, runs, control_fell, control_runs = (
-            number
-            for table in (cells[cell], cells["paper_mask"])
-            for number in ((table["falls"] > 0).sum(), len(table))
-        )
+        runs, control_runs = len(cells[cell]), len(cells["paper_mask"])
+        fell, control_fell = ((cells[name]["falls"] > 0).sum() for name in (cell, "paper_mask"))
         p = fisher_p(fell, runs, control_fell, control_runs)
         prevents, complete = p <= 0.05, runs >= len(seeds_of(cell)) - len(seen)
         so_far = (

@@ -11,7 +11,7 @@ from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.answer import CELLS, PAPER_CELLS, read_answer
 from unload.reproduce.changes import CHANGES
-from unload.reproduce.figures.style import styled
+from unload.reproduce.figures.style import hide_unused, styled
 from unload.reproduce.interventions import START, read_interventions
 from unload.reproduce.survival import constant_chance, surviving
 from unload.reproduce.verdict import PAPER_MSR, WINDOW_PICKS, cell_table, end_msr, windows
@@ -131,8 +131,7 @@ def _courses(runs: Mapping[str, Sequence[tuple]], columns: int) -> Figure:
         lines, columns, figsize=(7.8, 0.6 + 1.25 * lines), sharex=True, sharey=True,
         squeeze=False,
     )  # fmt: skip
-    for axes in grid.flat[len(runs) :]:
-        axes.set_visible(False)
+    hide_unused(grid, len(runs))
     for axes, (title, found) in zip(grid.flat, runs.items()):
         for _, seed, curve in found:
             msr = windows(curve)["success_rate"]
@@ -208,8 +207,7 @@ def survival(before: Mapping[str, np.ndarray], columns: int = 5) -> Figure:
         lines, columns, figsize=(1.9 * columns + 0.4, 0.7 + 1.5 * lines), sharex=True, sharey=True,
         squeeze=False,
     )  # fmt: skip
-    for axes in grid.flat[len(before) :]:
-        axes.set_visible(False)
+    hide_unused(grid, len(before))
     for axes, (name, successes) in zip(grid.flat, before.items()):
         share = surviving(successes)
         picks = np.arange(len(share))

@@ -6,6 +6,7 @@ from functools import wraps
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.figure import Figure
 
 from unload.support import files
@@ -34,6 +35,19 @@ def save(figure: Figure, name: str, folder: Path = files.FIGURES) -> None:
     with plt.style.context(STYLE):
         figure.savefig(folder / f"{name}.png", metadata={"Software": None})
         figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+
+
+def hide_unused(grid: np.ndarray, used: int) -> None:
+    """Hide the panels of a grid after the first ones; those above them show their ticks instead.
+
+    Args:
+        grid: (lines, columns) axes, as ``plt.subplots`` returns them with ``sharex`` and
+            ``squeeze=False``; only the last line is incomplete.
+        used: number of panels that stay.
+    """
+    for above, unused in zip(grid.flat[used - grid.shape[1] :], grid.flat[used:]):
+        unused.set_visible(False)
+        above.tick_params(labelbottom=True)
 
 
 def mark_reduced(figure: Figure, folder: str | Path, data: str) -> None:

@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from unload.reproduce.figures.style import styled
+from unload.reproduce.figures.style import hide_unused, styled
 from unload.reproduce.values import FRESH, FRESHER, SEEDS, TRACED, read_values
 from unload.support import checks, files
 
@@ -78,9 +78,7 @@ def wrong_states(folder: str | Path = files.DATA) -> Figure:
         for name, text in lines.items():
             axes.plot(run["picks"] / 1e6, run[name], linewidth=1, label=text)
         axes.set_title(f"seed {seed}", fontsize=9)
-    for above, axes in zip(grid.flat[len(runs) - 4 :], grid.flat[len(runs) :]):
-        axes.axis("off")
-        above.tick_params(labelbottom=True)
+    hide_unused(grid, len(runs))
     axes = grid[0, 0]
     axes.set_ylim(0, 1)
     axes.yaxis.set_major_formatter(PercentFormatter(1))
