@@ -150,3 +150,26 @@ def test_fishers_test_asks_whether_fewer_runs_fall():
     assert verdict.fisher_p(0, 5, 5, 5) == pytest.approx(1 / 252)
     with pytest.raises(ValueError, match="control_fallen is 6; expected an integer >= 0 and <= 5"):
         verdict.fisher_p(0, 5, 6, 5)
+
+
+def course(msr, loss):
+    return pd.DataFrame(
+        {"picks": 500_000 * np.arange(1, len(msr) + 1), "success_rate": msr, "loss": loss}
+    )
+
+
+def test_the_peak_of_the_loss_comes_after_a_rise():
+    flat = np.full(6, 0.5)
+    assert verdict.loss_peak(course(flat, [5, 1, 1.05, 2, 3, 2])) == 4
+    assert verdict.loss_peak(course(flat, [5, 4, 3, 2, 1, 1.05])) is None
+
+
+def test_the_rise_after_the_peak_of_the_loss():
+    loss = [5, 1, 2, 3, 2, 2, 2]
+    slow_and_noisy = course([0.1, 0.2, 0.3, 0.4, 0.5, 0.42, 0.5], loss)
+    assert verdict.after_loss_peak(slow_and_noisy) == (True, True)
+    fast_and_calm = course([0.1, 0.1, 0.2, 0.2, 0.4, 0.6, 0.8], loss)
+    assert verdict.after_loss_peak(fast_and_calm) == (False, False)
+    assert verdict.after_loss_peak(course(np.linspace(0, 1, 7), [7, 6, 5, 4, 3, 2, 1])) == (
+        False, False
+    )  # fmt: skip

@@ -17,6 +17,7 @@ from unload.reproduce import (
     heap_variation,
     interventions,
     lifts,
+    mistakes,
     observation,
     random_picks,
     random_share,
@@ -42,6 +43,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "drift": ("how the boxes of settled walls move", drift.drift_data, drift.OPTIONS),
     "answer": ("why 60 %: the runs of the plan", answer.answer_data, answer.OPTIONS),
     "trained": ("why 60 %: what those runs have learned", trained.trained_data, trained.OPTIONS),
+    "mistakes": ("why 60 %: the mistakes of those runs", mistakes.mistakes_data, mistakes.OPTIONS),
     "interventions": (
         "why 60 %: runs changed on the way",
         interventions.interventions_data,

@@ -24,6 +24,7 @@ from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, read_table
 from unload.reproduce.study import BASE
 from unload.support import checks, files
+from unload.support.provenance import read_provenance
 
 COLUMNS = ["picks", "success_rate", "deadlocked", "loss"]
 MASKED = replace(BASE, mask=True)
@@ -176,3 +177,12 @@ def read_answer(folder: str | Path = files.DATA) -> Iterator[tuple[str, int, pd.
 def paper_runs(folder: str | Path = files.DATA) -> list[tuple[str, int, pd.DataFrame]]:
     """Cell, seed and curve of each published run of the paper's cells."""
     return [run for run in read_answer(folder) if run[0] in PAPER_CELLS]
+
+
+def wall_minutes(batch_size: int, folder: str | Path = files.DATA) -> list[float]:
+    """Recorded wall time in minutes of each published run of the paper's cells with a batch."""
+    return [
+        read_provenance(Path(folder) / "answer" / cell, f"seed_{seed}")["wall_time_s"] / 60
+        for cell, seed, _ in paper_runs(folder)
+        if CELLS[cell].batch_size == batch_size
+    ]

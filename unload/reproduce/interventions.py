@@ -34,7 +34,7 @@ from unload.support.provenance import run_record
 
 CONTROL = CELLS["paper_mask"]
 START = 12_000_000  # picks before the change
-SEEDS = tuple(range(10))
+SEEDS = (0, 2, 3, 4, 5)  # of control runs that have not fallen by then (deviation 10 of the plan)
 FAILURES = "failures"  # column: share of failures in the replay
 CONTROL_FOLDER, FOLDER = "control", "interventions"
 

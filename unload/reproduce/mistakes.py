@@ -1,12 +1,112 @@
-"""The mistakes of a policy with the mask: often it tries the same boxes again."""
+"""The mistakes of trained policies in fresh containers.
+
+    python -m unload.reproduce mistakes
+
+With the mask a policy often tries the same boxes again; without it, its first mistake ends an
+episode. Each policy of the paper's cells is applied as it was trained.
+"""
+
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from unload.agent.evaluation import Policy
 from unload.agent.greedy import Greedy
+from unload.agent.weights import load_policy
 from unload.env.vector import ContainerVectorEnv
-from unload.support import checks
+from unload.reproduce.answer import CELLS, paper_runs
+from unload.reproduce.fingerprint import training_fingerprint
+from unload.reproduce.measure import LOADS_SEED, POLICY_LOADS
+from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
+from unload.reproduce.survival import before_first_mistake
+from unload.reproduce.trained import stored_policy
+from unload.support import checks, files
+
+NAME, FIRST = "mistakes", "first_mistakes"
+MEASURES = ["failed", "first_failed", "repeated", "value_failed"]
+OPTIONS = JOBS
+
+
+def mistakes_data(
+    loads: int = POLICY_LOADS,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    progress: bool = True,
+) -> None:
+    """Measure the paper's cells: ``answer/mistakes.csv`` and ``answer/first_mistakes.csv``.
+
+    The first has one row per policy trained with the mask: ``cell``, ``seed``, and what
+    ``mistakes`` says of it. The second has one row per policy trained without it and container:
+    ``cell``, ``seed``, ``container``, and ``before``, the picks that succeed before the first
+    mistake of an episode without the mask, 500 where there is none.
+
+    Args:
+        loads: fresh containers for each policy, 500 picks in each.
+        folder: of the data; it holds the runs.
+        runs_dir: where what has been measured is kept.
+        n_jobs: processes, as in joblib.
+        progress: show a progress bar.
+
+    Raises:
+        ValueError: ``loads`` is not positive, or a run is of training that differs from today's.
+        FileNotFoundError: no run has been published.
+    """
+    checks.integer("loads", loads, 1)
+    folder, fingerprint = Path(folder) / "answer", training_fingerprint()
+    runs = [(cell, seed) for cell, seed, _ in paper_runs(folder.parent)]
+    if not runs:
+        raise FileNotFoundError(f"{folder} holds no run; {COMMAND} answer makes them")
+    jobs = []
+    for cell, seed in runs:
+        path, weights = stored_policy(folder, cell, seed, fingerprint)
+        mask = CELLS[cell].mask
+        question = {"weights": weights, "mask": mask, "loads": loads, "seed": LOADS_SEED}
+        jobs.append((question, partial(_measure, path, mask, loads)))
+    answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
+    masked, unmasked = [], []
+    for (cell, seed), answer in zip(runs, answers):
+        if CELLS[cell].mask:
+            masked.append((cell, seed, *answer.value))
+        else:
+            unmasked += [(cell, seed, *each) for each in enumerate(answer.value)]
+    publish(
+        folder,
+        NAME,
+        {
+            NAME: pd.DataFrame(masked, columns=["cell", "seed", *MEASURES]),
+            FIRST: pd.DataFrame(unmasked, columns=["cell", "seed", "container", "before"]),
+        },
+        f"{COMMAND} {NAME}",
+        {"loads": loads, "loads_seed": LOADS_SEED},
+        loads < POLICY_LOADS,
+        [answer.record for answer in answers],
+        fingerprint,
+    )
+
+
+def _measure(path: str | Path, mask: bool, loads: int) -> list:
+    """``MEASURES`` with the mask, or the successes before each container's first mistake."""
+    policy = load_policy(path)
+    if mask:
+        return mistakes(policy, loads, LOADS_SEED)[MEASURES].tolist()
+    return before_first_mistake(policy, loads, LOADS_SEED).tolist()
+
+
+def read_mistakes(folder: str | Path = files.DATA) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The two tables of ``mistakes_data``."""
+    columns = {NAME: MEASURES, FIRST: ["container", "before"]}
+    first, second = (
+        read_table(
+            Path(folder) / "answer" / f"{name}.csv",
+            f"{COMMAND} {NAME}",
+            ["cell", "seed", *others],
+        )
+        for name, others in columns.items()
+    )
+    return first, second
 
 
 def mistakes(policy: Policy, episodes: int, seed: int) -> pd.Series:

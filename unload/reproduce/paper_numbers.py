@@ -1,9 +1,9 @@
 """The paper's numbers beside ours, section by section, as notebook 10 shows them.
 
-Ours are constants of the code, measured within a minute, or computed from ``data/``; only the
-paper's are typed. Each function returns a table indexed by ``number``, all columns text:
-``source`` (the section of the paper), ``paper``, ``here``, and ``agrees``, which is "yes", "no",
-"in part", or empty where the paper has no such number.
+Ours are constants of the code, or measured within a minute; only the paper's are typed. Each
+function returns a table indexed by ``number``, all columns text: ``source`` (the section of the
+paper), ``paper``, ``here``, and ``agrees``, which is "yes", "no", "in part", "not shown", or empty
+where the paper has no such number. ``paper_curves`` goes on with the tuning and the training.
 """
 
 from pathlib import Path
@@ -21,22 +21,10 @@ from unload.env.equalization import equalize
 from unload.load import substacks
 from unload.network.peq import PEQNetwork
 from unload.physics import bullet
-from unload.reproduce.answer import PAPER_CELLS, paper_runs
-from unload.reproduce.tuning import (
-    RUN_COUNT,
-    STEPS,
-    greedy_reached,
-    run_name,
-    running_mean,
-    set_name,
-)
-from unload.reproduce.verdict import PAPER_MSR, run_measures, t_interval, windows
+from unload.reproduce.tuning import RUN_COUNT, STEPS
 from unload.support import checks, files
 
 CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
-STEADY = 0.05  # MSR that a steady rise may lose
-BATCH_SIZES = (64, 256, 1024, 2048)  # of the tuning runs
-SETTLED = 200  # tuning steps after which the noise of the loss is measured
 
 
 class Row(NamedTuple):
@@ -233,12 +221,13 @@ def free_shares(episodes: int) -> tuple[float, float]:
 
 
 def rules(episodes: int, seed: int) -> pd.DataFrame:
-    """The MSR of two rules without the mask.
+    """The rewards, and the MSR of two rules without the mask.
 
     Args:
         episodes: containers.
         seed: of the first one.
     """
+    rewards = sorted(rewards_seen(seed), reverse=True)
     highest, nearest = (
         evaluate(rule, episodes, seed, mask=False)["success_rate"].mean()
         for rule in (policies.highest, policies.nearest)
@@ -246,191 +235,24 @@ def rules(episodes: int, seed: int) -> pd.DataFrame:
     best = f"highest item: {highest:.1%}"
     return table(
         [
+            Row(
+                "reward of a success, of a failure",
+                "III-D",
+                "1, -1",
+                ", ".join(f"{reward:g}" for reward in rewards),
+                rewards == [1, -1],
+            ),
             Row("MSR of an optimal policy", "IV-B", "100 %", best, highest == 1),
             Row("MSR of the nearest item", "—", "—", f"{nearest:.1%}"),
         ]
     )
 
 
-def tuning(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """The tuning environment: learning rates, batch sizes, feature engineering.
-
-    Args:
-        folder: of the data.
-    """
-    summary = pd.read_csv(Path(folder) / "tuning_summary.csv")
-    summary = summary.set_index(["equalize", "batch_size", "learning_rate"])
-    reached = {size: greedy_reached(_curves("hitrate", True, size, folder)) for size in BATCH_SIZES}
-    noise = {size: loss_noise(True, size, folder) for size in BATCH_SIZES}
-    return table(
-        [
-            *_learning_rates(summary),
-            *_batches(summary, reached, noise),
-            *_feature_engineering(summary, reached[2048], noise[2048], folder),
-        ]
-    )
-
-
-def _learning_rates(summary: pd.DataFrame) -> list[Row]:
-    rows = []
-    for rate, claim in (
-        (0.1, "unstable, in most cases unsuccessful"),
-        (0.01, "the same"),
-        (0.001, "successful"),
-    ):
-        runs = summary.loc[True, 1024, rate]
-        here = f"{_solved(runs)}; MSR at the end {runs.final_msr:.0%}"
-        agrees = (runs.solved > runs.runs / 2) == (rate == 0.001)
-        rows.append(Row(f"tuning, b = 1024, μ = {rate:g}", "IV-A, Fig. 8", claim, here, agrees))
-    return rows
-
-
-def _batches(summary: pd.DataFrame, reached: dict, noise: dict) -> list[Row]:
-    rows = [
-        Row(
-            f"tuning, b = {size}, μ = 0.001", "IV-A, Fig. 9", "a curve",
-            f"{_solved(summary.loc[True, size, 0.001])}; {_since(reached[size])}; "
-            f"noise of the loss {noise[size]:.4f}",
-        )
-        for size in BATCH_SIZES
-    ]  # fmt: skip
-    faster = "steps of the greedy MSR, above: b = 2048 against 64"
-    return [
-        *rows,
-        Row(
-            "… less noisy with larger b", "IV-A", "yes", "noise of the loss, above",
-            list(noise.values()) == sorted(noise.values(), reverse=True),
-        ),
-        Row(
-            "… faster with larger b", "IV-A", "yes", faster,
-            reached[2048]["high"] < reached[64]["low"],
-        ),
-    ]  # fmt: skip
-
-
-def _feature_engineering(
-    summary: pd.DataFrame, reached: dict, noise: float, folder: str | Path
-) -> list[Row]:
-    rows = []
-    for equalized, label in ((True, "with FE"), (False, "without FE")):
-        loss = summary.loc[equalized, 2048, 0.001]
-        here = f"{loss.loss_start:.2f}, {loss.loss_dip:.2f}, {loss.loss_peak:.2f}"
-        here += f", {loss.loss_end:.3f} at the end"
-        agrees = loss.loss_start > loss.loss_dip < loss.loss_peak > loss.loss_end
-        rows.append(
-            Row(f"tuning, loss {label}", "IV-A, Fig. 10", "falls, rises, falls", here, agrees)
-        )
-    without = greedy_reached(_curves("hitrate", False, 2048, folder))
-    spread = loss_noise(False, 2048, folder)
-    return [
-        *rows,
-        Row(
-            "… shorter with FE", "IV-A", "significantly",
-            f"with FE, {_since(reached)}; without, from {_steps(without)} on",
-            reached["high"] < without["low"],
-        ),
-        Row(
-            "… more stable with FE", "IV-A", "yes",
-            f"noise of the loss {noise:.4f} with FE, {spread:.4f} without", noise < spread,
-        ),
-    ]  # fmt: skip
-
-
-def loss_noise(equalized: bool, batch_size: int, folder: str | Path = files.DATA) -> float:
-    """Return the standard deviation of the losses of tuning runs around their running means.
-
-    Args:
-        equalized: whether with feature engineering.
-        batch_size: of the runs; their learning rate is the paper's.
-        folder: of the data.
-    """
-    loss = _curves("loss", equalized, batch_size, folder)
-    apart = loss - np.array([running_mean(run) for run in loss])
-    return float(np.nanstd(apart[:, SETTLED:]))
-
-
-def _curves(kind: str, equalized: bool, batch_size: int, folder: str | Path) -> np.ndarray:
-    """The curves of all tuning runs with the paper's learning rate, (runs, steps)."""
-    place = Path(folder) / set_name(equalized)
-    names = [f"{kind}_curve_{run_name(batch_size, 1e-3, run)}.csv" for run in range(RUN_COUNT)]
-    return np.array([np.loadtxt(place / name) for name in names if (place / name).is_file()])
-
-
-def _solved(runs: pd.Series) -> str:
-    return f"{runs.solved:.0f} of {runs.runs:.0f} runs end at 99 %"
-
-
-def _steps(reached: dict) -> str:
-    return f"{reached['step']:.0f} ({reached['low']:.0f}–{reached['high']:.0f})"
-
-
-def _since(reached: dict) -> str:
-    return f"greedy MSR above 90 % from step {_steps(reached)} on"
-
-
-def training(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """The training, by the plan's measures in ``unload.reproduce.verdict``.
-
-    Args:
-        folder: of the data.
-    """
-    runs = paper_runs(folder)
-    rows = _start(np.array([curve["success_rate"].iloc[0] for _, _, curve in runs]))
-    for cell, name in PAPER_CELLS.items():
-        curves = [curve for each, _, curve in runs if each == cell]
-        if len(curves) > 1:
-            rows += _cell(f"{name}, {len(curves)} runs", curves)
-    trained = pd.read_csv(Path(folder) / "training_summary.csv")
-    for mask, column in (("without", "msr_no_mask"), ("with", "msr_mask")):
-        label = f"MSR of the policies trained without the mask, b = 2048, applied {mask} it"
-        msr = trained[column]
-        rows.append(Row(label, "—", "—", f"{msr.mean():.0%} ({msr.min():.0%}–{msr.max():.0%})"))
-    return table(rows)
-
-
-def _start(msr: np.ndarray) -> list[Row]:
-    """The first episodes of all runs: mean reward and MSR."""
-    mean, reward = msr.mean(), 2 * msr.mean() - 1
-    return [
-        Row(
-            "mean reward at the start (first episodes)", "IV-B, Fig. 12", "-0.7", f"{reward:.2f}",
-            abs(reward + 0.7) < 2 * CHANCE_ERROR,
-        ),
-        Row(
-            "MSR at the start (first episodes)", "IV-B", "15 %", f"{mean:.1%}",
-            abs(mean - 0.15) < CHANCE_ERROR,
-        ),
-    ]  # fmt: skip
-
-
-def _cell(label: str, curves: list[pd.DataFrame]) -> list[Row]:
-    """The end, the rise and the loss of the runs of one cell."""
-    measured = pd.DataFrame([run_measures(curve) for curve in curves])
-    end, (low, high) = measured["end"], t_interval(measured["end"])
-    alike, half = int(measured["both"].sum()), len(curves) / 2
-    msr = [windows(curve)["success_rate"].to_numpy() for curve in curves]
-    steady = sum((np.maximum.accumulate(each) - each).max() <= STEADY for each in msr)
-    like_11 = int(measured["fig11"].sum())
-    holds = bool(low <= PAPER_MSR <= high)
-    reproduced = holds if alike >= half or not holds else "in part"  # the plan's question 1
-    return [
-        Row(
-            f"mean reward at the end: {label}", "IV-B, Fig. 12", "around 0.2",
-            f"{2 * end.mean() - 1:.2f} (95 % t interval {2 * low - 1:.2f} to {2 * high - 1:.2f})",
-            reproduced,
-        ),
-        Row(
-            f"MSR at the end: {label}", "abstract, IV-B, V", "60 %",
-            f"{end.mean():.0%} (95 % t interval {low:.0%} to {high:.0%}); "
-            f"{alike} of {len(end)} runs like the paper's",
-            reproduced,
-        ),
-        Row(
-            f"steady rise: {label}", "IV-B", "yes", f"{steady} of {len(curves)} runs",
-            steady >= half,
-        ),
-        Row(
-            f"loss: {label}", "IV-B, Fig. 11", "falls, rises, falls",
-            f"{like_11} of {len(curves)} runs", like_11 >= half,
-        ),
-    ]  # fmt: skip
+def rewards_seen(seed: int) -> set[float]:
+    """Return the rewards of random picks in one container."""
+    env = gymnasium.make("unload/Container-v0", physics="table")
+    env.action_space.seed(seed)
+    env.reset(seed=seed)
+    rewards = {env.step(env.action_space.sample())[1] for _ in range(task.MAX_PICKS)}
+    env.close()
+    return rewards

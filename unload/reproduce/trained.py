@@ -63,13 +63,7 @@ def trained_data(
         raise FileNotFoundError(f"{folder} holds no run; {COMMAND} answer makes them")
     jobs = []
     for cell, seed in runs:
-        found = read_provenance(folder / cell, f"seed_{seed}").get("fingerprint")
-        if found != fingerprint:
-            raise ValueError(
-                f"{folder / cell}/seed_{seed} has the fingerprint {found}; expected {fingerprint}"
-            )
-        path = folder / cell / f"seed_{seed}.safetensors"
-        weights = blake2b(path.read_bytes(), digest_size=16).hexdigest()
+        path, weights = stored_policy(folder, cell, seed, fingerprint)
         question = {"weights": weights, "loads": loads, "seed": LOADS_SEED}
         jobs.append((question, partial(measure_policy, path, loads)))
     answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
@@ -84,6 +78,21 @@ def trained_data(
         [answer.record for answer in answers],
         fingerprint,
     )
+
+
+def stored_policy(folder: Path, cell: str, seed: int, fingerprint: str) -> tuple[Path, str]:
+    """The file of a published run's weights, and their digest.
+
+    Raises:
+        ValueError: the run has another fingerprint.
+    """
+    found = read_provenance(folder / cell, f"seed_{seed}").get("fingerprint")
+    if found != fingerprint:
+        raise ValueError(
+            f"{folder / cell}/seed_{seed} has the fingerprint {found}; expected {fingerprint}"
+        )
+    path = folder / cell / f"seed_{seed}.safetensors"
+    return path, blake2b(path.read_bytes(), digest_size=16).hexdigest()
 
 
 def measure_policy(path: str | Path, loads: int) -> list[float]:

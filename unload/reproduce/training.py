@@ -19,6 +19,7 @@ from unload.env.container import ContainerEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings, write_table
+from unload.reproduce.verdict import end_msr
 from unload.support import checks, files
 
 PAPER_PICKS = TrainConfig().picks
@@ -105,15 +106,16 @@ def training_summary(result: TrainResult) -> dict[str, float]:
 
     Returns:
         ``msr_start``, ``msr_end`` and ``msr_best``: the MSR while training over the first
-        episode of all environments, the last hundredth of the picks (at least one episode),
-        and the best episode. ``msr_mask``, ``msr_no_mask``: the MSR of the trained policy on
-        50 fresh containers with and without the mask, each with its standard deviation over
-        the containers, and the share of picks in deadlocks without the mask.
+        episode of all environments, the last tenth of the picks, and the best episode.
+        ``msr_mask``, ``msr_no_mask``: the MSR of the trained policy on 50 fresh containers with
+        and without the mask, each with its standard deviation over the containers, and the share
+        of picks in deadlocks without the mask.
     """
-    msr = episode_means(result.curve)["success_rate"]
+    episodes = episode_means(result.curve)
+    msr = episodes["success_rate"]
     row = {
         "msr_start": msr.iloc[0],
-        "msr_end": msr.iloc[-max(1, len(msr) // 100) :].mean(),
+        "msr_end": end_msr(episodes),
         "msr_best": msr.max(),
     }
     for name, mask in (("mask", True), ("no_mask", False)):

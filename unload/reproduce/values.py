@@ -31,6 +31,7 @@ from unload.reproduce.interventions import (
     CONTROL,
     CONTROL_FOLDER,
     FAILURES,
+    SEEDS,
     START,
     changed,
     failure_share,
@@ -45,7 +46,6 @@ NAME = "values"
 TRACED = (
     "nothing", "successes_kept", "failures_kept", "successes_called_failures", "ties_averaged"
 )  # fmt: skip
-SEEDS = (0, 2, 3, 4, 5)  # of control runs that have not fallen by 12 million picks
 FRESH = range(10, 18)  # of control runs that deviation 20 of the plan adds
 FRESHER = (18, 19, 20, 22, 23)  # of those that deviation 21 adds
 RUNS = [*product(TRACED, SEEDS), *(("nothing", seed) for seed in (*FRESH, *FRESHER))]

@@ -100,10 +100,31 @@ def resembles_fig12(curve: pd.DataFrame) -> bool:
 
 def resembles_fig11(curve: pd.DataFrame) -> bool:
     """Whether the loss rises by a tenth from a minimum, and falls by a tenth afterwards."""
-    loss = windows(curve)["loss"].dropna().to_numpy()
-    lowest = np.minimum.accumulate(loss)
-    peaks = np.flatnonzero(loss >= 1.1 * lowest)
-    return bool(len(peaks) and loss[-1] <= 0.9 * loss[peaks].max())
+    loss, peak = windows(curve)["loss"].dropna(), loss_peak(curve)
+    return peak is not None and bool(loss.iloc[-1] <= 0.9 * loss[peak])
+
+
+def loss_peak(curve: pd.DataFrame) -> int | None:
+    """Return the window of the highest loss after a rise by a tenth; None without such a rise."""
+    loss = windows(curve)["loss"].dropna()
+    risen = loss[loss >= 1.1 * loss.cummin()]
+    return None if risen.empty else int(risen.idxmax())
+
+
+def after_loss_peak(curve: pd.DataFrame) -> tuple[bool, bool]:
+    """Return whether the MSR rises more slowly and is noisier after the loss's peak than before.
+
+    Compared are the mean and the standard deviation of its changes from window to window; both
+    are False if there are fewer than two changes before the peak or after it.
+    """
+    peak, msr = loss_peak(curve), windows(curve)["success_rate"]
+    if peak is None:
+        return False, False
+    changes = msr.diff().dropna()
+    before, after = changes[changes.index <= peak], changes[changes.index > peak]
+    if min(len(before), len(after)) < 2:
+        return False, False
+    return bool(after.mean() < before.mean()), bool(after.std() > before.std())
 
 
 def run_measures(curve: pd.DataFrame) -> dict:

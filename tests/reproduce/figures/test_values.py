@@ -1,7 +1,8 @@
 import pytest
 
 from unload.reproduce.figures.values import value_traces, wrong_states
-from unload.reproduce.values import FRESH, FRESHER, SEEDS, read_values
+from unload.reproduce.interventions import SEEDS
+from unload.reproduce.values import FRESH, FRESHER, read_values
 
 
 def test_a_line_for_each_run(saved_twice, names_its_command):

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.figures.style import hide_unused, styled
-from unload.reproduce.values import FRESH, FRESHER, SEEDS, TRACED, read_values
+from unload.reproduce.interventions import SEEDS
+from unload.reproduce.values import FRESH, FRESHER, TRACED, read_values
 from unload.support import checks, files
 
 
