@@ -1,3 +1,4 @@
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -84,10 +85,17 @@ def test_unknown_cells_are_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_the_runs_of_the_papers_cells_are_whole():
-    runs = answer.paper_runs()
-    assert {cell for cell, _, _ in runs} <= set(answer.PAPER_CELLS)
-    assert len({(cell, seed) for cell, seed, _ in runs}) == len(runs) >= 22
+def test_published_are_the_runs_of_the_plan_and_whole():
+    runs = list(answer.read_answer())
+    planned = [(cell, seed) for cell in answer.CELLS for seed in answer.seeds_of(cell)]
+    assert [run[:2] for run in runs] == planned
     for _, _, curve in runs:
         assert curve["picks"].iloc[-1] == 20_000_000
         assert 0.2 < end_msr(curve) <= 1
+
+
+def test_recorded_times_of_the_papers_cells():
+    small, large = answer.wall_minutes(256), answer.wall_minutes(2048)
+    assert len(small) == 20 and len(large) == 16
+    assert 1 < np.median(small) < np.median(large) < 60
+    assert answer.wall_minutes(64) == []

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -121,3 +122,8 @@ def test_a_failed_change_stops_no_other(tmp_path, monkeypatch):
         )  # fmt: skip
     found = [change for change, _, _ in interventions.read_interventions(tmp_path)]
     assert found == ["learning_rate_lowered"]
+
+
+def test_published_are_the_runs_that_the_command_makes():
+    published = [(change, seed) for change, seed, _ in interventions.read_interventions()]
+    assert published == list(product(CHANGES, interventions.SEEDS))

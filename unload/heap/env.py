@@ -96,7 +96,7 @@ class HeapEnv(EpisodeEnv):
     - ``unloaded`` and ``falls``: int, the two parts of the reward;
     - ``box``: int, the dragged box's number in the heap before the pick, -1 if there was none;
     - ``moved``: float, m, how far it came, and ``came``: bool;
-    - ``fates``: (96,) int8, what became of the box in each row of the observation before the
+    - ``fates``: (96,) int8, what happened to the box in each row of the observation before the
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
     Args:

@@ -28,7 +28,7 @@ class Episode:
         boxes: (t,) int64, dragged boxes, by their numbers in the heap before each pick.
         unloaded, falls: (t,) int64, of each pick.
         moved: (t,) float64, m, how far the dragged box came.
-        fates: (t, 96) int8, what became of the box in each row, see ``HeapEnv``.
+        fates: (t, 96) int8, what happened to the box in each row, see ``HeapEnv``.
         heaps: t + 1 heaps, before each pick and after the last; () if not kept.
     """
 

@@ -37,7 +37,7 @@ class Picks:
         next_observations: (n, 96, 13) float32, after it.
         next_masks: (n, 96) bool, what could be picked next; all False at an episode's end by
             termination.
-        fates: (n, 96) int8, what became of the box in each row, see ``HeapEnv``.
+        fates: (n, 96) int8, what happened to the box in each row, see ``HeapEnv``.
     """
 
     observations: np.ndarray

@@ -399,7 +399,7 @@ def _compared(table: pd.DataFrame, changes: Iterable[str]) -> list[str]:
 
 
 def _changed(table: pd.DataFrame, change: str) -> str:
-    """What became of the runs with a change, by ``intervention_table`` indexed by change."""
+    """How many runs with a change fall, by ``intervention_table`` indexed by change."""
     fell, runs, p = (table.loc[change, name] for name in ("fell", "runs", "p"))
     return f"{change.replace('_', ' ')}: {fell} of {runs} fall (p = {p:.2g})"
 

@@ -3,8 +3,8 @@
     python -m unload.reproduce values
 
 Control runs of the plan go on after 12 million picks, with one change or none (deviations 19 to 21
-of the plan). The states of the first episode are kept at five moments, with what would become of
-each item if it were picked; the values of these items are followed, episode by episode.
+of the plan). The states of the first episode are kept at five moments, with the outcome of a pick
+of each item; the values of these items are followed, episode by episode.
 """
 
 from collections import deque
