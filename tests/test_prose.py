@@ -18,7 +18,7 @@ from unload.reproduce.figures.heap import at_shown_weight, read_heap_table
 from unload.reproduce.figures.tuning import read_curves
 from unload.reproduce.heap_rules import candidates
 from unload.reproduce.heap_table import AS_TRAINED, LEARNED, REFERENCE, VARIED_RULE
-from unload.reproduce.interventions import read_interventions
+from unload.reproduce.interventions import SEEDS, read_interventions
 from unload.reproduce.measure import POLICY_LOADS
 from unload.reproduce.mistakes import read_mistakes
 from unload.reproduce.questions import (
@@ -242,6 +242,14 @@ def all_traced_falls():
     return shares_after_falls([*FRESH, *FRESHER], ["wrong", "own_wrong", "start_wrong"])
 
 
+def traced_earlier_and_later():
+    """All traced falls, with those of the first five in between."""
+    count, low, high, own_low, own_high, start_low, start_high = all_traced_falls()
+    five, *first = shares_after_falls(SEEDS, ["wrong", "own_wrong"])
+    assert five == "five"
+    return count, low, high, *first[:2], own_low, own_high, *first[2:], start_low, start_high
+
+
 def states_after_falls():
     """Later fresh runs that fall, and shares of their states that other networks are wrong in."""
     return shares_after_falls(FRESHER, ["start_wrong", "past_wrong"])
@@ -277,30 +285,59 @@ def failing_policies():
 
 
 def chances_of_a_mistake():
-    """Policies whose chance grows, of how many; one mistake in so many early and late picks."""
+    """Policies whose chance grows, of how many; then of each batch, of how many early and late
+    picks one is a mistake."""
     _, table = read_mistakes()
-    before = [each["before"].to_numpy() for _, each in table.groupby(["cell", "seed"], sort=False)]
-    found = pd.DataFrame([early_and_late(each) for each in before])
-    msr = np.array([each.mean() / task.MAX_PICKS for each in before])
+    rows = [
+        {
+            "cell": cell,
+            "msr": each["before"].mean() / task.MAX_PICKS,
+            "late_start": (each["before"] >= 300).mean(),
+            **early_and_late(each["before"].to_numpy()),
+        }
+        for (cell, _), each in table.groupby(["cell", "seed"], sort=False)
+    ]
+    found = pd.DataFrame(rows)
     grows = found["p"] < 0.001
-    assert (grows == (msr < 0.4)).all()
-    late = [each for each, rising in zip(before, grows) if rising]
-    assert (np.concatenate(late) >= 300).mean() < 0.05  # "by pick 300 nearly all"
-    once = 1 / found.loc[grows, ["early", "late"]].mean()
-    return grows.sum(), len(found), 100 * 0.4, round(once["early"], -1), once["late"]
+    assert (grows == (found["msr"] < 0.4)).all()
+    assert found.loc[grows, "late_start"].mean() < 0.05  # "by pick 300 nearly all"
+    counts = [grows.sum(), len(found), 40]
+    for cell in ("paper_no_mask", "paper_b2048_no_mask"):
+        policies = found[grows & (found["cell"] == cell)]
+        counts += [len(policies), *(1 / policies[["early", "late"]].mean())]
+    return counts
+
+
+def boxes_that_fail():
+    """Boxes that fail at least once in a container, on average: least and most; and policies."""
+    table, _ = read_mistakes()
+    failing = table[table["failed"] >= 0.1]
+    boxes = failing["failed"] * (1 - failing["repeated"]) * (task.MAX_PICKS - 1)
+    return boxes.min(), boxes.max()
+
+
+def values_of_failed_picks():
+    count, extremes = failing_policies()
+    table, _ = read_mistakes()
+    negative = (table.loc[table["failed"] >= 0.1, "value_failed"] < 0).sum()
+    return *extremes["value_failed"], COUNTS[negative], count
 
 
 def turning_points():
-    """Share of the runs with the mask that fall; where runs without it turn back, in percent."""
+    """Runs with the mask that fall, of how many; where runs without it turn back, in percent.
+
+    Then how many of these rise above that later, of how many.
+    """
     masked = [cell for cell in PAPER_CELLS if not cell.endswith("no_mask")]
     fell, runs = sum(map(runs_that_fall, masked)), sum(len(curves_of(cell)) for cell in masked)
-    turned = []
+    turned, risen = [], 0
     for cell in set(PAPER_CELLS) - set(masked):
         for msr in (windows(each)["success_rate"] for each in curves_of(cell)):
             first = (msr.cummax() - msr >= 0.05).idxmax()
             assert first < 20  # windows: before exploration ends
             turned.append(100 * msr.cummax()[first])
-    return fell, runs, min(turned), max(turned)
+            risen += 100 * msr[first:].max() > turned[-1]
+    return fell, runs, min(turned), max(turned), risen, len(turned)
 
 
 def paper_cell(cell):
@@ -473,14 +510,14 @@ CLAIMS = [
     (
         "README.md",
         "{} of {} runs with the mask rise to nearly 100 % and fall, the other one stays up, and "
-        "runs without it turn back at {:.0f} to {:.0f} %",
+        "runs without it turn back at {:.0f} to {:.0f} % before exploration ends; {} of {} rise "
+        "above that later",
         turning_points,
     ),
     (
         "README.md",
-        "With 2²³ picks instead of 2²⁰ and the mask, {} of {} runs fall within 20 million picks, "
-        "but none stays above 99 %. With b = 256 the larger memory raises the end by {:.0f} points "
-        "with the mask ({:.0f}–{:.0f}) and by {:.0f} without it ({:.0f}–{:.0f})",
+        "With 2²³ picks instead of 2²⁰ and the mask {} of {} do, but none stays above 99 %. They "
+        "end {:.0f} points higher ({:.0f}–{:.0f}), and without the mask {:.0f} ({:.0f}–{:.0f})",
         larger_memories,
     ),
     (
@@ -495,8 +532,8 @@ CLAIMS = [
     ),
     (
         "README.md",
-        "of the failures of the {} policies that fail in a tenth of the picks or more, {:.0f} to "
-        "{:.0f} % are of a box",
+        "in the {} policies trained with the mask that fail in a tenth of the picks or more, "
+        "{:.0f} to {:.0f} % of the failures are of a box",
         lambda: (failing_policies()[0], *(100 * failing_policies()[1]["repeated"])),
     ),
     (
@@ -577,11 +614,12 @@ CLAIMS = [
     ),
     (
         "README.md",
-        "In all {} falls of fresh seeds that were traced, over the half million picks after the "
-        "fall, a blocked item is its favourite in {:.1f} to {:.1f} % of the earlier states, and in "
-        "{:.0f} to {:.0f} % of those that its own picks lead to. The network of before the fall "
-        "errs in {:.0f} to {:.0f} % of the latter",
-        all_traced_falls,
+        "{} of other seeds were traced to test it: over the half million picks after the fall, a "
+        "blocked item is its favourite in {:.1f} to {:.1f} % of the earlier states (in the first "
+        "five falls {:.0f} to {:.0f} %), and in {:.0f} to {:.0f} % of those that its own picks "
+        "lead to ({:.0f} to {:.0f} %). The network of 12 million picks errs in {:.0f} to {:.0f} % "
+        "of the latter",
+        traced_earlier_and_later,
     ),
     ("README.md", "stand beside the data add up to {:.0f} hours of one core", recorded_hours),
     ("README.md", "it in {} single lifts from heaps", highest_lifts),
@@ -760,9 +798,10 @@ CLAIMS = [
     ),
     (
         "notebooks/11_why_60_percent.ipynb",
-        "In {} of the {} policies, all of those below an MSR of {:.0f} %, a constant chance is "
-        "refuted. One in {:.0f} of their first hundred picks of an episode is a mistake, and one "
-        "in {:.0f} of the later ones",
+        "In {} of the {} policies, all of those below an MSR of {} %, a constant chance is "
+        "refuted. With b = 256 ({} policies) one in {:.0f} of the first hundred picks of an "
+        "episode is a mistake, and one in {:.0f} of the later ones; with b = 2048 ({} policies) "
+        "one in {:.0f} and one in {:.0f}.",
         chances_of_a_mistake,
     ),
     (
@@ -787,7 +826,7 @@ CLAIMS = [
     (
         "notebooks/11_why_60_percent.ipynb",
         "{} of {} runs come to 100 %, and the other {} turn back as without them and end at {:.0f} "
-        "to {:.0f} %; the difference of the means holds 0 ({:.0f} to {:+.0f})",
+        "to {:.0f} %; the interval of the difference holds 0 ({:.0f} to {:+.0f})",
         lambda: (
             *failures_kept_without_the_mask(),
             *gain("failures_kept_no_mask", "paper_no_mask")[1:],
@@ -816,8 +855,24 @@ CLAIMS = [
     ),
     (
         "notebooks/11_why_60_percent.ipynb",
-        "median value of the picks that fail lies between {:.2f} and {:+.2f}",
-        lambda: failing_policies()[1]["value_failed"],
+        "The median of their values lies between {:.2f} and {:+.2f}. It is negative in {} of the "
+        "{} policies",
+        values_of_failed_picks,
+    ),
+    (
+        "notebooks/11_why_60_percent.ipynb",
+        "So {:.0f} to {:.0f} boxes of its 800 to 1000, on average per container",
+        boxes_that_fail,
+    ),
+    (
+        "notebooks/11_why_60_percent.ipynb",
+        "the shares are {:.0f} to {:.0f} % and {:.0f} to {:.0f} %.",
+        lambda: shares_after_falls(SEEDS, ["wrong", "own_wrong"])[1:],
+    ),
+    (
+        "notebooks/11_why_60_percent.ipynb",
+        "no difference of the ends is shown ({1:.0f} to {2:+.0f})",
+        partial(gain, "memory_22_mask", "paper_mask"),
     ),
     (
         "notebooks/15_appendix_why_60_percent.ipynb",
