@@ -532,12 +532,6 @@ CLAIMS = [
     ),
     (
         "README.md",
-        "in the {} policies trained with the mask that fail in a tenth of the picks or more, "
-        "{:.0f} to {:.0f} % of the failures are of a box",
-        lambda: (failing_policies()[0], *(100 * failing_policies()[1]["repeated"])),
-    ),
-    (
-        "README.md",
         "from the {} planned runs and {} continued ones",
         lambda: (
             sum(

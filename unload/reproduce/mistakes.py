@@ -16,12 +16,12 @@ from unload.agent.evaluation import Policy
 from unload.agent.greedy import Greedy
 from unload.agent.weights import load_policy
 from unload.env.vector import ContainerVectorEnv
-from unload.reproduce.answer import CELLS, paper_runs
+from unload.reproduce.answer import CELLS, PAPER_CELLS
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.measure import LOADS_SEED, POLICY_LOADS
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
 from unload.reproduce.survival import before_first_mistake
-from unload.reproduce.trained import stored_policy
+from unload.reproduce.trained import published_policies
 from unload.support import checks, files
 
 NAME, FIRST = "mistakes", "first_mistakes"
@@ -55,25 +55,23 @@ def mistakes_data(
         FileNotFoundError: no run has been published.
     """
     checks.integer("loads", loads, 1)
-    folder, fingerprint = Path(folder) / "answer", training_fingerprint()
-    runs = [(cell, seed) for cell, seed, _ in paper_runs(folder.parent)]
-    if not runs:
-        raise FileNotFoundError(f"{folder} holds no run; {COMMAND} answer makes them")
+    fingerprint = training_fingerprint()
+    policies = published_policies(PAPER_CELLS, fingerprint, folder)
     jobs = []
-    for cell, seed in runs:
-        path, weights = stored_policy(folder, cell, seed, fingerprint)
-        mask = CELLS[cell].mask
-        question = {"weights": weights, "mask": mask, "loads": loads, "seed": LOADS_SEED}
-        jobs.append((question, partial(_measure, path, mask, loads)))
+    for each in policies:
+        mask = CELLS[each.cell].mask
+        question = {"weights": each.weights, "mask": mask, "loads": loads, "seed": LOADS_SEED}
+        jobs.append((question, partial(_measure, each.path, mask, loads)))
     answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
     masked, unmasked = [], []
-    for (cell, seed), answer in zip(runs, answers):
-        if CELLS[cell].mask:
-            masked.append((cell, seed, *answer.value))
+    for each, answer in zip(policies, answers):
+        run = each.cell, each.seed
+        if CELLS[each.cell].mask:
+            masked.append((*run, *answer.value))
         else:
-            unmasked += [(cell, seed, *each) for each in enumerate(answer.value)]
+            unmasked += [(*run, *row) for row in enumerate(answer.value)]
     publish(
-        folder,
+        Path(folder) / "answer",
         NAME,
         {
             NAME: pd.DataFrame(masked, columns=["cell", "seed", *MEASURES]),

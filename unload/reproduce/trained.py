@@ -6,9 +6,11 @@ A trained policy no longer explores nor learns. Each is measured with the mask a
 whichever it was trained with.
 """
 
+from collections.abc import Collection
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
+from typing import NamedTuple
 
 import pandas as pd
 
@@ -57,19 +59,19 @@ def trained_data(
         FileNotFoundError: no run has been published.
     """
     checks.integer("loads", loads, 1)
-    folder, fingerprint = Path(folder) / "answer", training_fingerprint()
-    runs = [(cell, seed) for cell, seed, _ in read_answer(folder.parent) if cell in CELLS_MEASURED]
-    if not runs:
-        raise FileNotFoundError(f"{folder} holds no run; {COMMAND} answer makes them")
-    jobs = []
-    for cell, seed in runs:
-        path, weights = stored_policy(folder, cell, seed, fingerprint)
-        question = {"weights": weights, "loads": loads, "seed": LOADS_SEED}
-        jobs.append((question, partial(measure_policy, path, loads)))
+    fingerprint = training_fingerprint()
+    policies = published_policies(CELLS_MEASURED, fingerprint, folder)
+    jobs = [
+        (
+            {"weights": each.weights, "loads": loads, "seed": LOADS_SEED},
+            partial(measure_policy, each.path, loads),
+        )
+        for each in policies
+    ]
     answers = keep_all(Path(runs_dir) / NAME, jobs, n_jobs, progress)
-    rows = [(*run, *answer.value) for run, answer in zip(runs, answers)]
+    rows = [(each.cell, each.seed, *answer.value) for each, answer in zip(policies, answers)]
     publish(
-        folder,
+        Path(folder) / "answer",
         NAME,
         {NAME: pd.DataFrame(rows, columns=COLUMNS)},
         f"{COMMAND} {NAME}",
@@ -80,19 +82,50 @@ def trained_data(
     )
 
 
-def stored_policy(folder: Path, cell: str, seed: int, fingerprint: str) -> tuple[Path, str]:
-    """The file of a published run's weights, and their digest.
+class PublishedPolicy(NamedTuple):
+    """The weights of a published run, and where they are.
+
+    Attributes:
+        cell, seed: of the run.
+        path: of the weights.
+        weights: their digest, which says whether what was measured of them still holds.
+    """
+
+    cell: str
+    seed: int
+    path: Path
+    weights: str
+
+
+def published_policies(
+    cells: Collection[str], fingerprint: str, folder: str | Path = files.DATA
+) -> list[PublishedPolicy]:
+    """The trained policies of some cells, in the order of ``CELLS``.
+
+    Args:
+        cells: names in ``CELLS``.
+        fingerprint: of the training that the runs must have.
+        folder: of the data.
 
     Raises:
-        ValueError: the run has another fingerprint.
+        ValueError: a run has another fingerprint.
+        FileNotFoundError: no run has been published.
     """
-    found = read_provenance(folder / cell, f"seed_{seed}").get("fingerprint")
-    if found != fingerprint:
-        raise ValueError(
-            f"{folder / cell}/seed_{seed} has the fingerprint {found}; expected {fingerprint}"
-        )
-    path = folder / cell / f"seed_{seed}.safetensors"
-    return path, blake2b(path.read_bytes(), digest_size=16).hexdigest()
+    place, found = Path(folder) / "answer", []
+    for cell, seed, _ in read_answer(folder):
+        if cell not in cells:
+            continue
+        of_run = read_provenance(place / cell, f"seed_{seed}").get("fingerprint")
+        if of_run != fingerprint:
+            raise ValueError(
+                f"{place / cell}/seed_{seed} has the fingerprint {of_run}; expected {fingerprint}"
+            )
+        path = place / cell / f"seed_{seed}.safetensors"
+        weights = blake2b(path.read_bytes(), digest_size=16).hexdigest()
+        found.append(PublishedPolicy(cell, seed, path, weights))
+    if not found:
+        raise FileNotFoundError(f"{place} holds no run; {COMMAND} answer makes them")
+    return found
 
 
 def measure_policy(path: str | Path, loads: int) -> list[float]:
