@@ -3,7 +3,7 @@ import pandas as pd
 import pytest
 
 from unload import load_policy
-from unload.reproduce import answer
+from unload.reproduce import answer, training
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.verdict import end_msr
 from unload.support import files
@@ -37,6 +37,17 @@ def test_a_run_is_published_with_its_weights_and_provenance(published):
     curve = pd.read_csv(place / "seed_0.csv")
     assert curve["picks"].tolist() == [32_000, 64_000]
     assert curve["success_rate"].between(0.2, 0.9).all()
+
+
+def test_runs_of_the_training_are_not_made_again(tmp_path, monkeypatch):
+    training.training_data(PICKS, [0], tmp_path, tmp_path / "runs", 1, False)
+    monkeypatch.setattr("unload.agent.training.Training.step", None)  # nothing is trained
+    cell = answer.AS_TRAINED
+    answer.answer_data([cell], [0], PICKS, tmp_path, tmp_path / "runs", 1, False)
+    ((_, _, curve),) = answer.read_answer(tmp_path)
+    expected = pd.read_csv(tmp_path / "training_curves.csv")[answer.COLUMNS]
+    pd.testing.assert_frame_equal(curve, expected, rtol=1e-4)
+    assert len(curve) == 2  # of ten points
 
 
 def test_runs_are_kept_under_the_fingerprint_of_their_training(published):
@@ -99,3 +110,13 @@ def test_recorded_times_of_the_papers_cells():
     assert len(small) == 20 and len(large) == 16
     assert 1 < np.median(small) < np.median(large) < 60
     assert answer.wall_minutes(64) == []
+
+
+def test_published_runs_of_the_training_are_those_of_its_cell():
+    runs = {seed: curve for cell, seed, curve in answer.paper_runs() if cell == answer.AS_TRAINED}
+    curves = pd.read_csv(files.DATA / "training_curves.csv").groupby("seed")
+    assert list(curves.groups) == list(training.SEEDS)
+    for seed, curve in curves:
+        pd.testing.assert_frame_equal(
+            curve[answer.COLUMNS].reset_index(drop=True), runs[seed], rtol=1e-4, check_dtype=False
+        )

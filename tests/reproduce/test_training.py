@@ -1,5 +1,7 @@
 """The paper's training in the container: its data."""
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -16,7 +18,7 @@ from unload.support.provenance import read_provenance
 def test_training_data(tmp_path, monkeypatch):
     """In episodes of 50 picks."""
     monkeypatch.setattr(training, "EVALUATION", {"episodes": 2, "seed": 1})
-    monkeypatch.setattr(training, "LOG_INTERVAL", 10)
+    monkeypatch.setattr(training, "CONFIG", replace(training.CONFIG, log_interval=10))
     monkeypatch.setattr(task, "MAX_PICKS", 50)
     picks, seeds = 64 * 100, (3, 5)
     data = tmp_path / "data"

@@ -20,6 +20,7 @@ from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.sweep import run_all
 from unload.agent.weights import save_policy
+from unload.reproduce import training
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, JOBS, publish, read_table
 from unload.reproduce.study import BASE
@@ -28,6 +29,7 @@ from unload.support.provenance import read_provenance
 
 COLUMNS = ["picks", "success_rate", "deadlocked", "loss"]
 MASKED = replace(BASE, mask=True)
+AS_TRAINED = "paper_b2048_no_mask"  # the cell whose runs are those of ``training``
 
 
 def _both(name: str, **changes) -> dict[str, TrainConfig]:
@@ -41,7 +43,8 @@ def _both(name: str, **changes) -> dict[str, TrainConfig]:
 # Cell → its configuration with seed 0.
 CELLS: dict[str, TrainConfig] = {
     **_both("paper"),
-    **_both("paper_b2048", batch_size=2048),
+    AS_TRAINED: training.CONFIG,
+    "paper_b2048_mask": replace(MASKED, batch_size=2048),
     **_both("memory_22", replay_size=2**22),
     **_both("memory_23", replay_size=2**23),
     **_both("ties_averaged", ties="average"),
@@ -120,9 +123,10 @@ def answer_data(
         for seed in (seeds_of(cell) if seeds is None else seeds)
     }
     fingerprint = training_fingerprint()
-    kept, folder = Path(runs_dir) / "answer" / fingerprint, Path(folder) / "answer"
+    folder = Path(folder) / "answer"
     errors = Parallel(n_jobs, return_as="generator_unordered", batch_size=1)(
-        delayed(_run)(name, config, kept, folder, fingerprint) for name, config in configs.items()
+        delayed(_run)(name, config, Path(runs_dir), folder, fingerprint)
+        for name, config in configs.items()
     )
     bar = {"total": len(configs), "unit": "run", "disable": not progress, "ncols": 100}
     failed = [error for error in tqdm(errors, file=sys.stdout, **bar) if error]
@@ -130,13 +134,17 @@ def answer_data(
         raise RuntimeError("\n".join(failed))
 
 
-def _run(name: str, config: TrainConfig, kept: Path, folder: Path, fingerprint: str) -> str:
+def _run(name: str, config: TrainConfig, runs_dir: Path, folder: Path, fingerprint: str) -> str:
     """Train a run and publish it; what went wrong, or empty, so that the others go on."""
+    run, kept = name, runs_dir / "answer" / fingerprint
+    if name.startswith(f"{AS_TRAINED}/"):
+        run = name.removeprefix(f"{AS_TRAINED}/")
+        kept = training.runs_folder(runs_dir, fingerprint, config.picks)
     try:
-        run_all({name: config}, kept, n_jobs=1, progress=False)
+        run_all({run: config}, kept, n_jobs=1, progress=False)
     except RuntimeError as error:
         return str(error)
-    publish_run(name, config, kept / name, folder, fingerprint)
+    publish_run(name, config, kept / run, folder, fingerprint)
     return ""
 
 
@@ -156,7 +164,7 @@ def publish_run(name: str, config: TrainConfig, run: Path, folder: Path, fingerp
     publish(
         folder / cell,
         file,
-        {file: curve[COLUMNS]},
+        {file: training.episode_means(curve)[COLUMNS]},
         f"{COMMAND} answer --cells {cell}",
         asdict(config),
         config.picks < BASE.picks,

@@ -4,6 +4,7 @@ Made by ``python -m unload.reproduce training``.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,22 +23,21 @@ from unload.reproduce.results import COMMAND, JOBS, publish, shared_settings, wr
 from unload.reproduce.verdict import end_msr
 from unload.support import checks, files
 
-PAPER_PICKS = TrainConfig().picks
 SEEDS = (0, 1, 2, 3)
-LOG_INTERVAL = 100  # steps of all environments per point of the training's loss
+CONFIG = TrainConfig(log_interval=100)  # steps of all environments per point of the loss
 EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
 ASK_EVERY = 25  # unloaded items between two questions for the favourite
 MOST_PICKS = 100_000  # of an episode that is to end by unloading
 
 OPTIONS = {
-    "--picks": {"type": int, "default": PAPER_PICKS},
+    "--picks": {"type": int, "default": CONFIG.picks},
     "--seeds": {"type": int, "nargs": "+", "default": SEEDS},
     **JOBS,
 }
 
 
 def training_data(
-    picks: int = PAPER_PICKS,
+    picks: int = CONFIG.picks,
     seeds: Sequence[int] = SEEDS,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
@@ -67,11 +67,8 @@ def training_data(
     """
     checks.integer("picks", picks, task.NUM_ENVS * task.MAX_PICKS)
     fingerprint = training_fingerprint()
-    folder, kept = Path(folder), Path(runs_dir) / f"training/{fingerprint}/{picks}_picks"
-    configs = {
-        f"seed_{seed}": TrainConfig(picks=picks, seed=seed, log_interval=LOG_INTERVAL)
-        for seed in seeds
-    }
+    folder, kept = Path(folder), runs_folder(runs_dir, fingerprint, picks)
+    configs = {f"seed_{seed}": replace(CONFIG, picks=picks, seed=seed) for seed in seeds}
     records = run_all(configs, kept, n_jobs, progress)
     results = [train(config, kept / name) for name, config in configs.items()]
     for old in (*folder.glob("*_agent_seed_*.csv"), *folder.glob("policies/paper_seed_*")):
@@ -97,8 +94,13 @@ def training_data(
         "config": shared_settings(configs),
     }
     command = f"{COMMAND} training --picks {picks} --seeds {' '.join(map(str, seeds))}"
-    reduced = picks < PAPER_PICKS
+    reduced = picks < CONFIG.picks
     publish(folder, "training", tables, command, settings, reduced, records, fingerprint)
+
+
+def runs_folder(runs_dir: str | Path, fingerprint: str, picks: int) -> Path:
+    """The folder of the training runs, each in ``seed_<seed>``."""
+    return Path(runs_dir) / f"training/{fingerprint}/{picks}_picks"
 
 
 def training_summary(result: TrainResult) -> dict[str, float]:
