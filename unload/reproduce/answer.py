@@ -77,6 +77,7 @@ SEEDS = {
     "failures_kept_no_mask": 10,
     "failures_kept_mask": 10,
     "ties_averaged_mask": 10,
+    "b2048_ties_averaged_mask": 10,
 }
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)},
