@@ -159,9 +159,8 @@ def course(msr, loss):
 
 
 def test_the_peak_of_the_loss_comes_after_a_rise():
-    flat = np.full(6, 0.5)
-    assert verdict.loss_peak(course(flat, [5, 1, 1.05, 2, 3, 2])) == 4
-    assert verdict.loss_peak(course(flat, [5, 4, 3, 2, 1, 1.05])) is None
+    assert verdict.loss_peak(pd.Series([5, 1, 1.05, 2, 3, 2])) == 4
+    assert verdict.loss_peak(pd.Series([5, 4, 3, 2, 1, 1.05])) is None
 
 
 def test_the_rise_after_the_peak_of_the_loss():

@@ -217,10 +217,11 @@ def _cell(label: str, curves: list[pd.DataFrame], tuned: float) -> list[Row]:
     measured = pd.DataFrame([run_measures(curve) for curve in curves])
     end, (low, high) = measured["end"], t_interval(measured["end"])
     alike, half = int(measured["both"].sum()), len(curves) / 2
-    msr = [windows(curve)["success_rate"].to_numpy() for curve in curves]
-    steady = sum((np.maximum.accumulate(each) - each).max() <= STEADY for each in msr)
+    means = [windows(curve) for curve in curves]
+    msr = [each["success_rate"] for each in means]
+    steady = sum((each.cummax() - each).max() <= STEADY for each in msr)
     like_11 = int(measured["fig11"].sum())
-    losses = [windows(curve)["loss"].dropna() for curve in curves]
+    losses = [each["loss"].dropna() for each in means]
     slopes = [_decrease(loss.set_axis(WINDOW_PICKS * (loss.index + 1))) for loss in losses]
     slower, noisier = np.sum([after_loss_peak(curve) for curve in curves], axis=0)
     holds = bool(low <= PAPER_MSR <= high)

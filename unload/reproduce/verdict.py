@@ -100,13 +100,17 @@ def resembles_fig12(curve: pd.DataFrame) -> bool:
 
 def resembles_fig11(curve: pd.DataFrame) -> bool:
     """Whether the loss rises by a tenth from a minimum, and falls by a tenth afterwards."""
-    loss, peak = windows(curve)["loss"].dropna(), loss_peak(curve)
+    loss = windows(curve)["loss"].dropna()
+    peak = loss_peak(loss)
     return peak is not None and bool(loss.iloc[-1] <= 0.9 * loss[peak])
 
 
-def loss_peak(curve: pd.DataFrame) -> int | None:
-    """Return the window of the highest loss after a rise by a tenth; None without such a rise."""
-    loss = windows(curve)["loss"].dropna()
+def loss_peak(loss: pd.Series) -> int | None:
+    """Return the window of the highest loss after a rise by a tenth; None without such a rise.
+
+    Args:
+        loss: of the windows, without NaN.
+    """
     risen = loss[loss >= 1.1 * loss.cummin()]
     return None if risen.empty else int(risen.idxmax())
 
@@ -117,10 +121,11 @@ def after_loss_peak(curve: pd.DataFrame) -> tuple[bool, bool]:
     Compared are the mean and the standard deviation of its changes from window to window; both
     are False if there are fewer than two changes before the peak or after it.
     """
-    peak, msr = loss_peak(curve), windows(curve)["success_rate"]
+    means = windows(curve)
+    peak = loss_peak(means["loss"].dropna())
     if peak is None:
         return False, False
-    changes = msr.diff().dropna()
+    changes = means["success_rate"].diff().dropna()
     before, after = changes[changes.index <= peak], changes[changes.index > peak]
     if min(len(before), len(after)) < 2:
         return False, False
