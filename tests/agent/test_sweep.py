@@ -139,13 +139,13 @@ def test_a_run_whose_mark_cannot_be_read_is_reported_and_stops_no_other(
     configs, tmp_path, monkeypatch
 ):
     """The first run puts something else in the place of the second one's mark."""
-    train_run, mark = sweep.train, tmp_path / "set" / "run_1" / "attempts"
+    train_run, mark = sweep.train_changed, tmp_path / "set" / "run_1" / "attempts"
 
     def train_and_spoil(*args, **kwargs):
         mark.mkdir(parents=True, exist_ok=True)
         train_run(*args, **kwargs)
 
-    monkeypatch.setattr(sweep, "train", train_and_spoil)
+    monkeypatch.setattr(sweep, "train_changed", train_and_spoil)
     report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
     assert report["error"].iloc[0] == ""
     assert str(mark) in report["error"].iloc[1]

@@ -3,7 +3,7 @@
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -15,7 +15,7 @@ from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
 from unload.agent.config import TrainConfig
-from unload.agent.training import train
+from unload.agent.training import Training, train_changed, unchanged
 from unload.support import checks, files, provenance
 
 BACKENDS = ("loky", "dask")
@@ -28,6 +28,7 @@ def run_sweep(
     n_jobs: int = -1,
     backend: str = "loky",
     progress: bool = True,
+    changes: Mapping[str, Callable[[Training], None]] | None = None,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
@@ -45,6 +46,8 @@ def run_sweep(
         backend: joblib's: ``"loky"`` for processes on this machine, or ``"dask"`` for the
             cluster of the ``distributed.Client`` that you have made before.
         progress: show a progress bar over the runs.
+        changes: what is changed in some of the runs, by name, see ``training.train_changed``;
+            functions that can be pickled.
 
     Returns:
         One row per run, in the order given, its name as index: ``error`` (what went wrong,
@@ -67,13 +70,15 @@ def run_sweep(
     for place in folders.values():
         if _mark(place).exists():  # of a sweep that was stopped
             _mark(place).unlink()
+    changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
+    jobs = {name: (name, configs[name], folders[name], changes[name]) for name in configs}
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
     with bar, parallel_config(backend=backend, n_jobs=n_jobs) as chosen:
         if backend == "dask":
-            outcomes = _on_cluster(chosen["backend"].client, configs, folders)
+            outcomes = _on_cluster(chosen["backend"].client, jobs)
         else:
-            outcomes = _on_machine(configs, folders)
+            outcomes = _on_machine(jobs)
         for name, error in outcomes:
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
@@ -86,14 +91,18 @@ def run_sweep(
 
 
 def run_all(
-    configs: Mapping[str, TrainConfig], folder: str | Path, n_jobs: int, progress: bool
+    configs: Mapping[str, TrainConfig],
+    folder: str | Path,
+    n_jobs: int,
+    progress: bool,
+    changes: Mapping[str, Callable[[Training], None]] | None = None,
 ) -> list[dict]:
     """Run ``run_sweep`` and return the runs' records.
 
     Raises:
         RuntimeError: a run failed; the message says which and why.
     """
-    report = run_sweep(configs, folder, n_jobs, progress=progress)
+    report = run_sweep(configs, folder, n_jobs, progress=progress, changes=changes)
     failed = report[report["error"] != ""]
     if len(failed):
         raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
@@ -113,9 +122,7 @@ def _is_plain(name: object) -> bool:
     )
 
 
-def _on_cluster(
-    client, configs: Mapping[str, TrainConfig], folders: Mapping[str, Path]
-) -> Iterator[tuple[str, str]]:
+def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
     """Name and error of each run, as they end.
 
     Dask begins a run again if its process has died, on another worker or on the same one once
@@ -124,12 +131,9 @@ def _on_cluster(
 
     Args:
         client: the ``distributed.Client``.
-        configs, folders: of the runs.
+        jobs: the arguments of ``_run`` by the run's name.
     """
-    left = {
-        name: client.submit(_run, name, config, folders[name], pure=False)
-        for name, config in configs.items()
-    }
+    left = {name: client.submit(_run, *job, pure=False) for name, job in jobs.items()}
     while left:
         for name, future in [pair for pair in left.items() if pair[1].done()]:
             del left[name]
@@ -138,44 +142,44 @@ def _on_cluster(
         time.sleep(0.05)
 
 
-def _on_machine(
-    configs: Mapping[str, TrainConfig], folders: Mapping[str, Path]
-) -> Iterator[tuple[str, str]]:
-    """Name and error of each run, as they end.
+def _on_machine(jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
+    """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``.
 
     loky gives up all runs when one process dies. Those that were under way then go on alone,
     one after the other, so that it shows whose process it was.
     """
-    left = dict(configs)
+    left = dict(jobs)
     while left:
-        begun = _begun(left, folders)
-        interrupted = [name for name in left if _mark(folders[name]).exists()]
-        jobs = [delayed(_run)(name, left[name], folders[name]) for name in interrupted[:1] or left]
+        begun = _begun(left)
+        interrupted = [name for name, (_, _, folder, _) in left.items() if _mark(folder).exists()]
+        chosen = [delayed(_run)(*left[name]) for name in interrupted[:1] or left]
         try:
             runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-            for name, error in runs(jobs):
+            for name, error in runs(chosen):
                 del left[name]
                 yield name, error
         except BrokenProcessPool:
-            if _begun(left, folders) == begun:  # the processes die before they begin a run
+            if _begun(left) == begun:  # the processes die before they begin a run
                 raise
 
 
-def _begun(left: Mapping[str, TrainConfig], folders: Mapping[str, Path]) -> dict[str, str]:
+def _begun(left: Mapping[str, tuple]) -> dict[str, str]:
     """The runs that are left, and the attempts at each."""
-    marks = {name: _mark(folders[name]) for name in left}
+    marks = {name: _mark(folder) for name, (_, _, folder, _) in left.items()}
     return {name: mark.read_text() if mark.exists() else "" for name, mark in marks.items()}
 
 
-def _run(name: str, config: TrainConfig, folder: Path) -> tuple[str, str]:
+def _run(
+    name: str, config: TrainConfig, folder: Path, change: Callable[[Training], None]
+) -> tuple[str, str]:
     """Train one configuration; its name, and the error's text if it failed."""
     try:
-        return name, _attempt(config, folder)
+        return name, _attempt(config, folder, change)
     except Exception as error:  # whatever it was, the other runs go on
         return name, f"{type(error).__name__}: {error}"
 
 
-def _attempt(config: TrainConfig, folder: Path) -> str:
+def _attempt(config: TrainConfig, folder: Path, change: Callable[[Training], None]) -> str:
     """Train one configuration; an error's text if its process has died too often."""
     start, mark = time.monotonic(), _mark(folder)
     attempts = mark.read_text() if mark.exists() else ""
@@ -186,7 +190,7 @@ def _attempt(config: TrainConfig, folder: Path) -> str:
         mark.write_text(f"{attempts}{os.getpid()}\n")
         resumed = (folder / "checkpoint.npz").exists() or (folder / "config.json").exists()
         with open(folder / "log.txt", "a") as log, one_thread():
-            train(config, folder, progress=log)
+            train_changed(config, folder, change, progress=log)
         if not (folder / "record.json").exists():
             record = {"resumed": resumed, "process": os.getpid()}
             record |= provenance.run_record(time.monotonic() - start)

@@ -87,7 +87,7 @@ class Training:
         config, rollout = self.config, self.rollout
         enough = len(self.replay) >= min(config.batch_size, self.replay.size)
         updates = config.gradient_steps if enough else 0
-        finish_update = self._start_update() if updates else None
+        finish_update = self.start_update() if updates else None
 
         epsilon = config.epsilon(rollout.picks)
         actions = self.agent.choose(rollout.observations, rollout.allowed, epsilon, self.rng)
@@ -96,7 +96,7 @@ class Training:
 
         losses = [finish_update()] if updates else []
         for _ in range(1, updates):
-            losses.append(self._start_update()())
+            losses.append(self.start_update()())
         self.replay.add(**transitions)
         if config.gamma > 0 and rollout.picks % config.target_update_interval < config.num_envs:
             self.agent.update_target()
@@ -105,7 +105,8 @@ class Training:
         if rollout.steps % config.log_interval == 0 or rollout.finished:
             self.curve.end_point(rollout.picks, epsilon)
 
-    def _start_update(self) -> Callable[[], float]:
+    def start_update(self) -> Callable[[], float]:
+        """Begin an update by a batch of the replay, see ``DQN.start_update``."""
         rows = self.replay.sample_rows(self.config.batch_size, self.rng)
         return self.agent.start_update(self.replay.arrays, rows)
 
@@ -152,6 +153,32 @@ def train(
             pick, and the last checkpoint is kept.
         KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
     """
+    return train_changed(config, run_dir, unchanged, progress, stack)
+
+
+def unchanged(run: Training) -> None:
+    """The change that leaves a run as its configuration has it."""
+
+
+def train_changed(
+    config: TrainConfig,
+    run_dir: str | Path,
+    change: Callable[[Training], None],
+    progress: bool | TextIO = True,
+    stack: Callable[[np.random.Generator], Load] | None = None,
+) -> TrainResult:
+    """``train`` with something changed that no ``TrainConfig`` offers, for an experiment.
+
+    Args:
+        config, run_dir, progress, stack: see ``train``.
+        change: is called with the ``Training`` before its first pick, also where a run is
+            resumed, and may replace methods of its parts, such as ``run.replay.add``. What it
+            does to a pick may depend on the configuration and on how many picks were made before
+            (``run.replay.total``), but on nothing else; otherwise a resumed run would differ.
+
+    Raises:
+        As ``train``. The change is not written to ``run_dir``: each one needs a folder of its own.
+    """
     if not isinstance(config, TrainConfig):
         raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
     if not isinstance(progress, bool) and not hasattr(progress, "write"):
@@ -162,6 +189,7 @@ def train(
     with folder.locked(), deferred_interrupts() as interrupts:
         if not folder.finished:
             run = Training(config, stack)
+            change(run)
             try:
                 _go(run, folder, progress, interrupts)
             finally:

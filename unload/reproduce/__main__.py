@@ -28,6 +28,7 @@ from unload.reproduce import (
     tuning,
     values,
 )
+from unload.reproduce.falls import laboratory, long
 from unload.reproduce.results import COMMAND, JOBS
 
 # Part → summary, what makes its data, and its options.
@@ -56,6 +57,10 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "random-share": (
         "what a share of own picks changes", random_share.random_share_data, random_share.OPTIONS
     ),
+    "laboratory": (
+        "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
+    ),
+    "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
     "comparison": (
         "policies under other conditions", comparison.comparison_data, comparison.OPTIONS
     ),

@@ -1,0 +1,143 @@
+"""What the study of falls changes in a ``Training``, before its first pick.
+
+Observations are (batch, items, 3), x along the depth, y across the container, z upward. A change
+of them is a function ``(observations, rng) -> observations``; it may write into what it is given.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import torch
+
+from unload.agent.training import Training, unchanged
+from unload.env.equalization import equalize
+
+Change = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+
+
+def mirror(observations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Give x and y of each observation random signs: a pick and its mirror images are alike."""
+    signs = rng.choice(np.array([-1, 1], np.float32), (len(observations), 1, 2))
+    observations[..., :2] *= signs
+    return observations
+
+
+def shuffle(observations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Deal the places anew: permute the pairs (x, y) of each observation among its items."""
+    order = rng.random(observations.shape[:2]).argsort(axis=1)[..., np.newaxis]
+    observations[..., :2] = np.take_along_axis(observations[..., :2], order, axis=1)
+    return observations
+
+
+def store(run: Training, change: Change) -> None:
+    """Change each observation as it is stored in the replay memory; choices see it as it was."""
+    add = run.replay.add
+
+    def add_changed(observations: np.ndarray, **rest: np.ndarray) -> None:
+        rng = np.random.default_rng((run.config.seed, run.replay.total))
+        add(observations=change(observations.copy(), rng), **rest)
+
+    run.replay.add = add_changed
+
+
+def see(run: Training, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Change what is seen, in choosing and in learning alike."""
+    choose, add = run.agent.choose, run.replay.add
+    run.agent.choose = lambda observations, *rest: choose(change(observations), *rest)
+    run.replay.add = lambda observations, **rest: add(observations=change(observations), **rest)
+
+
+def without(observations: np.ndarray, axes: tuple[int, ...] = (0, 1)) -> np.ndarray:
+    """Observations with some coordinates set to 0."""
+    observations = observations.copy()
+    observations[..., axes] = 0
+    return observations
+
+
+def ranked(observations: np.ndarray, averaged: tuple[int, ...]) -> np.ndarray:
+    """Ranks of positions: ties share their mean rank in some axes, noise breaks them in others."""
+    seen = equalize(observations, "noise")
+    seen[..., averaged] = equalize(observations[..., averaged], "average")
+    return seen
+
+
+def successes_only(run: Training, start: int) -> None:
+    """Store no failed pick from ``start`` picks on.
+
+    In its place a successful one of the same step is stored twice, so that the memory reaches as
+    far back as otherwise; where all of a step failed, the last successful step is stored again.
+    """
+    add, last = run.replay.add, {}
+
+    def add_successes(**picks: np.ndarray) -> None:
+        won = np.flatnonzero(picks["rewards"] > 0)
+        if run.replay.total >= start and len(won) < len(picks["rewards"]):
+            rows = np.resize(won, len(picks["rewards"]))
+            picks = {name: each[rows] for name, each in picks.items()} if len(won) else last
+        last.update(picks)
+        add(**picks)
+
+    run.replay.add = add_successes
+
+
+def taught(run: Training, preference: float) -> None:
+    """Let a fixed policy choose: the highest height + ``preference`` · y among the items."""
+
+    def best_actions(observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+        score = observations[..., 2] + preference * observations[..., 1]
+        return np.where(allowed, score, -np.inf).argmax(axis=1)
+
+    run.agent.learner.best_actions = best_actions
+
+
+def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None:
+    """Let another network choose, which learns from the same picks with a change of its own.
+
+    Args:
+        run: whose network only watches.
+        change: of the network that chooses.
+        seed: is added to the run's for the first weights and batches of that network.
+    """
+    active = Training(replace(run.config, seed=run.config.seed + seed))
+    active.rollout.close()
+    change(active)
+    run.agent.choose, add = active.agent.choose, run.replay.add
+
+    def add_to_both(**picks: np.ndarray) -> None:
+        add(**picks)
+        active.replay.add(**picks)
+        if len(active.replay) >= run.config.batch_size:
+            active.start_update()()
+
+    run.replay.add = add_to_both
+
+
+def perfect_start(run: Training, change: Callable[[Training], None] = unchanged) -> None:
+    """Start from the weights of a run with places dealt anew; then ``change``."""
+    teacher = Training(replace(run.config, epsilon_init=1.0))
+    shuffled(teacher)
+    while not teacher.rollout.finished:
+        teacher.step()
+    teacher.rollout.close()
+    with torch.no_grad():
+        for mine, learned in zip(
+            run.agent.network.parameters(), teacher.agent.network.parameters()
+        ):
+            mine.copy_(learned)
+    change(run)
+
+
+def several(*makes: Callable[[Training], None]) -> Callable[[Training], None]:
+    """Return the change that makes some changes, one after the other."""
+    return partial(_each, makes)
+
+
+def _each(makes: tuple[Callable[[Training], None], ...], run: Training) -> None:
+    for make in makes:
+        make(run)
+
+
+mirrored = partial(store, change=mirror)
+shuffled = partial(store, change=shuffle)
