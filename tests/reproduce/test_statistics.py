@@ -1,0 +1,174 @@
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from unload.reproduce import statistics
+
+PICKS = 20_000_000
+STEP = 32_000  # picks of an episode of all environments
+
+
+def curve(msr, loss=(0.5, 0.3, 0.5, 0.3)) -> pd.DataFrame:
+    """A run whose MSR and loss run straight from one of the given values to the next."""
+    picks = np.arange(STEP, PICKS + 1, STEP)
+
+    def along(values):
+        return np.interp(picks, np.linspace(0, PICKS, len(values)), values)
+
+    return pd.DataFrame({"picks": picks, "success_rate": along(msr), "loss": along(loss)})
+
+
+def test_the_end_is_the_last_tenth():
+    run = curve([0.3, 0.3])
+    run.loc[run["picks"] > 18_000_000, "success_rate"] = 0.7
+    assert statistics.end_msr(run) == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize(
+    ("msr", "found"),
+    [
+        ([0.3, 0.9, 0.5], []),  # never high
+        ([0.3, 0.96, 0.81], []),  # never low again
+        ([0.3, 0.95, 0.9, 0.8, 0.3], [(1, 3)]),
+        ([0.96, 0.5, 0.6, 0.97, 0.7], [(0, 1), (3, 4)]),
+        ([0.96, 0.5, 0.4, 0.9, 0.4], [(0, 1)]),
+        ([0.96, 0.98, 0.5], [(1, 2)]),
+    ],
+)
+def test_a_fall_leads_from_high_to_low(msr, found):
+    assert statistics.falls(msr) == found
+
+
+@pytest.mark.parametrize(
+    ("msr", "like"),
+    [
+        ([0.25, 0.5, 0.6], True),
+        ([0.25, 0.5, 0.9], False),  # too good
+        ([0.25, 0.3, 0.35], False),  # too bad
+        ([0.25, 0.9, 0.6], False),  # no steady rise
+        ([0.5, 0.55, 0.6], False),  # hardly a rise
+    ],
+)
+def test_what_is_like_fig_12(msr, like):
+    assert statistics.resembles_fig12(curve(msr)) is like
+
+
+@pytest.mark.parametrize(
+    ("loss", "like"),
+    [
+        ([0.5, 0.3, 0.5, 0.3], True),
+        ([0.5, 0.3, 0.3], False),  # never rises
+        ([0.5, 0.3, 0.5], False),  # never falls again
+        ([0.5, 0.49, 0.5, 0.3], False),  # rises by too little
+    ],
+)
+def test_what_is_like_fig_11(loss, like):
+    assert statistics.resembles_fig11(curve([0.3, 0.6], loss)) is like
+
+
+def test_intervals_hold_the_mean_as_often_as_they_say():
+    """The t interval of five normally distributed values; the bootstrap's held it in 84 %."""
+    rng = np.random.default_rng(0)
+    draws = rng.normal(0.6, 0.1, (2000, 5))
+    inside = [low <= 0.6 <= high for low, high in map(statistics.t_interval, draws)]
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+
+
+def test_the_interquartile_mean_leaves_out_both_ends():
+    assert statistics.interquartile_mean([0, 1, 2, 3, 4, 5, 6, 100]) == 3.5
+    values = stats.norm.ppf(np.linspace(0.05, 0.95, 10))
+    low, high = statistics.bca_interval(values)
+    assert low < 0 < high
+    assert statistics.bca_interval(values) == (low, high)
+
+
+@pytest.mark.parametrize("interval", [statistics.t_interval, statistics.bca_interval])
+def test_too_few_values_have_no_interval(interval):
+    assert np.isnan(interval([0.6])).all()
+
+
+def test_a_cell_is_summed_up():
+    runs = [
+        ("a", 0, curve([0.25, 0.5, 0.6])),
+        ("a", 1, curve([0.25, 0.97, 0.6])),
+        ("b", 0, curve([0.2, 0.3])),
+    ]
+    table = statistics.cell_table(runs).set_index("cell")
+    ends = [statistics.end_msr(run) for _, _, run in runs]
+    assert table["runs"].tolist() == [2, 1]
+    assert table["mean"].tolist() == pytest.approx([np.mean(ends[:2]), ends[2]])
+    assert table.loc["a", ["fell", "fig11", "fig12", "both"]].tolist() == [1, 2, 1, 1]
+    low, high = table.loc["a", ["low", "high"]]
+    assert (low, high) == pytest.approx(statistics.t_interval(ends[:2]))
+
+
+def test_failures_in_the_replay_are_those_of_the_last_picks():
+    run = pd.DataFrame({"picks": [100, 200, 300, 400], "success_rate": [0.5, 0.9, 1.0, 0.8]})
+    assert statistics.replay_failures(run, 100).tolist() == pytest.approx([0.5, 0.1, 0, 0.2])
+    # Of the last 150 picks after the second point, 50 are half of the first point's.
+    shares = [0.5, (10 + 25) / 150, 5 / 150, 20 / 150]
+    assert statistics.replay_failures(run, 150).tolist() == pytest.approx(shares)
+    shares = [0.5, 60 / 200, 60 / 300, 80 / 400]
+    assert statistics.replay_failures(run, 10**6).tolist() == pytest.approx(shares)
+    with pytest.raises(ValueError, match="replay_size is 0"):
+        statistics.replay_failures(run, 0)
+
+
+def test_falls_are_listed_with_the_failures_remembered_when_they_begin():
+    run = curve([0.3, 0.3])
+    picks = run["picks"]
+    run["success_rate"] = 0.3
+    run.loc[(picks > 4_000_000) & (picks <= 8_000_000), "success_rate"] = 0.99
+    run.loc[(picks > 15_000_000) & (picks <= 15_520_000), "success_rate"] = 0.97
+    table = statistics.fall_table(run)
+    assert table["begin"].tolist() == [8_000_000, 15_500_000]
+    assert table["end"].tolist() == [8_500_000, 16_000_000]
+    before = 2**20 - 500_000  # picks of the memory from before the second rise
+    expected = [0.01, (0.03 * 500_000 + 0.7 * before) / 2**20]
+    assert table["failures"].tolist() == pytest.approx(expected, abs=0.02)
+    assert statistics.fall_table(curve([0.3, 0.99])).empty
+
+
+def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
+    first, second = np.array([0.6, 0.7, 0.8, 0.5, 0.65]), np.array([0.3, 0.42, 0.35])
+    parts = [values.var(ddof=1) / len(values) for values in (first, second)]
+    freedom = sum(parts) ** 2 / sum(
+        part**2 / (len(values) - 1) for part, values in zip(parts, (first, second))
+    )
+    reach = stats.t.ppf(0.975, freedom) * np.sqrt(sum(parts))
+    middle = first.mean() - second.mean()
+    interval = statistics.welch_interval(first, second)
+    assert interval == pytest.approx((middle - reach, middle + reach))
+    assert np.isnan(statistics.welch_interval(first, [0.3])).all()
+
+
+def test_fishers_test_asks_whether_fewer_runs_fall():
+    # Of the 10 runs 6 fall; that at most 1 of them is among 5 runs: 6 of 252 ways, p = 6 / 252.
+    assert statistics.fisher_p(1, 5, 5, 5) == pytest.approx(6 / 252)
+    assert statistics.fisher_p(5, 5, 1, 5) == pytest.approx(1)
+    assert statistics.fisher_p(0, 5, 5, 5) == pytest.approx(1 / 252)
+    with pytest.raises(ValueError, match="control_fallen is 6; expected an integer >= 0 and <= 5"):
+        statistics.fisher_p(0, 5, 6, 5)
+
+
+def course(msr, loss):
+    return pd.DataFrame(
+        {"picks": 500_000 * np.arange(1, len(msr) + 1), "success_rate": msr, "loss": loss}
+    )
+
+
+def test_the_peak_of_the_loss_comes_after_a_rise():
+    assert statistics.loss_peak(pd.Series([5, 1, 1.05, 2, 3, 2])) == 4
+    assert statistics.loss_peak(pd.Series([5, 4, 3, 2, 1, 1.05])) is None
+
+
+def test_the_rise_after_the_peak_of_the_loss():
+    loss = [5, 1, 2, 3, 2, 2, 2]
+    slow_and_noisy = course([0.1, 0.2, 0.3, 0.4, 0.5, 0.42, 0.5], loss)
+    assert statistics.after_loss_peak(slow_and_noisy) == (True, True)
+    fast_and_calm = course([0.1, 0.1, 0.2, 0.2, 0.4, 0.6, 0.8], loss)
+    assert statistics.after_loss_peak(fast_and_calm) == (False, False)
+    assert statistics.after_loss_peak(course(np.linspace(0, 1, 7), [7, 6, 5, 4, 3, 2, 1])) == (
+        False, False
+    )  # fmt: skip
