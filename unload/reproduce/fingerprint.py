@@ -5,15 +5,16 @@ as it did when a result was made; a result of another fingerprint would come out
 today.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from hashlib import blake2b
 from tempfile import TemporaryDirectory
 
 from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.training import train
+from unload.agent.training import Training, train_changed, unchanged
 from unload.network.variants import NETWORKS
+from unload.reproduce.changes import height_reward
 from unload.support import checks
 
 
@@ -37,17 +38,21 @@ def training_fingerprint(networks: Iterable[str] = ("peq",)) -> str:
     return digest.hexdigest()
 
 
-def short_runs(network: str) -> list[TrainConfig]:
-    """The runs of a network: for the paper's one, its configurations and the study's factors."""
+def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None]]]:
+    """The runs of a network, and what is changed in each (see ``train_changed``).
+
+    The paper's network has its configurations and the factors of the studies.
+    """
     if network != "peq":
         size = {"picks": 40 * task.NUM_ENVS, "batch_size": 64, "n_features": 16}
-        return [TrainConfig(network=network, log_interval=10, **size)]
+        return [(TrainConfig(network=network, log_interval=10, **size), unchanged)]
     paper = {"picks": 200 * task.NUM_ENVS, "log_interval": 40}
+    small = paper | {"batch_size": 256}
     return [
-        TrainConfig(**paper),
-        TrainConfig(**paper, batch_size=256, equalize=False, mask=True, epsilon_final=0.05),
-        TrainConfig(**paper, batch_size=256, ties="average", height_reward=0.5, gradient_steps=2),
-        TrainConfig(**paper, batch_size=256, env="unload/HighestItem-v0"),
+        (TrainConfig(**paper), unchanged),
+        (TrainConfig(**small, equalize=False, mask=True, epsilon_final=0.05), unchanged),
+        (TrainConfig(**small, ties="average", gradient_steps=2), height_reward(0.5)),
+        (TrainConfig(**small, env="unload/HighestItem-v0"), unchanged),
     ]
 
 
@@ -55,9 +60,9 @@ def short_runs(network: str) -> list[TrainConfig]:
 def _curves(network: str) -> str:
     """The rounded curves of a network's runs."""
     text = ""
-    for config in short_runs(network):
+    for config, change in short_runs(network):
         with TemporaryDirectory() as folder:
-            curve = train(config, folder, progress=False).curve
+            curve = train_changed(config, folder, change, progress=False).curve
         columns = ["picks", "success_rate", "deadlocked", "loss"]
         text += curve[columns].to_csv(index=False, float_format="%.3g")
     return text
