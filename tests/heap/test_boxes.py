@@ -54,22 +54,3 @@ def test_a_heap_cannot_be_changed(cubes):
 
 def test_packages_have_the_sizes_of_the_neat_loads():
     assert package_sizes(np.array([0]))[0] == pytest.approx([7 / 12, 25 / 36, 15 / 36])
-    assert package_sizes(np.array([0]), 0.5)[0] == pytest.approx([7 / 24, 25 / 72, 15 / 72])
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "message"),
-    [
-        ("positions", np.full((1, 3), np.nan), "positions holds nan"),
-        ("orientations", np.array([[0.0, 0, 0, 2]]), "orientations of box 0 have length 2"),
-        ("orientations", np.ones((2, 4)), "orientations has shape"),
-        ("sizes", np.zeros((1, 3)), "sizes holds 0.0; expected edges > 0"),
-        ("packages", np.array([0, 1]), "packages has shape"),
-    ],
-)
-def test_bad_fields_are_refused(cubes, field, value, message):
-    heap = cubes((5, 1, 0))
-    names = "positions", "orientations", "sizes", "packages"
-    fields = {name: getattr(heap, name) for name in names} | {field: value}
-    with pytest.raises(ValueError, match=message):
-        Heap(**fields)

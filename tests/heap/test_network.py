@@ -1,7 +1,8 @@
 import pytest
 import torch
 
-from unload.heap.network import KINDS, HeapNetwork, pair_columns
+from unload.heap.learning import holds_box
+from unload.heap.network import FateNetwork, expected_of, fate_loss, pair_columns
 from unload.heap.observation import COLUMN, COLUMNS
 
 
@@ -11,58 +12,69 @@ def generator() -> torch.Generator:
 
 
 @pytest.fixture
-def heaps(generator) -> tuple[torch.Tensor, torch.Tensor]:
-    """Three observations of 8 rows, of which 8, 5 and 1 hold a box."""
-    observations = torch.rand((3, 8, len(COLUMNS)), generator=generator)
-    present = torch.arange(8) < torch.tensor([[8], [5], [1]])
-    return observations * present[..., None], present
+def observations(generator) -> torch.Tensor:
+    """Two heaps with five and three boxes."""
+    rows = torch.rand((2, 5, len(COLUMNS)), generator=generator)
+    rows[1, 3:] = 0
+    return rows
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_permuted_boxes_have_permuted_answers(heaps, generator, kind):
-    observations, present = heaps
-    network = HeapNetwork(kind, 16, generator)
-    order = torch.randperm(8, generator=generator)
-    for answer, permuted in zip(
-        network(observations, present), network(observations[:, order], present[:, order])
-    ):
-        assert torch.allclose(answer[:, order], permuted, atol=1e-5)
+@pytest.fixture
+def network(generator) -> FateNetwork:
+    return FateNetwork(16, generator)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_rows_without_a_box_have_no_influence(heaps, generator, kind):
-    observations, present = heaps
-    network = HeapNetwork(kind, 16, generator)
-    filled = torch.where(present[..., None], observations, torch.tensor(5.0))
-    for answer, other in zip(network(observations, present), network(filled, present)):
-        assert torch.allclose(answer[present], other[present], atol=1e-5)
+def test_what_is_expected_is_the_sum_of_fates(network, observations):
+    present = holds_box(observations)
+    fates = network.fates(observations, present)
+    boxes, falls, logits = network(observations, present)
+    chance = fates.logits.sigmoid()
+    assert fates.logits.shape == (2, 5, 5, 2)
+    assert boxes.shape == falls.shape == logits.shape == (2, 5)
+    torch.testing.assert_close(boxes[1], chance[1, :, :3, 0].sum(1) + fates.hidden[1, :, 0])
+    torch.testing.assert_close(falls[0], chance[0, :, :, 1].sum(1) + fates.hidden[0, :, 1])
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_one_row_asked_for_has_the_same_answer_as_among_all(heaps, generator, kind):
-    observations, present = heaps
-    network = HeapNetwork(kind, 16, generator)
-    rows = torch.tensor([3, 4, 0])
-    for answer, all_rows in zip(
-        network(observations, present, rows), network(observations, present)
-    ):
-        assert answer.shape == (3, 1)
-        assert torch.allclose(answer[:, 0], all_rows[torch.arange(3), rows], atol=1e-5)
+def test_one_row_is_answered_as_among_all(network, observations):
+    present, rows = holds_box(observations), torch.tensor([4, 1])
+    every = network.fates(observations, present)
+    for whole, one in zip(every, network.fates(observations, present, rows)):
+        torch.testing.assert_close(whole[torch.arange(2), rows], one[:, 0])
 
 
-def test_only_some_kinds_know_their_neighbours(heaps, generator):
-    observations, present = heaps
-    changed = observations.clone()
-    changed[0, 7, COLUMN["z"]] += 1
-    for kind in KINDS:
-        network = HeapNetwork(kind, 16, generator)
-        before, after = (network(each, present).boxes[0, 0] for each in (observations, changed))
-        assert (before != after) == (kind in ("pairs", "pooled")), kind
+def test_boxes_in_another_order_have_the_same_fates(network, observations):
+    order = torch.tensor([3, 0, 4, 1, 2])
+    present = holds_box(observations)
+    before = network.fates(observations, present).logits
+    after = network.fates(observations[:, order], present[:, order]).logits
+    torch.testing.assert_close(after, before[:, order][:, :, order])
 
 
-def test_counts_are_not_negative(heaps, generator):
-    answers = HeapNetwork("pairs", 16, generator)(*heaps)
-    assert (answers.boxes > 0).all() and (answers.falls > 0).all()
+def test_empty_rows_change_nothing(network, observations):
+    more = torch.cat([observations, torch.zeros(2, 4, len(COLUMNS))], dim=1)
+    few, many = (network(each, holds_box(each)) for each in (observations, more))
+    torch.testing.assert_close(many.boxes[:, :5], few.boxes)
+
+
+def test_the_loss_is_least_for_what_has_happened(network, observations):
+    """One visible box is unloaded and one falls; of the two falls the other one is hidden."""
+    present, rows = holds_box(observations), torch.tensor([0, 0])
+    found = torch.tensor([[1, 2, 0, 0, 0], [1, 2, 0, 0, 0]], dtype=torch.int8)
+    fates = network.fates(observations, present, rows)
+    sure = torch.full_like(fates.logits, -9.0)
+    sure[:, 0, 0, 0] = sure[:, 0, 1, 1] = 9.0
+    hidden = torch.tensor([[[1e-6, 1.0]]]).expand(2, 1, 2)
+    right = fates._replace(logits=sure, hidden=hidden)
+    boxes, falls = torch.ones(2), torch.full((2,), 2.0)
+    losses = [fate_loss(each, present, found, boxes, falls) for each in (right, fates)]
+    assert losses[0] < losses[1]
+    counts = expected_of(right, present)
+    assert counts.boxes.numpy() == pytest.approx(1, abs=0.01)
+    assert counts.falls.numpy() == pytest.approx(2, abs=0.01)
+    empty = fates.logits.clone()
+    empty[1, :, 3:] += 5
+    same = fate_loss(fates._replace(logits=empty), present, found, boxes, falls)
+    assert same == losses[1], "rows without a box do not count"
 
 
 def test_pair_columns_are_distances_and_gaps():
@@ -72,16 +84,3 @@ def test_pair_columns_are_distances_and_gaps():
     rows[0, :, COLUMN["extent_x"] : COLUMN["extent_z"] + 1] = 0.4
     first_to_second = pair_columns(rows, rows)[0, 0, 1]
     assert first_to_second.tolist() == pytest.approx([-0.75, 0, 0.3, 0.35, -0.4, -0.1])
-
-
-def test_the_same_generator_gives_the_same_weights():
-    first, second = (HeapNetwork(generator=torch.Generator().manual_seed(4)) for _ in range(2))
-    for one, other in zip(first.parameters(), second.parameters()):
-        assert torch.equal(one, other)
-
-
-def test_bad_input_is_refused():
-    with pytest.raises(ValueError, match="kind is 'peq'; expected one of 'pairs'"):
-        HeapNetwork("peq")
-    with pytest.raises(ValueError, match="n_features is 0"):
-        HeapNetwork("own", 0)

@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
 
-from unload.heap.env import stored_heaps
-from unload.heap.rake import CAME, FALL, PHYSICS, REACH, REST, Poses, near_boxes
-from unload.physics.bullet import FRICTION
+from unload.heap.rake import CAME, FALL, PHYSICS, REACH, near_boxes
 
 
 @pytest.mark.parametrize("physics", PHYSICS)
@@ -50,28 +48,6 @@ def test_a_box_that_loses_its_support_falls_but_the_dragged_one_does_not_count(c
     assert (tower.positions[lowest.fallen, 2] - on_floor > FALL).all()
 
 
-def test_heaps_are_at_rest_at_their_own_friction(make_rake):
-    """While no box is dragged, none moves far; at another friction the heaps slump."""
-    moved = {}
-    for friction in (FRICTION, 0.3):
-        moved[friction] = 0
-        for heap in stored_heaps("test")[:3]:
-            rake, last = make_rake(friction=friction), Poses(heap)
-            bodies = rake._build(heap, 0)
-            rake._world.step(REST)
-            last.read(rake._world, bodies)
-            distances = np.linalg.norm(last.positions - heap.positions, axis=1)
-            moved[friction] += (distances > 0.1).sum()
-    assert moved[FRICTION] <= 2 and moved[0.3] > 20, "of about 315 boxes"
-
-
-def test_too_heavy_boxes_stay(cubes, make_rake):
-    """A failed pick: a force too small moves nothing, and nothing counts."""
-    heap = cubes((5, 1, 0), (6, 1, 0))
-    outcome = make_rake(friction=3.0, mass=20.0).pick(heap, 0)
-    assert not outcome.came and not outcome.unloaded.any() and len(outcome.heap) == 2
-
-
 @pytest.mark.parametrize("physics", PHYSICS)
 def test_a_pick_depends_on_nothing_but_the_heap(pile, make_rake, physics):
     used, fresh = make_rake(physics), make_rake(physics)
@@ -94,19 +70,3 @@ def test_near_leaves_far_boxes_exactly_where_they_are(cubes, make_rake):
     heap = cubes((6, 0.3, 0), (4.3, 2.2, 0), (4.3, 2.2, 1))
     outcome = make_rake("near").pick(heap, 0)
     assert outcome.heap.positions.tolist() == heap.positions[1:].tolist()
-
-
-def test_bad_input_is_refused(cubes, make_rake):
-    heap = cubes((5, 1, 0))
-    with pytest.raises(ValueError, match="physics is 'full'; expected one of 'whole'"):
-        make_rake("full")
-    with pytest.raises(ValueError, match="friction is -1"):
-        make_rake(friction=-1)
-    with pytest.raises(ValueError, match="mass is 0"):
-        make_rake(mass=0)
-    with pytest.raises(ValueError, match="box is 1; expected an integer >= 0 and <= 0"):
-        make_rake().pick(heap, 1)
-    with pytest.raises(TypeError, match="heap is 'heap'"):
-        make_rake().pick("heap", 0)
-    with pytest.raises(ValueError, match="heap holds a box with its centre at x = 7.3 m"):
-        make_rake().pick(cubes((5, 1, 0), (7.3, 1, 0)), 0)

@@ -124,7 +124,6 @@ def check_heap(name: str, heap: object) -> None:
         )
 
 
-def package_sizes(packages: np.ndarray, scale: float = 1.0) -> np.ndarray:
+def package_sizes(packages: np.ndarray) -> np.ndarray:
     """(n, 3) float64, m: depth, width and height of packages as in the neat loads."""
-    edges = np.column_stack([np.full(len(packages), DEPTH), PACKAGES[packages] * CELL])
-    return edges * scale
+    return np.column_stack([np.full(len(packages), DEPTH), PACKAGES[packages] * CELL])

@@ -11,12 +11,12 @@ from unload import task
 from unload.env.base import AllOrReset, EpisodeEnv
 from unload.heap import generate
 from unload.heap.boxes import Heap, check_heap
-from unload.heap.camera import Camera
 from unload.heap.observation import (
     COLUMNS,
     FELL,
     ROWS,
     UNLOADED,
+    Camera,
     camera_boxes,
     features,
     true_boxes,

@@ -10,7 +10,7 @@ from unload import task
 from unload.heap.boxes import DOOR, REAR, WIDTH, Heap, package_sizes
 from unload.heap.rake import PHYSICS, add_walls
 from unload.load.substacks import PACKAGES
-from unload.physics.bullet import FRICTION, World
+from unload.physics.bullet import World
 from unload.support import checks, files
 
 BOXES = 130  # dropped; with 140, half of the heaps are higher than the container
@@ -22,10 +22,11 @@ LAYER_TIME = 0.7  # s between layers
 SETTLE = 1.0  # s
 PAUSE = 0.1  # s over which speeds are measured
 ROUNDS = 8  # of settling and clearing at most, after the barrier is gone
+TRIES = 20  # heaps made at most until one is accepted
 FEWEST, HIGHEST, FASTEST = 80, float(task.CONTAINER[2]), 0.1  # boxes, m, m/s: see ``settled_heap``
 SPLITS = "train", "test"
 
-# What a heap depends on besides the arguments of ``settled_heap``.
+# What a heap depends on besides the generator of ``settled_heap``.
 CONSTANTS = (
     BOXES,
     LAYER,
@@ -44,12 +45,7 @@ CONSTANTS = (
 )
 
 
-def settled_heap(
-    rng: np.random.Generator,
-    scale: float = 1.0,
-    friction: float = FRICTION,
-    tries: int = 20,
-) -> Heap:
+def settled_heap(rng: np.random.Generator) -> Heap:
     """A random heap at rest, about 3 s of CPU time.
 
     Packages and orientations are uniformly random. The drop is simulated by ``"coarse"``
@@ -59,43 +55,30 @@ def settled_heap(
     rounds of settling and clearing: a box is beyond the door, or faster than 0.1 m/s in the
     last 0.1 s.
 
-    Args:
-        rng: makes it.
-        scale: of all edges of the boxes. If it is above 1, fewer boxes are dropped, and must
-            be left, so that their volume stays the same; below 1 the heap is smaller.
-        friction: of boxes, floor and walls; a heap that has settled at another one would
-            slump at the first pick.
-        tries: heaps made at most.
-
     Raises:
-        TypeError, ValueError: an argument is not as described.
-        RuntimeError: every try was rejected.
+        TypeError: ``rng`` is no generator.
+        RuntimeError: ``TRIES`` heaps were rejected.
     """
     checks.generator("rng", rng)
-    checks.real("scale", scale, 0.5, 1.5)
-    checks.real("friction", friction, 0, 10)
-    boxes = min(BOXES, round(BOXES / scale**3))
-    for _ in range(checks.integer("tries", tries, 1)):
-        heap, fastest = _settled(_dropped(rng, scale, friction, boxes), friction)
-        if _accepted(heap, fastest, FEWEST * boxes / BOXES):
+    for _ in range(TRIES):
+        heap, fastest = _settled(_dropped(rng))
+        if _accepted(heap, fastest):
             return heap
-    raise RuntimeError(
-        f"{tries} heaps of scale {scale} and friction {friction} were rejected; see settled_heap"
-    )
+    raise RuntimeError(f"{TRIES} heaps were rejected; see settled_heap")
 
 
-def _dropped(rng: np.random.Generator, scale: float, friction: float, count: int) -> Heap:
+def _dropped(rng: np.random.Generator) -> Heap:
     """Boxes that have come to lie behind the barrier."""
-    packages = rng.integers(len(PACKAGES), size=count)
-    sizes = package_sizes(packages, scale)
+    packages = rng.integers(len(PACKAGES), size=BOXES)
+    sizes = package_sizes(packages)
     time_step, iterations, _ = PHYSICS["coarse"]
     world = World(time_step, iterations=iterations)
-    add_walls(world, friction)
-    world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0, friction=friction)
+    add_walls(world)
+    world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0)
     bodies: list[int] = []
-    for first in range(0, count, LAYER):
+    for first in range(0, BOXES, LAYER):
         top = max((world.pose(body)[0][2] for body in bodies), default=0.0)
-        for number in range(first, min(first + LAYER, count)):
+        for number in range(first, min(first + LAYER, BOXES)):
             turn = rng.normal(size=4)
             place = (
                 rng.uniform(REAR + MARGIN, BARRIER - MARGIN),
@@ -103,7 +86,7 @@ def _dropped(rng: np.random.Generator, scale: float, friction: float, count: int
                 top + SPACING * (1 + number - first),
             )
             turn /= _length(turn)
-            bodies.append(world.add_box(place, sizes[number], task.MASS, turn, friction))
+            bodies.append(world.add_box(place, sizes[number], task.MASS, turn))
         world.step(LAYER_TIME)
     world.step(SETTLE)
     positions, orientations = (np.array(part) for part in zip(*map(world.pose, bodies)))
@@ -123,12 +106,12 @@ def _length(vector: np.ndarray) -> float:
     return sqrt(total)
 
 
-def _settled(heap: Heap, friction: float) -> tuple[Heap, float]:
+def _settled(heap: Heap) -> tuple[Heap, float]:
     """The heap without its barrier and without what leaves the door, and its fastest box's m/s."""
     world = World()
-    add_walls(world, friction)
+    add_walls(world)
     bodies = {
-        number: world.add_box(place, size, task.MASS, turn, friction)
+        number: world.add_box(place, size, task.MASS, turn)
         for number, (place, size, turn) in enumerate(
             zip(heap.positions, heap.sizes, heap.orientations)
         )
@@ -153,11 +136,11 @@ def _settled(heap: Heap, friction: float) -> tuple[Heap, float]:
     return left, fastest
 
 
-def _accepted(heap: Heap, fastest: float, fewest: float) -> bool:
+def _accepted(heap: Heap, fastest: float) -> bool:
     """Whether a heap is worth keeping."""
     top = (heap.positions[:, 2] + heap.extents()[:, 2] / 2).max()
     inside = ((heap.positions > (REAR, 0, 0)) & (heap.positions < (DOOR, WIDTH, HIGHEST))).all()
-    return bool(len(heap) >= fewest and top <= HIGHEST and inside and fastest <= FASTEST)
+    return bool(len(heap) >= FEWEST and top <= HIGHEST and inside and fastest <= FASTEST)
 
 
 def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:

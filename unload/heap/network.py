@@ -1,43 +1,58 @@
-"""The network: for each visible box, what dragging it would bring.
+"""The network: what dragging each visible box would do to every visible box.
 
 It is permutation equivariant, as the paper's (Sec. III-F), but what a box's neighbours do
 matters here: the box that is dragged pushes those before it and drops those on it.
 """
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import torch
 from torch import nn
 
-from unload.heap.observation import COLUMN, COLUMNS
-from unload.network.variants import linear_with_context, maximum_over_items
+from unload.heap.observation import COLUMN, COLUMNS, FELL, UNLOADED
 from unload.support import checks
 
 FEATURES = 64
-CONTEXTS = {"pairs": 2, "pooled": 1, "own": 0}  # layers' outputs beside a row's own one
-KINDS = *CONTEXTS, "linear"
 PAIR_COLUMNS = 6  # see ``pair_columns``
 HEADS = 3
+FATES = 2  # a box may be unloaded, and may fall, or both
 
 
 class Expected(NamedTuple):
-    """What dragging each box would bring; each (batch, rows) float32."""
+    """What dragging each box would bring; each (batch, asked) float32."""
 
     boxes: torch.Tensor  # unloaded, expected number
     falls: torch.Tensor  # expected number
     fall_logits: torch.Tensor  # of the probability that anything falls
 
 
-class HeapNetwork(nn.Module):
-    """Expected boxes, expected falls and the probability of a fall, for each box.
+class Fates(NamedTuple):
+    """What happens to the boxes when one is dragged; all float32.
+
+    Attributes:
+        logits: (batch, asked, items, 2), of the probabilities that each visible box is
+            unloaded, and that it falls. The box that is dragged is one of them.
+        hidden: (batch, asked, 2), expected numbers of hidden boxes that are unloaded, and fall.
+        fall_logits: (batch, asked), of the probability that anything falls.
+    """
+
+    logits: torch.Tensor
+    hidden: torch.Tensor
+    fall_logits: torch.Tensor
+
+
+class FateNetwork(nn.Module):
+    """The fate of every box when one is dragged.
+
+    For every pair of the dragged box and another one, a two-layer network reads both rows and
+    how the two blocks lie to each other (``pair_columns``). The sum and the maximum of what all
+    pairs say tell each pair what else is around the dragged box, because a third box may lie
+    between the two.
+
+    A pick is recorded with what it has done to every visible box. Therefore each pair is learned
+    from the fate of one box, and not only from what all of them together have brought.
 
     Args:
-        kind: what a box's answer depends on besides its own row. ``"pairs"``: for every other
-            box, a two-layer network of both rows and of how the two blocks lie to each other
-            (``pair_columns``), pooled by sum and maximum; ``"pooled"``: the maximum of each
-            feature over all boxes, as in ``unload.EquivariantStack``; ``"own"``: nothing;
-            ``"linear"``: nothing, and the network has no hidden layer.
         n_features: of each layer.
         generator: draws the weights, U(±1/√inputs); torch's global one if None.
 
@@ -46,27 +61,49 @@ class HeapNetwork(nn.Module):
     """
 
     def __init__(
-        self,
-        kind: str = "pairs",
-        n_features: int = FEATURES,
-        generator: torch.Generator | None = None,
+        self, n_features: int = FEATURES, generator: torch.Generator | None = None
     ) -> None:
         super().__init__()
-        checks.one_of("kind", kind, KINDS)
-        self.kind = kind
         self.n_features = n = checks.integer("n_features", n_features, 1)
-        if kind != "linear":
-            self.own = nn.Linear(len(COLUMNS), n)
-        if kind == "pairs":
-            self.chosen = nn.Linear(len(COLUMNS), n)
-            self.other = nn.Linear(len(COLUMNS), n, bias=False)
-            self.pair = nn.Linear(PAIR_COLUMNS, n, bias=False)
-            self.message = nn.Linear(n, n)
-        if kind != "linear":
-            self.hidden = nn.Linear(n + CONTEXTS[kind] * n, n)
-            self.last = nn.Linear(n, n)
-        self.heads = nn.Linear(len(COLUMNS) if kind == "linear" else n, HEADS)
-        reset_layers(self.modules(), generator)
+        self.own = nn.Linear(len(COLUMNS), n)
+        self.chosen = nn.Linear(len(COLUMNS), n)
+        self.other = nn.Linear(len(COLUMNS), n, bias=False)
+        self.pair = nn.Linear(PAIR_COLUMNS, n, bias=False)
+        self.message = nn.Linear(n, n)
+        self.hidden = nn.Linear(3 * n, n)
+        self.last = nn.Linear(n, n)
+        self.heads = nn.Linear(n, HEADS)
+        self.heard = nn.Linear(n, n)
+        self.context = nn.Linear(n, n, bias=False)
+        self.fate = nn.Linear(n, FATES)
+        for layer in self.children():
+            for weight in layer.parameters():
+                bound = layer.in_features**-0.5
+                nn.init.uniform_(weight, -bound, bound, generator=generator)
+
+    def fates(
+        self,
+        observations: torch.Tensor,
+        present: torch.Tensor,
+        rows: torch.Tensor | None = None,
+    ) -> Fates:
+        """Fates of all boxes for each row, or for one chosen row of each observation.
+
+        Args:
+            observations: (batch, items, 13) float32, see ``HeapEnv``.
+            present: (batch, items) bool, the rows that hold a box.
+            rows: (batch,) int64, the rows asked for; all if None. Training asks for one, since
+                each observation was followed by one pick; that costs a share of 1 / items.
+        """
+        asked = observations
+        if rows is not None:
+            asked = observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
+        messages = self._messages(asked, observations, present)
+        pooled = [messages.sum(dim=2) / 16, messages.amax(dim=2)]
+        around = torch.relu(self.hidden(torch.cat([torch.relu(self.own(asked)), *pooled], dim=2)))
+        pair = torch.relu(self.heard(messages) + self.context(around)[:, :, None])
+        heads = self.heads(torch.relu(self.last(around)))
+        return Fates(self.fate(pair), nn.functional.softplus(heads[..., :2]), heads[..., 2])
 
     def forward(
         self,
@@ -74,33 +111,10 @@ class HeapNetwork(nn.Module):
         present: torch.Tensor,
         rows: torch.Tensor | None = None,
     ) -> Expected:
-        """Answers for all rows, or for one chosen row of each observation.
+        """Sums of ``fates``, with the same arguments."""
+        return expected_of(self.fates(observations, present, rows), present)
 
-        Args:
-            observations: (batch, items, 13) float32, see ``HeapEnv``.
-            present: (batch, items) bool, the rows that hold a box.
-            rows: (batch,) int64, the rows asked for; all if None. Training asks for one, since
-                each observation was followed by one pick; that costs a share of 1 / items.
-
-        Returns:
-            (batch, items) each, or (batch, 1) if ``rows`` is given.
-        """
-        asked = asked_rows(observations, rows)
-        if self.kind == "linear":
-            return _expected(self.heads(asked))
-        if self.kind == "pairs":
-            messages = self.messages(asked, observations, present)
-            own = self.with_neighbours(asked, messages)
-        elif self.kind == "pooled":
-            own = torch.relu(self.own(asked))
-            everything = torch.relu(self.own(observations))
-            pooled = maximum_over_items(everything, present)
-            own = torch.relu(linear_with_context(self.hidden, own, pooled))
-        else:
-            own = torch.relu(self.hidden(torch.relu(self.own(asked))))
-        return _expected(self.heads(torch.relu(self.last(own))))
-
-    def messages(
+    def _messages(
         self, asked: torch.Tensor, others: torch.Tensor, present: torch.Tensor
     ) -> torch.Tensor:
         """What each other box means to each one asked for, (batch, asked, others, n) ≥ 0."""
@@ -109,33 +123,6 @@ class HeapNetwork(nn.Module):
         message = torch.relu(self.message(torch.relu(message + self.pair(relation))))
         # Messages are >= 0, so that 0 adds nothing to the sum and leaves the maximum.
         return message * present[:, None, :, None]
-
-    def with_neighbours(self, asked: torch.Tensor, messages: torch.Tensor) -> torch.Tensor:
-        """Features of the boxes asked for and of all that is around them, (batch, asked, n)."""
-        pooled = [messages.sum(dim=2) / 16, messages.amax(dim=2)]
-        return torch.relu(self.hidden(torch.cat([torch.relu(self.own(asked)), *pooled], dim=2)))
-
-
-def reset_layers(modules: Iterable[nn.Module], generator: torch.Generator | None) -> None:
-    """Draw the weights of the linear layers among some modules, U(±1/√inputs)."""
-    for layer in modules:
-        if isinstance(layer, nn.Linear):
-            for weight in (layer.weight, layer.bias):
-                if weight is not None:
-                    bound = layer.in_features**-0.5
-                    nn.init.uniform_(weight, -bound, bound, generator=generator)
-
-
-def asked_rows(observations: torch.Tensor, rows: torch.Tensor | None) -> torch.Tensor:
-    """(batch, items or 1, 13) float32, all rows, or the one that is asked for."""
-    if rows is None:
-        return observations
-    return observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
-
-
-def _expected(heads: torch.Tensor) -> Expected:
-    boxes, falls = nn.functional.softplus(heads[..., :2]).unbind(2)
-    return Expected(boxes, falls, heads[..., 2])
 
 
 def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
@@ -149,3 +136,34 @@ def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
     apart = others[:, None, :, place] - asked[:, :, None, place]
     reach = (others[:, None, :, block] + asked[:, :, None, block]) / 2
     return torch.cat([apart, apart.abs() - reach], dim=3)
+
+
+def expected_of(fates: Fates, present: torch.Tensor) -> Expected:
+    """Sums of fates over the boxes that are there."""
+    visible = (fates.logits.sigmoid() * present[:, None, :, None]).sum(dim=2)
+    boxes, falls = (visible + fates.hidden).unbind(2)
+    return Expected(boxes, falls, fates.fall_logits)
+
+
+def fate_loss(
+    fates: Fates,
+    present: torch.Tensor,
+    found: torch.Tensor,
+    boxes: torch.Tensor,
+    falls: torch.Tensor,
+) -> torch.Tensor:
+    """Negative log-likelihood of what one pick of each observation has done, per pick.
+
+    Args:
+        fates: of the box that was dragged in each observation.
+        present: (batch, items) bool.
+        found: (batch, items) int, the bits ``UNLOADED`` and ``FELL`` of each visible box.
+        boxes, falls: (batch,) float32, of the pick, hidden boxes included.
+    """
+    bits = torch.stack([(found & UNLOADED) > 0, (found & FELL) > 0], dim=2).float()
+    each = nn.functional.binary_cross_entropy_with_logits(
+        fates.logits[:, 0], bits, reduction="none"
+    )
+    hidden = torch.stack([boxes, falls], dim=1) - bits.sum(dim=1)
+    counts = nn.functional.poisson_nll_loss(fates.hidden[:, 0], hidden, log_input=False)
+    return (each * present[..., None]).sum(dim=(1, 2)).mean() + FATES * counts

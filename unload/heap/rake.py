@@ -20,10 +20,9 @@ STILL = 0.2  # m/s; a toppling box is faster, a creeping one slower
 FALL = 0.5  # m: a box that drops deeper may be damaged
 NEAR = 0.6  # m around the drag, within which ``near`` lets boxes move
 SUPPORT = 0.05  # m around those, within which it keeps boxes as obstacles
-# Name → time step in s, solver iterations, whether boxes far from the drag are left out. Of 300
-# random picks, coarse unloads as many boxes as whole does in 78 % (correlation 0.87; of falls
-# 0.84) in a third of the time; near in 70 % (0.77), in a seventh, but it counts a third fewer
-# falls (0.57): chains of boxes end where its neighbourhood does. See data/heap/agreement.csv.
+# Name → time step in s, solver iterations, whether boxes far from the drag are left out. Coarse
+# takes a third of the time of whole. Near takes a seventh, but it counts fewer falls, because
+# chains of boxes end where its neighbourhood does.
 PHYSICS = {
     "whole": (1 / 240, 50, False),
     "coarse": (1 / 120, 20, False),

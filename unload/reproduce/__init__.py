@@ -5,9 +5,7 @@ Read ``results`` first, then ``observation``, ``tuning`` and ``training`` (the p
 ``trained``, ``changes``, ``interventions``, ``values``, ``verdict``, ``survival``, ``mistakes``,
 ``questions``, ``value_questions`` and ``cell_texts`` (why 60 %);
 ``comparison`` and ``robustness`` (policies compared); ``lifts``, ``full_lifts`` and ``agreement``
-(the physics); ``heap``, ``heap_lifts``, ``heap_learning``, ``heap_variation``, ``heap_episodes``,
-``heap_rules``, ``heap_table`` and ``heap_limits`` (the unordered load); ``paper_numbers`` and
-``paper_curves`` (the paper compared with all this). ``fingerprint`` says whether the code still
+(the physics); ``paper_numbers`` and ``paper_curves`` (the paper compared with all this). ``fingerprint`` says whether the code still
 trains as it did, ``intervals`` how sure a mean is, ``resampling`` how far few runs mislead,
 ``exercise`` whether a reader's answer is right.
 ``__main__`` is the command line, and ``figures`` draws.

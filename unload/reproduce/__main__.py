@@ -3,30 +3,16 @@
 import argparse
 from collections.abc import Callable
 
+from unload.heap.study import table as heap
 from unload.reproduce import (
     agreement,
-    answer,
     comparison,
-    drift,
-    heap,
-    heap_learning,
-    heap_lifts,
-    heap_limits,
-    heap_rules,
-    heap_table,
-    heap_variation,
-    interventions,
     lifts,
-    mistakes,
     observation,
-    random_picks,
-    random_share,
     robustness,
     study,
-    trained,
     training,
     tuning,
-    values,
 )
 from unload.reproduce.falls import laboratory, long
 from unload.reproduce.results import COMMAND, JOBS
@@ -41,22 +27,6 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "tuning": ("Figs. 8–10", tuning.tuning_data, tuning.OPTIONS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
     "study": ("why 60 %: the controlled experiments", study.studies_data, study.OPTIONS),
-    "drift": ("how the boxes of settled walls move", drift.drift_data, drift.OPTIONS),
-    "answer": ("why 60 %: the runs of the plan", answer.answer_data, answer.OPTIONS),
-    "trained": ("why 60 %: what those runs have learned", trained.trained_data, trained.OPTIONS),
-    "mistakes": ("why 60 %: the mistakes of those runs", mistakes.mistakes_data, mistakes.OPTIONS),
-    "interventions": (
-        "why 60 %: runs changed on the way",
-        interventions.interventions_data,
-        interventions.OPTIONS,
-    ),
-    "values": ("why 60 %: values before a fall", values.values_data, values.OPTIONS),
-    "offline": (
-        "what random picks alone teach", random_picks.offline_data, random_picks.OPTIONS
-    ),
-    "random-share": (
-        "what a share of own picks changes", random_share.random_share_data, random_share.OPTIONS
-    ),
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
@@ -67,13 +37,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "robustness": (
         "policies with every box simulated", robustness.robustness_data, robustness.OPTIONS
     ),
-    **heap.PARTS,
-    **heap_lifts.PARTS,
-    **heap_learning.PARTS,
-    **heap_variation.PARTS,
-    **heap_rules.PARTS,
-    **heap_table.PARTS,
-    **heap_limits.PARTS,
+    **heap.PARTS,  # goes with the folder unload/heap
 }  # fmt: skip
 
 
