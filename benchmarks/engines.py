@@ -26,8 +26,8 @@ from unload.physics.local import LocalPhysics
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 from unload.reproduce.agreement import container_states
 from unload.reproduce.figures.speed import FOLDER
-from unload.reproduce.intervals import share_interval
 from unload.reproduce.results import measured, publish, read_table
+from unload.reproduce.statistics import share_interval
 from unload.support import checks
 
 COMMAND = "python benchmarks/engines.py"

@@ -26,7 +26,7 @@ from unload import task
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
 from unload.reproduce.figures import speed
-from unload.reproduce.figures.style import save
+from unload.reproduce.style import save
 from unload.support import files
 from unload.support.provenance import read_provenance
 

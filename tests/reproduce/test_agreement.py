@@ -11,7 +11,7 @@ from unload import policies, task
 from unload.load.substacks import front_walls, stack_load
 from unload.reproduce import agreement, full_lifts
 from unload.reproduce.figures.lifting import agreement_scatter
-from unload.reproduce.intervals import share_interval
+from unload.reproduce.statistics import share_interval
 from unload.support.provenance import read_provenance
 
 

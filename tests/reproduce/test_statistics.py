@@ -75,17 +75,9 @@ def test_intervals_hold_the_mean_as_often_as_they_say():
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
 
 
-def test_the_interquartile_mean_leaves_out_both_ends():
-    assert statistics.interquartile_mean([0, 1, 2, 3, 4, 5, 6, 100]) == 3.5
-    values = stats.norm.ppf(np.linspace(0.05, 0.95, 10))
-    low, high = statistics.bca_interval(values)
-    assert low < 0 < high
-    assert statistics.bca_interval(values) == (low, high)
-
-
-@pytest.mark.parametrize("interval", [statistics.t_interval, statistics.bca_interval])
-def test_too_few_values_have_no_interval(interval):
-    assert np.isnan(interval([0.6])).all()
+def test_too_few_values_have_no_interval():
+    assert np.isnan(statistics.t_interval([0.6])).all()
+    assert np.isnan(statistics.welch_interval([0.6, 0.7], [0.3])).all()
 
 
 def test_a_cell_is_summed_up():
@@ -103,33 +95,6 @@ def test_a_cell_is_summed_up():
     assert (low, high) == pytest.approx(statistics.t_interval(ends[:2]))
 
 
-def test_failures_in_the_replay_are_those_of_the_last_picks():
-    run = pd.DataFrame({"picks": [100, 200, 300, 400], "success_rate": [0.5, 0.9, 1.0, 0.8]})
-    assert statistics.replay_failures(run, 100).tolist() == pytest.approx([0.5, 0.1, 0, 0.2])
-    # Of the last 150 picks after the second point, 50 are half of the first point's.
-    shares = [0.5, (10 + 25) / 150, 5 / 150, 20 / 150]
-    assert statistics.replay_failures(run, 150).tolist() == pytest.approx(shares)
-    shares = [0.5, 60 / 200, 60 / 300, 80 / 400]
-    assert statistics.replay_failures(run, 10**6).tolist() == pytest.approx(shares)
-    with pytest.raises(ValueError, match="replay_size is 0"):
-        statistics.replay_failures(run, 0)
-
-
-def test_falls_are_listed_with_the_failures_remembered_when_they_begin():
-    run = curve([0.3, 0.3])
-    picks = run["picks"]
-    run["success_rate"] = 0.3
-    run.loc[(picks > 4_000_000) & (picks <= 8_000_000), "success_rate"] = 0.99
-    run.loc[(picks > 15_000_000) & (picks <= 15_520_000), "success_rate"] = 0.97
-    table = statistics.fall_table(run)
-    assert table["begin"].tolist() == [8_000_000, 15_500_000]
-    assert table["end"].tolist() == [8_500_000, 16_000_000]
-    before = 2**20 - 500_000  # picks of the memory from before the second rise
-    expected = [0.01, (0.03 * 500_000 + 0.7 * before) / 2**20]
-    assert table["failures"].tolist() == pytest.approx(expected, abs=0.02)
-    assert statistics.fall_table(curve([0.3, 0.99])).empty
-
-
 def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
     first, second = np.array([0.6, 0.7, 0.8, 0.5, 0.65]), np.array([0.3, 0.42, 0.35])
     parts = [values.var(ddof=1) / len(values) for values in (first, second)]
@@ -140,7 +105,6 @@ def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
     middle = first.mean() - second.mean()
     interval = statistics.welch_interval(first, second)
     assert interval == pytest.approx((middle - reach, middle + reach))
-    assert np.isnan(statistics.welch_interval(first, [0.3])).all()
 
 
 def test_fishers_test_asks_whether_fewer_runs_fall():
@@ -148,8 +112,6 @@ def test_fishers_test_asks_whether_fewer_runs_fall():
     assert statistics.fisher_p(1, 5, 5, 5) == pytest.approx(6 / 252)
     assert statistics.fisher_p(5, 5, 1, 5) == pytest.approx(1)
     assert statistics.fisher_p(0, 5, 5, 5) == pytest.approx(1 / 252)
-    with pytest.raises(ValueError, match="control_fallen is 6; expected an integer >= 0 and <= 5"):
-        statistics.fisher_p(0, 5, 6, 5)
 
 
 def course(msr, loss):
@@ -172,3 +134,69 @@ def test_the_rise_after_the_peak_of_the_loss():
     assert statistics.after_loss_peak(course(np.linspace(0, 1, 7), [7, 6, 5, 4, 3, 2, 1])) == (
         False, False
     )  # fmt: skip
+
+
+def test_a_bootstrap_interval_holds_the_mean_about_as_often_as_it_says():
+    rng = np.random.default_rng(0)
+    inside = [
+        low < 3 < high
+        for low, high in map(statistics.bootstrap_interval, rng.normal(3, 1, (300, 40)))
+    ]
+    assert 0.90 < np.mean(inside) < 0.98
+    assert statistics.bootstrap_interval([0.25]) == (0.25, 0.25)
+
+
+def test_groups_keep_their_order_and_their_means():
+    table = pd.DataFrame(
+        {"cell": ["b", "b", "a", "a"], "mask": [True] * 4, "msr": [0.0, 1.0, 0.5, 0.5]}
+    )
+    rows = statistics.with_intervals(table, ["cell", "mask"], ["msr"])
+    assert rows["cell"].tolist() == ["b", "a"]
+    assert rows["runs"].tolist() == [2, 2]
+    assert rows["msr"].tolist() == [0.5, 0.5]
+    assert rows[["msr_low", "msr_high"]].to_numpy().tolist() == [[0.0, 1.0], [0.5, 0.5]]
+
+
+def test_share_intervals_are_those_of_the_binomial_distribution():
+    """At the ends of the interval, what was seen or more extreme has a probability of 2.5 %."""
+    interval = statistics.share_interval
+    assert interval(0, 300) == pytest.approx((0, 1 - 0.025 ** (1 / 300)))
+    assert interval(300, 300) == pytest.approx((0.025 ** (1 / 300), 1))
+    low, high = interval(4, 50)
+    assert stats.binom.sf(3, 50, low) == pytest.approx(0.025)
+    assert stats.binom.cdf(4, 50, high) == pytest.approx(0.025)
+
+
+def test_pairs_make_the_interval_narrow():
+    reference = np.array([1.0, 5.0, 2.0, 8.0])
+    ratio, low, high = statistics.ratio_interval(1.3 * reference, reference)
+    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
+    assert np.isnan(statistics.ratio_interval(reference, -reference)).all()
+    assert np.isnan(statistics.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
+
+
+def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
+    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
+    mean, low, high = statistics.mean_interval(values)
+    percentile = statistics.bootstrap_interval(values)
+    assert mean == 4.1 and low < mean < high
+    assert low > percentile[0] and high > percentile[1]
+    assert statistics.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        (statistics.bootstrap_interval, ([],), "values is empty"),
+        (statistics.bootstrap_interval, ([np.nan],), "values"),
+        (statistics.t_interval, ([np.inf, 1],), "values"),
+        (statistics.welch_interval, ([1, 2], [np.nan, 1]), "second"),
+        (statistics.share_interval, (3, 2), "count is 3"),
+        (statistics.share_interval, (0, 0), "total is 0"),
+        (statistics.fisher_p, (0, 5, 6, 5), "control_fallen is 6; expected an integer >= 0"),
+        (statistics.with_intervals, (pd.DataFrame({"cell": [1]}), ["cell"], ["msr"]), "msr"),
+    ],
+)
+def test_bad_values_are_refused_by_name(function, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        function(*arguments)

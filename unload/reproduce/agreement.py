@@ -26,8 +26,8 @@ from unload.load.substacks import WALLS
 from unload.physics.local import LocalPhysics
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
 from unload.reproduce.full_lifts import LIVED, NEAR_WALLS, State, drifting_job, fresh_job
-from unload.reproduce.intervals import share_interval
 from unload.reproduce.results import COMMAND, JOBS, keep_all, measured, publish
+from unload.reproduce.statistics import share_interval
 from unload.support import checks, files
 
 NAME = "lift_agreement"

@@ -1,12 +1,12 @@
-"""What the plan in ``data/answer/PLAN.md`` asks of each run, and the statistics of a cell."""
+"""How a run ends and falls, whether it is like the paper's, and how sure means and shares are."""
 
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from unload.agent.config import TrainConfig
 from unload.support import checks
 
 END = 0.1  # share of the picks at the end of a run
@@ -15,6 +15,7 @@ HIGH, LOW = 0.95, 0.8  # MSR that a fall begins at, and ends at
 PAPER_MSR = 0.6  # at the end of its Fig. 12
 LIKE_THE_PAPER = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
 LEVEL = 0.95  # of the intervals
+RESAMPLES = 10_000
 
 
 def windows(curve: pd.DataFrame) -> pd.DataFrame:
@@ -50,43 +51,6 @@ def falls(msr: Sequence[float]) -> list[tuple[int, int]]:
         if value >= HIGH:
             high = window
     return found
-
-
-def replay_failures(curve: pd.DataFrame, replay_size: int = TrainConfig().replay_size) -> pd.Series:
-    """Return the share of failures in the replay memory at each point of a curve.
-
-    It is that of the last picks, because the memory holds these. Where it begins within a
-    point, the point's failures are taken to be spread evenly.
-
-    Args:
-        curve: ``picks`` (increasing) and ``success_rate`` since the point before.
-        replay_size: picks that the memory holds.
-    """
-    replay_size = checks.integer("replay_size", replay_size, 1)
-    picks = np.append(0, curve["picks"])
-    failed = np.append(0, np.cumsum((1 - curve["success_rate"]) * np.diff(picks)))
-    first = np.maximum(picks - replay_size, 0)
-    forgotten = np.interp(first, picks, failed)
-    return pd.Series((failed - forgotten)[1:] / (picks - first)[1:], curve.index)
-
-
-def fall_table(curve: pd.DataFrame, replay_size: int = TrainConfig().replay_size) -> pd.DataFrame:
-    """Return one row per fall of a run (hypothesis 6).
-
-    Args:
-        curve: see ``windows``.
-        replay_size: picks that the replay memory holds.
-
-    Returns:
-        ``begin`` and ``end``: picks at the ends of the last high and of the first low window;
-        ``failures``: share of failures in the replay memory at the beginning.
-    """
-    share, rows = replay_failures(curve, replay_size), []
-    for high, low in falls(windows(curve)["success_rate"]):
-        begin, end = (WINDOW_PICKS * (window + 1) for window in (high, low))
-        failures = np.interp(begin, curve["picks"], share)
-        rows.append({"begin": begin, "end": end, "failures": failures})
-    return pd.DataFrame(rows, columns=["begin", "end", "failures"])
 
 
 def resembles_fig12(curve: pd.DataFrame) -> bool:
@@ -146,6 +110,30 @@ def run_measures(curve: pd.DataFrame) -> dict:
     }
 
 
+def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
+    """Return one row per cell, with the statistics of the plan.
+
+    Args:
+        runs: cell, seed and curve of each, see ``paper_runs``.
+
+    Returns:
+        ``cell``, ``runs``, ``mean`` of the MSR over the last tenth with ``low`` and ``high``,
+        ``lowest`` and ``highest`` run; ``fell``, the runs that fall at least once; ``fig11``,
+        ``fig12`` and ``both``, the runs like the paper's.
+    """
+    measured = pd.DataFrame([{"cell": cell, **run_measures(curve)} for cell, _, curve in runs])
+    rows = []
+    for cell, group in measured.groupby("cell", sort=False):
+        ends = group["end"].to_numpy()
+        rows.append(
+            {"cell": cell, "runs": len(ends), "mean": ends.mean()}
+            | dict(zip(("low", "high"), t_interval(ends)))
+            | {"lowest": ends.min(), "highest": ends.max(), "fell": int((group["falls"] > 0).sum())}
+            | {name: int(group[name].sum()) for name in ("fig11", "fig12", "both")}
+        )
+    return pd.DataFrame(rows)
+
+
 def t_interval(values: Sequence[float]) -> tuple[float, float]:
     """Return the 95 % t interval of the mean of (n,) values; NaN for fewer than two."""
     values = checks.finite_array("values", values, (None,))
@@ -160,7 +148,7 @@ def t_interval(values: Sequence[float]) -> tuple[float, float]:
 def welch_interval(first: Sequence[float], second: Sequence[float]) -> tuple[float, float]:
     """Return the 95 % interval of the difference of two means, first minus second, by Welch.
 
-    NaN if there are fewer than two values of either (hypotheses 2 and 3).
+    NaN if there are fewer than two values of either.
     """
     samples = [
         checks.finite_array(name, values, (None,))
@@ -182,58 +170,111 @@ def fisher_p(fallen: int, runs: int, control_fallen: int, control_runs: int) -> 
     Raises:
         TypeError, ValueError: a number is no integer, or more runs fell than there are.
     """
-    rows = []
-    for name, fell, total in (
-        ("fallen", fallen, runs), ("control_fallen", control_fallen, control_runs)
-    ):  # fmt: skip
-        total = checks.integer(name.replace("fallen", "runs"), total, 1)
-        fell = checks.integer(name, fell, 0, total)
-        rows.append([fell, total - fell])
+    checks.integer("fallen", fallen, 0, runs)
+    checks.integer("control_fallen", control_fallen, 0, control_runs)
+    rows = [[fallen, runs - fallen], [control_fallen, control_runs - control_fallen]]
     return float(stats.fisher_exact(rows, alternative="less").pvalue)
 
 
-def interquartile_mean(values: Sequence[float], axis: int = -1) -> float:
-    """Return the mean without the lowest and the highest quarter."""
-    return stats.trim_mean(values, 0.25, axis=axis)
+def bootstrap_interval(values: Sequence[float]) -> tuple[float, float]:
+    """Return the 95 % percentile bootstrap interval of the mean.
 
-
-def bca_interval(values: Sequence[float], seed: int = 0) -> tuple[float, float]:
-    """Return the 95 % BCa bootstrap interval of the interquartile mean; NaN for fewer than four."""
-    values = checks.finite_array("values", values, (None,))
-    if len(values) < 4 or np.ptp(values) == 0:
-        return np.nan, np.nan
-    result = stats.bootstrap(
-        (values,),
-        interquartile_mean,
-        confidence_level=LEVEL,
-        method="BCa",
-        rng=np.random.default_rng(seed),
-    )
-    return tuple(map(float, result.confidence_interval))
-
-
-def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
-    """Return one row per cell, with the statistics of the plan.
+    Few values make it too narrow: of normally distributed ones, it holds the true mean in 75 %
+    of all cases with three values, 84 % with five, 89 % with ten.
 
     Args:
-        runs: cell, seed and curve of each, see ``unload.reproduce.answer.read_answer``.
+        values: (n,) one number per seed or container, n ≥ 1.
+    """
+    values = checks.finite_array("values", values, (None,))
+    if not values.size:
+        raise ValueError("values is empty; expected at least one number")
+    rows = np.random.default_rng(0).integers(values.size, size=(RESAMPLES, values.size))
+    low, high = np.quantile(values[rows].mean(axis=1), [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)
+
+
+def share_interval(count: int, total: int) -> tuple[float, float]:
+    """Return the 95 % Clopper–Pearson interval of a share: exact, two-sided.
+
+    Of nothing in 300 independent trials, a share of up to 1.2 % may be true.
+
+    Args:
+        count: trials that came out so.
+        total: all trials, at least 1.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    count = checks.integer("count", count, 0, checks.integer("total", total, 1))
+    interval = stats.binomtest(count, total).proportion_ci(LEVEL, method="exact")
+    return float(interval.low), float(interval.high)
+
+
+def with_intervals(table: pd.DataFrame, by: Sequence[str], measures: Sequence[str]) -> pd.DataFrame:
+    """Mean and 95 % bootstrap interval of each measure over the rows of a group.
+
+    Args:
+        table: one row per seed or container.
+        by: columns that make a group; the groups keep their order.
+        measures: columns of numbers.
 
     Returns:
-        ``cell``, ``runs``, ``mean`` of the MSR over the last tenth with ``low`` and ``high``,
-        ``iqm`` with ``iqm_low`` and ``iqm_high``; ``lowest`` and ``highest`` run; ``fell``, the
-        runs that fall at least once; ``fig11``, ``fig12`` and ``both``, the runs like the
-        paper's.
+        One row per group: the columns ``by``, ``runs``, and for each measure its mean under
+        its own name and the interval's ends as ``<measure>_low`` and ``<measure>_high``.
+
+    Raises:
+        TypeError, ValueError: a column is missing, or a measure is not finite.
     """
-    measured = pd.DataFrame([{"cell": cell, **run_measures(curve)} for cell, _, curve in runs])
+    checks.entries("table", dict(table), (*by, *measures))
     rows = []
-    for cell, group in measured.groupby("cell", sort=False):
-        ends = group["end"].to_numpy()
-        rows.append(
-            {"cell": cell, "runs": len(ends), "mean": ends.mean()}
-            | dict(zip(("low", "high"), t_interval(ends)))
-            | {"iqm": interquartile_mean(ends)}
-            | dict(zip(("iqm_low", "iqm_high"), bca_interval(ends)))
-            | {"lowest": ends.min(), "highest": ends.max(), "fell": int((group["falls"] > 0).sum())}
-            | {name: int(group[name].sum()) for name in ("fig11", "fig12", "both")}
-        )
+    for key, group in table.groupby(list(by), sort=False):
+        row = dict(zip(by, key)) | {"runs": len(group)}
+        for name in measures:
+            low, high = bootstrap_interval(group[name].to_numpy())
+            row |= {name: group[name].mean(), f"{name}_low": low, f"{name}_high": high}
+        rows.append(row)
     return pd.DataFrame(rows)
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
+    values = checks.finite_array("values", values, (None,))
+    if np.ptp(values) < 1e-12:
+        return (float(values.mean()),) * 3
+    return float(values.mean()), *_bca((values,), np.mean)
+
+
+def ratio_interval(
+    values: Sequence[float], reference: Sequence[float]
+) -> tuple[float, float, float]:
+    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
+
+    NaN where the reference's mean is not > 0 in every resample, because such a ratio means
+    nothing. If all pairs have the same ratio, the interval has no width.
+    """
+    values = checks.finite_array("values", values, (None,))
+    reference = checks.finite_array("reference", reference, values.shape)
+    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    if (reference[rows].mean(axis=1) <= 0).any():
+        return np.nan, np.nan, np.nan
+    ratio = float(values.mean() / reference.mean())
+    if np.abs(values - ratio * reference).max() < 1e-12:
+        return ratio, ratio, ratio
+    return ratio, *_bca((values, reference), _ratio)
+
+
+def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
+    return values.mean(axis=axis) / reference.mean(axis=axis)
+
+
+def _bca(samples: tuple[np.ndarray, ...], statistic: Callable) -> tuple[float, float]:
+    """BCa interval of a statistic of one sample, or of pairs; NaN of fewer than two values."""
+    if len(samples[0]) < 2:
+        return np.nan, np.nan
+    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
+        warnings.simplefilter("ignore")
+        interval = stats.bootstrap(
+            samples, statistic, n_resamples=RESAMPLES, paired=True, confidence_level=LEVEL,
+            method="BCa", vectorized=True, axis=-1, rng=np.random.default_rng(0),
+        ).confidence_interval  # fmt: skip
+    return float(interval.low), float(interval.high)

@@ -6,7 +6,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import pytest
 
-from unload.reproduce.figures import style
+from unload.reproduce import style
 
 matplotlib.use("Agg")
 

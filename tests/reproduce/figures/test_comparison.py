@@ -6,7 +6,7 @@ import pytest
 
 from unload.reproduce import comparison, robustness
 from unload.reproduce.figures import comparison as figures
-from unload.reproduce.intervals import bootstrap_interval
+from unload.reproduce.statistics import bootstrap_interval
 
 RATES = [0.5, 0.25, 0.75]
 

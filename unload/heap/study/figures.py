@@ -25,7 +25,7 @@ from unload.heap.study.table import (
 from unload.load.colours import COLOURS
 from unload.load.still import CORNERS, EYE, project
 from unload.load.view import SEAM
-from unload.reproduce.figures.style import mark_reduced, styled
+from unload.reproduce.style import mark_reduced, styled
 from unload.support import files
 
 # What happens to a box in a pick, and its colour. The later ones win.

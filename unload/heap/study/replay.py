@@ -25,7 +25,7 @@ from unload.load.colours import css
 from unload.load.slider import buttons, slider
 from unload.load.still import CORNERS, EYE
 from unload.load.view import TRIANGLES, UNIT, View, layout
-from unload.reproduce.figures.style import STYLE
+from unload.reproduce.style import STYLE
 from unload.support import checks
 
 HEIGHT = 460  # pixels

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.comparison import COMPARED, LEARNED
-from unload.reproduce.figures.style import styled
-from unload.reproduce.intervals import with_intervals
 from unload.reproduce.results import read_table
 from unload.reproduce.robustness import RESTORED
+from unload.reproduce.statistics import with_intervals
+from unload.reproduce.style import styled
 from unload.support import files
 
 KEY = ["policy", "mask", "condition"]

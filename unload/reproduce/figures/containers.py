@@ -12,7 +12,7 @@ from unload import task
 from unload.load.boxes import Load, check_load
 from unload.load.colours import COLOURS
 from unload.load.substacks import package_colour
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 from unload.support import checks
 
 

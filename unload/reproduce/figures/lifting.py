@@ -11,7 +11,7 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 
 from unload import task
 from unload.load.colours import COLOURS
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 from unload.support import checks
 
 

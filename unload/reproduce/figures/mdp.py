@@ -11,7 +11,7 @@ from unload.env.equalization import equalize
 from unload.load.colours import COLOURS
 from unload.load.substacks import package_colour, stack_load
 from unload.reproduce.figures.observation import EQUALIZED
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 
 INK, GREY = "#333333", "#9a9a9a"
 AGENT, ENVIRONMENT = "#eaf2f8", "#f6f1e7"

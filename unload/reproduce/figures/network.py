@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from unload import task
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 from unload.support import checks
 
 ROWS, FEATURES = 7, 6  # items and features that are drawn, of 128 and n

@@ -11,8 +11,8 @@ from unload import task
 from unload.env import observation
 from unload.load.colours import COLOURS
 from unload.reproduce.figures.containers import draw_items
-from unload.reproduce.figures.style import styled
 from unload.reproduce.results import read_table
+from unload.reproduce.style import styled
 from unload.support import checks, files
 
 FOLDER = "obs_hist_equal"

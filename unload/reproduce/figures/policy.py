@@ -13,7 +13,7 @@ from matplotlib.ticker import PercentFormatter
 from unload.load.boxes import Load
 from unload.load.colours import COLOURS
 from unload.reproduce.figures.perspective import Painter
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 
 SIZE = 560, 400  # pixels of a picture
 ROOM = 6, 6, 6, 6  # around the container

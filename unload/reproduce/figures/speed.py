@@ -14,7 +14,7 @@ from unload.load.boxes import Load
 from unload.load.colours import COLOURS
 from unload.physics.situation import RESOLUTION, Situation
 from unload.reproduce import results
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 from unload.support import checks, files
 
 FOLDER = files.DATA / "benchmarks"

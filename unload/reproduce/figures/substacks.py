@@ -20,7 +20,7 @@ from unload.load.substacks import (
     check_variants,
     package_colour,
 )
-from unload.reproduce.figures.style import styled
+from unload.reproduce.style import styled
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
 INK = "#333333"

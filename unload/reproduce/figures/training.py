@@ -11,8 +11,8 @@ from matplotlib.ticker import EngFormatter
 
 from unload import task
 from unload.load.colours import COLOURS
-from unload.reproduce.figures.style import mark_reduced, styled
 from unload.reproduce.results import read_table
+from unload.reproduce.style import mark_reduced, styled
 from unload.reproduce.training import episode_means
 from unload.support import files
 from unload.support.provenance import read_provenance

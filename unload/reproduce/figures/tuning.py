@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from unload.reproduce.figures.style import mark_reduced, styled
+from unload.reproduce.style import mark_reduced, styled
 from unload.reproduce.tuning import REACHED, greedy_msr, run_name, running_mean, set_name
 from unload.support import files
 

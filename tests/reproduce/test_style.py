@@ -1,7 +1,7 @@
 """How figures are saved, and that the paper's are there."""
 
 from unload.reproduce.figures.network import fig07_network
-from unload.reproduce.figures.style import save
+from unload.reproduce.style import save
 from unload.support import files
 
 
