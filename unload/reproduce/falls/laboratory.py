@@ -153,7 +153,7 @@ def laboratory_data(
     ]
     tables = {"laboratory": pd.DataFrame(rows)[COLUMNS]}
     if traces:
-        tables["trace"] = pd.concat(traces)[["cell", "seed", *POINT]]
+        tables["trace"] = pd.concat(traces)[["cell", "seed", *POINT]].astype({"picks": int})
     reduced = seeds is not None or set(cells) < set(CELLS)
     publish(
         Path(folder) / ("reduced/falls" if reduced else "falls"),

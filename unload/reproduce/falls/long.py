@@ -38,7 +38,6 @@ LONG = Grid(
         "shuffled_b2048": Cell(B2048, FEW_SEEDS, changes.shuffled),
         "shuffled_b2048_no_mask": Cell(replace(B2048, mask=False), FEW_SEEDS, changes.shuffled),
     },
-    points=250,
 )
 OPTIONS = {"--cells": {"nargs": "+", "choices": LONG.cells}, **JOBS}
 
@@ -77,7 +76,7 @@ def trace_data(
     publish(
         Path(folder) / ("reduced/falls" if reduced else "falls"),
         "long_trace",
-        {"long_trace": pd.concat(tables)[["seed", *POINT]]},
+        {"long_trace": pd.concat(tables)[["seed", *POINT]].astype({"picks": int})},
         f"{COMMAND} falls",
         {"seeds": list(TRACED_SEEDS), "picks": picks},
         reduced,

@@ -5,9 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
+from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.evaluation import evaluate
+from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
+from unload.env.container import ContainerEnv
 from unload.network.peq import PEQNetwork
 from unload.reproduce.falls.changes import without
 
@@ -77,7 +79,11 @@ def mistakes(
 
 
 def judged(
-    network: PEQNetwork, config: TrainConfig, blank: tuple[int, ...] = (), seen: Seen | None = None
+    network: PEQNetwork,
+    config: TrainConfig,
+    blank: tuple[int, ...] = (),
+    seen: Seen | None = None,
+    loads: dict = LOADS,
 ) -> float:
     """MSR of a trained network's choices in fresh containers.
 
@@ -86,6 +92,7 @@ def judged(
         config: that it was trained with, which says what is seen and whether the mask is on.
         blank: coordinates that are set to 0.
         seen: what the network saw of the observations, if they were changed.
+        loads: ``episodes`` and ``seed`` of the containers, see ``unload.evaluate``.
     """
 
     def policy(observations, masks, rng):
@@ -94,4 +101,38 @@ def judged(
         return greedy_actions(network, without(observations, blank), masks)
 
     env = {"equalize": config.equalize, "ties": config.ties}
-    return evaluate(policy, mask=config.mask, **LOADS, **env)["success_rate"].mean()
+    return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
+
+
+def surface(
+    policy: Policy, picks: int = 300, containers: int = 8, seed: int = 0, depth: float = 2.4
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a policy leaves of the loads, seen from the entrance.
+
+    Args:
+        policy: see ``unload.policies``; it plays with the mask on.
+        picks: in each container.
+        containers: how many.
+        seed: of the first load.
+        depth: of the part at the entrance that is looked at, in m.
+
+    Returns:
+        Places across the containers, (100,) in m, and the mean height of the highest box there,
+        (100,) in m.
+    """
+    env = ContainerEnv(physics="table", max_picks=picks + 1)
+    places = (np.arange(100) + 0.5) / 100 * task.CONTAINER[1]
+    heights, rng = np.zeros((containers, len(places))), np.random.default_rng(seed)
+    for container in range(containers):
+        observation, info = env.reset(seed=seed + container)
+        for _ in range(picks):
+            action = policy(observation[None], info["action_mask"][None], rng)[0]
+            observation, *_, info = env.step(int(action))
+        load = env.physics.load
+        near = env.physics.present & (load.positions[:, 0] > task.CONTAINER[0] - depth)
+        for centre, size in zip(load.positions[near], load.sizes[near]):
+            above = np.abs(places - centre[1]) < size[1] / 2
+            top = np.maximum(heights[container], centre[2] + size[2] / 2)
+            heights[container] = np.where(above, top, heights[container])
+    env.close()
+    return places, heights.mean(axis=0)

@@ -1,0 +1,152 @@
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from unload.agent.training import Training, train_changed
+from unload.env.equalization import equalize
+from unload.reproduce.falls import changes
+from unload.reproduce.falls.cells import CONFIG
+
+SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
+
+
+def observations(rng, count=5):
+    return equalize(rng.random((count, 128, 3)))
+
+
+def pairs(observation):
+    """The places of an observation's items, in a fixed order."""
+    return sorted(map(tuple, observation[:, :2].tolist()))
+
+
+def test_mirrored_places_keep_their_size_and_heights_are_untouched():
+    seen = observations(np.random.default_rng(0), 200)
+    found = changes.mirror(seen.copy(), np.random.default_rng(1))
+    signs = found[:, :, :2] / seen[:, :, :2]
+    assert (found[..., 2] == seen[..., 2]).all()
+    assert (signs == signs[:, :1]).all()  # one sign per observation and axis
+    assert len(np.unique(signs[:, 0], axis=0)) == 4  # all combinations occur
+
+
+def test_shuffled_places_are_those_of_other_items_of_the_same_observation():
+    seen = observations(np.random.default_rng(0))
+    found = changes.shuffle(seen.copy(), np.random.default_rng(1))
+    assert (found[..., 2] == seen[..., 2]).all()
+    for before, after in zip(seen, found):
+        assert pairs(before) == pairs(after)  # x and y stay together
+        assert (before[:, 0] != after[:, 0]).mean() > 0.9
+
+
+def run_of(change, steps=3, config=SMALL):
+    """A run with a change, and the observations that it has seen, as stored rows."""
+    run = Training(config)
+    change(run)
+    seen = []
+    for _ in range(steps):
+        seen.append(run.rollout.observations.copy())
+        run.step()
+    run.rollout.close()
+    return run, np.concatenate(seen)
+
+
+def test_only_what_is_stored_is_changed():
+    run, seen = run_of(changes.shuffled)
+    plain, same = run_of(lambda run: None)
+    stored = run.replay.rows(np.arange(len(seen)))["observations"]
+    assert (seen == same).all()  # exploring alone: the choices do not depend on the weights
+    assert (stored[..., 2] == seen[..., 2]).all()
+    assert (stored[..., 0] != seen[..., 0]).mean() > 0.9
+    assert (plain.replay.rows(np.arange(len(seen)))["observations"] == seen).all()
+
+
+def test_what_is_seen_is_changed_in_choosing_and_learning():
+    run = Training(SMALL)
+    asked = []
+    run.agent.learner.best_actions = lambda observations, allowed: (
+        asked.append(observations) or np.zeros(len(allowed), np.int64)
+    )
+    changes.see(run, changes.without)
+    run.step()
+    run.agent.choose(run.rollout.observations, run.rollout.allowed, 0.0, run.rng)
+    run.rollout.close()
+    assert (asked[-1][..., :2] == 0).all()
+    assert (asked[-1][..., 2] == run.rollout.observations[..., 2]).all()
+    assert (run.replay.rows(np.arange(64))["observations"][..., :2] == 0).all()
+
+
+def test_ties_are_averaged_along_the_given_axes_alone():
+    seen = np.random.default_rng(0).choice([0.0, 0.3], (2, 128, 3))
+    found = changes.ranked(seen, averaged=(2,))
+    assert [len(np.unique(found[0, :, axis])) for axis in range(3)] == [128, 128, 2]
+
+
+def test_failures_are_replaced_by_successes_of_the_same_step():
+    run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
+    rewards = run.replay.arrays["rewards"][:256]
+    assert (rewards[:128] < 0).any()
+    assert (rewards[128:] > 0).all()
+    assert run.replay.total == 256
+
+
+def test_a_step_without_a_success_stores_the_step_before():
+    run = Training(SMALL)
+    added = []
+    run.replay.add = lambda **picks: added.append(picks)
+    changes.successes_only(run, start=0)
+    won = {"rewards": np.array([1.0, -1.0]), "actions": np.array([4, 5])}
+    lost = {"rewards": np.array([-1.0, -1.0]), "actions": np.array([6, 7])}
+    run.replay.add(**won)
+    run.replay.add(**lost)
+    run.rollout.close()
+    assert [list(picks["actions"]) for picks in added] == [[4, 4], [4, 4]]
+
+
+def test_a_teacher_chooses_by_height_and_its_preference():
+    run = Training(SMALL)
+    changes.taught(run, preference=0.5)
+    seen = np.array([[[0, 0, 0.5], [0, 1, 0.1], [1, 1, 0.2]]], np.float32)
+    best = run.agent.learner.best_actions
+    run.rollout.close()
+    assert best(seen, np.array([[True, True, True]])) == 2
+    assert best(seen, np.array([[True, True, False]])) == 1
+
+
+def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
+    alone = Training(replace(SMALL, seed=SMALL.seed + 50))
+    run, _ = run_of(partial(changes.tandem, change=lambda run: None, seed=50), steps=4)
+    first = Training(SMALL).agent.state()
+    assert run.agent.choose.__self__ is not run.agent
+    active = run.agent.choose.__self__.state()
+    assert not np.array_equal(active["network.extractor.weight"], alone.agent.state()[
+        "network.extractor.weight"])  # it has learned  # fmt: skip
+    assert not np.array_equal(run.agent.state()["network.extractor.weight"], first[
+        "network.extractor.weight"])  # fmt: skip
+    assert len(run.replay) == 256
+
+
+@pytest.mark.slow
+def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, monkeypatch):
+    """Otherwise the long runs would depend on where they were stopped."""
+    whole = train_changed(SMALL, tmp_path / "whole", changes.shuffled, progress=False)
+    steps = []
+
+    def stop(run):
+        changes.shuffled(run)
+        step = run.step
+
+        def step_or_stop():
+            if len(steps) == 60:
+                raise KeyboardInterrupt
+            steps.append(step())
+
+        run.step = step_or_stop
+
+    eager = replace(SMALL, checkpoint_interval=0)
+    with pytest.raises(KeyboardInterrupt):
+        train_changed(eager, tmp_path / "stopped", stop, progress=False)
+    assert (tmp_path / "stopped" / "checkpoint.npz").exists()
+    resumed = train_changed(SMALL, tmp_path / "stopped", changes.shuffled, progress=False)
+    columns = ["picks", "success_rate", "loss"]
+    assert resumed.curve[columns].equals(whole.curve[columns])

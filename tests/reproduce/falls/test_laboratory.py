@@ -1,0 +1,39 @@
+import pandas as pd
+import pytest
+
+from unload.reproduce.falls import cells, laboratory
+from unload.support.provenance import read_provenance
+
+
+@pytest.mark.slow
+def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
+    """Two runs as long as all; they show what the laboratory is for."""
+    laboratory.laboratory_data(["ranks", "shuffled"], 1, tmp_path, tmp_path / "runs", n_jobs=2)
+    folder = tmp_path / "reduced" / "falls"
+    rows = pd.read_csv(folder / "laboratory.csv")
+    assert list(rows.columns) == laboratory.COLUMNS
+    ranks, shuffled = rows.itertuples()
+    assert (ranks.cell, ranks.seed, shuffled.cell) == ("ranks", cells.FIRST_SEED, "shuffled")
+    assert ranks.end < 0.9 < 0.98 < shuffled.end
+    assert ranks.judged_place == shuffled.judged_place == 1
+    trace = pd.read_csv(folder / "trace.csv")
+    assert (trace.groupby("cell").size() == cells.CONFIG.picks / laboratory.EVERY).all()
+    assert trace["picks"].iloc[0] == laboratory.EVERY - 64
+    assert read_provenance(folder, "laboratory")["reduced"]
+    assert not (tmp_path / "falls").exists()
+
+
+def test_an_unknown_cell_is_refused():
+    with pytest.raises(ValueError, match="cells is 'nonsense'"):
+        laboratory.laboratory_data(["nonsense"])
+
+
+def test_cells_differ_from_the_first_in_what_they_are_named_for():
+    plain = cells.CELLS["ranks"].config
+    assert cells.CELLS["ranks_no_mask"].config.mask is False and plain.mask
+    assert cells.CELLS["averaged"].config.ties == "average"
+    assert not cells.CELLS["positions"].config.equalize
+    assert set(cells.SEEN) < set(cells.CELLS) and set(cells.TRACED) < set(cells.CELLS)
+    for name, fields in cells.TAKEN_BACK.items():
+        ((field, value),) = fields.items()
+        assert getattr(cells.CELLS[f"ranks_{name}"].config, field) == value != getattr(plain, field)
