@@ -7,7 +7,7 @@ from unload import PEQNetwork, TrainConfig
 from unload.network.variants import NETWORKS
 from unload.reproduce import fingerprint
 from unload.reproduce.fingerprint import short_runs, training_fingerprint
-from unload.reproduce.study import EXPERIMENTS
+from unload.reproduce.variants.grids import GRIDS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
@@ -18,8 +18,8 @@ NOT_TRAINED = {
 
 def networks_of(name: str) -> set[str]:
     """The networks that a result rests on."""
-    experiment = EXPERIMENTS.get(name.removeprefix("study/"))
-    return {config.network for config in experiment().values()} if experiment else {"peq"}
+    grid = GRIDS.get(name.removeprefix("variants/"))
+    return {cell.config.network for cell in grid.cells.values()} if grid else {"peq"}
 
 
 def test_data_is_of_todays_training():

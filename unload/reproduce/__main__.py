@@ -10,12 +10,12 @@ from unload.reproduce import (
     lifts,
     observation,
     robustness,
-    study,
     training,
     tuning,
 )
 from unload.reproduce.falls import laboratory, long
 from unload.reproduce.results import COMMAND, JOBS
+from unload.reproduce.variants import grids as variants
 
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
@@ -26,7 +26,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "observation": ("Figs. 4–6", observation.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, tuning.OPTIONS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
-    "study": ("why 60 %: the controlled experiments", study.studies_data, study.OPTIONS),
+    "variants": ("other networks, rewards and settings", variants.variants_data, variants.OPTIONS),
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),

@@ -2,8 +2,11 @@
 
 An experiment is a grid: named cells, each a configuration that is trained with several seeds,
 and perhaps something changed in its runs that no configuration offers. All runs of a grid are
-published together: one table of curves, one file of policies, one record of where they come
-from.
+published together: a table of each measure, in which a run is a column; one file of policies;
+one record of where they come from.
+
+A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<table>/<name>``, its
+curves are published in a table of that name, so that no file of a large grid becomes large.
 """
 
 import json
@@ -27,7 +30,8 @@ from unload.reproduce.results import COMMAND, read_table, write_table
 from unload.support import checks, files
 from unload.support.provenance import joined, read_provenance, write_provenance
 
-COLUMNS = ["cell", "seed", "picks", "success_rate", "deadlocked", "loss"]
+# Of a curve, what is published, and its digits: a success rate of 64 picks needs six.
+COLUMNS = {"success_rate": "%.6g", "loss": "%.5g"}
 
 
 class Cell(NamedTuple):
@@ -51,13 +55,16 @@ class Grid(NamedTuple):
         name: of the data in ``data/``, with its folder, such as ``"falls/long"``.
         command: what trains the grid.
         cells: by name.
-        points: of each published curve; means over as many equal parts of the run.
+        measure: of a trained policy and its configuration. A grid with one publishes what it
+            returns, a row per run, instead of curves and policies.
+        policies: whether the trained policies are published beside the curves.
     """
 
     name: str
     command: str
     cells: Mapping[str, Cell]
-    points: int
+    measure: Callable[[Greedy, TrainConfig], dict[str, float]] | None = None
+    policies: bool = True
 
     def configs(self, picks: int | None = None) -> dict[str, TrainConfig]:
         """The configuration of each planned run by its name, ``<cell>/seed_<seed>``."""
@@ -76,7 +83,7 @@ def train_grid(
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
     progress: bool = True,
-) -> None:
+) -> Path:
     """Train the runs of a grid that are not finished, and publish all that are.
 
     Args:
@@ -88,6 +95,9 @@ def train_grid(
         n_jobs: processes, see ``run_sweep``.
         progress: show a progress bar.
 
+    Returns:
+        The folder that holds the folders of the runs, by their names.
+
     Raises:
         ValueError: an unknown cell.
         RuntimeError: runs failed; the message says which and why. The others are published.
@@ -96,16 +106,17 @@ def train_grid(
         checks.one_of("cells", cell, grid.cells)
     configs = grid.configs(picks)
     wanted = {
-        name: config for name, config in configs.items() if not cells or name.split("/")[0] in cells
+        name: config for name, config in configs.items() if not cells or cell_of(name) in cells
     }
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
     kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
-    changes = {name: grid.cells[name.split("/")[0]].change for name in wanted}
+    changes = {name: grid.cells[cell_of(name)].change for name in wanted}
     report = run_sweep(wanted, kept, n_jobs, progress=progress, changes=changes)
     publish_grid(grid, configs, kept, Path(folder), picks is not None, fingerprint)
     failed = report[report["error"] != ""]
     if len(failed):
         raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+    return kept
 
 
 def publish_grid(
@@ -116,7 +127,7 @@ def publish_grid(
     reduced: bool,
     fingerprint: str,
 ) -> None:
-    """Publish the finished runs in ``kept``: a table, the policies and their provenance.
+    """Publish the finished runs in ``kept``, and their provenance.
 
     Raises:
         ValueError: more runs are published already than are finished in ``kept``.
@@ -133,43 +144,111 @@ def publish_grid(
         )
     if not done:
         return
-    curves, policies = [], {}
+    policies, curves = {}, {}
     for name, config in done.items():
-        policies[name], curve = RunFolder(kept / name).result(config)
-        cell, _, seed = name.partition("/seed_")
-        curves.append(_points(curve, grid.points).assign(cell=cell, seed=int(seed)))
-    write_table(place.with_name(f"{place.name}.csv"), pd.concat(curves)[COLUMNS], "%.5g")
-    write_policies(place.with_name(f"{place.name}.safetensors"), policies)
+        policies[name], curves[name] = RunFolder(kept / name).result(config)
+    if grid.measure is None:
+        write_curves(place, curves)
+        if grid.policies:
+            write_policies(place.with_name(f"{place.name}.safetensors"), policies)
+    else:
+        rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
+        write_measures(place, rows)
     settings = {name: asdict(config) for name, config in _first_of_each(configs).items()}
     record = joined(files.read_json(records[name]) for name in done)
     record |= {"fingerprint": fingerprint, "planned": len(configs)}
     write_provenance(place.parent, place.name, grid.command, settings, reduced, record)
 
 
-def _points(curve: pd.DataFrame, points: int) -> pd.DataFrame:
-    """Means of a curve over equal parts of the run; ``picks`` are those at a part's end."""
-    length = curve["picks"].iloc[-1] / points
-    part = ((curve["picks"] - 1) // length).rename("part")
-    means = curve.groupby(part)[["success_rate", "deadlocked", "loss"]].mean()
-    return means.assign(picks=curve.groupby(part)["picks"].last())
+def cell_of(run: str) -> str:
+    """The cell of a run, by its name."""
+    return run.rpartition("/seed_")[0]
+
+
+def _table_path(place: Path, cell: str, column: str) -> Path:
+    """Of the table that holds a column of a cell's curves."""
+    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}.csv")
+
+
+def write_curves(place: Path, curves: Mapping[str, pd.DataFrame]) -> None:
+    """Write curves by the names of their runs; all have the same picks.
+
+    ``<place>_success_rate.csv`` and ``<place>_loss.csv`` have a row per point of the curves, its
+    ``picks``, and a column per run.
+    """
+    picks = next(iter(curves.values()))["picks"]
+    for column, digits in COLUMNS.items():
+        tables: dict[Path, dict[str, pd.Series]] = {}
+        for name, curve in curves.items():
+            path = _table_path(place, cell_of(name), column)
+            tables.setdefault(path, {"picks": picks})[name] = curve[column]
+        for path, table in tables.items():
+            write_table(path, pd.DataFrame(table), digits)
+
+
+def write_measures(place: Path, rows: Mapping[str, dict[str, float]]) -> None:
+    """Write ``<place>.csv``: what is measured, by the names of the runs."""
+    runs = [name.rpartition("/seed_") for name in rows]
+    table = pd.DataFrame(list(rows.values()))
+    table.insert(0, "cell", [cell for cell, _, _ in runs])
+    table.insert(1, "seed", [int(seed) for _, _, seed in runs])
+    write_table(place.with_name(f"{place.name}.csv"), table)
 
 
 def _first_of_each(configs: Mapping[str, TrainConfig]) -> dict[str, TrainConfig]:
     """The configuration of each cell, with its first seed."""
     first: dict[str, TrainConfig] = {}
     for name, config in configs.items():
-        first.setdefault(name.split("/")[0], config)
+        first.setdefault(cell_of(name), config)
     return first
 
 
-def read_grid(grid: Grid, folder: str | Path = files.DATA) -> pd.DataFrame:
-    """The published curves of a grid, with the columns ``COLUMNS``.
+def read_grid(
+    grid: Grid, folder: str | Path = files.DATA, cells: Iterable[str] | None = None
+) -> pd.DataFrame:
+    """The published curves of a grid, in the order of its cells.
+
+    Args:
+        grid: of the curves.
+        folder: of the data.
+        cells: of the curves, all if None.
+
+    Returns:
+        A row per point: ``cell``, ``seed``, ``picks``, ``success_rate`` (MSR while training since
+        the point before) and ``loss``.
 
     Raises:
         FileNotFoundError: it has not been published.
-        ValueError: it has other columns.
+        ValueError: an unknown cell.
     """
-    return read_table(Path(folder) / f"{grid.name}.csv", grid.command, COLUMNS)
+    wanted = list(grid.cells if cells is None else cells)
+    for cell in wanted:
+        checks.one_of("cells", cell, grid.cells)
+    columns = [_read_column(grid, Path(folder) / grid.name, wanted, column) for column in COLUMNS]
+    curves = columns[0].assign(loss=columns[1]["loss"])
+    names = curves.pop("run").str.rpartition("/seed_")
+    curves.insert(0, "cell", names[0])
+    curves.insert(1, "seed", names[2].astype(int))
+    return curves
+
+
+def _read_column(grid: Grid, place: Path, cells: list[str], column: str) -> pd.DataFrame:
+    """A column of the curves of some cells: ``picks``, ``run`` and the column."""
+    parts = []
+    for path in dict.fromkeys(_table_path(place, cell, column) for cell in cells):
+        table = read_table(path, grid.command, ["picks"])
+        table = table[[name for name in table if name == "picks" or cell_of(name) in cells]]
+        parts.append(table.melt("picks", var_name="run", value_name=column))
+    return pd.concat(parts, ignore_index=True)
+
+
+def read_measures(grid: Grid, folder: str | Path = files.DATA) -> pd.DataFrame:
+    """What a grid's ``measure`` has returned, a row per run: ``cell``, ``seed`` and its entries.
+
+    Raises:
+        FileNotFoundError: it has not been published.
+    """
+    return read_table(Path(folder) / f"{grid.name}.csv", grid.command, ["cell", "seed"])
 
 
 def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
@@ -206,8 +285,3 @@ def read_policies(path: str | Path) -> dict[str, Greedy]:
             )
             policies[name] = Greedy(network, each["equalize"], each["ties"])
     return policies
-
-
-def of_cell(items: Mapping[str, Greedy], cells: Iterable[str]) -> dict[str, Greedy]:
-    """Those of some cells, of policies by the name of their run."""
-    return {name: item for name, item in items.items() if name.split("/")[0] in set(cells)}

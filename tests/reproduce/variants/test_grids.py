@@ -1,0 +1,99 @@
+"""The grids of the outlook: their plans, what they publish, and what is refused."""
+
+from dataclasses import asdict, replace
+
+import pytest
+
+from unload import TrainConfig, evaluate, load_policy
+from unload.reproduce.fingerprint import training_fingerprint
+from unload.reproduce.grid import read_measures
+from unload.reproduce.variants import grids
+from unload.reproduce.variants.figures import variants_msr
+from unload.reproduce.variants.grids import GRIDS, judged, variants_data
+from unload.support import files
+from unload.support.provenance import read_provenance
+
+FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_data_hold_the_runs_of_the_plan(name):
+    rows = read_measures(GRIDS[name])
+    planned = list(GRIDS[name].configs())
+    assert [f"{cell}/seed_{seed}" for cell, seed in zip(rows["cell"], rows["seed"])] == planned
+    provenance = read_provenance(files.DATA, f"variants/{name}")
+    assert provenance["runs"] == provenance["planned"] == len(planned)
+    assert not provenance["reduced"]
+
+
+@pytest.mark.parametrize(
+    ("name", "varied"),
+    [
+        ("networks", {"network"}),
+        ("rewards", set()),
+        ("settings", {"learning_rate", "gradient_steps"}),
+        ("recommended", {"equalize"}),
+    ],
+)
+def test_each_cell_differs_from_the_paper_in_little(name, varied):
+    paper, changes = asdict(TrainConfig()), set()
+    for cell in GRIDS[name].cells.values():
+        config = asdict(cell.config)
+        assert {field for field in paper if paper[field] != config[field]} <= varied | FREE
+        changes.add((repr(cell.config), repr(cell.change)))
+    assert len(changes) == len(GRIDS[name].cells)
+
+
+def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
+    monkeypatch.setattr(grids, "LOADS", {"episodes": 3, "seed": 1000})
+    policy = load_policy(files.DATA / "policies/paper_seed_2.safetensors")
+    expected = [
+        evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
+    ]
+    assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
+
+
+def test_the_recommended_policy_is_judged_as_the_data_say():
+    policy = load_policy(files.DATA / "policies/recommended.safetensors")
+    first = read_measures(GRIDS["recommended"]).iloc[0]
+    assert judged(policy, grids.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
+
+
+def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
+    small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5)
+    for name in ("rewards", "recommended"):
+        cells = {
+            cell: one._replace(config=replace(small, equalize=one.config.equalize, picks=200))
+            for cell, one in GRIDS[name].cells.items()
+        }
+        monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
+    monkeypatch.setattr(grids, "LOADS", {"episodes": 1, "seed": 1000})
+    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "n_jobs": 1, "progress": False}
+    variants_data(["rewards"], 40, **folders)
+    rows = read_measures(GRIDS["rewards"], tmp_path / "reduced")
+    assert rows["cell"].nunique() == 4 and rows["msr_mask"].between(0, 1).all()
+    variants_data(["recommended"], **folders)
+    provenance = read_provenance(tmp_path, "variants/recommended")
+    assert provenance["fingerprint"] == training_fingerprint()
+    assert not load_policy(tmp_path / "policies/recommended.safetensors").equalize
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (
+            lambda folder: variants_data(["nothing"], folder=folder),
+            ValueError,
+            "grids is 'nothing'",
+        ),
+        (lambda folder: variants_msr("nothing", folder), ValueError, "grid is 'nothing'"),
+        (
+            lambda folder: variants_msr("networks", folder),
+            FileNotFoundError,
+            "networks.csv is missing; python -m unload.reproduce variants makes it",
+        ),
+    ],
+)
+def test_bad_input_is_refused_by_name(tmp_path, call, error, message):
+    with pytest.raises(error, match=message):
+        call(tmp_path)
