@@ -12,11 +12,13 @@ import os
 import random
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 
 import numpy as np
 import torch
+from tqdm import tqdm
 
 import unload
 from unload.support import files
@@ -85,6 +87,7 @@ def live(config: unload.TrainConfig, folder: str, shared: mmap.mmap, moment: int
 
 def main(folder: str, config: unload.TrainConfig) -> None:
     torch.set_num_threads(1)
+    tqdm.set_lock(threading.RLock())  # its own is one for all forks: who is killed would keep it
     # Compile and open everything once; the environment of this run is not used.
     unload.train(unload.TrainConfig(**vars(config) | {"seed": 1}), f"{folder}.warm", False)
     shared, rng = mmap.mmap(-1, 2), random.Random(0)

@@ -50,6 +50,8 @@ def test_epsilon_falls_linearly_and_stays():
         ("gamma", float("nan"), ValueError),
         ("gamma", True, TypeError),
         ("beta", float("inf"), ValueError),
+        ("position_noise", -1e-3, ValueError),
+        ("position_noise", "none", TypeError),
         ("height_reward", 1.1, ValueError),
         ("height_reward", "high", TypeError),
         ("network", "mlp", ValueError),
@@ -86,28 +88,3 @@ def test_numpy_flags_and_strings_make_the_same_configuration():
 def test_runs_that_fit_into_no_memory_are_refused_by_name(field):
     with pytest.raises(ValueError, match=f"^{field} is .*; expected an integer >= 1 and <= "):
         TrainConfig(**{field: 64 * 10**14})
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "error"),
-    [
-        ("position_noise", -1e-3, ValueError),
-        ("position_noise", "none", TypeError),
-        ("drift", "wind", ValueError),
-        ("staggered", 1, TypeError),
-        ("literal", "yes", TypeError),
-        ("failures_kept", -0.1, ValueError),
-        ("failures_kept", float("nan"), ValueError),
-        ("failures_kept", "half", TypeError),
-        ("failures_kept", 1.0, ValueError),  # leaves no room for the agent's own picks
-        ("failures_kept", 1e-9, ValueError),  # keeps none
-    ],
-)
-def test_bad_values_of_later_settings_are_refused_by_name(field, value, error):
-    with pytest.raises(error, match=f"^{field} is "):
-        TrainConfig(**{field: value})
-
-
-def test_only_containers_settle():
-    with pytest.raises(ValueError, match="^drift is 'settled'; expected 'noise' for env="):
-        TrainConfig(env="unload/HighestItem-v0", drift="settled")

@@ -247,7 +247,7 @@ def test_bad_settings_are_refused(kwargs, message):
 def test_the_defaults_are_those_of_the_paper(rng):
     batch = make_batch(rng)
     batch["rewards"] *= 3  # errors on both sides of beta
-    paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0, "literal": False}
+    paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0}
     states = []
     for agent in (DQN(peq()), DQN(peq(), **paper)):
         losses = [agent.update(batch) for _ in range(20)]

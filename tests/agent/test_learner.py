@@ -52,7 +52,7 @@ def test_learners_have_one_interface(rng, kind):
 
 
 @pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
-def test_without_the_literal_update_tanh_is_taken_in_double_precision(rng, kind):
+def test_the_fused_update_takes_tanh_in_double_precision(rng, kind):
     """Where the value is nearly 1, the slope of tanh in single precision is 0."""
     saturated = network()
     with torch.no_grad():

@@ -184,14 +184,6 @@ def test_an_environment_waits_for_the_pick_that_begins_its_episode(env_id, rng):
         assert_same(alone.set_state(one)[0][0], observations[env])
 
 
-def test_a_state_says_after_how_many_picks_each_episode_ends():
-    envs = gymnasium.make_vec(CONTAINER, 3, max_picks=10).unwrapped
-    envs.reset(seed=0)
-    envs.set_state(envs.get_state() | {"limits": np.array([1, 3, 9])})
-    ends = [envs.step(np.zeros(3, int))[3].tolist() for _ in range(3)]
-    assert ends == [[True, False, False], [False, False, False], [False, True, False]]
-
-
 # --- bad input ----------------------------------------------------------------------
 
 
@@ -282,43 +274,3 @@ def test_nothing_works_before_reset_or_after_close(call):
         getattr(envs, call)(*arguments)
     with pytest.raises(ClosedEnvironmentError):
         envs.reset()
-
-
-@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
-def test_staggered_episodes_end_in_turn(env_id):
-    envs = gymnasium.make_vec(env_id, 4, max_picks=10, staggered=True)
-    envs.reset(seed=0)
-    ends = [envs.step(np.zeros(4, int))[3] for _ in range(30)]
-    first, second, third, last = (
-        [int(step) + 1 for step in np.flatnonzero(e)] for e in np.transpose(ends)
-    )
-    assert (first, second) == ([3, 13, 23], [5, 15, 25])
-    assert (third, last) == ([8, 18, 28], [10, 20, 30])
-    envs.reset(seed=1)  # begins anew
-    assert envs.step(np.zeros(4, int))[3].any() == False  # noqa: E712
-    assert [envs.step(np.zeros(4, int))[3].any() for _ in range(2)] == [False, True]
-
-
-@pytest.mark.parametrize("picks", [0, 2, 7, 10, 34])
-def test_a_staggered_state_goes_on_identically(picks, rng):
-    one, other = (
-        gymnasium.make_vec(CONTAINER, 3, max_picks=10, staggered=True).unwrapped for _ in range(2)
-    )
-    one.reset(seed=0)
-    for _ in range(picks):
-        one.step(rng.integers(128, size=3))
-    state = one.get_state()
-    other.set_state(state)
-    assert_same(other.get_state(), state)
-    for _ in range(25):
-        actions = rng.integers(128, size=3)
-        assert_same(one.step(actions), other.step(actions))
-    for limits, message in (
-        ([0, 1, 2], "holds 0 to 2"),
-        ([9, 10, 11], "holds 9 to 11"),
-        ([5], "shape"),
-    ):
-        with pytest.raises(ValueError, match=rf"state\['limits'\] .*{message}"):
-            one.set_state(state | {"limits": np.array(limits)})
-    with pytest.raises(TypeError, match="^staggered is 1"):
-        gymnasium.make_vec(CONTAINER, 3, staggered=1)

@@ -11,13 +11,15 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from unload.agent.config import ADDED, TrainConfig
+from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy
 from unload.agent.rollout import Rollout
 from unload.agent.weights import load_policy, save_policy
 from unload.support import checks, files
 
 FORMAT = 4  # of the checkpoints
+# Settings that there were once. A run that has them at these values is as one of today.
+FORMER = {"drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0}
 # Of a ``Training``: what has a state besides the generator.
 STATEFUL = ("agent", "curve", "rollout")
 
@@ -192,9 +194,9 @@ class RunFolder:
     def _check_same(self, stored: dict, config: TrainConfig) -> None:
         """Raise ValueError unless a stored configuration is ``config``."""
         wanted = json.loads(json.dumps(asdict(config)))
-        stored = {name: getattr(TrainConfig(), name) for name in ADDED} | stored
         # How often it is saved changes nothing in a run.
-        names = [name for name in wanted | stored if name != "checkpoint_interval"]
+        names = [name for name in FORMER | wanted | stored if name != "checkpoint_interval"]
+        stored, wanted = FORMER | stored, FORMER | wanted
         differing = [name for name in names if stored.get(name) != wanted.get(name)]
         if differing:
             details = ", ".join(

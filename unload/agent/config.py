@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from unload.env.equalization import TIES
-from unload.env.observation import DRIFTS, MOST_NOISE, POSITION_NOISE
+from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.variants import HEADS, NETWORKS
 from unload.support import checks
 
@@ -21,8 +21,6 @@ MOST = {
     "log_interval": 10**9,
 }
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
-# Settings that older runs do not name: they had the defaults.
-ADDED = ("position_noise", "drift", "staggered", "literal", "failures_kept")
 
 
 @dataclass(frozen=True)
@@ -37,8 +35,6 @@ class TrainConfig:
     learning_rate: float = 1e-3  # μ
     batch_size: int = 2048  # b
     replay_size: int = 2**20
-    # * share of the replay that holds failed picks of a random policy for good, from the start on
-    failures_kept: float = 0.0
     epsilon_init: float = 1.0
     epsilon_final: float = 0.0
     epsilon_fraction: float = 0.5  # K_ε / K
@@ -53,12 +49,7 @@ class TrainConfig:
     ties: str = "noise"  # * see unload.equalize
     # * m, see ContainerEnv; 0 leaves equal coordinates equal, and ranks them in the items' order.
     position_noise: float = POSITION_NOISE
-    drift: str = "noise"  # * or "settled", in the container: see ContainerVectorEnv
-    staggered: bool = False  # * containers are filled in turn instead of all together
     mask: bool = False  # * whether failed items are masked in training's choices, too
-    # * tanh in single precision, and the choice by the values after it instead of before it; so it
-    # always is with networks other than "peq".
-    literal: bool = False
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
@@ -69,18 +60,16 @@ class TrainConfig:
         checks.one_of("env", self.env, ENVS)
         checks.one_of("ties", self.ties, TIES)
         checks.one_of("network", self.network, NETWORKS)
-        checks.one_of("drift", self.drift, DRIFTS)
-        for name in ("env", "ties", "network", "drift"):
+        for name in ("env", "ties", "network"):
             self._set(name, str(getattr(self, name)))
-        for name in ("equalize", "mask", "staggered", "literal"):
+        for name in ("equalize", "mask"):
             self._set(name, checks.boolean(name, getattr(self, name)))
         for name, most in MOST.items():
             self._set(name, checks.integer(name, getattr(self, name), 1, most))
         for name in ("seed", "gradient_steps", "snapshots"):
             self._set(name, checks.integer(name, getattr(self, name), 0))
         for name in (
-            "epsilon_init", "epsilon_final", "epsilon_fraction", "gamma", "height_reward",
-            "failures_kept",
+            "epsilon_init", "epsilon_final", "epsilon_fraction", "gamma", "height_reward"
         ):  # fmt: skip
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
@@ -88,10 +77,6 @@ class TrainConfig:
         self._set(
             "position_noise", checks.real("position_noise", self.position_noise, 0, MOST_NOISE)
         )
-        if self.drift != DRIFTS[0] and self.env != ENVS[0]:
-            raise ValueError(
-                f"drift is {self.drift!r}; expected {DRIFTS[0]!r} for env={self.env!r}"
-            )
         if self.network == "attention" and self.n_features % HEADS:
             raise ValueError(
                 f"n_features is {self.n_features}; expected a multiple of {HEADS} for "
@@ -105,17 +90,6 @@ class TrainConfig:
             raise ValueError(
                 f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
             )
-        size, kept = self.memory()
-        if self.failures_kept and not kept:
-            raise ValueError(
-                f"failures_kept is {self.failures_kept}; expected 0 or a share that keeps at least "
-                f"one of {size} picks"
-            )
-        if size - kept < self.num_envs:
-            raise ValueError(
-                f"failures_kept is {self.failures_kept}; expected a share that leaves at least "
-                f"num_envs={self.num_envs} of {size} picks in the replay to the agent's own"
-            )
 
     def _set(self, name: str, value: object) -> None:
         """Keep a checked value as one of Python's own types, which JSON can hold."""
@@ -127,22 +101,10 @@ class TrainConfig:
         progress = min(1.0, picks / span) if span else 1.0
         return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
 
-    def memory(self) -> tuple[int, int]:
-        """Return how many picks the replay holds, and how many of them are failures kept."""
-        size = min(self.replay_size, self.picks)
-        return size, int(self.failures_kept * size)
-
     def seeds(self) -> tuple[int, int, int]:
         """Return the seeds of the environments, of exploration and batches, and of the weights.
 
         The key keeps the loads apart from those that ``unload.evaluate`` draws with the same
         seed.
         """
-        return self._seeds()[:3]
-
-    def failures_seed(self) -> int:
-        """Return the seed of the failures that are kept."""
-        return self._seeds()[3]
-
-    def _seeds(self) -> tuple[int, ...]:
-        return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(4).tolist())
+        return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(3).tolist())

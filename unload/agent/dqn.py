@@ -28,8 +28,6 @@ class DQN:
         beta: threshold of the smooth-L1 loss (Sec. III-G); 1 in the paper.
         fused_update: choose and update by the compiled twin of plain PyTorch, see
             ``unload.agent.fast``; wherever it applies if None.
-        literal: take tanh in single precision, and choose by the values after it; PyTorch does
-            so anyway, the fused update only if it is asked for, see ``FusedLearner``.
 
     Attributes:
         learner: the ``PlainLearner`` or ``FusedLearner`` that chooses and updates.
@@ -47,7 +45,6 @@ class DQN:
         gamma: float = 0.0,
         beta: float = 1.0,
         fused_update: bool | None = None,
-        literal: bool = False,
     ) -> None:
         self.network = check_network(network)
         applies = fused.applies(network)
@@ -60,10 +57,9 @@ class DQN:
         self.gamma = checks.real("gamma", gamma, 0, 1)
         learning_rate = checks.real("learning_rate", learning_rate, 0)
         beta = checks.real("beta", beta, 0)
-        literal = checks.boolean("literal", literal)
         self.learner: FusedLearner | PlainLearner
         if fused_update:
-            self.learner = FusedLearner(network, learning_rate, beta, literal)
+            self.learner = FusedLearner(network, learning_rate, beta)
         else:
             self.learner = PlainLearner(network, learning_rate, beta)
         self.update_target()

@@ -13,8 +13,7 @@ from hashlib import blake2b
 import gymnasium
 import numpy as np
 
-from unload.agent.config import ENVS, TrainConfig
-from unload.load.boxes import Load
+from unload.agent.config import TrainConfig
 
 
 class Rollout:
@@ -34,12 +33,20 @@ class Rollout:
     """
 
     def __init__(self, config: TrainConfig, reach: int, stack: Callable | None = None) -> None:
-        self._config, self._reach, self._stack = config, reach, stack
+        self._config, self._reach = config, reach
         # Every pick of the run; a row of the observation fits a byte.
         shape = (config.picks // config.num_envs, config.num_envs)
         self._actions = np.empty(shape, np.uint8)
         self.steps = 0
-        self.envs = _make_envs(config, stack)
+        self.envs = gymnasium.make_vec(
+            config.env,
+            config.num_envs,
+            equalize=config.equalize,
+            ties=config.ties,
+            max_picks=config.max_picks,
+            position_noise=config.position_noise,
+            **({} if stack is None else {"stack": stack}),
+        )
         self._see(*self.envs.reset(seed=config.seeds()[0]))
         # Of the episodes that the replay memory reaches back to: first step, state there.
         self._starts = deque([(0, self.envs.get_state())])
@@ -134,44 +141,9 @@ class Rollout:
                 "of unload as when it was written"
             )
 
-    def actions_since(self, step: int) -> np.ndarray:
-        """Return the rows picked from this step on, (steps, num_envs) uint8.
-
-        It must not lie before what a checkpoint holds, from which the rollout was restored.
-        """
-        return self._actions[step : self.steps].copy()
-
-    def reopen(self, config: TrainConfig) -> None:
-        """Go on with the same episodes in environments of another configuration.
-
-        It must have as many environments, and the same loads.
-        """
-        state = self.envs.get_state()
-        self.envs.close()
-        self._config, self.envs = config, _make_envs(config, self._stack)
-        self._see(*self.envs.set_state(state))
-
     def close(self) -> None:
         """Free the environments."""
         self.envs.close()
-
-
-def _make_envs(
-    config: TrainConfig, stack: Callable[[np.random.Generator], Load] | None
-) -> gymnasium.vector.VectorEnv:
-    of_containers: dict[str, object] = {} if stack is None else {"stack": stack}
-    if config.env == ENVS[0]:
-        of_containers["drift"] = config.drift
-    return gymnasium.make_vec(
-        config.env,
-        config.num_envs,
-        equalize=config.equalize,
-        ties=config.ties,
-        max_picks=config.max_picks,
-        position_noise=config.position_noise,
-        staggered=config.staggered,
-        **of_containers,
-    )
 
 
 def _next_states(

@@ -19,7 +19,6 @@ from unload.agent.dqn import DQN
 from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import Greedy
 from unload.agent.interrupt import deferred_interrupts
-from unload.agent.kept import KeptPicks, random_picks
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_load, check_stack
@@ -47,26 +46,15 @@ class Training:
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
         network = NETWORKS[config.network](config.n_features, generator)
-        self.agent = DQN(
-            network, config.learning_rate, config.gamma, config.beta, literal=config.literal
+        self.agent = DQN(network, config.learning_rate, config.gamma, config.beta)
+        self.replay = ReplayBuffer(
+            min(config.replay_size, config.picks),
+            task.N_VISIBLE,
+            next_state=config.gamma > 0,
+            equalized=config.gamma == 0 and self._ranks_of_all(stack),
         )
-        self.replay = self._memory(stack)
         self.curve = Curve()
         self.rollout = Rollout(config, self.replay.size, stack)
-
-    def _memory(self, stack: Callable | None) -> ReplayBuffer:
-        """The empty replay memory, but for the failures that are kept."""
-        config = self.config
-        size, kept = config.memory()
-        kinds = {
-            "next_state": config.gamma > 0,
-            "equalized": config.gamma == 0 and self._ranks_of_all(stack),
-        }
-        if not kept:
-            return ReplayBuffer(size, task.N_VISIBLE, **kinds)
-        rng = np.random.default_rng(config.failures_seed())
-        failures = random_picks(config, kept, rng, stack=stack)
-        return KeptPicks(size, task.N_VISIBLE, kept, failures, **kinds)
 
     def _ranks_of_all(self, stack: Callable | None) -> bool:
         """Whether each observation holds the ranks of 128 items, which the fused update can read.

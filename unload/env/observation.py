@@ -16,8 +16,6 @@ PADDING = -1.0
 POSITION_NOISE = 0.0005
 SINK = 0.001
 MOST_NOISE = 10.0  # m, more than the container is long
-# Where boxes are seen: blurred by independent noise, or moved as in a settled simulation.
-DRIFTS = ("noise", "settled")
 
 
 def distance(positions: np.ndarray) -> np.ndarray:

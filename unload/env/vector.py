@@ -6,11 +6,10 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.fast import containers, settling
+from unload.env.fast import containers
 from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
-from unload.env.observation import DRIFTS, drift, scaled
-from unload.env.settled import settled_drift, shared_settled
+from unload.env.observation import drift, scaled
 from unload.env.vector_base import PickingVectorEnv
 from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
@@ -29,10 +28,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         num_envs: number of containers.
         physics: ``"table"``; there is no other one for arrays.
         stack: makes a ``Load`` from a ``numpy.random.Generator``.
-        drift: where boxes are seen. ``"noise"``: blurred once per load by ``position_noise``.
-            ``"settled"``: as the boxes of a settled simulation, see ``unload.env.settled``; they
-            rise when what rests on them is taken away, but which items are the nearest is told
-            by their places in the full load. Only loads of the paper's substacks will do.
 
     Attributes:
         table: the lifts that are known, filled by unknown ones; it may be replaced.
@@ -45,15 +40,12 @@ class ContainerVectorEnv(PickingVectorEnv):
         num_envs: int = task.NUM_ENVS,
         physics: str = "table",
         stack: Callable[[np.random.Generator], Load] = stack_load,
-        drift: str = DRIFTS[0],
         **settings,
     ) -> None:
         super().__init__(num_envs, **settings)
         checks.one_of("physics", physics, ("table",))
         check_stack(stack)
-        checks.one_of("drift", drift, DRIFTS)
-        self.stack, self.drift = stack, drift
-        self._settling = settling.allocate(self.num_envs, 0)
+        self.stack = stack
         self._physics = TablePhysics(shared_table())
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
@@ -92,14 +84,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         for rng in rngs:
             load = self.stack(rng)
             check_load(load)
-            drawn.append((load, self._draw_drift(load, rng)))
+            drawn.append((load, drift(len(load), self.position_noise, rng)))
         return drawn
-
-    def _draw_drift(self, load: Load, rng: np.random.Generator) -> np.ndarray:
-        """(n, 3) float64 in m; of settled boxes, also along z with nothing on them."""
-        if self.drift == "settled":
-            return settled_drift(load, rng, shared_settled())
-        return drift(len(load), self.position_noise, rng)
 
     def _fill(self, envs: np.ndarray, drawn: list[tuple[Load, np.ndarray]]) -> None:
         for env, (load, blur) in zip(envs, drawn):
@@ -110,7 +96,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)
-        positions = load.positions + blur[:, :3]
+        positions = load.positions + blur
         state.geometry[env, :count, :3] = load.positions
         state.geometry[env, :count, 3:] = load.sizes
         state.starts[env, :, : count + 1] = starts
@@ -121,9 +107,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.seen[env, :count] = scaled(positions)
         state.by_distance[env, :count] = observation.nearest(positions, count)
         containers.start(state, env, *self._features)
-        if self.drift == "settled":
-            self._settling.offsets[env, :count] = blur[:, 2:]
-            settling.start(state, self._settling, env)
 
     def _make_room(self, items: int, links: int) -> None:
         """Let the arrays hold loads of so many items and contacts."""
@@ -134,20 +117,12 @@ class ContainerVectorEnv(PickingVectorEnv):
         # A tenth more than needed, so that not every larger load moves all again.
         wanted = [max(have, need + need // 10) for have, need in zip(room, (items, links))]
         self._containers = containers.allocate(self.num_envs, *wanted)
-        pairs = [*zip(old, self._containers)]
-        if self.drift == "settled":
-            old, self._settling = self._settling, settling.allocate(self.num_envs, wanted[0])
-            pairs += zip(old, self._settling)
-        for before, after in pairs:
+        for before, after in zip(old, self._containers):
             after[tuple(slice(length) for length in before.shape)] = before
 
     def _pick(self, actions: np.ndarray) -> np.ndarray:
-        state = self._containers
-        self._items, self._distances = items, distances = self._look_up(actions)
-        rewards = containers.pick(state, actions, distances, *self._features)
-        if self.drift == "settled":
-            settling.relieve(state, self._settling, items, rewards, *self._features)
-        return rewards
+        self._items, self._distances = self._look_up(actions)
+        return containers.pick(self._containers, actions, self._distances, *self._features)
 
     def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""

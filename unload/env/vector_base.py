@@ -33,8 +33,6 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
     Args:
         num_envs: number of environments.
         equalize, ties, max_picks, position_noise: as for the single environment.
-        staggered: after ``reset``, the first episode of environment i ends after (i + 1) /
-            ``num_envs`` of ``max_picks``, so that later they do not all end at once.
         render_mode: None; there are no pictures of many containers.
 
     Raises:
@@ -54,13 +52,11 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         max_picks: int = task.MAX_PICKS,
         position_noise: float = POSITION_NOISE,
         render_mode: None = None,
-        staggered: bool = False,
     ) -> None:
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         checked = check_settings(equalize, ties, max_picks, position_noise)
         self.equalize, self.ties, self.max_picks, self.position_noise = checked
         checks.one_of("render_mode", render_mode, (None,))
-        self.staggered = checks.boolean("staggered", staggered)
         shape = (task.N_VISIBLE, 3)
         self.single_observation_space = gymnasium.spaces.Box(-1, 1, shape, np.float32)
         self.single_action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
@@ -72,7 +68,6 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self._starts = [""] * self.num_envs  # the generators' states before each episode's reset
         # Of each episode so far. An environment that waits for others counts up to 0.
         self._picks = np.zeros(self.num_envs, np.int64)
-        self._limits = np.full(self.num_envs, self.max_picks)  # picks of each episode
         # The last actions, (num_envs,) each: no episode is longer.
         self._actions: deque[np.ndarray] = deque(maxlen=self.max_picks)
 
@@ -102,16 +97,8 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             [
                 rng if one is None and rng is not None else seeding.np_random(one)[0]
                 for one, rng in zip(seeds, old)
-            ],
-            self._first_limits(),
+            ]
         )
-
-    def _first_limits(self) -> np.ndarray:
-        """Picks of each environment's first episode, (num_envs,) int64."""
-        if not self.staggered:
-            return np.full(self.num_envs, self.max_picks)
-        shares = np.arange(1, self.num_envs + 1) / self.num_envs
-        return np.ceil(self.max_picks * shares).astype(np.int64)
 
     def step(self, actions: np.ndarray):
         """Pick row ``actions[i]``, (num_envs,) int, in environment i.
@@ -135,7 +122,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         rewards = self._pick(actions)
         self._picks += 1
         terminations = self._emptied()
-        truncations = self._picks == self._limits
+        truncations = self._picks == self.max_picks
         observations, infos = self._look(), self._infos() | self._pick_infos()
         ended = terminations | truncations
         if ended.any():
@@ -171,16 +158,14 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         Returns:
             ``rng``: (num_envs,) str, the generators' states before each episode's reset, and
             ``actions``: (picks, num_envs) int64, the picks made since, the latest in the last
-            row. -1 stands for picks before the environment's episode began. If ``staggered``,
-            also ``limits``: (num_envs,) int64, after how many picks each episode ends.
+            row. -1 stands for picks before the environment's episode began.
         """
         self._check_started()
         steps = int(self._picks.max())
         latest = list(self._actions)[len(self._actions) - steps :]
         actions = np.array(latest, np.int64).reshape(steps, self.num_envs)
         actions[np.arange(steps)[:, np.newaxis] < steps - self._picks] = -1
-        state = {"rng": np.array(self._starts), "actions": actions}
-        return state | {"limits": self._limits.copy()} if self.staggered else state
+        return {"rng": np.array(self._starts), "actions": actions}
 
     def set_state(self, state: dict[str, np.ndarray]):
         """Go on from what ``get_state`` returned, here or in another environment.
@@ -209,28 +194,20 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             )
         if (actions[1:] < 0)[actions[:-1] >= 0].any():
             raise ValueError("state['actions'] holds -1 after a pick; expected -1 before all picks")
-        limits = np.full(self.num_envs, self.max_picks)
-        if "limits" in state:
-            limits = checks.integer_array("state['limits']", state["limits"], limits.shape)
-            if limits.min() < 1 or limits.max() > self.max_picks:
-                raise ValueError(
-                    f"state['limits'] holds {limits.min()} to {limits.max()}; "
-                    f"expected 1 to {self.max_picks}"
-                )
         rngs = [np.random.default_rng() for _ in texts]
         for rng, text in zip(rngs, texts):
             random_state.set_text(text, rng)
-        observations, infos = self._restart(rngs, limits)
+        observations, infos = self._restart(rngs)
         with AllOrReset(self):
             self._picks -= (actions < 0).sum(axis=0)
             for row in actions:
                 observations, _, _, _, infos = self._advance(row)
         return observations, infos
 
-    def _restart(self, rngs: list[np.random.Generator], limits: np.ndarray):
+    def _restart(self, rngs: list[np.random.Generator]):
         """Begin an episode in every environment; return ``reset``'s observations and infos."""
         self._begin(np.arange(self.num_envs), rngs)
-        self._rngs, self._limits = rngs, limits
+        self._rngs = rngs
         self._actions.clear()
         self._state = "running"
         return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
@@ -243,7 +220,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         with AllOrReset(self):
             for env, start in zip(envs, starts):
                 self._starts[env] = start
-            self._picks[envs], self._limits[envs] = 0, self.max_picks
+            self._picks[envs] = 0
             self._fill(envs, drawn)
 
     def _check_open(self) -> None:

@@ -418,69 +418,12 @@ def test_any_update_is_that_of_double_precision(shape, n_features, scale, levels
 
 
 @pytest.mark.parametrize("ties", ["noise", "average"])
-@pytest.mark.parametrize("literal", [False, True])
-def test_bytes_give_the_same_bits_as_floats(batch, ties, literal, rng):
+def test_bytes_give_the_same_bits_as_floats(batch, ties, rng):
     coarse = np.round(batch["observations"] * 8) / 8
     batch["observations"] = equalize(coarse, ties)
     weights, rows = fused.weights_of(network(70)), rng.integers(BATCH, size=200)
     totals = []
     for seen in (batch["observations"], ranks.encode(batch["observations"])):
-        arguments = seen, batch["actions"], batch["rewards"], 1.0, rows, literal
+        arguments = seen, batch["actions"], batch["rewards"], 1.0, rows
         totals.append(fused.start_gradients(weights, *arguments)())
     assert totals[0].tobytes() == totals[1].tobytes()
-
-
-def saturated_network(bias: float):
-    """A network whose values before tanh lie around ``bias``."""
-    net = network(16)
-    with torch.no_grad():
-        net.scorer.bias[:] = bias
-    return net
-
-
-@pytest.mark.parametrize("bias", [0.0, 3.0, 7.0, 9.0, -8.5])
-def test_literal_gradients_are_those_of_single_precision(batch, bias):
-    net = saturated_network(bias)
-    values = net(torch.from_numpy(batch["observations"]))
-    chosen = values.gather(1, torch.from_numpy(batch["actions"])[:, None]).squeeze(1)
-    smooth_l1_loss(chosen, torch.from_numpy(batch["rewards"])).backward()
-    expected = np.concatenate([p.grad.numpy().ravel() for p in fused._parameters(net)])
-    total = fused.start_gradients(fused.weights_of(net), *batch.values(), literal=True)()
-    # Near saturation 1 - tanh² is a small multiple of 2⁻²⁴: one more or less is rounding.
-    tolerance = 1e-5 * np.abs(expected).max() + 2e-7
-    np.testing.assert_allclose(total[:-1], expected, atol=tolerance)
-
-
-def test_only_literal_gradients_vanish_where_single_precision_rounds_to_one(batch):
-    weights = fused.weights_of(saturated_network(12.0))
-    literal, default = (
-        fused.start_gradients(weights, *batch.values(), literal=flag)()[:-1]
-        for flag in (True, False)
-    )
-    assert not literal.any() and default.any()
-
-
-def test_the_literal_choice_is_that_of_the_values(batch, rng):
-    """Of values that are equal after tanh, the first is taken; before tanh they differ."""
-    allowed = rng.random((BATCH, ITEMS)) < 0.5
-    differing = 0
-    for bias in (0.0, 5.0, 8.8, 20.0):
-        net = saturated_network(bias)
-        weights = fused.weights_of(net)
-        literal = fused.best_actions(weights, batch["observations"], allowed, literal=True)
-        with torch.no_grad():
-            values = net(torch.from_numpy(batch["observations"])).numpy()
-        values[~allowed] = -np.inf
-        rows = np.arange(BATCH)
-        assert (values.max(axis=1) - values[rows, literal]).max() <= 3 * 2.0**-24
-        default = fused.best_actions(weights, batch["observations"], allowed)
-        differing += (literal != default).sum()
-    assert (literal == allowed.argmax(axis=1)).all()  # with the last one, all values are 1
-    assert differing > BATCH // 2
-
-
-def test_a_literal_choice_without_a_finite_value_is_refused(batch):
-    weights, allowed = fused.weights_of(network(16)), np.ones((BATCH, ITEMS), bool)
-    batch["observations"][7, 3] = np.nan
-    with pytest.raises(FloatingPointError, match="row 7 has no allowed action"):
-        fused.best_actions(weights, batch["observations"], allowed, literal=True)

@@ -28,7 +28,7 @@ import numpy as np
 import torch
 
 from unload import task
-from unload.agent.fast.kernel import CHUNK, add_chunks, best_items, best_values, sum_chunks
+from unload.agent.fast.kernel import CHUNK, add_chunks, best_items, sum_chunks
 from unload.network.peq import PEQNetwork
 
 CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
@@ -106,12 +106,8 @@ def start_gradients(
     targets: np.ndarray,
     beta: float = 1.0,
     rows: np.ndarray | None = None,
-    literal: bool = False,
 ) -> Callable[[], np.ndarray]:
     """Begin ``loss_and_gradients`` on all threads but this one, which may do something else.
-
-    Args:
-        literal: take tanh and its derivative in single precision, where it is flat sooner.
 
     Returns:
         A function that does what is left to do and returns (8n + 2,) float64: the gradients of
@@ -133,7 +129,7 @@ def start_gradients(
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
-    work = (np.zeros(1, np.int64), *batch, np.float32(beta), literal, *weights, partial)
+    work = (np.zeros(1, np.int64), *batch, np.float32(beta), *weights, partial)
     threads = min(torch.get_num_threads(), len(partial) // CHUNKS_PER_THREAD)
     others = [_helpers(os.getpid()).submit(add_chunks, *work) for _ in range(1, threads)]
 
@@ -158,20 +154,16 @@ def _helpers(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor()
 
 
-def best_actions(
-    weights: Weights, observations: np.ndarray, allowed: np.ndarray, literal: bool = False
-) -> np.ndarray:
+def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """The allowed action of the highest value.
 
     The global features add the same to every item's score and tanh keeps the order, so
-    the item's own features decide, unless single precision is asked for, where the values of
-    many items may be equal.
+    the item's own features decide.
 
     Args:
         weights: of the network.
         observations: (batch, items, 3) float32.
         allowed: (batch, items) bool, at least one per row.
-        literal: compare values after tanh in single precision, of equals take the first.
 
     Returns:
         (batch,) int64.
@@ -187,10 +179,7 @@ def best_actions(
             f"expected ({size}, {items}) bool"
         )
     actions = np.full(size, -1)
-    if literal:
-        best_values(observations, allowed, *weights, actions)
-    else:
-        best_items(observations, allowed, weights.weight, weights.bias, weights.score[0], actions)
+    best_items(observations, allowed, weights.weight, weights.bias, weights.score[0], actions)
     if (actions < 0).any():
         raise FloatingPointError(
             f"row {int(np.argmin(actions))} has no allowed action of a finite value; "

@@ -107,7 +107,6 @@ def add_chunks(
     actions,
     targets,
     beta,
-    literal,
     weight,
     bias,
     score,
@@ -150,13 +149,13 @@ def add_chunks(
                 _reduce_items(fours, numbers, items, mask, samples, later, blocks[b])
                 _find_extremes(x, items, mask, blocks[b])
                 logit += _forward(x, picked[number], items, blocks[b])
-            value, derivative = _tanh(logit, literal)
+            value = np.tanh(logit)
             error = value - wanted[number]
             if abs(error) < beta:
                 loss, slope = error * error / (2 * beta), error / beta
             else:
                 loss, slope = abs(error) - beta / 2, np.sign(error)
-            slope *= derivative
+            slope *= 1 - value * value
             sum_slopes += slope
             sum_losses += loss
             for b in range(len(blocks)):
@@ -169,16 +168,6 @@ def add_chunks(
                 partial[chunk, row * n + f] = block[GRADIENT + row * BLOCK + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
         chunk = following
-
-
-@compiled(forceinline=True)
-def _tanh(logit, literal):
-    """The hyperbolic tangent and its derivative; if ``literal``, both in single precision."""
-    if literal:
-        rounded = np.tanh(np.float32(logit))
-        return np.float64(rounded), np.float64(ONE - rounded * rounded)
-    value = np.tanh(logit)
-    return value, 1 - value * value
 
 
 @compiled
@@ -515,39 +504,3 @@ def best_items(observations, allowed, weight, bias, score, actions):
                 break
             if scores[i] > best:
                 best, actions[sample] = scores[i], i
-
-
-@compiled
-def best_values(observations, allowed, weight, bias, score, score_bias, actions):
-    """Write the item of the highest value in single precision to ``actions``, of equals the first.
-
-    Unlike ``best_items``, this compares values after tanh, which rounds the values of many items
-    to 1 or -1 once they are far from 0. Where an allowed item's value is not finite, the action
-    becomes -1.
-    """
-    x = np.empty((3, observations.shape[1]), np.float32)
-    values, scores = np.empty_like(x[0]), np.empty_like(x[0])
-    for sample in range(len(actions)):
-        for i in range(len(scores)):
-            for axis in range(3):
-                x[axis, i] = observations[sample, i, axis]
-        scores[:] = 0
-        shared = score_bias[0]  # the part of the value before tanh that all items have
-        for f in range(len(bias)):
-            a, b, c, d = weight[f, 0], weight[f, 1], weight[f, 2], bias[f]
-            for i in range(len(scores)):
-                value = _value(a, b, c, d, x[0, i], x[1, i], x[2, i])
-                values[i] = ZERO if value < ZERO else value
-                scores[i] = fma(score[0, f], values[i], scores[i])
-            shared += score[1, f] * values.min() + score[2, f] * values.max()
-            shared += score[3, f] * np.float32(values.mean())
-        best = -np.inf
-        for i in range(len(scores)):
-            if not allowed[sample, i]:
-                continue
-            value = np.tanh(scores[i] + shared)
-            if not np.isfinite(value):
-                actions[sample] = -1
-                break
-            if value > best:
-                best, actions[sample] = value, i

@@ -13,23 +13,20 @@ class FusedLearner:
     """``PlainLearner`` for a network to which ``fused.applies``, with the same interface.
 
     Its update reads the rows where they are, which saves copying them, and goes on in other
-    threads while the caller does something else.
+    threads while the caller does something else. It takes tanh in double precision, where its
+    slope does not become 0 so soon, and the choice compares what stands before it, which never
+    ties.
 
     Args:
         network, learning_rate, beta: see ``PlainLearner``.
-        literal: take tanh in single precision, as ``PlainLearner`` does. By default the update
-            takes it in double precision, where its slope does not become 0 so soon, and the
-            choice compares what stands before it, which never ties.
     """
 
-    def __init__(
-        self, network: PEQNetwork, learning_rate: float, beta: float, literal: bool = False
-    ) -> None:
-        self.weights, self.beta, self.literal = fused.weights_of(network), beta, literal
+    def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
+        self.weights, self.beta = fused.weights_of(network), beta
         self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-        return fused.best_actions(self.weights, observations, allowed, self.literal)
+        return fused.best_actions(self.weights, observations, allowed)
 
     def start(
         self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
@@ -42,7 +39,6 @@ class FusedLearner:
             targets,
             self.beta,
             rows,
-            self.literal,
         )
 
         def finish() -> float:

@@ -1,4 +1,4 @@
 """Compiled code for many containers at once, equal in bits to the plain environments.
 
-Read ``ranking``, ``containers`` and ``settling``, in this order.
+Read ``ranking``, then ``containers``.
 """
