@@ -6,14 +6,13 @@ from collections.abc import Callable
 from unload.heap.study import table as heap
 from unload.reproduce import (
     agreement,
-    comparison,
     lifts,
     observation,
-    robustness,
     training,
     tuning,
 )
 from unload.reproduce.falls import laboratory, long
+from unload.reproduce.policies import comparison, robustness
 from unload.reproduce.results import COMMAND, JOBS
 from unload.reproduce.variants import grids as variants
 

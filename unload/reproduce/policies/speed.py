@@ -13,28 +13,22 @@ from unload import task
 from unload.load.boxes import Load
 from unload.load.colours import COLOURS
 from unload.physics.situation import RESOLUTION, Situation
-from unload.reproduce import results
+from unload.reproduce.results import read_table
 from unload.reproduce.style import styled
-from unload.support import checks, files
+from unload.support import files
 
 FOLDER = files.DATA / "benchmarks"
-COLUMNS = {
-    "speeds": ["what", "how", "value", "unit", "ratio"],
-    "containers": ["containers", "step_ns", "reset_ns", "picks_per_s", "memory_mb"],
-    "profile": ["part", "us", "floor_us", "floor"],
-}
+COLUMNS = ["what", "how", "value", "unit", "ratio"]
 
 
-def read_table(name: str, folder: str | Path = FOLDER) -> pd.DataFrame:
-    """A table of the benchmarks: ``"speeds"``, ``"containers"`` or ``"profile"``.
+def read_speeds(folder: str | Path = FOLDER) -> pd.DataFrame:
+    """The table of the benchmarks, a row per way of doing a thing.
 
     Raises:
         FileNotFoundError: it is missing; the message says how to measure it.
-        ValueError: an unknown name, other columns, no rows, or values that are not finite.
+        ValueError: a column is missing.
     """
-    checks.one_of("name", name, COLUMNS)
-    path = Path(folder) / f"{name}.csv"
-    return results.read_table(path, "python benchmarks/run.py", COLUMNS[name], exact=True)
+    return read_table(Path(folder) / "speeds.csv", "python benchmarks/run.py", COLUMNS)
 
 
 def three_digits(value: float) -> str:
@@ -47,12 +41,12 @@ def speed_ratios(folder: str | Path = FOLDER) -> Figure:
     """Speed ratio of each implementation to the first one.
 
     Args:
-        folder: of the tables.
+        folder: of the table.
 
     Raises:
-        FileNotFoundError, ValueError: see ``read_table``.
+        FileNotFoundError, ValueError: see ``read_speeds``.
     """
-    table = read_table("speeds", folder)
+    table = read_speeds(folder)
     groups = table.groupby("what", sort=False)
     figure, panels = plt.subplots(
         len(groups), 1, figsize=(6.4, 0.34 * len(table) + 0.5 * len(groups)), sharex=True,
@@ -75,59 +69,6 @@ def speed_ratios(folder: str | Path = FOLDER) -> Figure:
         axes.minorticks_off()
         axes.grid(False, axis="y")
     axes.set_xlabel("times as fast as the first way of its kind")
-    return figure
-
-
-@styled
-def speed_containers(folder: str | Path = FOLDER) -> Figure:
-    """What a pick costs in the array environment over the number of containers.
-
-    Arguments and errors as in ``speed_ratios``.
-    """
-    table = read_table("containers", folder)
-    counts, cost = table["containers"], table["step_ns"] + table["reset_ns"]
-    figure, axes = plt.subplots()
-    axes.plot(counts, cost, "o-", label="together")
-    axes.plot(counts, table["step_ns"], "o--", color="0.45", markersize=3, label="picking")
-    axes.plot(counts, table["reset_ns"], "o:", color="0.45", markersize=3, label="new loads")
-    axes.set(xscale="log", yscale="log", xlabel="containers in one environment")
-    axes.set(ylabel="time per pick (ns)", ylim=(10**2.5, 10**5))
-    axes.set_xticks(counts, [str(count) for count in counts])
-    axes.minorticks_off()
-    rates = axes.secondary_yaxis("right", functions=(_reciprocal, _reciprocal))
-    rates.set_ylabel("picks/s")
-    rates.set_yticks([1e4, 1e5, 1e6], ["10,000", "100,000", "1,000,000"])
-    rates.minorticks_off()
-    rates.spines["right"].set_visible(True)
-    axes.legend()
-    return figure
-
-
-def _reciprocal(nanoseconds: np.ndarray) -> np.ndarray:
-    """ns per pick to picks per second, and back."""
-    return 1e9 / np.maximum(nanoseconds, 1e-9)
-
-
-@styled
-def speed_profile(folder: str | Path = FOLDER) -> Figure:
-    """The parts of a training step: measured, and at the floor of the machine.
-
-    Arguments and errors as in ``speed_ratios``.
-    """
-    table = read_table("profile", folder)
-    figure, axes = plt.subplots(figsize=(6.4, 3.2))
-    places = np.arange(len(table))
-    axes.barh(places - 0.18, table["us"], height=0.36, label="measured")
-    axes.barh(places + 0.18, table["floor_us"], height=0.36, label="operations or bytes alone")
-    for place, measured, floor, why in zip(places, table["us"], table["floor_us"], table["floor"]):
-        axes.text(measured, place - 0.18, f" {measured:,.0f}", va="center", fontsize=8)
-        if floor:
-            axes.text(floor, place + 0.18, f" {floor:,.1f}: {why}", va="center", fontsize=8)
-    axes.set_yticks(places, table["part"])
-    axes.set(xlabel=f"µs per step of {task.NUM_ENVS} picks", ylim=(len(table) - 0.5, -0.5))
-    axes.set_xlim(0, 1.15 * table["us"].max())
-    axes.grid(False, axis="y")
-    axes.legend(loc="lower right")
     return figure
 
 

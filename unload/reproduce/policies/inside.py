@@ -1,37 +1,14 @@
-"""One policy from inside: how it learned, where it picks, and what it prefers."""
+"""One policy from inside: how it learned, what it prefers, and what noise does to it."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from matplotlib.ticker import PercentFormatter
 
-from unload.load.boxes import Load
-from unload.load.colours import COLOURS
-from unload.reproduce.figures.perspective import Painter
 from unload.reproduce.style import styled
-
-SIZE = 560, 400  # pixels of a picture
-ROOM = 6, 6, 6, 6  # around the container
-PICKED = {"unseen": "unseen", "visible": "visible", "liftable": "next pick"}
-
-
-class Stage(NamedTuple):
-    """A container before a pick that succeeds.
-
-    Attributes:
-        present: (n,) bool, the boxes that are left.
-        visible: (k,) int, those that the agent sees.
-        pick: the one that it picks.
-    """
-
-    present: np.ndarray
-    visible: np.ndarray
-    pick: int
 
 
 @styled
@@ -52,28 +29,6 @@ def learning(curve: pd.DataFrame, greedy: pd.Series) -> Figure:
     left.legend()
     right.plot(thousands, curve["loss"], color="C3")
     right.set(xlabel="picks (thousands)", ylabel=r"loss $\ell$", ylim=(0, None))
-    return figure
-
-
-@styled
-def unloading(load: Load, stages: list[Stage]) -> Figure:
-    """A load at some stages of its unloading, from outside the entrance, in true proportions.
-
-    Args:
-        load: the boxes.
-        stages: two lines of pictures, in order.
-    """
-    painter = Painter(load, SIZE, ROOM)
-    figure, panels = plt.subplots(2, -(-len(stages) // 2), figsize=(9, 5), squeeze=False)
-    for axes in panels.flat:
-        axes.axis("off")
-    for axes, (present, visible, pick) in zip(panels.flat, stages):
-        colours = np.tile(COLOURS["unseen"], (len(load), 1))
-        colours[visible], colours[pick] = COLOURS["visible"], COLOURS["liftable"]
-        axes.imshow(painter.paint(present, colours, np.zeros(len(load)), []))
-        axes.set_title(f"{present.sum()} boxes left")
-    handles = [Patch(color=COLOURS[name], label=text) for name, text in PICKED.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
 

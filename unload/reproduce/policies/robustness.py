@@ -1,0 +1,147 @@
+"""Policies compared with every box simulated.
+
+    python -m unload.reproduce robustness
+
+In ``full`` physics all boxes are free to move. With ``after_pick="restore"`` they are put
+back after every pick; with ``"keep"`` they stay where the pick has left them. They drift,
+and a box on which nothing lies may be jammed between its neighbours.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from unload.agent.evaluation import Policy, success_rate
+from unload.env.container import ContainerEnv
+from unload.load.boxes import Load
+from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
+from unload.physics.bullet import SETTINGS
+from unload.physics.situation import Surroundings
+from unload.reproduce.policies.comparison import LEARNED, SIMPLE, digests, find_policy
+from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
+from unload.support import checks, files
+
+EPISODES, PICKS = 10, 100
+SEED = 2000  # of the loads; no other data uses it
+# Who plays how; of the others, every decision with boxes restored would be the table's.
+PLAYED = {"keep": (*SIMPLE, *LEARNED), "restore": ("recommended",)}
+OPTIONS = JOBS
+
+
+def robustness_data(
+    episodes: int = EPISODES,
+    picks: int = PICKS,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = 1,
+    progress: bool = True,
+) -> None:
+    """Let policies unload the same containers: ``policies/robustness.csv``.
+
+    One row per ``policy``, ``after_pick`` and ``episode``, with the columns of ``play``. An
+    episode takes minutes. Each one that is finished is kept, so that a run that was stopped
+    goes on.
+
+    Args:
+        episodes: containers per policy and ``after_pick``; only their front walls are
+            simulated, see ``front_walls``.
+        picks: per container, at most 100.
+        folder: of the data; it holds the learned policies.
+        runs_dir: where finished episodes are kept.
+        n_jobs: processes, as in joblib.
+        progress: show a progress bar.
+
+    Raises:
+        FileNotFoundError: a policy's file is absent; the message names it.
+        TypeError, ValueError: an argument is not as described.
+    """
+    checks.integer("episodes", episodes, 1)
+    checks.integer("picks", picks, 1, PICKS)
+    found = {name: find_policy(name, folder) for names in PLAYED.values() for name in names}
+    weights = digests(folder)
+    seeds = np.random.SeedSequence(SEED).generate_state(episodes).tolist()
+    containers = [
+        {"policy": name, "after_pick": after_pick, "episode": episode}
+        for after_pick, names in PLAYED.items()
+        for name in names
+        for episode in range(episodes)
+    ]
+    jobs = []
+    for container in containers:
+        name, after_pick, episode = container.values()
+        size = {"seed": seeds[episode], "picks": picks, "walls": FRONT_WALLS}
+        question = container | size | {"weights": weights.get(name), "settings": SETTINGS}
+        jobs.append((question, partial(play, found[name], after_pick, seeds[episode], picks)))
+    answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs, progress)
+    frame = pd.DataFrame([one | answer.value for one, answer in zip(containers, answers)])
+    settings = {"policies": weights, "episodes": episodes, "picks": picks, "seed": SEED}
+    publish(
+        Path(folder) / "policies",
+        "robustness",
+        {"robustness": frame},
+        f"{COMMAND} robustness",
+        settings | {"front walls": FRONT_WALLS},
+        episodes < EPISODES or picks < PICKS,
+        [answer.record for answer in answers],
+    )
+
+
+def front_load(rng: np.random.Generator) -> Load:
+    """The front walls of a random load."""
+    return front_walls(stack_load(rng))
+
+
+def play(
+    policy: Policy,
+    after_pick: str,
+    seed: int,
+    picks: int = PICKS,
+    stack: Callable[[np.random.Generator], Load] = front_load,
+) -> dict[str, float]:
+    """Let a policy unload one container, with the mask.
+
+    Args:
+        policy: see ``unload.policies``.
+        after_pick: ``"keep"`` or ``"restore"``, see ``FullPhysics``.
+        seed: of the load and of the policy's random numbers.
+        picks: how many.
+        stack: makes the load, see ``ContainerEnv``.
+
+    Returns:
+        ``success_rate``; ``free`` and ``jammed``, the shares of picks at items on which nothing
+        rested in the neat load but what has been unloaded since, and of those that failed
+        nevertheless; ``median_displacement`` and ``max_displacement`` of the boxes that are
+        left, in m, at the end.
+
+    Raises:
+        ValueError: the load does not hold more items than ``picks``.
+    """
+    rng = np.random.default_rng([seed])
+    rewards, free = [], []
+    env = ContainerEnv("full", after_pick, max_picks=picks, stack=stack)
+    try:
+        observation, info = env.reset(seed=seed)
+        physics = env.physics
+        if len(physics.load) <= picks:
+            raise ValueError(f"stack made {physics.load}; expected more than picks={picks} items")
+        around = Surroundings(physics.load, physics.present)
+        for _ in range(picks):
+            allowed = info["action_mask"]
+            action = int(policy(observation[np.newaxis], allowed[np.newaxis], rng)[0])
+            free.append(not around.on_top(int(env.visible[action])))
+            observation, reward, _, _, info = env.step(action)
+            rewards.append(reward)
+        moved = np.linalg.norm(physics.positions() - physics.load.positions, axis=1)
+        moved = moved[physics.present]
+    finally:
+        env.close()
+    return {
+        "success_rate": success_rate(rewards),
+        "free": float(np.mean(free)),
+        "jammed": float(np.mean(free & (np.array(rewards) < 0))),
+        "median_displacement": float(np.median(moved)),
+        "max_displacement": float(moved.max()),
+    }
