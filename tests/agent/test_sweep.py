@@ -14,7 +14,7 @@ from unload import TrainConfig
 from unload.agent import sweep
 from unload.agent.training import train
 from unload.physics.lift_table import LiftTable
-from unload.reproduce.tuning import tuning_config
+from unload.reproduce.paper.grids import tuning_config
 from unload.support import files
 
 

@@ -6,7 +6,6 @@ from functools import wraps
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.figure import Figure
 
 from unload.support import files
@@ -37,25 +36,7 @@ def save(figure: Figure, name: str, folder: Path = files.FIGURES) -> None:
         figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
 
 
-def hide_unused(grid: np.ndarray, used: int) -> None:
-    """Hide the panels of a grid after the first ones; those above them show their ticks instead.
-
-    Args:
-        grid: (lines, columns) axes, as ``plt.subplots`` returns them with ``sharex`` and
-            ``squeeze=False``; only the last line is incomplete.
-        used: number of panels that stay.
-    """
-    for above, unused in zip(grid.flat[used - grid.shape[1] :], grid.flat[used:]):
-        unused.set_visible(False)
-        above.tick_params(labelbottom=True)
-
-
 def mark_reduced(figure: Figure, folder: str | Path, data: str) -> None:
     """Say so in the figure if its data is of a smaller run than the paper's."""
-    provenance = read_provenance(folder, data)
-    if provenance["reduced"]:
-        settings = provenance["settings"]
-        size = ", ".join(
-            f"{settings[name]:,} {name}" for name in ("picks", "steps", "runs") if name in settings
-        )
-        figure.supxlabel(f"reduced run: {size}", fontsize=8, color="0.45")
+    if read_provenance(folder, data)["reduced"]:
+        figure.supxlabel("reduced run", fontsize=8, color="0.45")

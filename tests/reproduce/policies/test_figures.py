@@ -52,7 +52,7 @@ def test_a_table_says_100_only_if_no_pick_failed():
     "draw", [figures.comparison_means, figures.comparison_table, figures.comparison_msr]
 )
 def test_missing_data_name_their_command(tmp_path, draw):
-    with pytest.raises(FileNotFoundError, match="python -m unload.reproduce comparison makes it"):
+    with pytest.raises(FileNotFoundError, match="python -m unload.reproduce policies makes it"):
         draw(tmp_path)
 
 

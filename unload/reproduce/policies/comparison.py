@@ -1,6 +1,6 @@
 """Picking policies compared where the lift table reaches.
 
-    python -m unload.reproduce comparison
+    python -m unload.reproduce policies
 
 Rules and learned policies unload the same containers: in the conditions of the training, with
 blurred positions, and with boxes of other sizes.
@@ -68,7 +68,7 @@ def comparison_data(
         Path(folder) / "policies",
         "comparison",
         {"comparison": pd.concat([result.value for result in results])},
-        f"{COMMAND} comparison",
+        f"{COMMAND} policies",
         {"policies": digests(folder), "loads": loads, "seed": SEED},
         loads < COMPARISON_LOADS,
         [result.record for result in results],

@@ -48,9 +48,9 @@ def read_comparison(folder: str | Path = files.DATA) -> pd.DataFrame:
     """
     place = Path(folder) / "policies"
     columns = [*KEY, "success_rate"]
-    table = read_table(place / "comparison.csv", f"{COMMAND} comparison", columns)
+    table = read_table(place / "comparison.csv", f"{COMMAND} policies", columns)
     columns = ["policy", "after_pick", "success_rate"]
-    full = read_table(place / "robustness.csv", f"{COMMAND} robustness", columns)
+    full = read_table(place / "robustness.csv", f"{COMMAND} policies", columns)
     full = full.assign(mask=True, condition=full["after_pick"].map(FULL))
     return pd.concat([table, full], ignore_index=True)[[*KEY, "success_rate"]]
 

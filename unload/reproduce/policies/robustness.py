@@ -1,6 +1,6 @@
 """Policies compared with every box simulated.
 
-    python -m unload.reproduce robustness
+    python -m unload.reproduce policies
 
 In ``full`` physics all boxes are free to move. With ``after_pick="restore"`` they are put
 back after every pick; with ``"keep"`` they stay where the pick has left them. They drift,
@@ -82,7 +82,7 @@ def robustness_data(
         Path(folder) / "policies",
         "robustness",
         {"robustness": frame},
-        f"{COMMAND} robustness",
+        f"{COMMAND} policies",
         settings | {"front walls": FRONT_WALLS},
         episodes < EPISODES or picks < PICKS,
         [answer.record for answer in answers],
