@@ -13,19 +13,19 @@ README = (ROOT / "README.md").read_text()
 
 # The files and folders of unload/ that may import a library; "" stands for all.
 LIBRARIES = {
-    "PIL": ("load/still.py", "heap/study/", "reproduce/figures/"),
+    "PIL": ("load/view.py", "heap/study/", "reproduce/figures/"),
     "anywidget": ("play/canvas.py",),
     "gymnasium": ("__init__.py", "env/", "agent/", "heap/", "reproduce/"),
     "ipywidgets": ("play/",),
     "joblib": ("agent/sweep.py", "reproduce/"),
     "llvmlite": ("agent/fast/kernel.py", "support/compiled.py"),
-    "matplotlib": ("load/still.py", "heap/study/", "reproduce/figures/"),
+    "matplotlib": ("load/view.py", "heap/study/", "reproduce/figures/"),
     "numba": ("support/compiled.py", "agent/fast/kernel.py"),
     "numpy": ("",),
     "pandas": ("agent/", "heap/study/", "reproduce/"),
     "plotly": ("load/view.py", "play/replay.py", "heap/study/replay.py"),
     "pybullet": ("physics/bullet.py",),
-    "safetensors": ("agent/weights.py", "heap/learning.py"),
+    "safetensors": ("agent/greedy.py", "heap/learning.py"),
     "scipy": ("heap/", "reproduce/"),
     "torch": ("network/", "agent/", "heap/", "reproduce/"),
     "tqdm": ("agent/", "reproduce/"),
@@ -34,7 +34,6 @@ LIBRARIES = {
 # Modules that have no test file of their own, and the file in tests/ that covers them.
 COVERED_BY = {
     "agent/fast/kernel.py": "agent/fast/test_fused.py",  # its loops
-    "agent/fast/learner.py": "agent/test_learner.py",  # beside the plain one
 }
 
 

@@ -6,9 +6,8 @@ from unload.agent import policies
 from unload.agent.config import TrainConfig
 from unload.agent.dqn import DQN
 from unload.agent.evaluation import evaluate, success_rate
-from unload.agent.greedy import Greedy
+from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.training import train
-from unload.agent.weights import load_policy, save_policy
 from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
 from unload.env.highest_item import HighestItemEnv

@@ -12,12 +12,11 @@ import numpy as np
 import pandas as pd
 
 from unload.agent.config import TrainConfig
-from unload.agent.greedy import Greedy
+from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.rollout import Rollout
-from unload.agent.weights import load_policy, save_policy
 from unload.support import checks, files
 
-FORMAT = 4  # of the checkpoints
+FORMAT = 5  # of the checkpoints
 # Settings that there were once. A run that has them at these values is as one of today.
 FORMER = {"drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0}
 # Of a ``Training``: what has a state besides the generator.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from unload import task
-from unload.agent.fast import ranks
+from unload.agent.fast import kernel
 from unload.support import checks
 
 # By the kind of an array's dtype: what may be written into it.
@@ -46,7 +46,7 @@ class ReplayBuffer:
         next_state: keep the observation and mask after each pick, and whether the task
             ended there.
         equalized: all observations are equalized, of 128 items each, and kept as bytes, see
-            ``unload.agent.fast.ranks``. What follows a pick is not kept so.
+            ``unload.agent.fast.kernel``. What follows a pick is not kept so.
 
     Raises:
         ValueError: ``equalized`` with another number of items or with ``next_state``.
@@ -149,7 +149,7 @@ class ReplayBuffer:
             for name, array in self.arrays.items()
         }
         if self.equalized:
-            checked["observations"] = ranks.encode(checked["observations"])
+            checked["observations"] = kernel.encode(checked["observations"])
         items = self.arrays["observations"].shape[1]
         if count and not 0 <= checked["actions"].min() <= checked["actions"].max() < items:
             actions = checked["actions"]
@@ -185,5 +185,5 @@ class ReplayBuffer:
         # Indexing by ``array[rows]`` would take half as long again.
         batch = {name: array.take(rows, axis=0) for name, array in self.arrays.items()}
         if self.equalized:
-            batch["observations"] = ranks.decode(batch["observations"])
+            batch["observations"] = kernel.decode(batch["observations"])
         return batch

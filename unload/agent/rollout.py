@@ -1,9 +1,10 @@
 """The picks of a training run, and how the latest of them are repeated.
 
 A checkpoint does not hold the replay memory, which is 0.4 GB in the paper's configuration.
-The environments are deterministic, so it holds their state at the start of the oldest
-episode that the memory reaches back to, and the actions since: repeating these fills the
-memory again, pick by pick as it was.
+The environments are deterministic, so it holds the state of their generators at the start of the
+oldest episodes that the memory reaches back to, and the actions since: repeating these fills the
+memory again, pick by pick as it was. Where the episodes never start all together, because their
+loads are so small, the picks are repeated from the first one on.
 """
 
 from collections import deque
@@ -48,8 +49,9 @@ class Rollout:
             **({} if stack is None else {"stack": stack}),
         )
         self._see(*self.envs.reset(seed=config.seeds()[0]))
-        # Of the episodes that the replay memory reaches back to: first step, state there.
-        self._starts = deque([(0, self.envs.get_state())])
+        # Of the episodes that the replay memory reaches back to, where all started together: first
+        # step, generators there.
+        self._starts = deque([(0, self.envs.starts())])
 
     def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
         self.observations, self.masks = observations, infos["action_mask"]
@@ -78,7 +80,7 @@ class Rollout:
         Returns:
             The rewards, (num_envs,), and what to add to a ``ReplayBuffer``.
         """
-        following, rewards, terminations, _, infos = self.envs.step(actions)
+        following, rewards, terminations, truncations, infos = self.envs.step(actions)
         transitions = {
             "observations": self.observations,
             "actions": actions,
@@ -89,8 +91,8 @@ class Rollout:
         self._actions[self.steps] = actions
         self.steps += 1
         self._see(following, infos)
-        if self.steps % self._config.max_picks == 0:  # an episode's end in most environments
-            self._starts.append((self.steps, self.envs.get_state()))
+        if (terminations | truncations).all():
+            self._starts.append((self.steps, self.envs.starts()))
             while (self.steps - self._starts[1][0]) * self._config.num_envs >= self._reach:
                 self._starts.popleft()
         return rewards, transitions
@@ -109,8 +111,9 @@ class Rollout:
 
     def state(self) -> dict[str, np.ndarray]:
         """Return what ``load_state`` needs to go on from here."""
-        start, envs = self._starts[0]
-        return {f"envs.{name}": array for name, array in envs.items()} | {
+        start, generators = self._starts[0]
+        return {
+            "generators": generators,
             "start": np.array(start),
             "actions": self._actions[start : self.steps],
             "digest": np.array(self.digest()),
@@ -125,14 +128,12 @@ class Rollout:
         Raises:
             ValueError: the picks are more than the run's, or lead to other observations.
         """
-        prefix = "envs."
-        envs = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
         start, most = int(arrays["start"]), len(self._actions) - len(arrays["actions"])
-        if start % self._config.max_picks or not 0 <= start <= most:
-            raise ValueError(f"start is {start}; expected the first step of an episode")
+        if not 0 <= start <= most:
+            raise ValueError(f"start is {start}; expected 0 to {most}")
         self.steps = start
-        self._starts = deque([(self.steps, envs)])
-        self._see(*self.envs.set_state(envs))
+        self._starts = deque([(self.steps, arrays["generators"])])
+        self._see(*self.envs.restart(arrays["generators"]))
         for actions in arrays["actions"].astype(np.int64):
             yield self.pick(actions)[1]
         if self.digest() != arrays["digest"]:

@@ -1,28 +1,92 @@
 """The training loop (Sec. II-B and IV-B): ε-greedy picks, replay, updates, learning curve."""
 
+import signal
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from copy import deepcopy
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
+import pandas as pd
 import torch
 from tqdm import tqdm
 
 from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult
 from unload.agent.config import ENVS, TrainConfig
-from unload.agent.curve import Curve
 from unload.agent.dqn import DQN
 from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import Greedy
-from unload.agent.interrupt import deferred_interrupts
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_load, check_stack
 from unload.network.variants import NETWORKS
+
+CURVE_COLUMNS = (
+    "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
+)  # fmt: skip
+SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
+
+
+class Curve:
+    """The learning curve: points over every ``log_interval`` steps, and the sums since the last.
+
+    Attributes:
+        points: one tuple of ``CURVE_COLUMNS`` each, see ``TrainResult``.
+        sums: by the names in ``SUMS``.
+    """
+
+    def __init__(self) -> None:
+        self.points: list[tuple[float, ...]] = []
+        self._start_point()
+
+    def _start_point(self) -> None:
+        self.sums = dict.fromkeys(SUMS, 0.0)
+
+    def add(self, rewards: np.ndarray, deadlocked: np.ndarray, losses: Iterable[float]) -> None:
+        """Count one step.
+
+        Args:
+            rewards: (num_envs,) of its picks.
+            deadlocked: (num_envs,) bool, picks of items that had failed since the last success.
+            losses: of its updates.
+        """
+        sums = self.sums
+        sums["picks"] += len(rewards)
+        sums["rewards"] += rewards.sum()
+        sums["deadlocked"] += deadlocked.sum()
+        for loss in losses:
+            sums["losses"] += loss
+            sums["updates"] += 1
+
+    def end_point(self, picks: int, epsilon: float) -> None:
+        """Add the point of the steps since the last one, after ``picks`` picks in all."""
+        sums = self.sums
+        mean_reward = sums["rewards"] / sums["picks"]
+        loss = sums["losses"] / sums["updates"] if sums["updates"] else float("nan")
+        self.points.append((
+            picks, mean_reward, (mean_reward + 1) / 2, sums["deadlocked"] / sums["picks"],
+            loss, epsilon, time.time(),
+        ))  # fmt: skip
+        self._start_point()
+
+    def table(self) -> pd.DataFrame:
+        """Return one row per point, with the columns ``CURVE_COLUMNS``."""
+        return pd.DataFrame(self.points, columns=CURVE_COLUMNS)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return what ``load_state`` needs to go on from here."""
+        points = np.array(self.points, dtype=np.float64).reshape(-1, len(CURVE_COLUMNS))
+        return {"points": points, "sums": np.array([self.sums[name] for name in SUMS])}
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` returned."""
+        self.points = [(int(picks), *means) for picks, *means in arrays["points"].tolist()]
+        self.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
 
 
 class Training:
@@ -226,6 +290,40 @@ def _go(run: Training, folder: RunFolder, progress: bool | TextIO, interrupts: l
                 bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
             stop_if_interrupted(rollout.picks)
     folder.finish(run, first_shown)
+
+
+@contextmanager
+def deferred_interrupts() -> Iterator[list[int]]:
+    """Note the first Ctrl-C of a run instead of raising; the second one stops at once.
+
+    Yields:
+        The signals received so far. The caller polls them and stops at a safe point.
+
+    Raises:
+        KeyboardInterrupt: at the second Ctrl-C, or at the end if nobody has stopped since the
+            first one.
+    """
+    received: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield received  # only the main thread receives signals
+        return
+
+    def receive(number: int, frame: object) -> None:
+        received.append(number)
+        if len(received) > 1:
+            raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGINT, receive)
+    try:
+        yield received
+    except SystemError as error:  # of compiled code in which the second one was raised
+        if len(received) > 1:
+            raise KeyboardInterrupt from error
+        raise
+    finally:
+        signal.signal(signal.SIGINT, previous)
+    if received:
+        raise KeyboardInterrupt
 
 
 def _progress_bar(picks: int, total: int, progress: bool | TextIO) -> tqdm:

@@ -1,5 +1,5 @@
 """The environments: a container, and the choice of the highest item.
 
 Read ``observation``, ``equalization``, ``base``, ``container``, ``highest_item``,
-``vector_base``, ``vector`` and ``render``, in this order. ``fast`` is the compiled twin.
+``vector`` and ``render``, in this order. ``fast`` is the compiled twin.
 """

@@ -1,15 +1,29 @@
-"""The base of the two environments: spaces, settings, and the order of calls."""
+"""The bases of the environments, single ones and arrays of them: settings and order of calls.
 
+``gymnasium.make_vec(id, num_envs)`` makes an array of environments. It behaves, bit for bit, as
+Gymnasium's ``SyncVectorEnv`` of the single environments with autoreset in the same step: same
+seeds, same actions, same observations, rewards, masks and infos. Each environment begins its next
+episode when its own has ended.
+"""
+
+import json
 import sys
+from abc import abstractmethod
+from collections.abc import Sequence
 
 import gymnasium
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
 
 from unload import task
 from unload.env import observation
-from unload.env.equalization import TIES, equalize
-from unload.support import checks, random_state
+from unload.env.equalization import TIE_TOLERANCE, TIES, equalize
+from unload.support import checks
+
+MOST_ENVS = 2**16  # several GB
 
 
 def check_settings(
@@ -108,17 +122,231 @@ class PickingEnv(EpisodeEnv):
         present = np.arange(task.N_VISIBLE) < len(positions)
         return equalize(seen, self.ties, present=present)
 
-    def _rng_state(self) -> np.ndarray:
-        """The state of ``np_random`` as a plain array."""
-        return np.array(random_state.to_text(self.np_random))
-
-    def _set_rng_state(self, text: np.ndarray) -> None:
-        """Let ``np_random`` go on from what ``_rng_state`` returned."""
-        rng = np.random.default_rng()
-        random_state.set_text(text, rng)
-        self._np_random = rng
-
     def _row(self, action: int) -> int:
         if isinstance(action, np.ndarray) and action.ndim == 0:
             action = action.item()  # what Stable-Baselines3's predict returns
         return checks.integer("action", action, 0, task.N_VISIBLE - 1)
+
+
+class PickingVectorEnv(gymnasium.vector.VectorEnv):
+    """Base of environments in which each action picks one of 128 visible items.
+
+    Args:
+        num_envs: number of environments.
+        equalize, ties, max_picks, position_noise: as for the single environment.
+        render_mode: None; there are no pictures of many containers.
+
+    Raises:
+        TypeError, ValueError: an argument, a seed or actions are not as described.
+        gymnasium.error.ResetNeeded: ``step`` or ``starts`` before ``reset``, or after a call
+            that raised an error half-way.
+        gymnasium.error.ClosedEnvironmentError: use after ``close``.
+    """
+
+    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = task.NUM_ENVS,
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = observation.POSITION_NOISE,
+        render_mode: None = None,
+    ) -> None:
+        self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
+        checked = check_settings(equalize, ties, max_picks, position_noise)
+        self.equalize, self.ties, self.max_picks, self.position_noise = checked
+        checks.one_of("render_mode", render_mode, (None,))
+        shape = (task.N_VISIBLE, 3)
+        self.single_observation_space = gymnasium.spaces.Box(-1, 1, shape, np.float32)
+        self.single_action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._features = (self.equalize, ties == "average", np.float32(TIE_TOLERANCE))
+        self._state = "not started"
+        self._rngs: list[np.random.Generator] = []
+        self._starts = [""] * self.num_envs  # the generators' states before each episode's reset
+        self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
+
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options=None):
+        """Start an episode in every environment. There are no options.
+
+        Args:
+            seed: environment i gets ``seed + i``, or ``seed[i]`` of a sequence; None lets
+                the generators go on, or seeds them at random.
+        """
+        self._check_open()
+        if options:
+            raise ValueError(f"options is {options!r}; expected none")
+        if seed is None:
+            seeds = [None] * self.num_envs
+        elif isinstance(seed, Sequence):
+            seeds = [None if one is None else checks.integer("seed", one, 0) for one in seed]
+            if len(seeds) != self.num_envs:
+                raise ValueError(f"seed holds {len(seeds)} seeds; expected {self.num_envs}")
+        else:
+            first = checks.integer("seed", seed, 0)
+            seeds = range(first, first + self.num_envs)
+        old = self._rngs or [None] * self.num_envs
+        return self._restart(
+            [
+                rng if one is None and rng is not None else seeding.np_random(one)[0]
+                for one, rng in zip(seeds, old)
+            ]
+        )
+
+    def step(self, actions: np.ndarray):
+        """Pick row ``actions[i]``, (num_envs,) int, in environment i.
+
+        Where an episode ends, the next one begins: the observation and infos are the
+        reset's, and ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones.
+        """
+        self._check_started()
+        actions = checks.integer_array("actions", actions, (self.num_envs,))
+        if actions.min() < 0 or actions.max() >= task.N_VISIBLE:
+            raise ValueError(
+                f"actions holds {actions.min()} to {actions.max()}; "
+                f"expected 0 to {task.N_VISIBLE - 1}"
+            )
+        with AllOrReset(self):
+            rewards = self._pick(actions)
+            self._picks += 1
+            terminations = self._emptied()
+            truncations = self._picks == self.max_picks
+            observations, infos = self._look(), self._infos() | self._pick_infos()
+            ended = terminations | truncations
+            if ended.any():
+                observations, infos = self._begin_next(ended, observations, infos)
+            else:
+                infos = _flagged(infos, ~ended)
+        return observations, rewards, terminations, truncations, infos
+
+    def _begin_next(self, ended: np.ndarray, last: np.ndarray, last_infos: dict[str, np.ndarray]):
+        """Begin the next episode where one has ended; return ``step``'s observations and infos.
+
+        Args:
+            ended: (num_envs,) bool.
+            last, last_infos: observations and infos after the pick in every environment.
+        """
+        envs = np.flatnonzero(ended)
+        self._begin(envs, [self._rngs[env] for env in envs])
+        infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
+        if not ended.all():  # a reset has no infos about a pick
+            picks = {name: each for name, each in last_infos.items() if name not in infos}
+            infos |= _flagged(_masked(picks, ~ended), ~ended)
+        final = np.full(self.num_envs, None)
+        for env in envs:
+            final[env] = last[env]
+        infos |= {"final_obs": final, "_final_obs": ended}
+        final_infos = _flagged(_masked(last_infos, ended), ended)
+        infos |= {"final_info": final_infos, "_final_info": ended}
+        return self._look(), infos
+
+    def starts(self) -> np.ndarray:
+        """(num_envs,) str, the generators' states before each environment's latest reset."""
+        self._check_started()
+        return np.array(self._starts)
+
+    def restart(self, starts: np.ndarray):
+        """Begin the episodes again that began from what ``starts`` returned, here or elsewhere.
+
+        Returns:
+            Observations and infos, as ``reset`` does.
+
+        Raises:
+            ValueError: ``starts`` is something else.
+        """
+        self._check_open()
+        if np.shape(starts) != (self.num_envs,):
+            raise ValueError(f"starts has shape {np.shape(starts)}; expected ({self.num_envs},)")
+        return self._restart([rng_of_text("starts", text) for text in starts])
+
+    def _restart(self, rngs: list[np.random.Generator]):
+        """Begin an episode in every environment; return ``reset``'s observations and infos."""
+        self._begin(np.arange(self.num_envs), rngs)
+        self._rngs, self._state = rngs, "running"
+        return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
+
+    def _begin(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+        """Begin an episode in each of these environments."""
+        with AllOrReset(self):
+            for env, rng in zip(envs, rngs):
+                self._starts[env] = text_of_rng(rng)
+            self._picks[envs] = 0
+            self._fill(envs, rngs)
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError("the environment is closed; make a new one")
+
+    def _check_started(self) -> None:
+        self._check_open()
+        if self._state != "running":
+            raise ResetNeeded(f"the episodes are {self._state}; call reset first")
+
+    @abstractmethod
+    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+        """Put fresh items into environments, (k,) int64, drawn from the generator of each."""
+
+    @abstractmethod
+    def _pick(self, actions: np.ndarray) -> np.ndarray:
+        """Carry out checked actions; return the rewards, (num_envs,) float64."""
+
+    @abstractmethod
+    def _emptied(self) -> np.ndarray:
+        """(num_envs,) bool, True where the last item has been unloaded."""
+
+    @abstractmethod
+    def _look(self) -> np.ndarray:
+        """The observations as a fresh array, (num_envs, 128, 3) float32."""
+
+    @abstractmethod
+    def _infos(self) -> dict[str, np.ndarray]:
+        """The infos of ``reset`` and ``step``, without Gymnasium's flags."""
+
+    def _pick_infos(self) -> dict[str, np.ndarray]:
+        """The infos of ``step`` only."""
+        return {}
+
+
+def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
+    """Add Gymnasium's flags that say in which environments there are such infos."""
+    return infos | {f"_{name}": where for name in infos}
+
+
+def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
+    """The infos of some environments, and 0 elsewhere."""
+    infos = {name: values.copy() for name, values in infos.items()}
+    for values in infos.values():
+        values[~where] = 0
+    return infos
+
+
+def text_of_rng(rng: np.random.Generator) -> str:
+    """Return the state of a generator as JSON, to be kept with other plain arrays.
+
+    Raises:
+        TypeError: its bit generator is not a ``PCG64``, as those of ``default_rng`` are.
+    """
+    if not isinstance(rng.bit_generator, np.random.PCG64):
+        raise TypeError(f"the generator is {rng!r}; expected one of numpy.random.default_rng")
+    return json.dumps(rng.bit_generator.state)
+
+
+def rng_of_text(name: str, text: object) -> np.random.Generator:
+    """Return a generator that goes on from what ``text_of_rng`` returned.
+
+    Args:
+        name: what the error calls it.
+        text: str, or an array that holds one.
+
+    Raises:
+        ValueError: ``text`` is something else.
+    """
+    rng = np.random.default_rng()
+    try:
+        rng.bit_generator.state = json.loads(str(text))
+    except (KeyError, OverflowError, RecursionError, TypeError, ValueError) as error:
+        raise ValueError(f"{name} is {text!r}; expected a generator's state") from error
+    return rng

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-from gymnasium.utils import seeding
 
 from unload import task
 from unload.env import observation
@@ -12,11 +11,11 @@ from unload.env.observation import POSITION_NOISE
 from unload.env.render import Camera
 from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
-from unload.physics.choose import make_physics
-from unload.support import checks, random_state
-
-MOST_BLUR = 100.0  # m, ten times the largest standard deviation
-LOAD = ("positions", "sizes", "packages", "walls")  # fields of a Load
+from unload.physics.base import Physics
+from unload.physics.full import AFTER_PICK, FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics, shared_table
+from unload.support import checks
 
 
 class ContainerEnv(PickingEnv):
@@ -115,31 +114,29 @@ class ContainerEnv(PickingEnv):
         super().__init__(equalize, ties, max_picks, position_noise, render_mode)
         check_stack(stack)
         self.stack = stack
-        self.physics = make_physics(physics, after_pick)
+        self.physics = _make_physics(physics, after_pick)
         self._camera: Camera | None = None
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
-        """Fill the container anew; ``options={"load": load}`` gives the load to use.
-
-        If ``stack`` fails, the episode and the generator stay as they were.
-        """
+        """Fill the container anew; ``options={"load": load}`` gives the load to use."""
         self._check_open()
         options = {} if options is None else options
         checks.entries("options", options, ())
         for name in options:
             checks.one_of("options", name, ("load",))
-        rng, number = self.np_random, self._np_random_seed
-        if seed is not None:
-            rng, number = seeding.np_random(seed)
-        with random_state.kept_on_error([rng]):
-            load = options["load"] if "load" in options else self.stack(rng)
-            check_load(load)
-            blur = observation.drift(len(load), self.position_noise, rng)
+        if "load" in options:
+            check_load(options["load"])
+        super().reset(seed=seed)
         with AllOrReset(self):
-            self._np_random, self._np_random_seed = rng, number
-            self._fill(load, blur)
+            load = options["load"] if "load" in options else self.stack(self.np_random)
+            check_load(load)
+            self._blur = observation.drift(len(load), self.position_noise, self.np_random)
+            self.physics.reset(load)
+            self._failed = np.zeros(len(load), dtype=bool)
+            self._picks = self._unloaded = 0
+            self._state = "running"
             self._look()
-        return self._observation.copy(), self._info()
+            return self._observation.copy(), self._info()
 
     def step(self, action: int):
         """Pick the item in row ``action`` of the observation."""
@@ -181,63 +178,6 @@ class ContainerEnv(PickingEnv):
         lifts = [self.physics.lift(item) if item >= 0 else 0.0 for item in self.visible.tolist()]
         return np.array(lifts) >= task.LIFT_THRESHOLD
 
-    def get_state(self) -> dict[str, np.ndarray]:
-        """All that ``set_state`` needs to go on from here, as plain arrays.
-
-        Raises:
-            ValueError: the physics is not restored after a pick, so that the boxes'
-                motion is part of the state.
-        """
-        self._check_started()
-        if not self.physics.exact:
-            raise ValueError("after_pick lets boxes drift; expected 'restore'")
-        load = self.physics.load
-        return {
-            "positions": load.positions,
-            "sizes": load.sizes,
-            "packages": load.packages,
-            "walls": load.walls,
-            "present": self.physics.present.copy(),
-            "blur": self._blur.copy(),
-            "failed": self._failed.copy(),
-            "counts": np.array([self._picks, self._unloaded]),
-            "rng": self._rng_state(),
-        }
-
-    def set_state(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what ``get_state`` returned, here or in another environment.
-
-        Raises:
-            TypeError, ValueError: ``state`` is something else, or does not fit this
-                environment's ``max_picks``. The episode stays as it was.
-        """
-        self._check_open()
-        checks.entries("state", state, (*LOAD, "present", "blur", "failed", "counts", "rng"))
-        load = Load(**{name: state[name] for name in LOAD})
-        count = len(load)
-        present = checks.flag_array("state['present']", state["present"], (count,))
-        failed = checks.flag_array("state['failed']", state["failed"], (count,))
-        blur = checks.finite_array("state['blur']", state["blur"], (count, 3))
-        if np.abs(blur).max() > MOST_BLUR:
-            raise ValueError(
-                f"state['blur'] reaches {np.abs(blur).max()}; expected <= {MOST_BLUR} m"
-            )
-        counts = checks.integer_array("state['counts']", state["counts"], (2,)).tolist()
-        removed = int((~present).sum())
-        picks = checks.integer("state['counts'][0]", counts[0], removed, self.max_picks)
-        unloaded = checks.integer("state['counts'][1]", counts[1], removed, removed)
-        random_state.check_text("state['rng']", state["rng"])
-        with AllOrReset(self):
-            self._set_rng_state(state["rng"])
-            self._fill(load, blur)
-            for item in np.flatnonzero(~present).tolist():
-                self.physics.remove(item)
-            self._failed = failed
-            self._picks, self._unloaded = picks, unloaded
-            if any(self._ends()):
-                self._state = "finished"
-            self._look()
-
     def render(self) -> np.ndarray | None:
         """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
         self._check_started()
@@ -253,13 +193,6 @@ class ContainerEnv(PickingEnv):
         if self._camera is not None:
             self._camera.close()
         super().close()
-
-    def _fill(self, load: Load, blur: np.ndarray) -> None:
-        self.physics.reset(load)
-        self._blur = blur
-        self._failed = np.zeros(len(load), dtype=bool)
-        self._picks = self._unloaded = 0
-        self._state = "running"
 
     def observed_positions(self) -> np.ndarray:
         """(n, 3) float64, where all items of the load are seen to be, in m."""
@@ -286,3 +219,13 @@ class ContainerEnv(PickingEnv):
             "item_mask": (self.visible >= 0).astype(np.int8),
             "unloaded": self._unloaded,
         }
+
+
+def _make_physics(name: str, after_pick: str) -> Physics:
+    checks.one_of("physics", name, ("local", "full", "table"))
+    checks.one_of("after_pick", after_pick, AFTER_PICK)
+    if name == "full":
+        return FullPhysics(after_pick)
+    if after_pick != "restore":
+        raise ValueError(f"after_pick is {after_pick!r}; expected 'restore' for physics={name!r}")
+    return LocalPhysics() if name == "local" else TablePhysics(shared_table())

@@ -7,7 +7,6 @@ from unload.env import observation
 from unload.env.base import AllOrReset, PickingEnv
 from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
-from unload.support import checks, random_state
 
 HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
 # Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
@@ -103,33 +102,6 @@ class HighestItemEnv(PickingEnv):
         """(128,) bool, all True."""
         self._check_started()
         return np.ones(task.N_VISIBLE, dtype=bool)
-
-    def get_state(self) -> dict[str, np.ndarray]:
-        """All that ``set_state`` needs to go on from here, as plain arrays."""
-        self._check_started()
-        return {
-            "picks": np.array(self._picks),
-            "highest": self._highest.copy(),
-            "rng": self._rng_state(),
-        }
-
-    def set_state(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what ``get_state`` returned, here or in another environment.
-
-        Raises:
-            TypeError, ValueError: ``state`` is something else, or does not fit this
-                environment's ``max_picks``. The episode stays as it was.
-        """
-        self._check_open()
-        checks.entries("state", state, ("picks", "highest", "rng"))
-        picks = checks.integer_array("state['picks']", state["picks"], ()).item()
-        picks = checks.integer("state['picks']", picks, 0, self.max_picks)
-        highest = checks.flag_array("state['highest']", state["highest"], (task.N_VISIBLE,))
-        random_state.check_text("state['rng']", state["rng"])
-        with AllOrReset(self):
-            self._set_rng_state(state["rng"])
-            self._picks, self._highest = picks, highest
-            self._state = "finished" if picks == self.max_picks else "running"
 
     def render(self) -> None:
         """None: there is nothing to draw."""

@@ -6,16 +6,15 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
+from unload.env.base import PickingVectorEnv
 from unload.env.fast import containers
 from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
-from unload.env.vector_base import PickingVectorEnv
 from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
-from unload.physics.lift_table import LiftTable
 from unload.physics.situation import Surroundings
-from unload.physics.table import TablePhysics, shared_table
+from unload.physics.table import LiftTable, TablePhysics, shared_table
 from unload.support import checks
 
 
@@ -79,17 +78,11 @@ class ContainerVectorEnv(PickingVectorEnv):
         distances = np.stack([self._look_up(actions)[1] for actions in rows], axis=1)
         return distances >= task.LIFT_THRESHOLD
 
-    def _draw(self, rngs: list[np.random.Generator]) -> list[tuple[Load, np.ndarray]]:
-        drawn = []
-        for rng in rngs:
+    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+        for env, rng in zip(envs, rngs):
             load = self.stack(rng)
             check_load(load)
-            drawn.append((load, drift(len(load), self.position_noise, rng)))
-        return drawn
-
-    def _fill(self, envs: np.ndarray, drawn: list[tuple[Load, np.ndarray]]) -> None:
-        for env, (load, blur) in zip(envs, drawn):
-            self._put(env, load, blur)
+            self._put(env, load, drift(len(load), self.position_noise, rng))
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
@@ -166,7 +159,7 @@ class HighestItemVectorEnv(PickingVectorEnv):
         self._observations = np.zeros(self.observation_space.shape, np.float32)
         self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
 
-    def _draw(self, rngs: list[np.random.Generator]) -> tuple[np.ndarray, np.ndarray]:
+    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
         shape = len(rngs), task.N_VISIBLE
         places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
         for number, rng in enumerate(rngs):
@@ -182,17 +175,12 @@ class HighestItemVectorEnv(PickingVectorEnv):
             observations,
             highest,
         )
-        return observations, highest
-
-    def _fill(self, envs: np.ndarray, drawn: tuple[np.ndarray, np.ndarray]) -> None:
-        self._observations[envs], self._highest[envs] = drawn
+        self._observations[envs], self._highest[envs] = observations, highest
 
     def _pick(self, actions: np.ndarray) -> np.ndarray:
-        rewards = np.where(self._highest[np.arange(self.num_envs), actions], 1.0, -1.0)
-        waiting = actions < 0
-        rewards[waiting] = 0
-        envs = np.flatnonzero(~waiting)
-        self._fill(envs, self._draw([self._rngs[env] for env in envs]))
+        envs = np.arange(self.num_envs)
+        rewards = np.where(self._highest[envs, actions], 1.0, -1.0)
+        self._fill(envs, self._rngs)
         return rewards
 
     def _emptied(self) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from unload import task
-from unload.env.base import AllOrReset, EpisodeEnv
+from unload.env.base import AllOrReset, EpisodeEnv, rng_of_text, text_of_rng
 from unload.heap import generate
 from unload.heap.boxes import Heap, check_heap
 from unload.heap.observation import (
@@ -23,7 +23,7 @@ from unload.heap.observation import (
 )
 from unload.heap.rake import Outcome, Rake
 from unload.physics.bullet import FRICTION
-from unload.support import checks, random_state
+from unload.support import checks
 
 MAX_PICKS = 15  # they unload some 25 to 40 of 100 boxes, the front of the heap
 OBSERVATIONS = {"truth": true_boxes, "camera": camera_boxes}
@@ -216,7 +216,7 @@ class HeapEnv(EpisodeEnv):
             **{name: getattr(self.heap, name).copy() for name in STATE[:4]},
             "failed": self._failed.copy(),
             "counts": np.array([self._picks]),
-            "rng": np.array(random_state.to_text(self.np_random)),
+            "rng": np.array(text_of_rng(self.np_random)),
         }
 
     def set_state(self, state: dict[str, np.ndarray]) -> None:
@@ -233,10 +233,8 @@ class HeapEnv(EpisodeEnv):
         failed = checks.flag_array("state['failed']", state["failed"], (len(heap),))
         counts = checks.integer_array("state['counts']", state["counts"], (1,))
         picks = checks.integer("state['counts'][0]", int(counts[0]), 0, self.max_picks)
-        random_state.check_text("state['rng']", state["rng"])
+        rng = rng_of_text("state['rng']", state["rng"])
         with AllOrReset(self):
-            rng = np.random.default_rng()
-            random_state.set_text(state["rng"], rng)
             self._np_random = rng
             self._start(heap, failed, picks)
             if picks == self.max_picks or not len(heap):

@@ -1,5 +1,4 @@
 """A full container: its boxes, which of them touch, and how a load is stacked.
 
-Read ``contacts``, ``boxes``, ``substacks``, ``colours``, ``still``, ``view`` and ``slider``, in
-this order.
+Read ``boxes``, ``substacks`` and ``view``, in this order.
 """

@@ -1,15 +1,42 @@
-"""The boxes of one container: their places, sizes and contacts."""
+"""The boxes of one container: their places, sizes and contacts.
+
+Overlaps and contacts are those of axis-aligned boxes, given by their lower and upper corners,
+``low`` and ``high``, (n, 3) float64 in m.
+"""
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from unload import task
-from unload.load.contacts import Contacts, contacts
 from unload.support import checks
+from unload.support.compiled import compiled
 
 # Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
 SMALLEST_EDGE = 0.002
+CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
+OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
+ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
+
+
+class Contacts(NamedTuple):
+    """Lists of touching boxes, one after the other in one array.
+
+    The boxes above (0), below (1) or beside (2) box ``b`` are
+    ``boxes[starts[kind, b] : starts[kind, b + 1]]``.
+
+    Attributes:
+        starts: (3, n + 1) int32.
+        boxes: (m,) int32.
+    """
+
+    starts: np.ndarray
+    boxes: np.ndarray
+
+    def of(self, kind: int, box: int) -> np.ndarray:
+        """The boxes that touch ``box``, (k,) int32."""
+        return self.boxes[self.starts[kind, box] : self.starts[kind, box + 1]]
 
 
 @dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
@@ -88,3 +115,110 @@ def check_stack(stack: object) -> None:
     """Raise TypeError unless ``stack`` is callable, as what makes a load must be."""
     if not callable(stack):
         raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+
+
+def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Number groups of intervals between which there is no overlap, such as item walls.
+
+    Args:
+        low, high: (n,) start and end of each interval, for example along x.
+
+    Returns:
+        (n,) int64, each interval's group, 0 being the lowest.
+    """
+    order = np.argsort(low, kind="stable")
+    reach = np.maximum.accumulate(high[order])
+    groups = np.empty(len(low), np.int64)
+    groups[order] = np.append(0, np.cumsum(low[order][1:] >= reach[:-1]))
+    return groups
+
+
+def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
+    """Find which boxes stand on each other, and which stand side by side.
+
+    Boxes touch only where they share a stretch of depth, and of height or width.
+
+    Args:
+        low, high: (n, 3) float64, corners in m.
+
+    Raises:
+        ValueError: two boxes overlap.
+    """
+    groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
+    left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
+    found, first, second = _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
+    if first != second:
+        pair = min(first, second), max(first, second)
+        raise ValueError(f"boxes {pair[0]} and {pair[1]} overlap; expected disjoint boxes")
+    return Contacts(*_lists(found, len(low)))
+
+
+@compiled
+def _find(low, high, order, ends):
+    """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
+
+    Args:
+        low, high: corners.
+        order: (n,) the boxes, slab by slab, from left to right in each.
+        ends: where in ``order`` each slab ends.
+    """
+    count, start = 0, 0
+    found = np.empty((8 * len(order) + 4, 3), np.int32)
+    # One array each: what is read next is near what was read last.
+    x0, y0, z0 = _columns(low, order)
+    x1, y1, z1 = _columns(high, order)
+    for end in ends:
+        for i in range(start, end):
+            if count + 2 * (end - i) > len(found):
+                found = np.concatenate((found, np.empty_like(found)))
+            limit = y1[i] + CONTACT_TOLERANCE
+            for j in range(i + 1, end):
+                if y0[j] > limit:
+                    break  # j begins to the right of i, and so do all further ones
+                # Lengths of the stretches that both share; below 0 the gap between them.
+                upwards = min(z1[i], z1[j]) - max(z0[i], z0[j])
+                if upwards < -CONTACT_TOLERANCE:
+                    continue
+                across = min(y1[i], y1[j]) - y0[j]
+                along = min(x1[i], x1[j]) - max(x0[i], x0[j])
+                if min(across, upwards, along) > OVERLAP:
+                    return found[:count], order[i], order[j]
+                if max(across, upwards) <= CONTACT_TOLERANCE or along <= CONTACT_TOLERANCE:
+                    continue
+                one, other = BESIDE, BESIDE  # what j is to i, and i to j
+                if across > CONTACT_TOLERANCE:
+                    one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
+                found[count, 0], found[count, 1], found[count, 2] = one, order[i], order[j]
+                count += 1
+                found[count, 0], found[count, 1], found[count, 2] = other, order[j], order[i]
+                count += 1
+        start = end
+    return found[:count], 0, 0
+
+
+@compiled
+def _columns(corners, order):
+    """x, y and z of corners in this order."""
+    x, y, z = np.empty(len(order)), np.empty(len(order)), np.empty(len(order))
+    for i, box in enumerate(order):
+        x[i], y[i], z[i] = corners[box]
+    return x, y, z
+
+
+@compiled
+def _lists(found, count):
+    """``starts`` and ``boxes`` of ``Contacts``."""
+    starts = np.zeros((3, count + 1), np.int32)
+    for row in range(len(found)):
+        starts[found[row, 0], found[row, 1]] += 1
+    total = 0
+    for kind in range(3):  # from the number of a box's contacts to the end of its list
+        for box in range(count + 1):
+            total += starts[kind, box]
+            starts[kind, box] = total
+    boxes = np.empty(total, np.int32)
+    for row in range(len(found)):  # fills each list from its end, which leaves its start
+        kind, box = found[row, 0], found[row, 1]
+        starts[kind, box] -= 1
+        boxes[starts[kind, box]] = found[row, 2]
+    return starts, boxes

@@ -6,7 +6,6 @@ All have ``reset(load)``, ``lift(item)``, ``remove(item)``, ``positions()`` and 
 """
 
 from abc import ABC, abstractmethod
-from threading import RLock
 
 import numpy as np
 
@@ -17,8 +16,6 @@ from unload.support import checks
 
 class Physics(ABC):
     """A container whose items can be lifted.
-
-    Threads may share one physics: its methods wait for each other.
 
     Attributes:
         exact: True where unlifted boxes stay exactly where the load put them.
@@ -36,7 +33,6 @@ class Physics(ABC):
         self.present = np.zeros(0, dtype=bool)
         self._closed = False
         self._world: World | None = None  # started when it is first needed
-        self._lock = RLock()  # a simulator serves one caller at a time
 
     def reset(self, load: Load) -> None:
         """Fill the container with ``load``.
@@ -45,16 +41,11 @@ class Physics(ABC):
             TypeError: ``load`` is not a ``Load``.
         """
         check_load(load)
-        with self._lock:
-            self._check_open()
-            self.load = load
-            self.present = np.ones(len(load), dtype=bool)
-            try:
-                self._reset()
-            except BaseException:  # interrupted: nothing may be lifted in a half-filled container
-                self.load = None
-                self._stop()
-                raise
+        self._check_open()
+        self.load = None  # until it is filled: nothing may be lifted in a half-filled container
+        self.present = np.ones(len(load), dtype=bool)
+        self._reset(load)
+        self.load = load
 
     def lift(self, item: int) -> float:
         """Try to lift an item; return how far it moved, in m (Sec. III-C, appendix).
@@ -62,8 +53,7 @@ class Physics(ABC):
         Raises:
             ValueError: the item does not exist or has been removed.
         """
-        with self._lock:
-            return self._lift(self._check(item))
+        return self._lift(self._check(item))
 
     def remove(self, item: int) -> None:
         """Take an item out of the container.
@@ -71,22 +61,19 @@ class Physics(ABC):
         Raises:
             ValueError: the item does not exist or has been removed.
         """
-        with self._lock:
-            item = self._check(item)
-            self.present[item] = False
-            self._remove(item)
+        item = self._check(item)
+        self.present[item] = False
+        self._remove(item)
 
     def positions(self) -> np.ndarray:
         """(n, 3) float64, the centre of each item in m; removed items keep their last one."""
-        with self._lock:
-            self._check_filled()
-            return self._positions()
+        self._check_filled()
+        return self._positions()
 
     def close(self) -> None:
         """Free the simulator; may be called again."""
-        with self._lock:
-            self._closed = True
-            self._stop()
+        self._closed = True
+        self._stop()
 
     def _stop(self) -> None:
         if self._world is not None:
@@ -110,7 +97,7 @@ class Physics(ABC):
         return item
 
     @abstractmethod
-    def _reset(self) -> None: ...
+    def _reset(self, load: Load) -> None: ...
 
     @abstractmethod
     def _lift(self, item: int) -> float: ...

@@ -1,24 +1,22 @@
 """Lifts in a simulation of every box of the container."""
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from unload import task
+from unload.load.boxes import Load
 from unload.physics.base import Physics
 from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
 from unload.physics.situation import RESOLUTION
 from unload.support import checks
 
 AFTER_PICK = ("restore", "restore_failure", "keep")
-DEPOT = -100.0  # m, height of the floor far below on which spare boxes wait
+DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
 
 class FullPhysics(Physics):
     """Simulates every box of the container.
-
-    Boxes are created once and moved to their places at each reset (Sec. III-A).
 
     Args:
         after_pick: what is done with the other boxes after a pick. ``"restore"`` puts all
@@ -35,17 +33,12 @@ class FullPhysics(Physics):
         super().__init__()
         self.after_pick = after_pick
         self.exact = after_pick == "restore"
-        self._bodies_of_size: dict[tuple[int, ...], list[int]] = {}  # by edges in micrometres
-        self._bodies: list[int] = []  # of the load's items
 
-    def _start(self) -> None:
-        """Start a world that holds floor and walls only."""
+    def _reset(self, load: Load) -> None:
         self._stop()
-        # Rigid bodies are twice as fast to lift, but moving them far rebuilds a part of
-        # Bullet's search tree: a reset takes longer than creating them anew. Where nothing
-        # is put back, resets are rare beside lifts.
+        # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
+        # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
         self._world = World(maximal_coordinates=self.after_pick == "keep")
-        self._bodies_of_size, self._bodies = {}, []
         length, width, height = task.CONTAINER
         for position, size in (
             ((length / 2, width / 2, -0.5), (length + 2, width + 2, 1)),  # floor
@@ -55,33 +48,12 @@ class FullPhysics(Physics):
             ((0, 0, DEPOT - 0.5), (2000, 2000, 1)),
         ):
             self._world.add_box(position, size, 0)
-
-    def _reset(self) -> None:
-        sizes = list(map(tuple, np.rint(self.load.sizes / RESOLUTION).astype(int).tolist()))
-        if self._world is None or 2 * self._useless(sizes) > len(sizes):
-            self._start()
-        self._clear(self._bodies)
-        self._poses = [(tuple(position), UPRIGHT) for position in self.load.positions.tolist()]
-        self._bodies = []
-        used: Counter[tuple[int, ...]] = Counter()
-        for (position, _), size in zip(self._poses, sizes):
-            self._bodies.append(self._take(size, used[size], position))
-            used[size] += 1
-
-    def _useless(self, sizes: Iterable[tuple[int, ...]]) -> int:
-        """The number of bodies of other sizes, which cost time because they are simulated, too."""
-        other = self._bodies_of_size.keys() - sizes
-        return sum(len(self._bodies_of_size[size]) for size in other)
-
-    def _take(self, size: tuple[int, ...], number: int, position: tuple[float, ...]) -> int:
-        """Put the body of this size and number in its place; create it if there is none."""
-        bodies = self._bodies_of_size.setdefault(size, [])
-        if number == len(bodies):
-            edges = slim(np.array(size) * RESOLUTION)
-            bodies.append(self._world.add_box(position, edges, task.MASS))
-            return bodies[number]
-        self._world.place(bodies[number], position)
-        return bodies[number]
+        sizes = np.rint(load.sizes / RESOLUTION) * RESOLUTION
+        self._bodies = [
+            self._world.add_box(position, slim(size), task.MASS)
+            for position, size in zip(load.positions, sizes)
+        ]
+        self._poses = [(tuple(position), UPRIGHT) for position in load.positions.tolist()]
 
     def _clear(self, bodies: Sequence[int]) -> None:
         """Empty the container, so that Bullet forgets the contacts in it.
@@ -94,7 +66,7 @@ class FullPhysics(Physics):
         self._world.step(TIME_STEP)
 
     def _park(self, body: int) -> None:
-        """Keep a body for a later load, on a place of its own in the depot."""
+        """Move a body to a place of its own in the depot."""
         row, column = divmod(body, 100)
         self._world.place(body, (8.0 * row, 3.0 * column, DEPOT + task.CONTAINER[2] / 2))
 
@@ -104,10 +76,9 @@ class FullPhysics(Physics):
         Raises:
             TypeError, ValueError: ``seconds`` is no finite number >= 0.
         """
-        with self._lock:
-            self._check_filled()
-            self._world.step(seconds)
-            self._keep()
+        self._check_filled()
+        self._world.step(seconds)
+        self._keep()
 
     def _lift(self, item: int) -> float:
         try:

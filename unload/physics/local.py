@@ -3,6 +3,7 @@
 import numpy as np
 
 from unload import task
+from unload.load.boxes import Load
 from unload.physics.base import Physics
 from unload.physics.bullet import World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
@@ -29,15 +30,14 @@ class LocalPhysics(Physics):
         Raises:
             RuntimeError: the physics is closed.
         """
-        with self._lock:
-            self._check_open()
-            if self._world is None or self._world.shapes >= MOST_SHAPES:
-                self._stop()
-                self._world = World()
-            return lift(self._world, situation)
+        self._check_open()
+        if self._world is None or self._world.shapes >= MOST_SHAPES:
+            self._stop()
+            self._world = World()
+        return lift(self._world, situation)
 
-    def _reset(self) -> None:
-        self.surroundings = Surroundings(self.load, self.present)
+    def _reset(self, load: Load) -> None:
+        self.surroundings = Surroundings(load, self.present)
 
     def _lift(self, item: int) -> float:
         return self.simulate(self.surroundings.situation(item))

@@ -11,8 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load
-from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
+from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load
 
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 

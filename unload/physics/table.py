@@ -1,16 +1,140 @@
-"""Local physics with a memory: each situation is simulated once."""
+"""Local physics with a memory: each situation is simulated once.
 
+A lift depends on its situation alone, so a table of lifts says how far the box of a situation
+moved. The table is only as good as the physics that filled it: a file of another physics is
+refused.
+"""
+
+import json
 from functools import cache
-from threading import Lock
+from pathlib import Path
 
-from unload.physics.lift_table import LiftTable
+import numpy as np
+
+from unload.physics.bullet import SETTINGS
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
-from unload.support import files
+from unload.support import checks, files
+from unload.support.compiled import compiled
 
 HELD_DOWN = 3  # boxes on top that no lift moves
 LIFTS_FILE = files.DATA / "lifts.npz"
-_reading = Lock()
+EMPTY = np.uint64(0)  # digest of a free slot
+FEWEST_SLOTS = 1024
+FARTHEST = np.iinfo(np.int32).max / 1e6  # m
+
+
+class LiftTable:
+    """Distances in micrometres by the digest of a situation; empty at first.
+
+    A hash table in two arrays, so that compiled code can look into it, too. Among a
+    million situations two share a 64-bit digest with a probability of 3e-8.
+
+    Attributes:
+        slots: digests, (n,) uint64, 0 in free slots, and their distances in micrometres,
+            (n,) int32. n is a power of two, and at least half of the slots are free.
+    """
+
+    def __init__(self) -> None:
+        self._hold(np.zeros(0, np.uint64), np.zeros(0, np.int32))
+
+    def __len__(self) -> int:
+        return self._count
+
+    def find(self, situation: Situation) -> float | None:
+        """Return the distance in m that the table holds for a situation, or None."""
+        digests, micrometres = self.slots
+        digest = _digest(situation)
+        slot = slot_of(digests, digest)
+        return int(micrometres[slot]) / 1e6 if digests[slot] == digest else None
+
+    def add(self, situation: Situation, distance: float) -> None:
+        """Remember a lift. A situation that is known keeps its distance.
+
+        Args:
+            situation: of the box.
+            distance: how far it moved in m, kept in whole micrometres.
+
+        Raises:
+            TypeError, ValueError: ``distance`` is no number from 0 to 2147 m.
+        """
+        distance = checks.real("distance", distance, 0, FARTHEST)
+        digest = _digest(situation)
+        digests, micrometres = self.slots
+        slot = slot_of(digests, digest)
+        if digests[slot] != EMPTY:
+            return
+        digests[slot], micrometres[slot] = digest, round(distance * 1e6)
+        self._count += 1
+        if 2 * self._count > len(digests):
+            self._hold(*self.entries())
+
+    def entries(self) -> tuple[np.ndarray, np.ndarray]:
+        """All digests (n,) uint64 in increasing order, and their distances (n,) int32."""
+        digests, micrometres = self.slots
+        filled = np.flatnonzero(digests)
+        order = filled[np.argsort(digests[filled])]
+        return digests[order], micrometres[order]
+
+    def _hold(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
+        """Start new arrays with these entries."""
+        size = max(FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
+        slots = np.full(size, EMPTY), np.zeros(size, np.int32)
+        _fill(*slots, digests, micrometres)
+        self.slots, self._count = slots, len(digests)
+
+    def save(self, path: str | Path) -> None:
+        """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
+        digests, micrometres = self.entries()
+        settings = np.array(json.dumps(SETTINGS))
+        arrays = {"digests": digests, "micrometres": micrometres, "settings": settings}
+        files.write_arrays(path, arrays)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "LiftTable":
+        """Read a table that ``save`` wrote.
+
+        Raises:
+            FileNotFoundError: there is no such file.
+            ValueError: the file is damaged, or was made with other physics settings.
+        """
+        arrays = files.read_arrays(path)
+        if set(arrays) != {"digests", "micrometres", "settings"}:
+            raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
+        _check_settings(path, str(arrays["settings"]))
+        digests, micrometres = arrays["digests"], arrays["micrometres"]
+        for name, array, dtype in (("digests", digests, "u8"), ("micrometres", micrometres, "i4")):
+            if array.dtype != dtype or array.shape != (digests.size,):
+                raise ValueError(
+                    f"{path} holds {name} of shape {array.shape} and dtype {array.dtype}; "
+                    f"expected {(digests.size,)} {np.dtype(dtype)}"
+                )
+        if digests.size and not (digests[0] > EMPTY and (digests[1:] > digests[:-1]).all()):
+            raise ValueError(f"{path} holds digests out of order; expected increasing ones > 0")
+        if (micrometres < 0).any():
+            raise ValueError(f"{path} holds {micrometres.min()} micrometres; expected all >= 0")
+        table = cls()
+        table._hold(digests, micrometres)
+        return table
+
+
+def _check_settings(path: str | Path, text: str) -> None:
+    """Raise ValueError unless the file's settings, in JSON, are those of this physics."""
+    try:
+        settings = json.loads(text)
+    except (ValueError, RecursionError):
+        settings = None
+    if not isinstance(settings, dict):
+        raise ValueError(f"{path} has settings {text!r}; expected those of a physics in JSON")
+    differing = []
+    for name in sorted({*settings, *SETTINGS}):
+        there, here = (values.get(name, "missing") for values in (settings, SETTINGS))
+        if there != here:
+            differing.append(f"{name} is {there!r} there and {here!r} here")
+    if differing:
+        raise ValueError(
+            f"{path} is of another physics: {'; '.join(differing)}; remove it to fill a new one"
+        )
 
 
 class TablePhysics(LocalPhysics):
@@ -21,8 +145,8 @@ class TablePhysics(LocalPhysics):
     lifts none by more than 4 cm.
 
     Args:
-        table: filled as situations are met. Share one among environments and threads to
-            share their experience; one of its own if None.
+        table: filled as situations are met. Share one among environments to share their
+            experience; one of its own if None.
 
     Raises:
         TypeError: ``table`` is something else.
@@ -50,12 +174,45 @@ class TablePhysics(LocalPhysics):
         return distance
 
 
+@cache
 def shared_table() -> LiftTable:
     """The lifts known to this process: those of ``data/lifts.npz``, and all made since."""
-    with _reading:  # two threads that ask first get the same table
-        return _read_once()
-
-
-@cache
-def _read_once() -> LiftTable:
     return LiftTable.load(LIFTS_FILE) if LIFTS_FILE.exists() else LiftTable()
+
+
+def _digest(situation: Situation) -> np.uint64:
+    return np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
+
+
+@compiled
+def absorb(digest, word):
+    """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
+    digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
+    return digest ^ (digest >> np.uint64(29))
+
+
+@compiled
+def digest_of(words):
+    """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
+    digest = np.uint64(len(words))
+    for word in words:
+        digest = absorb(digest, word)
+    return max(digest, np.uint64(1))
+
+
+@compiled
+def slot_of(digests, digest):
+    """The slot of a digest, or the free one where it belongs."""
+    last = np.uint64(len(digests) - 1)
+    slot = (digest ^ (digest >> np.uint64(32))) & last
+    while digests[slot] != EMPTY and digests[slot] != digest:
+        slot = (slot + np.uint64(1)) & last
+    return slot
+
+
+@compiled
+def _fill(digests, micrometres, new_digests, new_micrometres):
+    """Put entries into free slots."""
+    for entry in range(len(new_digests)):
+        slot = slot_of(digests, new_digests[entry])
+        digests[slot], micrometres[slot] = new_digests[entry], new_micrometres[entry]

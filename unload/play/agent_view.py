@@ -5,9 +5,8 @@ import numpy as np
 
 from unload.env.equalization import TIES
 from unload.env.observation import POSITION_NOISE, drift
-from unload.load.colours import COLOURS
 from unload.load.substacks import stack_load
-from unload.load.view import view
+from unload.load.view import COLOURS, view
 from unload.play.canvas import ABSENT, Canvas
 from unload.play.players import AGENTS, Run, policy_of
 from unload.play.sight import Sight, look

@@ -50,7 +50,7 @@ class Moment:
     pick: Pick | None
 
     def groups(self) -> dict[str, np.ndarray]:
-        """Items by the names of ``unload.load.colours.COLOURS``, the later name holds."""
+        """Items by the names of ``unload.load.view.COLOURS``, the later name holds."""
         groups = {"visible": self.visible, "tried": self.failed}
         if self.pick is not None and not self.pick.success:
             groups["failed"] = np.array([self.pick.item])
@@ -76,10 +76,12 @@ class Episode:
     def __init__(self, load: Load, seed: int = 0, physics: str = "table") -> None:
         checks.one_of("physics", physics, ("local", "table"))
         self._env = ContainerEnv(physics, max_picks=sys.maxsize)
-        self._now = self._env.reset(seed=checks.integer("seed", seed, 0), options={"load": load})
-        self.load = load
+        self.load, self._seed = load, checks.integer("seed", seed, 0)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._now = self._env.reset(seed=self._seed, options={"load": self.load})
         self.picks: list[Pick] = []
-        self._past: list[tuple] = []  # before each pick: the environment's state, what was seen
 
     @property
     def observation(self) -> np.ndarray:
@@ -112,24 +114,21 @@ class Episode:
         surroundings = Surroundings(self.load, self._env.physics.present)
         on_top = tuple(surroundings.on_top(item))
         deadlocked = self.allowed()[rows[0]] == 0
-        before = self._env.get_state(), self._now
         observation, reward, _, _, info = self._env.step(int(rows[0]))
-        self._past.append(before)
         self._now = observation, info
         self.picks.append(Pick(item, info["distance"], reward > 0, on_top, bool(deadlocked)))
         return self.picks[-1]
 
     def back_to(self, count: int) -> None:
-        """Take back all picks but the first ``count``.
+        """Take back all picks but the first ``count``, which are made again.
 
         Raises:
             ValueError: there are fewer.
         """
-        count = checks.integer("count", count, 0, len(self.picks))
-        if count < len(self.picks):
-            state, self._now = self._past[count]
-            self._env.set_state(state)
-            del self.picks[count:], self._past[count:]
+        made = self.picks[: checks.integer("count", count, 0, len(self.picks))]
+        self._begin()
+        for pick in made:
+            self.pick(pick.item)
 
     def moment(self, count: int | None = None) -> Moment:
         """The container after the first ``count`` picks; after all of them if None."""

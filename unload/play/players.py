@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 
 from unload.agent import policies
-from unload.agent.weights import load_policy
+from unload.agent.greedy import load_policy
 from unload.load.boxes import Load
 from unload.play.episode import Episode
 from unload.support import checks, files
@@ -55,7 +55,6 @@ class Run(Episode):
         self._policy = policy_of(player)
         self._mask = checks.boolean("mask", mask)
         super().__init__(load, seed)
-        self._seed = seed
 
     @property
     def mask(self) -> bool:

@@ -6,8 +6,8 @@ import ipywidgets as widgets
 import numpy as np
 
 from unload import task
-from unload.load.colours import COLOURS
 from unload.load.substacks import stack_load
+from unload.load.view import COLOURS
 from unload.play.canvas import ABSENT, Canvas
 from unload.play.episode import Episode, Moment, explain
 from unload.play.players import PLAYERS, Run

@@ -3,9 +3,7 @@
 import numpy as np
 import plotly.graph_objects as go
 
-from unload.load.colours import COLOURS
-from unload.load.slider import buttons, slider
-from unload.load.view import View, layout, mesh, view
+from unload.load.view import COLOURS, View, buttons, layout, mesh, slider, view
 from unload.play.episode import Episode
 from unload.support import checks
 

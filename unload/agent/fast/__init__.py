@@ -1,4 +1,4 @@
 """The compiled twin of the learner.
 
-Read ``learner``, ``fused``, its loops in ``kernel``, ``adam``, and ``ranks``, in this order.
+Read ``learner``, ``fused``, and its loops in ``kernel``, in this order.
 """

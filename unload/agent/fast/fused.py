@@ -191,7 +191,7 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
 def _check(observations: np.ndarray, ranks: bool = False) -> tuple[int, int]:
     """Batch size and number of items of (batch, items, 3) float32 observations.
 
-    With ``ranks``, they may also be bytes, see ``unload.agent.fast.ranks``.
+    With ``ranks``, they may also be bytes, see ``kernel.encode``.
     """
     if ranks and observations.dtype == np.uint8 and observations.shape[1:] == (task.N_VISIBLE, 3):
         return observations.shape[:2]

@@ -2,6 +2,10 @@
 
 Features are handled in blocks of ``BLOCK``, whose numbers lie in one flat array; samples in
 chunks of ``CHUNK``, which several threads share.
+
+Equalized observations may be in bytes: a quarter of the memory, and not a bit lost. Among 128
+items, a coordinate (2 r - 127) / 127 is told by twice the item's rank r, which is an integer from
+0 to 254 even where ties share the mean of their ranks.
 """
 
 import numpy as np
@@ -10,6 +14,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from unload import task
+from unload.env.fast.ranking import LEVELS
 from unload.support.compiled import compiled
 
 CHUNK = 32  # samples whose gradients are summed in single precision
@@ -32,6 +37,7 @@ FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
 ZERO, ONE = np.float32(0), np.float32(1)
 LAST = np.float32(task.N_VISIBLE - 1)  # greatest rank
 SHARE = ONE / LAST
+COORDINATES = LEVELS[task.N_VISIBLE]  # by twice the rank
 
 
 @intrinsic
@@ -116,7 +122,7 @@ def add_chunks(
     """Sum the gradients and losses of each chunk into its row of ``partial``.
 
     Several threads may call this with the same ``counter``, and share the chunks. Observations
-    in bytes are those of ``unload.agent.fast.ranks``.
+    in bytes are those of ``encode``.
     """
     n, items = len(bias), observations.shape[1]
     samples = observations.reshape(len(observations), 3 * items)
@@ -504,3 +510,37 @@ def best_items(observations, allowed, weight, bias, score, actions):
                 break
             if scores[i] > best:
                 best, actions[sample] = scores[i], i
+
+
+def encode(observations: np.ndarray) -> np.ndarray:
+    """Twice the ranks, uint8 of the same shape as ``observations``, float32.
+
+    Raises:
+        ValueError: a number is no equalized coordinate of 128 items, as it happens where fewer
+            are left.
+    """
+    codes = np.empty(observations.shape, np.uint8)
+    numbers = np.ascontiguousarray(observations).reshape(-1)
+    if not _encode(numbers, codes.reshape(-1)):
+        wrong = numbers[decode(codes).reshape(-1) != numbers][0]
+        raise ValueError(
+            f"observations holds {wrong}; expected equalized coordinates of {task.N_VISIBLE} items"
+        )
+    return codes
+
+
+def decode(codes: np.ndarray) -> np.ndarray:
+    """The observations that ``encode`` was given."""
+    return COORDINATES[codes]
+
+
+@compiled
+def _encode(numbers, codes):
+    """Fill ``codes``; whether all can be decoded."""
+    exact = True
+    for i in range(len(numbers)):
+        twice = np.rint(numbers[i] * LAST + LAST)
+        code = np.uint8(np.int32(min(max(twice, np.float32(0)), 2 * LAST)))
+        codes[i] = code
+        exact &= level(np.float32(code)) == numbers[i]
+    return exact

@@ -12,10 +12,9 @@ import numpy as np
 
 from unload import task
 from unload.env.fast.ranking import features, rank, remove, replace
-from unload.load.contacts import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
-from unload.physics.lift_table import EMPTY, absorb, slot_of
+from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
 from unload.physics.situation import RESOLUTION
-from unload.physics.table import HELD_DOWN
+from unload.physics.table import EMPTY, HELD_DOWN, absorb, slot_of
 from unload.support.compiled import compiled
 
 CONTAINER_WIDTH = float(task.CONTAINER[1])
@@ -110,13 +109,13 @@ def show(containers, env, rows, equalize, average, tolerance):
 def look_up(containers, actions, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
-    Where the row is padded, or the action is -1, the item is -1 and moves by 0.
+    Where the row is padded, the item is -1 and moves by 0.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     members = np.empty(containers.present.shape[1], np.int32)
     for env in range(len(actions)):
         row = actions[env]
-        items[env] = containers.visible[env, row] if row >= 0 else -1
+        items[env] = containers.visible[env, row]
         if items[env] < 0:
             distances[env] = 0
             continue
@@ -135,16 +134,10 @@ def look_up(containers, actions, digests, micrometres):
 
 @compiled
 def pick(containers, actions, distances, equalize, average, tolerance):
-    """Unload the items that moved far enough; the rewards, (E,) float64.
-
-    Where the action is -1 nothing happens, and the reward is 0.
-    """
+    """Unload the items that moved far enough; the rewards, (E,) float64."""
     rewards = np.empty(len(actions))
     for env in range(len(actions)):
         row = actions[env]
-        if row < 0:
-            rewards[env] = 0
-            continue
         if distances[env] < task.LIFT_THRESHOLD:
             rewards[env] = -1
             containers.masks[env, row] = 0

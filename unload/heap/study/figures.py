@@ -22,9 +22,7 @@ from unload.heap.study.table import (
     SHOWN_WEIGHT,
     read_heap_table,
 )
-from unload.load.colours import COLOURS
-from unload.load.still import CORNERS, EYE, project
-from unload.load.view import SEAM
+from unload.load.view import COLOURS, CORNERS, EYE, SEAM, project
 from unload.reproduce.style import mark_reduced, styled
 from unload.support import files
 
@@ -164,7 +162,7 @@ def expected_fates(
     colours[box] = dragged
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
     draw_heap(left, before, colours, "expected by the network")
-    draw_heap(right, before, colours_of(meanings(outcome, box)), "after the pick")
+    draw_heap(right, before, colours_of(meanings(outcome, box)), "what the pick does")
     add_legend(figure)
     return figure
 

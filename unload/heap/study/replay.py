@@ -21,10 +21,7 @@ from unload.heap.study.figures import (
     draw_heap,
     meanings,
 )
-from unload.load.colours import css
-from unload.load.slider import buttons, slider
-from unload.load.still import CORNERS, EYE
-from unload.load.view import TRIANGLES, UNIT, View, layout
+from unload.load.view import CORNERS, EYE, TRIANGLES, UNIT, View, buttons, css, layout, slider
 from unload.reproduce.style import STYLE
 from unload.support import checks
 

@@ -61,7 +61,7 @@ def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
     """Learning curves of the laboratory, side by side in one panel.
 
     Args:
-        curves: name → curve of a run, see ``unload.agent.curve``.
+        curves: name → curve of a run, see ``unload.agent.training``.
     """
     figure, axes = plt.subplots()
     for name, curve in curves.items():

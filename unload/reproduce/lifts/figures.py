@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Polygon, Rectangle
 
 from unload import task
-from unload.load.colours import COLOURS
+from unload.load.view import COLOURS
 from unload.reproduce.style import styled
 from unload.support import checks
 

@@ -13,9 +13,7 @@ from unload.agent.evaluation import Policy
 from unload.env import observation
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
-from unload.load.colours import COLOURS, css
-from unload.load.still import CORNERS, FACES, back_to_front, project
-from unload.load.view import corners
+from unload.load.view import COLOURS, CORNERS, FACES, back_to_front, corners, css, project
 from unload.support import checks, files
 
 WIDTH, HEIGHT = 440, 410  # of one agent's half, in pixels
@@ -144,7 +142,7 @@ def _palette(frames: list[Image.Image]) -> Image.Image:
 
 
 class Painter:
-    """Paints the boxes of one load as ``unload.load.still`` draws it, but fast enough for a film.
+    """Paints the boxes of one load as ``unload.load.view`` draws it, but fast enough for a film.
 
     Args:
         load: the boxes.

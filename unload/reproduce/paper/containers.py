@@ -10,8 +10,8 @@ from matplotlib.patches import Patch, Rectangle
 
 from unload import task
 from unload.load.boxes import Load, check_load
-from unload.load.colours import COLOURS
 from unload.load.substacks import package_colour
+from unload.load.view import COLOURS
 from unload.reproduce.style import styled
 from unload.support import checks
 

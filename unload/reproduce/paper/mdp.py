@@ -8,8 +8,8 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
 from unload.env import observation
 from unload.env.equalization import equalize
-from unload.load.colours import COLOURS
 from unload.load.substacks import package_colour, stack_load
+from unload.load.view import COLOURS
 from unload.reproduce.paper.observation import EQUALIZED
 from unload.reproduce.style import styled
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from unload import task
 from unload.env import observation
 from unload.env.equalization import equalize
-from unload.load.colours import COLOURS
+from unload.load.view import COLOURS
 from unload.reproduce.paper.containers import draw_items
 from unload.reproduce.results import COMMAND, measured, publish, read_table
 from unload.reproduce.style import styled

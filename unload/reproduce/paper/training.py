@@ -13,8 +13,7 @@ import pandas as pd
 from unload import task
 from unload.agent.checkpoint import RunFolder
 from unload.agent.evaluation import Policy, evaluate
-from unload.agent.greedy import Greedy
-from unload.agent.weights import save_policy
+from unload.agent.greedy import Greedy, save_policy
 from unload.env.container import ContainerEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.reproduce.grid import read_grid, read_policies, train_grid

@@ -12,7 +12,7 @@ from matplotlib.ticker import EngFormatter
 
 from unload import task
 from unload.load.boxes import Load
-from unload.load.colours import COLOURS
+from unload.load.view import COLOURS
 from unload.reproduce.paper.grids import PAPER
 from unload.reproduce.paper.training import default_curves, episode_means
 from unload.reproduce.style import mark_reduced, styled

@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 
 from unload.agent import policies
 from unload.agent.evaluation import Policy, evaluate
-from unload.agent.weights import load_policy
+from unload.agent.greedy import load_policy
 from unload.load.substacks import stack_load
 from unload.reproduce.results import COMMAND, JOBS, measured, publish
 from unload.support import checks, files

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 
 from unload import task
 from unload.load.boxes import Load
-from unload.load.colours import COLOURS
+from unload.load.view import COLOURS
 from unload.physics.situation import RESOLUTION, Situation
 from unload.reproduce.results import read_table
 from unload.reproduce.style import styled

@@ -14,8 +14,7 @@ from pathlib import Path
 
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import evaluate
-from unload.agent.greedy import Greedy
-from unload.agent.weights import load_policy, save_policy
+from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.reproduce.changes import height_reward
 from unload.reproduce.grid import Cell, Grid, train_grid
 from unload.reproduce.results import COMMAND, JOBS
