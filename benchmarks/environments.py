@@ -1,25 +1,60 @@
-"""Picks per second of the environments, with random actions."""
+"""Lifts per second of each physics, and picks per second of each environment."""
 
-import time
-import tracemalloc
 from collections.abc import Callable
 
 import gymnasium
 import numpy as np
-import pandas as pd
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
+import unload
 from benchmarks.timing import best_times
 from unload import task
+from unload.physics.base import Physics
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics
 
 CONTAINER = "unload/Container-v0"
-LOADS = 64  # different ones
+
+
+def lift_rates(load: unload.Load, full: int = 2, others: int = 100, rounds: int = 2) -> dict:
+    """Lifts per second in a full container, all known to the table.
+
+    Args:
+        load: the container's.
+        full: lifts of one round of ``FullPhysics``, which needs seconds for each.
+        others: lifts of one round of the others.
+        rounds: see ``best_times``.
+
+    Returns:
+        By physics.
+    """
+    items = np.random.default_rng(0).permutation(len(load)).tolist()
+    answering = {"full": FullPhysics(), "local": LocalPhysics(), "table": TablePhysics()}
+    counts = {"full": full, "local": others, "table": others}
+    for physics in answering.values():
+        physics.reset(load)
+    times = best_times(
+        {name: _lifts(physics, items[: counts[name]]) for name, physics in answering.items()},
+        rounds,
+    )
+    for physics in answering.values():
+        physics.close()
+    return {name: counts[name] / seconds for name, seconds in times.items()}
+
+
+def _lifts(physics: Physics, items: list[int]) -> Callable[[], None]:
+    def lift_all() -> None:
+        for item in items:
+            physics.lift(item)
+
+    return lift_all
 
 
 def pick_rates(
     num_envs: int = task.NUM_ENVS, picks: int = 500, rounds: int = 3
 ) -> dict[str, float]:
-    """Picks per second of one container, and of many in a loop and in arrays.
+    """Random picks per second of one container, and of many in a loop and in arrays.
 
     The same episodes are played in each round, all but for their last pick, so that each
     pick carries its share of one reset; after the first round the table knows all lifts.
@@ -69,64 +104,3 @@ def _episode(env: gymnasium.Env | VectorEnv, picks: int) -> Callable[[], None]:
             env.step(action)
 
     return play
-
-
-def container_costs(
-    counts: tuple[int, ...] = (1, 4, 16, 64, 256, 1024, 4096), picks: int = 500, rounds: int = 2
-) -> pd.DataFrame:
-    """What a pick costs in the array environment, by the number of containers.
-
-    The loads are 64 different ones, repeated if there are more containers, so that none
-    of them brings lifts that the table has not met.
-
-    Args:
-        counts: numbers of containers.
-        picks: of an episode.
-        rounds: the least time of so many is taken.
-
-    Returns:
-        One row per number: ``containers``; ``step_ns`` and ``reset_ns``, time per pick of
-        stepping and of filling the container once per episode; ``picks_per_s`` of both
-        together; ``memory_mb``, of the environment after a reset.
-    """
-    _play_episode(_make(LOADS, picks), picks)  # the table meets all lifts
-    rows = []
-    for containers in counts:
-        tracemalloc.start()
-        envs = _make(containers, picks)
-        envs.reset(seed=_seeds(containers))
-        memory, _ = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        times = np.min([_play_episode(envs, picks) for _ in range(rounds)], axis=0)
-        envs.close()
-        reset_ns, step_ns = times / containers / [picks, picks - 1] * 1e9
-        rows.append(
-            {
-                "containers": containers,
-                "step_ns": step_ns,
-                "reset_ns": reset_ns,
-                "picks_per_s": 1e9 / (step_ns + reset_ns),
-                "memory_mb": memory / 1e6,
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def _make(containers: int, picks: int) -> VectorEnv:
-    return gymnasium.make_vec(CONTAINER, containers, max_picks=picks, equalize=True)
-
-
-def _seeds(containers: int) -> list[int]:
-    return [number % LOADS for number in range(containers)]
-
-
-def _play_episode(envs: VectorEnv, picks: int) -> tuple[float, float]:
-    """Seconds for the reset and for all picks of an episode but its last, which resets."""
-    actions = np.random.default_rng(0).integers(task.N_VISIBLE, size=(picks - 1, LOADS))
-    actions = actions[:, _seeds(envs.num_envs)]
-    start = time.perf_counter()
-    envs.reset(seed=_seeds(envs.num_envs))
-    filled = time.perf_counter()
-    for row in actions:
-        envs.step(row)
-    return filled - start, time.perf_counter() - filled

@@ -82,7 +82,7 @@ MODULES = {
     "env/equalization": "env/test_equalization.py",
     "env/highest_item": "env/test_highest_item.py env/test_vector_base.py",
     "env/observation": "env/test_observation.py env/test_base.py env/test_container.py",
-    "env/vector": "env/test_settled.py env/test_vector.py env/test_vector_base.py",
+    "env/vector": "env/test_vector.py env/test_vector_base.py",
     "env/vector_base": "env/test_vector_base.py env/test_vector.py env/test_highest_item.py",
     "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
     "env/fast/ranking": "env/fast/test_ranking.py",

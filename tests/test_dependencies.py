@@ -15,7 +15,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"benchmarks", "notebooks", "tests", "unload"}
 # Extras for one command each, pinned in pyproject.toml.
-ON_DEMAND = ("book", "browser", "mujoco", "mutants")
+ON_DEMAND = ("book", "browser", "mutants")
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
