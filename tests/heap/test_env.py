@@ -65,14 +65,15 @@ def test_reward_is_boxes_less_weighted_falls(make_heap_env):
     assert max(rewards) > 0
 
 
-def test_fates_say_what_became_of_each_visible_box(make_heap_env, cubes):
+def test_fates_say_what_happened_to_each_visible_box(make_heap_env, cubes):
     """A tower whose lowest cube is dragged away: two drop by one level, and two by more."""
-    env = make_heap_env(physics="whole", friction=0.05)
+    env = make_heap_env(physics="whole", friction=0.05, falls_weight=0.25)
     _, info = env.reset(options={"heap": cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (5, 1, 3))})
     rows = {box: row for row, box in enumerate(env.visible.tolist()) if box >= 0}
     assert sorted(rows) == [0, 1, 2, 3]
-    info = env.step(rows[0])[4]
+    _, reward, _, _, info = env.step(rows[0])
     fates = info["fates"]
+    assert reward == 2 - 0.25 * 2
     assert fates.dtype == np.int8 and fates.shape == (96,)
     assert ((fates & 1) > 0).sum() == info["unloaded"] == 2
     assert ((fates & 2) > 0).sum() == info["falls"] == 2

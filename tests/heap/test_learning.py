@@ -5,9 +5,9 @@ import torch
 from unload.heap.learning import (
     Learned,
     Picks,
+    batches,
     fit,
     holds_box,
-    joined,
     load_networks,
     mirrored,
     save_networks,
@@ -73,6 +73,12 @@ def test_the_same_seed_gives_the_same_bits():
     assert not torch.equal(first["heads.weight"], other["heads.weight"])
 
 
+def test_each_pick_is_learned_from_equally_often_until_the_steps_are_done():
+    rows = [each.tolist() for each in batches(300, 4, torch.Generator().manual_seed(0))]
+    assert [len(each) for each in rows] == [128, 128, 44, 128]
+    assert sorted(sum(rows[:3], [])) == list(range(300))
+
+
 def test_mirrored_changes_the_side_only():
     observations = torch.rand((2, 3, len(COLUMNS)))
     mirror = mirrored(observations)
@@ -117,12 +123,6 @@ def test_several_networks_are_averaged(learned):
     single = [Learned([each]).expected(unseen.observations) for each in (network, other)]
     for together, first, second in zip(both, *single):
         assert together == pytest.approx((first + second) / 2, abs=1e-5)
-
-
-def test_joined_keeps_the_order(rng):
-    parts = [made_up_picks(rng, 3), made_up_picks(rng, 2)]
-    whole = joined(parts)
-    assert len(whole) == 5 and whole.actions[3:].tolist() == parts[1].actions.tolist()
 
 
 def test_stored_networks_are_the_same(tmp_path, learned):

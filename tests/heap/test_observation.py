@@ -50,14 +50,6 @@ def test_a_box_behind_another_is_not_visible(camera, cubes):
     assert camera.scan(heap.only(np.array([4]))).pixels[0] > 50
 
 
-def test_a_scan_depends_on_nothing_before(camera, pile, cubes):
-    first = camera.scan(pile)
-    camera.scan(cubes((5, 1, 0)))
-    again = camera.scan(pile)
-    assert again.points.tobytes() == first.points.tobytes()
-    assert again.owners.tobytes() == first.owners.tobytes()
-
-
 def test_boxes_with_few_pixels_are_not_visible_unless_there_are_no_others(camera, pile):
     scan = camera.scan(pile)
     few = type(scan)(np.array([SEEN, SEEN - 1, 0]), scan.points, scan.owners)
@@ -89,15 +81,6 @@ def test_a_box_half_in_front_covers_half(camera, cubes):
     seen = true_boxes(heap, camera.scan(heap))
     rows = features(seen)
     assert column(rows, "clear_in_front")[np.argsort(seen.numbers)] == pytest.approx([0.5, 1])
-
-
-def test_features_do_not_change_where_the_heap_stands(camera, pile):
-    """They are told from the foremost face, so that a heap that recedes looks alike."""
-    seen = true_boxes(pile, camera.scan(pile))
-    moved = SeenBoxes(
-        seen.numbers, seen.centres + (0.5, 0, 0), seen.extents, seen.edges, seen.tilts, seen.pixels
-    )
-    assert features(moved) == pytest.approx(features(seen), abs=1e-6)
 
 
 def test_boxes_outside_the_door_do_not_move_the_edge(camera, cubes):

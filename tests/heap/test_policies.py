@@ -60,14 +60,6 @@ def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):
     assert np.array_equal(info["item_mask"], episode.observations[2].any(axis=1))
 
 
-def test_the_same_seed_gives_the_same_episode(make_heap_env, pile):
-    first, second = (
-        play(make_heap_env(max_picks=4), RULES["random"], pile, seed) for seed in (7, 7)
-    )
-    assert first.actions.tolist() == second.actions.tolist()
-    assert first.observations.tobytes() == second.observations.tobytes()
-
-
 def test_outcomes_of_an_episode_are_those_that_were_played(make_heap_env, make_rake, pile):
     episode = play(make_heap_env(max_picks=3), RULES["lowest"], pile, 0)
     found = outcomes(episode, make_rake("coarse"))

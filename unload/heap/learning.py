@@ -84,7 +84,7 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
     data = _Batch(*map(torch.from_numpy, arrays), torch.from_numpy(picks.falls > 0).float())
     adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
-    for rows in _batches(len(picks), steps, generator):
+    for rows in batches(len(picks), steps, generator):
         batch = _Batch(*(each[rows] for each in data))
         if torch.rand((), generator=generator) < 0.5:
             batch = batch._replace(observations=mirrored(batch.observations))
@@ -123,12 +123,12 @@ def _loss(network: FateNetwork, batch: _Batch) -> torch.Tensor:
     return loss + boxes + falls + fell
 
 
-def _batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
+def batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
     """Rows of each batch: all of them in random order, again and again."""
     while steps > 0:
-        batches = torch.randperm(count, generator=generator).split(BATCH)[:steps]
-        yield from batches
-        steps -= len(batches)
+        some = torch.randperm(count, generator=generator).split(BATCH)[:steps]
+        yield from some
+        steps -= len(some)
 
 
 def mirrored(observations: torch.Tensor) -> torch.Tensor:

@@ -7,7 +7,7 @@ import pytest
 
 from unload.heap.study import figures
 from unload.heap.study.table import SHOWN_WEIGHT, read_heap_table
-from unload.load.colours import COLOURS
+from unload.load.view import COLOURS
 
 
 def test_every_figure_draws_its_data(heap, outcome):

@@ -7,7 +7,7 @@ import pytest
 
 from unload.heap.study.figures import MEANINGS, corners
 from unload.heap.study.replay import Played, replay_heaps
-from unload.load.colours import COLOURS, css
+from unload.load.view import COLOURS, css
 
 
 @pytest.fixture

@@ -29,8 +29,8 @@ from unload.heap.study.recording import (
     make_heaps,
     make_networks,
 )
-from unload.reproduce.intervals import mean_interval, ratio_interval
 from unload.reproduce.results import COMMAND, JOBS, Result, keep_all, publish, read_table
+from unload.reproduce.statistics import mean_interval, ratio_interval
 from unload.support import files
 
 # A box near the front takes many along if others lie before it and on it; how much each of these
@@ -47,12 +47,13 @@ PHYSICS = "whole"  # that judges
 SHOWN_WEIGHT = 1.0  # λ at which all policies play; at the others, only those that depend on it
 REFERENCE, LEARNED, ORACLE = "best rule", "learned", "oracle"
 MEASURES = "boxes", "falls", "net"
+ENDS = "", "_low", "_high"  # of a mean and its interval
 COLUMNS = [
     "falls_weight", "policy", "heaps",
     *(
         name + end
         for name in (*MEASURES, "boxes_ratio", "net_ratio", *(f"{name}_more" for name in MEASURES))
-        for end in ("", "_low", "_high")
+        for end in ENDS
     ),
 ]  # fmt: skip
 
@@ -287,6 +288,30 @@ def read_heap_table(folder: str | Path = files.DATA) -> pd.DataFrame:
         FileNotFoundError: it is missing; the message names the command.
     """
     return read_table(Path(folder) / NAME / "table.csv", f"{COMMAND} {NAME}", COLUMNS)
+
+
+def by_price(table: pd.DataFrame) -> pd.DataFrame:
+    """The learned policy beside the best rule at each λ, as text, with 95 % intervals.
+
+    Args:
+        table: see ``compared``.
+
+    Returns:
+        One row per λ: boxes and falls a pick of both, and of boxes - λ falls the ratio and the
+        difference.
+    """
+    by = table.set_index(["policy", "falls_weight"])
+    rows = {}
+    for weight in WEIGHTS:
+        row = {}
+        for name in (REFERENCE, LEARNED):
+            for measure in ("boxes", "falls"):
+                row[f"{measure}, {name}"] = f"{by.loc[(name, weight), measure]:.2f}"
+        for title, measure in (("ratio", "net_ratio"), ("difference", "net_more")):
+            value, low, high = (by.loc[(LEARNED, weight), f"{measure}{e}"] for e in ENDS)
+            row[title] = f"{value:.2f} ({low:.2f} to {high:.2f})"
+        rows[f"λ = {weight:g}"] = row
+    return pd.DataFrame(rows).T
 
 
 def heap_data(
