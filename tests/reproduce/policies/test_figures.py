@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from unload import stack_load
-from unload.load.colours import COLOURS
+from unload.load.view import COLOURS
 from unload.physics.situation import Surroundings
 from unload.reproduce.policies import comparison, figures, inside, robustness, speed
 

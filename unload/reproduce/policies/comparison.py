@@ -17,7 +17,7 @@ from unload.agent import policies
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import load_policy
 from unload.load.substacks import stack_load
-from unload.reproduce.results import COMMAND, JOBS, measured, publish
+from unload.reproduce.results import COMMAND, measured, publish
 from unload.support import checks, files
 
 SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
@@ -38,7 +38,6 @@ CONDITIONS = {
     "boxes × 0.8": {"stack": partial(stack_load, scale=0.8)},
     "boxes × 1.2": {"stack": partial(stack_load, scale=1.2)},
 }
-OPTIONS = JOBS
 
 
 def comparison_data(

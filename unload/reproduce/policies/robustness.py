@@ -21,14 +21,13 @@ from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
 from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Surroundings
 from unload.reproduce.policies.comparison import LEARNED, SIMPLE, digests, find_policy
-from unload.reproduce.results import COMMAND, JOBS, keep_all, publish
+from unload.reproduce.results import COMMAND, keep_all, publish
 from unload.support import checks, files
 
 EPISODES, PICKS = 10, 100
 SEED = 2000  # of the loads; no other data uses it
 # Who plays how; of the others, every decision with boxes restored would be the table's.
 PLAYED = {"keep": (*SIMPLE, *LEARNED), "restore": ("recommended",)}
-OPTIONS = JOBS
 
 
 def robustness_data(
