@@ -12,7 +12,7 @@ from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
 NOT_TRAINED = {
-    "benchmarks", "heap", "heaps", "lift_agreement", "lifts", "obs_hist_equal", "settled"
+    "benchmarks", "heap", "heaps", "lift_agreement", "lifts", "obs_hist_equal", "policies"
 }  # fmt: skip
 
 

@@ -8,7 +8,6 @@ import json
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +16,6 @@ import pandas as pd
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
-from unload.agent.config import TrainConfig
 from unload.support import checks, files
 from unload.support.provenance import joined, run_record, write_provenance
 
@@ -94,38 +92,6 @@ def keep_all(
     return list(tqdm(answers, file=sys.stdout, **bar))
 
 
-def same_settings(path: str | Path, settings: dict) -> None:
-    """Write the settings of results beside them, and refuse to go on with others.
-
-    Args:
-        path: of the settings, a JSON file, in the folder of results that are named by a number
-            instead of by all that they depend on.
-        settings: as JSON can hold them.
-
-    Raises:
-        ValueError: results with other settings are there already.
-    """
-    settings = json.loads(json.dumps(settings, sort_keys=True))
-    if not Path(path).exists():
-        files.write_json(path, settings)
-    there = files.read_json(path)
-    if there != settings:
-        raise ValueError(
-            f"{path} says that the results beside it were made with {there}; expected {settings}: "
-            "remove them, or use their settings"
-        )
-
-
-def shared_settings(configs: Mapping[str, TrainConfig]) -> dict:
-    """The fields in which all configurations agree, and their value."""
-    first, *others = (asdict(config) for config in configs.values())
-    return {
-        name: value
-        for name, value in first.items()
-        if all(other[name] == value for other in others)
-    }
-
-
 def publish(
     folder: str | Path,
     name: str,
@@ -165,32 +131,21 @@ def write_table(path: str | Path, table: pd.DataFrame, float_format: str = "%.6g
     files.write_text(path, table.to_csv(index=False, float_format=float_format))
 
 
-def read_table(
-    path: str | Path, command: str, columns: Sequence[str], exact: bool = False
-) -> pd.DataFrame:
+def read_table(path: str | Path, command: str, columns: Sequence[str]) -> pd.DataFrame:
     """A table that a command of this repository has made.
 
     Args:
         path: of the ``.csv`` file.
         command: what makes it.
         columns: that it must have.
-        exact: whether it must have these columns and no others, at least one row, and finite
-            numbers.
 
     Raises:
         FileNotFoundError: it is missing; the message names the command.
-        ValueError: a column is missing, or the table is not ``exact``.
+        ValueError: a column is missing.
     """
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} is missing; {command} makes it")
     table = pd.read_csv(path)
-    if not exact:
-        checks.entries(str(path), dict(table), columns)
-        return table
-    if list(table.columns) != list(columns):
-        raise ValueError(f"{path} has columns {list(table.columns)}; expected {list(columns)}")
-    if table.empty:
-        raise ValueError(f"{path} has no rows; expected at least one")
-    checks.finite_array(str(path), table.select_dtypes("number"), (None, None))
+    checks.entries(str(path), dict(table), columns)
     return table

@@ -1,0 +1,227 @@
+"""The three physics decide alike."""
+
+from functools import partial
+
+import gymnasium
+import numpy as np
+import pandas as pd
+import pytest
+
+from unload import policies, task
+from unload.load.substacks import front_walls, stack_load
+from unload.reproduce.lifts import agreement, full
+from unload.reproduce.statistics import share_interval
+from unload.support.provenance import read_provenance
+
+
+@pytest.fixture
+def asker():
+    asker = agreement.Asker()
+    yield asker
+    asker.close()
+
+
+@pytest.fixture(scope="module")
+def committed():
+    return agreement.read_agreement()
+
+
+def test_table_decides_as_local(asker):
+    states, frame = agreement.collect_lifts(300, 7, asker)
+    assert len(frame) >= 300 and len(states) == 6 * 5
+    assert set(frame["policy"]) == set(agreement.UNLOADED_BY)
+    assert set(frame["picks"]) == set(agreement.STAGES)
+    assert not len(agreement.disagreements(frame, "table", "local"))
+    few = frame[frame["on_top"] < 3]
+    assert (few["table"] == few["local"]).all()
+    many = frame[frame["on_top"] >= 3]
+    assert len(many) > 30 and (many["table"] == 0).all()
+    for _, same in frame.groupby("situation"):
+        assert same["local"].nunique() == 1
+
+
+def test_lifts_are_asked_about_in_the_state_they_name(asker):
+    states, frame = agreement.collect_lifts(100, 3, asker)
+    for state, rows in frame.groupby("state"):
+        named = states[state]
+        assert (rows["picks"] == named.picks).all() and (rows["seed"] == named.seed).all()
+        assert named.present[named.visible].all()
+        assert set(rows["item"]) <= set(named.visible)
+        assert not rows["item"].duplicated().any()
+        assert (np.bincount(np.minimum(rows["on_top"], 3), minlength=4) <= agreement.WANTED).all()
+    assert [state.present.all() for state in states] == [state.picks == 0 for state in states]
+
+
+def test_choice_for_full():
+    """A few lifts of each state drawn, others of three and more on top, and all close ones."""
+    rng = np.random.default_rng(0)
+    states, on_top = np.repeat(np.arange(60), 12), np.tile(np.arange(6), 120)
+    distances = rng.uniform(0, 0.46, len(states))
+    frame = pd.DataFrame({"state": states, "local": distances, "on_top": on_top})
+    why, walls = agreement.choose_for_full(frame, 30, np.random.default_rng(0))
+    _, each = np.unique(states[why == "drawn"], return_counts=True)
+    assert each.tolist() == [agreement.PER_STATE] * 10
+    assert set(on_top[why == "drawn"]) > {0, 1, 2}
+    assert (why == "buried").sum() == 30 and on_top[why == "buried"].min() == 3
+    close = (distances >= agreement.CLOSE[0]) & (distances <= agreement.CLOSE[1])
+    assert (close[why == "close"]).all() and not close[why == ""].any()
+    assert ((walls == 0) == (why == "")).all()
+    assert (walls[why == "drawn"] == 12).sum() == 2 * agreement.PER_STATE
+    assert (walls[np.isin(why, ("buried", "close"))] == 5).all()
+    why, walls = agreement.choose_for_full(frame, 0, np.random.default_rng(0))
+    assert (why == "").all() and not walls.any()
+
+
+def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
+    """Three lifts in a container of two walls, after 30 picks."""
+    stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
+    monkeypatch.setattr(agreement.gymnasium, "make", partial(gymnasium.make, **stack))
+    monkeypatch.setattr(agreement, "UNLOADED_BY", {"highest": policies.highest})
+    monkeypatch.setattr(agreement, "STAGES", (30,))
+    monkeypatch.setattr(agreement, "WANTED", (1, 1, 1, 0))
+    folders = {"folder": tmp_path / "data", "runs_dir": tmp_path / "runs", "progress": False}
+    frame = agreement.agreement_data(3, 3, 5, 0, **folders)
+    assert (frame["asked_full"] == "drawn").all() and frame["full"].notna().all()
+    assert (frame["after_pick"] == "restore").all() and not frame[["lived", "drift"]].any(axis=None)
+    assert not len(agreement.disagreements(frame, "local", "full"))
+    assert frame["full"].max() == pytest.approx(frame["local"].max(), abs=0.01)
+    provenance = read_provenance(tmp_path / "data", agreement.NAME)
+    assert provenance["reduced"] and provenance["settings"]["lifts"] == 3
+    written = (tmp_path / "data" / "lift_agreement.csv").read_bytes()
+    monkeypatch.setattr(full, "FullPhysics", None)
+    agreement.agreement_data(3, 3, 5, 0, **folders)
+    assert (tmp_path / "data" / "lift_agreement.csv").read_bytes() == written
+    with pytest.raises(TypeError):  # an answer to another question is not taken
+        agreement.agreement_data(3, 3, 6, 0, **folders)
+
+
+def test_rows_of_a_drifting_world_are_asked_of_local_without_what_was_unloaded(asker):
+    states, _ = agreement.collect_lifts(1, 3, asker)
+    state, lived = states[2], agreement.LIVED
+    asker.enter(state)
+    below = {item: asker.local.surroundings.on_top(item) for item in state.visible.tolist()}
+    covered = next(item for item, above in below.items() if len(above) == 1)
+    above = below[covered][0]
+    others = [item for item in below if item not in (covered, above)][: lived - 1]
+    picks = [(item, 0.0, 0.0) for item in others] + [(above, 0.46, 0.001), (covered, 0.45, 0.002)]
+    (row,) = agreement.drifted_rows(state, "keep", picks, asker)
+    assert (row["item"], row["on_top"], row["lived"]) == (covered, 0, lived)
+    assert (row["full"], row["drift"], row["after_pick"]) == (0.45, 0.002, "keep")
+    assert row["local"] > 0.4
+    asker.enter(state)
+    assert asker.lift(covered)["on_top"] == 1
+
+
+def test_bounds_count_each_kind_of_lift():
+    columns = ["situation", "on_top", "asked_full", "after_pick", "lived", "local", "full"]
+    rows = [
+        (0, 0, "drawn", "restore", 0, 0.4, 0.4),
+        (0, 0, "drawn", "restore", 0, 0.4, 0.1),
+        (1, 4, "buried", "restore", 0, 0.0, 0.0),
+        (2, 1, "", "", 0, 0.1, np.nan),
+        (3, 1, "drifted", "keep", 11, 0.4, 0.1),
+        (3, 1, "drifted", "keep", 12, 0.4, 0.4),
+    ]
+    frame = pd.DataFrame(rows, columns=columns).assign(seed=0, picks=100)
+    frame["table"] = frame["local"]
+    bounds = agreement.error_bounds(frame)
+    counted = bounds[["lifts", "states", "situations", "differ"]].T.to_dict("list")
+    assert counted == {
+        "table, local": [4, 3, 4, 0],
+        "table, local: three or more on top": [1, 1, 1, 0],
+        "local, full: drawn": [2, 1, 1, 1],
+        "local, full: three or more on top": [1, 1, 1, 0],
+        "local, full: all of fresh worlds": [3, 1, 2, 1],
+        "local, full: after drift, keep": [2, 2, 1, 1],
+    }
+    for _, row in bounds.iterrows():
+        assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))
+
+
+def test_committed_lifts(committed):
+    assert committed.dtypes.astype(str).to_dict() == agreement.DTYPES
+    assert len(committed) >= 5000
+    assert not committed[["table", "local"]].isna().any(axis=None)
+    assert len(agreement.disagreements(committed, "table", "local")) == 0
+    assert (committed["on_top"].isin((1, 2))).mean() > 0.6
+    assert set(committed["policy"]) == set(agreement.UNLOADED_BY)
+    of = {why: committed[committed["asked_full"] == why] for why in agreement.ASKED_FULL}
+    assert len(of["drawn"]) >= 300 and len(of["buried"]) == 300 and len(of["close"]) > 0
+    assert of["drawn"].groupby(["seed", "picks"]).ngroups >= 100
+    assert set(of["drawn"]["walls"]) == {5, 12} and (of["drawn"]["walls"] == 12).sum() >= 50
+    assert of["buried"]["on_top"].min() >= 3
+    drifted = of["drifted"]
+    assert set(drifted["after_pick"]) == set(agreement.DRIFTING) and len(drifted) >= 200
+    assert drifted["lived"].min() == agreement.LIVED and (drifted["drift"] > 1e-4).all()
+    asked = committed["asked_full"] != ""
+    assert (committed["full"].notna() == asked).all() and ((committed["walls"] > 0) == asked).all()
+    fresh = committed["asked_full"].isin(("drawn", "buried", "close"))
+    assert (fresh == (committed["after_pick"] == "restore")).all()
+    close = committed["local"].between(*agreement.CLOSE)
+    assert committed.loc[close, "full"].notna().all()
+    settings = read_provenance(agreement.files.DATA, agreement.NAME)["settings"]
+    assert settings["lifts"] == len(committed)
+    assert all(settings[f"in full, {why}"] == len(rows) for why, rows in of.items())
+    assert settings["lift table"] == agreement.table_digest(), "another table ships: compare again"
+
+
+def test_committed_lifts_that_full_decides_otherwise(committed):
+    """In fresh worlds only close ones may differ; after drift a free box may stick, too."""
+    both = committed.dropna(subset="full")
+    differs = (both["local"] >= task.LIFT_THRESHOLD) != (both["full"] >= task.LIFT_THRESHOLD)
+    differing = agreement.disagreements(committed, "local", "full")
+    assert differing.equals(both[differs])
+    fresh = differing["after_pick"] == "restore"
+    assert differing.loc[fresh, "local"].between(*agreement.CLOSE).all()
+    bounds = agreement.error_bounds(committed)
+    assert len(bounds) == 8
+    assert bounds.loc["local, full: drawn", "high"] < 0.02
+    assert bounds.loc["local, full: three or more on top", "differ"] == 0
+    assert (bounds["high"] < 0.1).all()
+
+
+def test_committed_lifts_can_be_computed_again(committed, asker):
+    _, frame = agreement.collect_lifts(100, agreement.FRESH, asker)
+    first = committed[: len(frame)]
+    columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
+    assert (frame[columns] == first[columns]).all(axis=None)
+    assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("lifts", "full", "message"),
+    [(0, 0, "lifts is 0"), (10, 11, "full is 11"), (10, -1, "full is -1")],
+)
+def test_impossible_counts_are_refused(tmp_path, lifts, full, message):
+    with pytest.raises(ValueError, match=message):
+        agreement.agreement_data(lifts, full, folder=tmp_path, runs_dir=tmp_path)
+
+
+def test_unknown_names_are_refused(committed):
+    with pytest.raises(ValueError, match="policy is 'lowest'"):
+        next(agreement.container_states("lowest", 0))
+    with pytest.raises(ValueError, match="other is 'mujoco'"):
+        agreement.disagreements(committed, "local", "mujoco")
+
+
+def test_buried_boxes_count_once_per_situation_and_in_fresh_worlds_of_full():
+    rows = [  # on_top, situation, after_pick, local, full
+        (3, 1, "restore", 0.01, 0.02),
+        (3, 1, "restore", 0.01, 0.02),
+        (4, 2, "restore", 0.03, 0.25),
+        (5, 3, "", 0.04, np.nan),
+        (3, 4, "keep", 0.05, 0.3),
+        (2, 5, "restore", 0.4, 0.4),
+    ]
+    columns = ["on_top", "situation", "after_pick", "local", "full"]
+    found = agreement.buried_lifts(pd.DataFrame(rows, columns=columns))
+    assert found["situations"].to_dict() == {"local": 4, "full": 2}
+    assert found["farthest"].to_dict() == {"local": 0.05, "full": 0.25}
+    assert found["lifted"].to_dict() == {"local": 0, "full": 1}
+    assert found["high"].tolist() == [share_interval(0, 4)[1], share_interval(1, 2)[1]]
+
+
+def test_buried_boxes_have_the_bound_of_the_errors_of_the_table(committed):
+    bounds = agreement.error_bounds(committed).loc["table, local: three or more on top"]
+    found = agreement.buried_lifts(committed).loc["local"]
+    assert (found["situations"], found["high"]) == (bounds["lifts"], bounds["high"])

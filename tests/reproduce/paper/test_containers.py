@@ -1,0 +1,89 @@
+"""Fig. 2, views from the side and from the entrance."""
+
+import numpy as np
+import pytest
+
+from unload.load.substacks import front_walls, package_colour, stack_load
+from unload.load.view import COLOURS
+from unload.reproduce.paper.containers import fig02_containers, side_views, wall_views
+
+
+@pytest.fixture
+def images(rng):
+    """Three pictures with a white margin of two lines and one column."""
+    pictures = np.full((3, 8, 10, 3), 255, np.uint8)
+    pictures[:, 2:, 1:] = rng.integers(255, size=(3, 6, 9, 3))
+    return pictures
+
+
+def test_pictures_are_cropped_and_in_order(images):
+    figure = fig02_containers(images, [7, 8, 9], columns=2)
+    assert len(figure.axes) == 4
+    shown = [axes.images[0].get_array() for axes in figure.axes if axes.images]
+    assert np.array_equal(shown, images[:, 2:, 1:])
+    assert [axes.texts[0].get_text() for axes in figure.axes[:3]] == ["7", "8", "9"]
+
+
+def test_white_pictures_are_left_whole():
+    (axes,) = fig02_containers(np.full((1, 4, 5, 3), 255, np.uint8), columns=1).axes
+    assert axes.images[0].get_array().shape == (4, 5, 3)
+
+
+@pytest.fixture
+def load():
+    return front_walls(stack_load(np.random.default_rng(0)), 2)
+
+
+def test_side_views_show_each_group_in_its_colour_to_scale(load):
+    everything = np.arange(len(load))
+    groups = {"unseen": everything, "visible": everything[:5], "failed": everything[3:4]}
+    figure = side_views(load.positions, {"first": groups, "second": {"unseen": everything}})
+    assert [axes.get_title() for axes in figure.axes] == ["first", "second"]
+    for line, (meaning, items) in zip(figure.axes[0].lines, groups.items(), strict=True):
+        assert line.get_label() == meaning and line.get_color() == COLOURS[meaning]
+        assert np.array_equal(line.get_xydata(), load.positions[items][:, [0, 2]])
+    assert all(axes.get_aspect() == 1 for axes in figure.axes)
+    assert [text.get_text() for text in figure.legends[0].texts] == list(groups)
+
+
+def test_wall_views_show_the_boxes_of_each_wall_to_scale(load):
+    walls = np.unique(load.walls)[::-1]
+    visible, present = np.flatnonzero(load.walls == walls[0])[:4], np.ones(len(load), dtype=bool)
+    present[visible[0]] = False
+    figure = wall_views(load, walls, {"visible": visible}, present)
+    for axes, wall in zip(figure.axes, walls, strict=True):
+        assert axes.get_aspect() == 1
+        items = np.flatnonzero(present & (load.walls == wall))
+        for item, box in zip(items, axes.patches, strict=True):
+            meaning = "visible" if item in visible else "unseen"
+            assert box.get_facecolor()[:3] == pytest.approx(COLOURS[meaning])
+            assert (box.get_width(), box.get_height()) == pytest.approx(load.sizes[item, 1:])
+            assert box.get_center() == pytest.approx(load.positions[item, 1:])
+    assert [text.get_text() for text in figure.legends[0].texts] == ["unseen", "visible"]
+
+
+def test_walls_without_groups_show_packages(load):
+    figure = wall_views(load, [load.walls[0]])
+    packages = load.packages[load.walls == load.walls[0]]
+    for package, box in zip(packages, figure.axes[0].patches, strict=True):
+        assert box.get_facecolor()[:3] == pytest.approx(package_colour(package))
+    assert not figure.legends
+
+
+LOAD = stack_load(np.random.default_rng(0))
+WHITE = np.full((2, 4, 5, 3), 255, np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("draw", "arguments", "message"),
+    [
+        (fig02_containers, ([],), r"images has shapes \[\]; expected one"),
+        (fig02_containers, ([WHITE[0], WHITE[0][1:]],), "images has shapes .*; expected one"),
+        (fig02_containers, (WHITE, [1]), "unloaded has 1 entries; expected 2"),
+        (side_views, (LOAD.positions, {"": {"seen": np.arange(2)}}), "a group's name is 'seen'"),
+        (wall_views, (LOAD, [11], {"seen": np.arange(2)}), "a group's name is 'seen'"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(draw, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        draw(*arguments)

@@ -1,0 +1,204 @@
+"""Every figure is drawn, and saved as the same bytes; and what some of them show."""
+
+from functools import partial
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_rgb
+
+from unload import stack_load, task
+from unload.env.observation import nearest
+from unload.load.view import COLOURS
+from unload.reproduce import style
+from unload.reproduce.lifts import figures as lifts
+from unload.reproduce.lifts.agreement import read_agreement
+from unload.reproduce.paper import (
+    containers,
+    mdp,
+    network,
+    observation,
+    substacks,
+    training_figures,
+    tuning_figures,
+)
+from unload.reproduce.paper.tuning import read_curves, running_mean
+from unload.reproduce.policies.figures import comparison_msr
+from unload.reproduce.policies.speed import speed_ratios
+from unload.reproduce.variants.figures import variants_msr
+from unload.reproduce.variants.grids import GRIDS
+
+matplotlib.use("Agg")
+
+LOAD = stack_load(np.random.default_rng(0))
+VISIBLE = nearest(LOAD.positions)
+POSES = np.zeros((2, 2, 3))
+LINE = np.arange(3.0)
+FIELD = np.add.outer(LINE, LINE)
+
+# Figures that are drawn from data/, and take its folder.
+FROM_DATA = {
+    "fig04_observation": observation.fig04_observation,
+    "fig05_histogram": observation.fig05_histogram,
+    "fig06_equalized": observation.fig06_equalized,
+    "fig08_learning_rate": tuning_figures.fig08_learning_rate,
+    "fig09_batch_size": tuning_figures.fig09_batch_size,
+    "fig10_loss": tuning_figures.fig10_loss,
+    "tuning_greedy": tuning_figures.greedy_curves,
+    "fig11_loss": training_figures.fig11_loss,
+    "fig12_reward": training_figures.fig12_reward,
+    **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
+    "comparison": comparison_msr,
+}
+# The others, with what they are given here.
+FIGURES = FROM_DATA | {
+    "fig01_mdp": mdp.fig01_mdp,
+    "fig02_containers": lambda: containers.fig02_containers(
+        np.arange(3 * 48).reshape(3, 4, 4, 3).astype(np.uint8), [1, 2, 3]
+    ),
+    "fig03_substacks": substacks.fig03_substacks,
+    "fig07_network": network.fig07_network,
+    "packages": substacks.packages,
+    "rows": lambda: substacks.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
+    "side_views": lambda: containers.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
+    "wall_views": lambda: containers.wall_views(LOAD, [10, 11]),
+    "visibility": lambda: observation.visibility(LOAD.positions, VISIBLE),
+    "score_landscapes": lambda: network.score_landscapes(
+        np.zeros((4, 3)), LINE, [FIELD, -FIELD], [2, 0], ["first", "second"]
+    ),
+    "distance_curves": lambda: lifts.distance_curves(
+        {"force (N)": {"one box": (LINE, LINE, LINE)}}, {"force (N)": 20}
+    ),
+    "lift_sequences": lambda: lifts.lift_sequences({"a": (np.ones((2, 2)), POSES)}, [0.0, 0.3]),
+    "agreement_scatter": lambda: lifts.agreement_scatter(read_agreement()),
+    "speed_ratios": speed_ratios,
+}
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_a_figure_is_saved_as_the_same_bytes(name, tmp_path, monkeypatch):
+    """In few dots and with its margins, which takes half the time."""
+    quick = {"savefig.dpi": 50, "savefig.bbox": "standard", "pdf.fonttype": 3}
+    monkeypatch.setattr(style, "STYLE", [style.STYLE, quick])
+    for folder in ("a", "b"):
+        style.save(FIGURES[name](), name, tmp_path / folder)
+    for suffix in ("png", "pdf"):
+        first, second = (tmp_path / folder / f"{name}.{suffix}" for folder in "ab")
+        assert first.read_bytes() == second.read_bytes()
+        assert first.stat().st_size > 500
+
+
+@pytest.mark.parametrize("name", FROM_DATA)
+def test_missing_data_name_the_command_that_makes_them(name, tmp_path):
+    with pytest.raises(FileNotFoundError, match="python -m unload.reproduce"):
+        FROM_DATA[name](tmp_path)
+
+
+def test_the_tuning_figures_draw_running_means_with_the_papers_runs_strong():
+    lines = tuning_figures.fig08_learning_rate().axes[0].lines
+    strong = [line for line in lines if line.get_zorder() == 3]
+    assert len(lines) == 30 and len(strong) == 3
+    for line, rate, run in zip(strong, (1e-1, 1e-2, 1e-3), (6, 7, 5)):
+        stored = read_curves("success_rate", 1024, rate)[run]
+        assert np.array_equal(line.get_ydata(), running_mean(stored))
+
+
+def test_greedy_curves_are_means_over_the_runs():
+    _, axes = plt.subplots()
+    runs = {run: np.full(100, value) for run, value in enumerate((0.25, 0.75))}
+    tuning_figures.draw_greedy(axes, {"a": runs})
+    assert axes.lines[0].get_ydata()[70:] == pytest.approx(0.5)
+
+
+def test_each_seed_of_the_training_has_a_colour_and_a_label():
+    lines = training_figures.fig12_reward().axes[0].lines
+    assert [line.get_label() for line in lines] == [f"seed {seed}" for seed in range(4)]
+    assert len({line.get_color() for line in lines}) == 4
+
+
+def test_a_learning_curve_is_drawn_over_whole_episodes():
+    picks = np.arange(1, 101) * 640
+    curve = pd.DataFrame({"picks": picks, "success_rate": np.tile([0.2, 0.6], 50)})
+    _, axes = plt.subplots()
+    training_figures.draw_learning_curve(axes, curve.assign(wall_time=0, epsilon=0), "run")
+    points, episodes = axes.lines
+    assert len(points.get_ydata()) == 100
+    assert episodes.get_xdata().tolist() == [16_000, 48_000]
+    assert episodes.get_ydata() == pytest.approx([0.4, 0.4])
+
+
+def test_picks_and_values_are_drawn_by_their_meaning():
+    _, axes = plt.subplots()
+    training_figures.draw_values(axes, LINE / 3, np.zeros(3), np.array([True, False, True]))
+    blocked, liftable = axes.collections
+    assert (len(blocked.get_offsets()), len(liftable.get_offsets())) == (1, 2)
+    _, axes = plt.subplots()
+    training_figures.draw_picks(axes, np.array([7, 7, 9]), np.array([False, False, True]))
+    failed, unloaded = axes.collections
+    assert failed.get_offsets().tolist() == [[0, 7], [1, 7]]
+    assert unloaded.get_offsets().tolist() == [[2, 9]]
+
+
+def test_the_wall_of_a_stuck_item():
+    present = np.ones(len(LOAD), bool)
+    wall = np.flatnonzero(LOAD.walls == 1)
+    present[wall[-1]] = False
+    _, axes = plt.subplots()
+    training_figures.draw_stuck(axes, LOAD, present, int(wall[0]), wall[1:3])
+    colours = [to_rgb(box.get_facecolor()) for box in axes.patches]
+    assert len(colours) == len(wall) - 1
+    assert colours.count(COLOURS["blocked"]) == 1
+    assert colours.count(COLOURS["on top of it"]) == 2
+
+
+def test_the_networks_figure_counts_its_parameters():
+    texts = [text.get_text() for axes in network.fig07_network(17).axes for text in axes.texts]
+    assert any("(68 for n = 17)" in text for text in texts)
+    assert any("(69 for n = 17)" in text for text in texts)
+
+
+def test_score_gradients_are_those_of_the_front_wall():
+    observed = np.array([[0.95, 0.1, 0.2], [0.5, 0.0, 0.0], [0.92, -0.3, 0.4]])
+    jacobian = np.arange(27.0).reshape(3, 3, 3)
+    arrows = network.score_gradients(observed, np.zeros(3), jacobian).axes[0].collections[1]
+    assert np.array_equal(arrows.U, jacobian[[0, 2], [0, 2], 1])
+    assert np.array_equal(arrows.V, jacobian[[0, 2], [0, 2], 2])
+
+
+def test_every_package_has_its_number_and_size():
+    texts = [text.get_text() for text in substacks.packages().axes[0].texts]
+    assert [text for text in texts if text.isdigit()] == [str(number) for number in range(13)]
+    assert sum("×" in text for text in texts) == 13
+
+
+def test_the_colour_of_the_chosen_box_says_whether_it_was_lifted():
+    sizes, lifted = np.ones((2, 2)), POSES.copy()
+    lifted[1, 0, 1] = task.LIFT_THRESHOLD
+    both = {"stays": (sizes, POSES), "moves": (sizes, lifted)}
+    figure = lifts.lift_sequences(both, [0.0, 0.3])
+    colours = [axes.patches[0].get_facecolor()[:3] for axes in figure.axes]
+    blocked, liftable = COLOURS["blocked"], COLOURS["liftable"]
+    assert np.allclose(colours, [blocked, blocked, liftable, liftable])
+
+
+def test_distance_curves_show_formula_and_measurement():
+    curves = {"one box": (LINE, LINE / 10, LINE / 9), "two boxes": (LINE, LINE / 20, LINE / 21)}
+    (axes,) = lifts.distance_curves({"force (N)": curves}, {"force (N)": 20}).axes
+    shown = [line.get_ydata().tolist() for line in axes.lines[:4]]
+    assert shown == [values.tolist() for _, *both in curves.values() for values in both]
+    assert len(axes.lines) == 4 + 2  # threshold, and the mark
+
+
+def test_the_agreement_is_drawn_with_all_lifts():
+    frame = read_agreement()
+    for axes, physics in zip(lifts.agreement_scatter(frame).axes, ("table", "full")):
+        shown = sum(len(points.get_offsets()) for points in axes.collections)
+        assert shown == frame[physics].notna().sum()
