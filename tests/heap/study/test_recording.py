@@ -92,3 +92,4 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
     assert (tmp_path / "again" / "heap" / "networks.safetensors").read_bytes() == written
     make_networks(size._replace(steps=3), tmp_path / "data", tmp_path, progress=False)
     assert len(learned) == 12 and published.read_bytes() != written, "other settings, other files"
+    assert len(list((tmp_path / "heap" / "picks").glob("*.npz"))) == 6, "other explorers, too"

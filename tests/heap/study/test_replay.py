@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from unload.heap.rake import Outcome
 from unload.heap.study.figures import MEANINGS, corners
 from unload.heap.study.replay import Played, replay_heaps
 from unload.load.view import COLOURS, css
@@ -22,6 +23,11 @@ def test_episodes_follow_the_boxes_of_the_first_heap(played, outcome):
     assert np.array_equal(played.state(9)[0], places), "after its end it stays"
     assert played.title("lowest", 0) == "lowest: 0 unloaded, 0 fallen"
     assert played.title("lowest", 5) == "lowest: 2 unloaded, 1 fallen"
+    after = outcome.heap.only(np.array([1]))
+    gone, none = np.array([True, False]), np.zeros(2, bool)
+    second = Outcome(after, np.array([1]), gone, none, 0.7, True)
+    longer = Played([*played.heaps, after], np.array([0, 0]), [outcome, second])
+    assert longer.state(2)[0][3] == pytest.approx(corners(after)[0])
 
 
 def test_a_replay_has_a_stop_for_each_pick_and_needs_no_kernel(played, heap):

@@ -104,6 +104,17 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
     pd.testing.assert_frame_equal(study.read_heap_table(tmp_path), table, check_dtype=False)
     again = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
     assert again == stored
+    players = []
+
+    def made_up(player, split, number, physics):
+        players.append(player)
+        return {"boxes": 2.0 + number, "falls": 0.5}
+
+    monkeypatch.setattr(study, "_play", made_up)
+    table = study.compare(size, tmp_path, tmp_path / "made up", progress=False)
+    assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
+    weights = [player["falls_weight"] for player in players if "networks" in player]
+    assert weights == [0.0, 0.0, 1.0, 1.0]
 
 
 def test_the_command_makes_everything_about_heaps(monkeypatch):
