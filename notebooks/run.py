@@ -22,12 +22,13 @@ import papermill
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
+ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
 
 def notebooks() -> list[Path]:
-    """All notebooks in reading order, each before its solutions."""
-    return sorted(HERE.glob("*.ipynb")) + sorted((HERE / "solutions").glob("*.ipynb"))
+    """All notebooks: the course in reading order, its solutions, and the report."""
+    return [path for folder in ("", *ASIDE) for path in sorted((HERE / folder).glob("*.ipynb"))]
 
 
 def key(notebook: Path) -> str:

@@ -9,7 +9,7 @@ import pytest
 from notebooks import run
 
 NOTEBOOKS = run.notebooks()
-CHAPTERS = [path for path in NOTEBOOKS if path.parent.name != "solutions"]
+CHAPTERS = [path for path in NOTEBOOKS if path.parent.name not in run.ASIDE]
 
 
 def cells(path, kind):

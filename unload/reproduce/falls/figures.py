@@ -15,7 +15,9 @@ from unload.reproduce.statistics import PAPER_MSR, end_msr, t_interval
 from unload.reproduce.style import styled
 
 # One colour, one meaning: what is seen or stored.
-COLOURS = {"ranks": "C1", "shuffled": "C0", "averaged": "C3", "positions": "C2"}
+COLOURS = {"ranks": "C1", "shuffled": "C0", "averaged": "C3", "short": "C2"}
+# Name and colour of each of ``PUPILS``.
+PUPIL_LOOKS = list(COLOURS.items())
 TITLES = {
     "paper_no_mask": "mask off, b = 256",
     "paper_mask": "mask on, b = 256",
@@ -64,8 +66,8 @@ def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
         curves: name → curve of a run, see ``unload.agent.training``.
     """
     figure, axes = plt.subplots()
-    for name, curve in curves.items():
-        draw_msr(axes, curve["picks"], curve["success_rate"], label=name, lw=1)
+    for (name, curve), colour in zip(curves.items(), COLOURS.values()):
+        draw_msr(axes, curve["picks"], curve["success_rate"], label=name, color=colour, lw=1)
     axes.legend()
     return figure
 
@@ -79,9 +81,9 @@ def surfaces(profiles: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
     """
     figure, axes = plt.subplots(figsize=(5.2, 3.4))
     width, _, height = task.CONTAINER[[1, 0, 2]]
-    for name, (places, heights) in profiles.items():
-        axes.plot(places, heights, label=name)
-        axes.fill_between(places, heights, alpha=0.1)
+    for (name, (places, heights)), colour in zip(profiles.items(), COLOURS.values()):
+        axes.plot(places, heights, color=colour, label=name)
+        axes.fill_between(places, heights, color=colour, alpha=0.1, lw=0)
     axes.set(xlim=(0, width), ylim=(0, height), xlabel="y, across the container (m)",
              ylabel="mean height of the load (m)")  # fmt: skip
     axes.legend(loc="lower left")
@@ -104,14 +106,14 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
     left.set(xlabel="preference: slope across / upward", ylabel="tilt of the load", xlim=(-2, 2))
     left.legend(markerscale=3)
     middle.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
-    for pupil, colour in zip(PUPILS, ("ranks", "shuffled", "averaged")):
+    for pupil, (name, colour) in zip(PUPILS, PUPIL_LOOKS):
         cells = [f"{pupil}_{preference}" for preference in PREFERENCES]
         groups = [runs[runs["cell"] == cell] for cell in cells]
         learned = [(group["slope_y"] / group["slope_z"].abs()).mean() for group in groups]
-        middle.plot(PREFERENCES, learned, "o-", ms=3, color=COLOURS[colour], label=colour)
+        middle.plot(PREFERENCES, learned, "o-", ms=3, color=colour, label=name)
         if pupil == "taught":
             success = [100 * group["mean"].mean() for group in groups]
-            right.plot(PREFERENCES, success, "o-", ms=3, color=COLOURS[colour])
+            right.plot(PREFERENCES, success, "o-", ms=3, color=colour)
     middle.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
     middle.legend(fontsize=8)
     right.set(xlabel="preference of the teacher", ylabel="its MSR (%)", ylim=(0, 102))
@@ -157,7 +159,7 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     for line, cell in enumerate(names):
         end = 100 * runs.loc[runs["cell"] == cell, "end"]
         heights = line + rng.uniform(-0.2, 0.2, len(end))
-        axes.plot(end, heights, ".", color="C0" if end.min() >= 99 else "C1", ms=5, alpha=0.6)
+        axes.plot(end, heights, ".", color="C0" if end.min() >= 97 else "C1", ms=5, alpha=0.6)
     axes.set(xlim=(0, 101), ylim=(len(names) - 0.4, -0.6), xlabel="MSR over the last tenth (%)")
     axes.set_yticks(range(len(names)), names.values())
     axes.grid(axis="y", visible=False)
