@@ -15,15 +15,7 @@ from unload.load.view import COLOURS
 from unload.reproduce import style
 from unload.reproduce.lifts import figures as lifts
 from unload.reproduce.lifts.agreement import read_agreement
-from unload.reproduce.paper import (
-    containers,
-    mdp,
-    network,
-    observation,
-    substacks,
-    training_figures,
-    tuning_figures,
-)
+from unload.reproduce.paper import containers, figures, mdp, network, observation, substacks
 from unload.reproduce.paper.tuning import read_curves, running_mean
 from unload.reproduce.policies.figures import comparison_msr
 from unload.reproduce.policies.speed import speed_ratios
@@ -43,12 +35,12 @@ FROM_DATA = {
     "fig04_observation": observation.fig04_observation,
     "fig05_histogram": observation.fig05_histogram,
     "fig06_equalized": observation.fig06_equalized,
-    "fig08_learning_rate": tuning_figures.fig08_learning_rate,
-    "fig09_batch_size": tuning_figures.fig09_batch_size,
-    "fig10_loss": tuning_figures.fig10_loss,
-    "tuning_greedy": tuning_figures.greedy_curves,
-    "fig11_loss": training_figures.fig11_loss,
-    "fig12_reward": training_figures.fig12_reward,
+    "fig08_learning_rate": figures.fig08_learning_rate,
+    "fig09_batch_size": figures.fig09_batch_size,
+    "fig10_loss": figures.fig10_loss,
+    "tuning_greedy": figures.greedy_curves,
+    "fig11_loss": figures.fig11_loss,
+    "fig12_reward": figures.fig12_reward,
     **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
     "comparison": comparison_msr,
 }
@@ -103,7 +95,7 @@ def test_missing_data_name_the_command_that_makes_them(name, tmp_path):
 
 
 def test_the_tuning_figures_draw_running_means_with_the_papers_runs_strong():
-    lines = tuning_figures.fig08_learning_rate().axes[0].lines
+    lines = figures.fig08_learning_rate().axes[0].lines
     strong = [line for line in lines if line.get_zorder() == 3]
     assert len(lines) == 30 and len(strong) == 3
     for line, rate, run in zip(strong, (1e-1, 1e-2, 1e-3), (6, 7, 5)):
@@ -114,12 +106,12 @@ def test_the_tuning_figures_draw_running_means_with_the_papers_runs_strong():
 def test_greedy_curves_are_means_over_the_runs():
     _, axes = plt.subplots()
     runs = {run: np.full(100, value) for run, value in enumerate((0.25, 0.75))}
-    tuning_figures.draw_greedy(axes, {"a": runs})
+    figures.draw_greedy(axes, {"a": runs})
     assert axes.lines[0].get_ydata()[70:] == pytest.approx(0.5)
 
 
 def test_each_seed_of_the_training_has_a_colour_and_a_label():
-    lines = training_figures.fig12_reward().axes[0].lines
+    lines = figures.fig12_reward().axes[0].lines
     assert [line.get_label() for line in lines] == [f"seed {seed}" for seed in range(4)]
     assert len({line.get_color() for line in lines}) == 4
 
@@ -128,7 +120,7 @@ def test_a_learning_curve_is_drawn_over_whole_episodes():
     picks = np.arange(1, 101) * 640
     curve = pd.DataFrame({"picks": picks, "success_rate": np.tile([0.2, 0.6], 50)})
     _, axes = plt.subplots()
-    training_figures.draw_learning_curve(axes, curve.assign(wall_time=0, epsilon=0), "run")
+    figures.draw_learning_curve(axes, curve.assign(wall_time=0, epsilon=0), "run")
     points, episodes = axes.lines
     assert len(points.get_ydata()) == 100
     assert episodes.get_xdata().tolist() == [16_000, 48_000]
@@ -137,11 +129,11 @@ def test_a_learning_curve_is_drawn_over_whole_episodes():
 
 def test_picks_and_values_are_drawn_by_their_meaning():
     _, axes = plt.subplots()
-    training_figures.draw_values(axes, LINE / 3, np.zeros(3), np.array([True, False, True]))
+    figures.draw_values(axes, LINE / 3, np.zeros(3), np.array([True, False, True]))
     blocked, liftable = axes.collections
     assert (len(blocked.get_offsets()), len(liftable.get_offsets())) == (1, 2)
     _, axes = plt.subplots()
-    training_figures.draw_picks(axes, np.array([7, 7, 9]), np.array([False, False, True]))
+    figures.draw_picks(axes, np.array([7, 7, 9]), np.array([False, False, True]))
     failed, unloaded = axes.collections
     assert failed.get_offsets().tolist() == [[0, 7], [1, 7]]
     assert unloaded.get_offsets().tolist() == [[2, 9]]
@@ -152,7 +144,7 @@ def test_the_wall_of_a_stuck_item():
     wall = np.flatnonzero(LOAD.walls == 1)
     present[wall[-1]] = False
     _, axes = plt.subplots()
-    training_figures.draw_stuck(axes, LOAD, present, int(wall[0]), wall[1:3])
+    figures.draw_stuck(axes, LOAD, present, int(wall[0]), wall[1:3])
     colours = [to_rgb(box.get_facecolor()) for box in axes.patches]
     assert len(colours) == len(wall) - 1
     assert colours.count(COLOURS["blocked"]) == 1

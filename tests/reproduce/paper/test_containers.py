@@ -71,15 +71,11 @@ def test_walls_without_groups_show_packages(load):
 
 
 LOAD = stack_load(np.random.default_rng(0))
-WHITE = np.full((2, 4, 5, 3), 255, np.uint8)
 
 
 @pytest.mark.parametrize(
     ("draw", "arguments", "message"),
     [
-        (fig02_containers, ([],), r"images has shapes \[\]; expected one"),
-        (fig02_containers, ([WHITE[0], WHITE[0][1:]],), "images has shapes .*; expected one"),
-        (fig02_containers, (WHITE, [1]), "unloaded has 1 entries; expected 2"),
         (side_views, (LOAD.positions, {"": {"seen": np.arange(2)}}), "a group's name is 'seen'"),
         (wall_views, (LOAD, [11], {"seen": np.arange(2)}), "a group's name is 'seen'"),
     ],

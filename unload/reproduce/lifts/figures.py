@@ -12,7 +12,6 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 from unload import task
 from unload.load.view import COLOURS
 from unload.reproduce.style import styled
-from unload.support import checks
 
 
 @styled
@@ -26,13 +25,7 @@ def distance_curves(
         panels: label of the horizontal axis → curves; these are name → (x, formula, measured),
             three (k,) float arrays, distances in m.
         marks: label of the horizontal axis → a value of it that a grey line marks.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described, or there is nothing to draw.
     """
-    checks.entries("panels", panels, marks)
-    if not panels:
-        raise ValueError("panels is empty; expected at least one")
     figure, grid = plt.subplots(
         1, len(panels), figsize=(3.4 * len(panels) + 1, 3.2), sharey=True, squeeze=False
     )
@@ -66,20 +59,7 @@ def lift_sequences(
             of rotation about the x axis in rad.
         times: when the poses were taken, s.
         dynamic: how many of the boxes can move.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described, or there is nothing to draw.
     """
-    checks.entries("lifts", lifts, ())
-    times = checks.finite_array("times", times, (None,))
-    if not lifts or not len(times):
-        raise ValueError(
-            f"lifts has {len(lifts)} and times {len(times)} entries; expected at least one each"
-        )
-    for label, (sizes, poses) in lifts.items():
-        boxes = len(checks.finite_array(f"sizes of {label!r}", sizes, (None, 2)))
-        checks.finite_array(f"poses of {label!r}", poses, (len(times), boxes, 3))
-        checks.integer("dynamic", dynamic, 1, boxes)
     figure, grid = plt.subplots(
         len(lifts), len(times), figsize=(10, 2.05 * len(lifts) + 0.3), squeeze=False
     )

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 
 from unload import task
-from unload.load.boxes import Load, check_load
+from unload.load.boxes import Load
 from unload.load.substacks import package_colour
 from unload.load.view import COLOURS
 from unload.reproduce.style import styled
@@ -28,18 +28,7 @@ def fig02_containers(
         unloaded: items unloaded from each container, written below its picture.
         columns: pictures in a line.
 
-    Raises:
-        ValueError: there is no picture, they differ in shape, or ``unloaded`` has
-            another length.
     """
-    checks.integer("columns", columns, 1)
-    shapes = {np.shape(image) for image in images}
-    if len(shapes) != 1 or len(next(iter(shapes))) != 3:
-        raise ValueError(
-            f"images has shapes {sorted(shapes)}; expected one, (height, width, 3), for all"
-        )
-    if unloaded is not None and len(unloaded) != len(images):
-        raise ValueError(f"unloaded has {len(unloaded)} entries; expected {len(images)}")
     images = _crop(np.stack(images))
     lines = -(-len(images) // columns)
     _, height, width, _ = images.shape
@@ -79,12 +68,8 @@ def side_views(positions: np.ndarray, views: Mapping[str, Mapping[str, np.ndarra
             Of two groups that share an item the later one is drawn.
 
     Raises:
-        TypeError, ValueError: an argument is not as described, or there is nothing to draw.
+        ValueError: a group's name is not in ``unload.load.COLOURS``.
     """
-    positions = checks.finite_array("positions", positions, (None, 3))
-    checks.entries("views", views, ())
-    if not views:
-        raise ValueError("views is empty; expected at least one")
     length, _, height = task.CONTAINER
     figure, panels = plt.subplots(
         len(views), 1, figsize=(7, 2.3 * len(views) + 0.6), sharex=True, squeeze=False
@@ -132,12 +117,8 @@ def wall_views(
         present: (n,) bool, which boxes to draw; all if None.
 
     Raises:
-        TypeError, ValueError: an argument is not as described, or there is nothing to draw.
+        ValueError: a group's name is not in ``unload.load.COLOURS``.
     """
-    check_load(load)
-    walls = checks.integer_array("walls", walls, (None,))
-    if not len(walls):
-        raise ValueError("walls is empty; expected at least one")
     colours = [package_colour(package) for package in load.packages]
     if groups is not None:
         groups = {"unseen": np.arange(len(load)), **groups}

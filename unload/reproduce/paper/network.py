@@ -11,7 +11,6 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from unload import task
 from unload.reproduce.style import styled
-from unload.support import checks
 
 ROWS, FEATURES = 7, 6  # items and features that are drawn, of 128 and n
 TOP, CELL_HEIGHT = 6.2, 0.36  # of the tensors
@@ -30,7 +29,7 @@ def fig07_network(n_features: int = 64) -> Figure:
     Args:
         n_features: n, for the parameter counts below the drawing.
     """
-    n = checks.integer("n_features", n_features, 1)
+    n = n_features
     observed, features, pooled, values = _forward_pass()
     figure, axes = plt.subplots(figsize=(11, 4.2))
     axes.set(xlim=(0, 22), ylim=(-0.7, 7.6), aspect="equal")
@@ -93,22 +92,11 @@ def score_landscapes(
         fields: of each network the scores, (k, k) float, rows along z, columns along x.
         choices: of each network the row of ``observed`` that it picks, drawn as a star.
         titles: one for each network.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described, or there is no network.
     """
-    observed = checks.finite_array("observed", observed, (None, 3))
-    grid = checks.finite_array("grid", grid, (None,))
-    counts = len(fields), len(choices), len(titles)
-    if not counts[0] or len(set(counts)) != 1:
-        raise ValueError(
-            f"fields, choices and titles have {counts} entries; expected as many, at least one"
-        )
     figure, panels = plt.subplots(
         1, len(fields), figsize=(3.5 * len(fields), 3.4), sharey=True, squeeze=False
     )
     for axes, field, choice, title in zip(panels[0], fields, choices, titles):
-        field = checks.finite_array("a field", field, (len(grid), len(grid)))
         drawn = axes.contourf(grid, grid, field, levels=20, cmap="viridis")
         axes.plot(observed[:, 0], observed[:, 2], "k.", ms=4, label="items")
         star = {"ms": 16, "color": "white", "mec": "black", "mew": 1.2, "ls": "none"}
@@ -130,14 +118,7 @@ def score_gradients(observed: np.ndarray, scores: np.ndarray, jacobian: np.ndarr
         scores: (items,) float.
         jacobian: (items, items, 3) float, entry [i, j] is the gradient of the score of item i
             in the position of item j.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
-    observed = checks.finite_array("observed", observed, (None, 3))
-    count = len(observed)
-    scores = checks.finite_array("scores", scores, (count,))
-    jacobian = checks.finite_array("jacobian", jacobian, (count, count, 3))
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.9))
     front = observed[:, 0] > 0.9
     y, z = observed[front, 1], observed[front, 2]

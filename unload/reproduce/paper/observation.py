@@ -19,7 +19,7 @@ from unload.load.view import COLOURS
 from unload.reproduce.paper.containers import draw_items
 from unload.reproduce.results import COMMAND, measured, publish, read_table
 from unload.reproduce.style import styled
-from unload.support import checks, files
+from unload.support import files
 
 FOLDER = "obs_hist_equal"  # of the paper's own plots
 # Of ranks instead of positions; all other colours mean what they mean in every picture.
@@ -37,11 +37,7 @@ def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
     Args:
         seed: of the load.
         folder: of the data.
-
-    Raises:
-        TypeError, ValueError: the seed is not a whole number >= 0.
     """
-    checks.integer("seed", seed, 0)
     points, record = measured(lambda: _positions(seed))
     tables = {
         name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
@@ -92,51 +88,25 @@ def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
 
 @styled
 def fig04_observation(folder: str | Path = files.DATA) -> Figure:
-    """Fig. 4: side view of all items of a fresh container, and of the observed ones.
-
-    Args:
-        folder: holds ``obs_hist_equal/{all_items,Observation}.csv``.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_points``.
-    """
-    everything, observed = read_points("all_items", folder), read_points("Observation", folder)
-    figure, axes = plt.subplots(figsize=(4.6, 4.8))
-    for points, meaning, label in (
-        (everything, "unseen", "all items"),
-        (observed, "visible", "visible items"),
-    ):
-        colour = COLOURS[meaning]
-        axes.plot(*points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=colour, label=label)
-    _side_view(axes, r"$\tilde{p}_{0,i,\mathrm{x}}$", r"$\tilde{p}_{0,i,\mathrm{z}}$")
-    _legend_above(axes)
-    return figure
+    """Fig. 4: side view of all items of a fresh container, and of the observed ones."""
+    groups = {
+        "all items": (read_points("all_items", folder), COLOURS["unseen"]),
+        "visible items": (read_points("Observation", folder), COLOURS["visible"]),
+    }
+    return _side_view(groups, r"\tilde{p}")
 
 
 @styled
 def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
-    """Fig. 5: histogram of the visible items' x, before and after equalization.
-
-    Args:
-        folder: holds ``obs_hist_equal/{Observation,Equalized_Observation}.csv``.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_points``.
-    """
+    """Fig. 5: histogram of the visible items' x, before and after equalization."""
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
     for name, colour, label in (
         ("Observation", COLOURS["visible"], "visible items"),
         ("Equalized_Observation", EQUALIZED, "equalized observation"),
     ):
-        axes.hist(
-            read_points(name, folder)[:, 0],
-            bins=BINS,
-            color=colour,
-            alpha=0.75,
-            edgecolor=colour,
-            linewidth=0.6,
-            label=label,
-        )
+        x = read_points(name, folder)[:, 0]
+        look = {"color": colour, "alpha": 0.75, "edgecolor": colour, "linewidth": 0.6}
+        axes.hist(x, bins=BINS, label=label, **look)
     axes.set(
         xlim=(-1.1, 1.1),
         xticks=np.arange(-1, 1.1, 0.5),
@@ -150,20 +120,20 @@ def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
 
 @styled
 def fig06_equalized(folder: str | Path = files.DATA) -> Figure:
-    """Fig. 6: side view of the visible items after equalization.
-
-    Args:
-        folder: holds ``obs_hist_equal/Equalized_Observation.csv``.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_points``.
-    """
-    figure, axes = plt.subplots(figsize=(4.6, 4.8))
+    """Fig. 6: side view of the visible items after equalization."""
     points = read_points("Equalized_Observation", folder)
-    axes.plot(
-        *points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=EQUALIZED, label="equalized observation"
-    )
-    _side_view(axes, r"$\tilde{p}'_{0,i,\mathrm{x}}$", r"$\tilde{p}'_{0,i,\mathrm{z}}$")
+    return _side_view({"equalized observation": (points, EQUALIZED)}, r"\tilde{p}'")
+
+
+def _side_view(groups: dict[str, tuple[np.ndarray, tuple]], position: str) -> Figure:
+    """Points and their colour by what they are called."""
+    figure, axes = plt.subplots(figsize=(4.6, 4.8))
+    for label, (points, colour) in groups.items():
+        axes.plot(*points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=colour, label=label)
+    ticks = np.arange(-1, 1.1, 0.5)
+    axes.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), xticks=ticks, yticks=ticks, aspect="equal")
+    axes.set_xlabel(rf"${position}_{{0,i,\mathrm{{x}}}}$")
+    axes.set_ylabel(rf"${position}_{{0,i,\mathrm{{z}}}}$")
     _legend_above(axes)
     return figure
 
@@ -177,12 +147,7 @@ def visibility(positions: np.ndarray, visible: np.ndarray) -> Figure:
     Args:
         positions: (n, 3) float, centres in m.
         visible: (k,) int, the visible items.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
-    positions = checks.finite_array("positions", positions, (None, 3))
-    visible = checks.integer_array("visible", visible, (None,))
     length, _, height = task.CONTAINER
     x, z = np.meshgrid(np.linspace(0, length, 200), np.linspace(0, height, 100))
     points = np.stack([x, 0 * x, z], axis=-1).reshape(-1, 3)
@@ -200,19 +165,6 @@ def visibility(positions: np.ndarray, visible: np.ndarray) -> Figure:
     axes.grid(False)
     _legend_above(axes)
     return figure
-
-
-def _side_view(axes: Axes, xlabel: str, ylabel: str) -> None:
-    ticks = np.arange(-1, 1.1, 0.5)
-    axes.set(
-        xlim=(-1.1, 1.1),
-        ylim=(-1.1, 1.1),
-        xticks=ticks,
-        yticks=ticks,
-        xlabel=xlabel,
-        ylabel=ylabel,
-        aspect="equal",
-    )
 
 
 def _legend_above(axes: Axes) -> None:
