@@ -26,7 +26,6 @@ RUNS = {
     "container": CONTAINER,
     "container, masked": CONTAINER | {"mask": True, "equalize": False, "gradient_steps": 2},
     "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
-    "container, height reward": CONTAINER | {"height_reward": 0.5},
     "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100, "gradient_steps": 1},
 }
 

@@ -192,19 +192,3 @@ def test_bytes_hold_equalized_observations_only(rng):
     for items, next_state in ((64, False), (129, False), (128, True)):
         with pytest.raises(ValueError, match="^equalized is True with items="):
             ReplayBuffer(20, items, next_state, equalized=True)
-
-
-def test_picks_are_overwritten_where_it_is_said(rng):
-    replay = ReplayBuffer(10, 4)
-    replay.add(**picks(0, 6))
-    replay.overwrite(np.array([1, 4]), **picks(50, 2))
-    assert replay.arrays["observations"][:6, 0, 0].tolist() == [0, 50, 2, 3, 51, 5]
-    assert replay.arrays["actions"][:6].tolist() == [0, 2, 2, 3, 3, 1]
-    assert replay.total == 6
-    replay.overwrite(np.array([0]), **picks(60, 1))
-    assert replay.arrays["observations"][:3, 0, 0].tolist() == [60, 50, 2]
-    for slots in ([3, 10], [-1, 2]):
-        with pytest.raises(ValueError, match="^slots holds .*expected 0 to 9"):
-            replay.overwrite(np.array(slots), **picks(0, 2))
-    with pytest.raises(ValueError, match="slots has shape"):
-        replay.overwrite(np.array([3]), **picks(0, 2))

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
 
-from tests.agent.runs import CONTAINER, begun
+from tests.agent.runs import CONTAINER, assert_same, at_step, begun, interrupt
 from unload import TrainConfig, stack_load, train
-from unload.agent.curve import CURVE_COLUMNS
 from unload.env.vector import ContainerVectorEnv
 
 
@@ -43,26 +42,16 @@ def test_training_meets_other_loads_than_evaluate_does_with_its_seed(tmp_path):
     assert not met & {observation.tobytes() for observation in shown}
 
 
-@pytest.mark.parametrize("equalize", [True, False])
-def test_a_failed_pick_is_the_less_bad_the_higher_its_item(tmp_path, equalize):
-    """The same picks with and without the reward for height, learned from or not."""
-    plain = CONTAINER | {"equalize": equalize, "epsilon_final": 1.0, "log_interval": 25}
-    memories, curves = [], []
-    for height_reward in (0, 0.5):
-        config = TrainConfig(**plain | {"height_reward": height_reward})
-        with begun(config, tmp_path / str(height_reward)) as run:
-            for _ in range(25):
-                run.step()
-        memories.append(run.replay.rows(np.arange(100)))
-        curves.append(dict(zip(CURVE_COLUMNS, run.curve.points[-1], strict=True)))
-    true, shaped = memories
-    assert (true["actions"] == shaped["actions"]).all()
-    heights = shaped["observations"][np.arange(100), shaped["actions"], 2]
-    failed = true["rewards"] == -1
-    assert 20 < failed.sum() < 100 and np.ptp(heights[failed]) > 0.5
-    assert shaped["rewards"][failed] == pytest.approx(-1 + 0.5 * (heights[failed] + 1) / 2)
-    assert (shaped["rewards"][~failed] == 1).all() and (true["rewards"][~failed] == 1).all()
-    for name in ("mean_reward", "success_rate", "deadlocked"):
-        assert curves[0][name] == curves[1][name]
-    assert curves[0]["mean_reward"] == pytest.approx(true["rewards"].mean())
-    assert curves[0]["loss"] != curves[1]["loss"]
+@pytest.mark.parametrize("stop", [3, 30, 90])
+def test_a_run_on_loads_of_few_items_goes_on_from_its_first_pick(tmp_path, few_items, stop):
+    """Their episodes hardly ever begin together."""
+
+    def stack(rng):
+        return few_items(rng, int(rng.integers(1, 30)))
+
+    config = TrainConfig(**CONTAINER | {"picks": 400, "max_picks": 20, "equalize": False})
+    train(config, tmp_path / "straight", progress=False, stack=stack)
+    with at_step(stop, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "broken", progress=False, stack=stack)
+    train(config, tmp_path / "broken", progress=False, stack=stack)
+    assert_same(tmp_path / "straight", tmp_path / "broken")

@@ -1,11 +1,6 @@
 """Many runs side by side: what is kept, what is reported, and who does the work."""
 
-import logging
 import os
-import signal
-import threading
-import time
-from concurrent.futures.process import BrokenProcessPool
 
 import pandas as pd
 import pytest
@@ -13,7 +8,7 @@ import pytest
 from unload import TrainConfig
 from unload.agent import sweep
 from unload.agent.training import train
-from unload.physics.lift_table import LiftTable
+from unload.physics.table import LiftTable
 from unload.reproduce.paper.grids import tuning_config
 from unload.support import files
 
@@ -45,8 +40,7 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
         assert not record["resumed"]
         assert record["peak_memory_mib"] > 50
         assert "256/256" in (folder / "log.txt").read_text()
-        assert not (folder / "attempts").exists()
-    written = sorted(tmp_path.glob("many/set/*/*[!t]"))  # all but log.txt
+    written = sorted(tmp_path.glob("many/set/*/*.[!t]*"))  # all but log.txt and the lock
     before = [path.stat().st_mtime_ns for path in written]
     sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
     assert [path.stat().st_mtime_ns for path in written] == before
@@ -73,82 +67,6 @@ def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
     report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
     assert "n_features (5, not 4)" in report["error"].iloc[0]
     assert report["error"].iloc[1] == ""
-
-
-class Killer(threading.Thread):
-    """Kills the process of a run whenever it starts."""
-
-    def __init__(self, folder):
-        super().__init__(daemon=True)
-        self.path, self.done, self.killed = folder / "attempts", threading.Event(), []
-
-    def run(self):
-        while not self.done.wait(0.01):
-            try:
-                process = int(self.path.read_text().splitlines()[-1])
-            except (OSError, IndexError, ValueError):
-                continue
-            if process not in self.killed:
-                self.killed.append(process)
-                time.sleep(0.1)  # into the run
-                os.kill(process, signal.SIGKILL)
-
-
-def test_processes_that_cannot_begin_are_given_up(configs, tmp_path, monkeypatch):
-    def broken(*args, **kwargs):
-        raise BrokenProcessPool("out of memory")
-
-    monkeypatch.setattr(sweep.Parallel, "__call__", broken)
-    with pytest.raises(BrokenProcessPool, match="out of memory"):
-        sweep.run_sweep(configs, tmp_path, n_jobs=2, progress=False)
-
-
-@pytest.mark.slow
-def test_a_process_that_dies_is_reported_and_stops_no_other(configs, tmp_path):
-    runs = {"doomed": tuning_config(8, 1e-3, 0, steps=10_000, n_features=4), **configs}
-    killer = Killer(tmp_path / "doomed")
-    killer.start()
-    report = sweep.run_sweep(runs, tmp_path, n_jobs=2, progress=False)
-    killer.done.set()
-    assert report["error"].tolist() == ["its process died, 2 times", "", ""]
-    assert len(killer.killed) == 2
-    assert not list(tmp_path.rglob("attempts"))
-
-
-@pytest.mark.slow
-def test_a_dask_worker_that_dies_is_reported_and_stops_no_other(configs, tmp_path):
-    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
-    doomed, last = (tuning_config(8, 1e-3, 2, steps=steps, n_features=4) for steps in (10_000, 4))
-    runs = {**configs, "doomed": doomed, "last": last}  # two for each worker, "last" on the other
-    killer = Killer(tmp_path / "doomed")
-    killer.start()
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):  # given up at once
-        cluster = distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None,
-            silence_logs=logging.CRITICAL,
-        )  # fmt: skip
-        with cluster, distributed.Client(cluster):
-            report = sweep.run_sweep(runs, tmp_path, backend="dask", progress=False)
-    killer.done.set()
-    assert "KilledWorker" in report.loc["doomed", "error"]
-    assert (report["error"].drop("doomed") == "").all()
-    assert len(killer.killed) == 1
-
-
-def test_a_run_whose_mark_cannot_be_read_is_reported_and_stops_no_other(
-    configs, tmp_path, monkeypatch
-):
-    """The first run puts something else in the place of the second one's mark."""
-    train_run, mark = sweep.train_changed, tmp_path / "set" / "run_1" / "attempts"
-
-    def train_and_spoil(*args, **kwargs):
-        mark.mkdir(parents=True, exist_ok=True)
-        train_run(*args, **kwargs)
-
-    monkeypatch.setattr(sweep, "train_changed", train_and_spoil)
-    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
-    assert report["error"].iloc[0] == ""
-    assert str(mark) in report["error"].iloc[1]
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """Comparison of environments, and stacks that fail."""
 
+from copy import copy
+
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -53,3 +55,13 @@ class FailingStack:
         if self.calls in self.failing:
             raise OSError("the stack failed")
         return load
+
+
+def state_of(env) -> dict:
+    """All that the next steps of a container depend on."""
+    env = env.unwrapped
+    names = ("_observation", "_blur", "_failed", "visible", "_picks", "_unloaded", "_state")
+    return {name: copy(getattr(env, name)) for name in names} | {
+        "present": env.physics.present.copy(),
+        "rng": str(env.np_random.bit_generator.state),
+    }

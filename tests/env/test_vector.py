@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_pair
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.lift_table import LiftTable
+from unload.physics.table import LiftTable
 
 
 def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -> np.ndarray:
@@ -174,35 +174,6 @@ def test_visible_items_and_masks():
     for number, env in enumerate(side_by_side.envs):
         assert (envs.unwrapped.visible[number] == env.unwrapped.visible).all()
         assert (envs.unwrapped.action_masks()[number] == env.unwrapped.action_masks()).all()
-
-
-@pytest.mark.parametrize("picks", [0, 1, 30, 100, 333])
-@pytest.mark.parametrize("max_picks", [40, 500])
-def test_a_state_in_different_stages_goes_on_identically(mixed_stack, picks, max_picks, rng):
-    def make():
-        return gymnasium.make_vec(CONTAINER, 4, max_picks=max_picks, stack=mixed_stack).unwrapped
-
-    def act():
-        actions = rng.integers(128, size=4)
-        return np.where(rng.random(4) < 0.5, 0, actions)
-
-    envs, other = make(), make()
-    results = envs.reset(seed=1)
-    for _ in range(picks):
-        results = envs.step(act())
-    state = envs.get_state()
-    assert state["actions"].shape[0] <= min(picks, max_picks)
-    if picks >= 100:
-        assert (state["actions"][0] == -1).any() and (state["actions"][0] >= 0).any()
-    observations, infos = other.set_state(state)
-    assert_same(observations, results[0])
-    for name in ("action_mask", "item_mask", "unloaded"):
-        assert_same(infos[name], results[-1][name])
-    assert_same(other.get_state(), state)
-    for _ in range(200):
-        actions = act()
-        assert_same(other.step(actions), envs.step(actions))
-    assert_same(other.get_state(), envs.get_state())
 
 
 # --- the table ----------------------------------------------------------------------

@@ -1,14 +1,28 @@
 import base64
 import copy
+import io
 import json
+from itertools import combinations, permutations
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 from IPython.core.formatters import DisplayFormatter
+from matplotlib.image import imread
 
 from unload import Load, view
-from unload.load.colours import COLOURS, css
-from unload.load.view import PLOTLY_MIMETYPE
+from unload.load.substacks import package_colour
+from unload.load.view import (
+    COLOURS,
+    EYE,
+    PLOTLY_MIMETYPE,
+    back_to_front,
+    buttons,
+    css,
+    project,
+    slider,
+    still,
+)
 
 
 def vertices(trace) -> np.ndarray:
@@ -147,3 +161,105 @@ def test_a_copy_of_a_view_is_a_figure(small_load):
 def test_bad_input_is_refused(small_load, kwargs, error, message):
     with pytest.raises(error, match=message):
         view(**({"load": small_load} | kwargs))
+
+
+RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
+
+
+def pixels(low, high, colours) -> np.ndarray:
+    """(height, width, 3) float, a picture of boxes."""
+    legend = {}
+    png = still(np.array(low, float), np.array(high, float), np.array(colours), legend, 4.0)
+    return imread(io.BytesIO(png))[:, :, :3]
+
+
+def seen(picture, colour) -> int:
+    """Number of pixels in a colour, bright or shaded."""
+    strong = np.argmax(colour)
+    others = np.delete(picture, strong, axis=2).max(axis=2)
+    return int((picture[:, :, strong] > 2 * others).sum())
+
+
+def test_a_nearer_box_covers_a_farther_one():
+    near, far = [(6, 0, 0), (7, 2, 2)], [(4, 0.5, 0.5), (5, 1.5, 1.5)]
+    alone = seen(pixels(far[:1], far[1:], [RED]), RED)
+    for (first, one), (second, other) in permutations([(near, BLUE), (far, RED)]):
+        beside = seen(pixels([first[0], second[0]], [first[1], second[1]], [one, other]), RED)
+        assert beside < alone / 2
+
+
+def test_whatever_is_nearest_on_a_ray_is_drawn_last(full_load, rng):
+    low = full_load.positions - full_load.sizes / 2
+    high = low + full_load.sizes
+    drawn = back_to_front(low, high)
+    assert sorted(drawn) == list(range(len(full_load)))
+    rank = np.argsort(drawn)
+    for target in rng.uniform(0, (7, 2.5, 2.0), (300, 3)):
+        ahead = target - EYE
+        enters = np.minimum((low - EYE) / ahead, (high - EYE) / ahead).max(axis=1)
+        leaves = np.maximum((low - EYE) / ahead, (high - EYE) / ahead).min(axis=1)
+        hit = np.flatnonzero(enters < leaves - 1e-6)
+        assert hit.size
+        assert hit[rank[hit].argmax()] == hit[enters[hit].argmin()]
+
+
+def test_boxes_in_a_circle_are_all_drawn():
+    low = np.array([(0, 0, 0), (0, 1, 1), (1, 0.5, 0.2)], float)
+    assert sorted(back_to_front(low, low + 0.9)) == [0, 1, 2]
+
+
+def test_nothing_is_drawn_of_no_boxes():
+    picture = pixels(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
+    assert seen(picture, RED) == seen(picture, BLUE) == 0
+
+
+def test_the_colours_of_boxes_and_of_the_ground_are_kept():
+    """Although many colours are reduced to few."""
+    low = np.array([(1 + number / 3, 0, 0) for number in range(13)])
+    names = {f"package {number}": package_colour(number) for number in range(13)}
+    png = still(low, low + (0.3, 2, 1), np.array([*names.values()]), names, 4.0)
+    shown = np.rint(255 * imread(io.BytesIO(png))[:, :, :3])
+    legend, boxes = shown[:, :110], shown[:, 110:]
+    for colour in names.values():
+        for part in (legend, boxes):
+            assert (part == np.rint(255 * np.array(colour))).all(axis=2).any()
+    assert (shown[-1] == 255).all()
+
+
+def test_what_is_up_is_seen_higher():
+    points = np.array([(3.5, 1.2, 0), (3.5, 1.2, 1), (3.5, 2.2, 0)])
+    floor, above, to_the_right = project(points)
+    assert above[1] > floor[1] and to_the_right[0] > floor[0]
+    assert EYE[0] > 7
+
+
+def test_plotly_takes_both_and_they_name_the_frames():
+    layout = go.Layout(
+        sliders=[slider({"0": "no pick", "1": "one pick"})], updatemenus=[buttons(300)]
+    )
+    steps = layout.sliders[0].steps
+    assert [step.label for step in steps] == ["no pick", "one pick"]
+    assert [list(step.args[0]) for step in steps] == [["0"], ["1"]]
+    play, pause = layout.updatemenus[0].buttons
+    assert play.args[0] is None and list(pause.args[0]) == [None]
+    assert play.args[1]["frame"]["duration"] == 300 and play.args[1]["fromcurrent"]
+
+
+# Machado et al. (2009): linear RGB as seen without the long, the middle, the short cones.
+BLINDNESS = {
+    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+@pytest.mark.parametrize("kind", BLINDNESS)
+def test_the_colour_blind_tell_all_meanings_apart(kind):
+    linear = np.array(list(COLOURS.values())) ** 2.2
+    seen = (linear @ np.transpose(BLINDNESS[kind])).clip(0, 1) ** (1 / 2.2)
+    for (one, a), (other, b) in combinations(zip(COLOURS, seen), 2):
+        assert np.linalg.norm(a - b) > 0.1, (one, other)
+
+
+def test_css():
+    assert css((1.0, 0.5, 0.0)) == "rgb(255,128,0)"

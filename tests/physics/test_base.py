@@ -1,7 +1,6 @@
 """What all three physics have in common."""
 
 from collections.abc import Callable
-from threading import Thread
 
 import numpy as np
 import pytest
@@ -68,24 +67,6 @@ def test_interleaved_containers_answer_as_separate_ones(make, rng):
         first, second = (make(kind, load) for load in loads)
         together = [(first.lift(item), second.lift(item)) for item in items]
         assert list(zip(*separate)) == together
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_threads_may_share_a_physics(make, boxes, kind):
-    load = boxes(*[(0.3 + 0.45 * column, 0.2) for column in range(5)])
-    known = lifts(make(kind, load), range(5))
-    shared, answers = make(kind, load), {}
-
-    def work(number: int) -> None:
-        answers[number] = lifts(shared, range(5))
-
-    threads = [Thread(target=work, args=(number,)) for number in range(3)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for number in range(3):
-        assert answers[number] == pytest.approx(known, abs=0.002 if kind == "full" else 0)
 
 
 @pytest.mark.parametrize("kind", KINDS)

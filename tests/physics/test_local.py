@@ -1,7 +1,5 @@
 """Lifts of a box in its situation."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from unload.physics.bullet import World
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Surroundings
-from unload.physics.table import HELD_DOWN, TablePhysics
 
 
 def hard_items(load: Load, present: np.ndarray) -> list[int]:
@@ -98,18 +95,6 @@ def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
         assert interrupted.simulate(situation) == fresh.simulate(situation)
     interrupted.close()
     fresh.close()
-
-
-@pytest.mark.parametrize("kind", [LocalPhysics, TablePhysics])
-def test_threads_may_simulate_in_one_physics(situations, kind):
-    light = [situation for situation in situations if situation.on_top < HELD_DOWN][:12]
-    alone, shared = LocalPhysics(), kind()
-    known = [alone.simulate(situation) for situation in light]
-    with ThreadPoolExecutor(4) as pool:
-        answers = list(pool.map(lambda _: list(map(shared.simulate, light)), range(4)))
-    assert answers == [known] * 4
-    alone.close()
-    shared.close()
 
 
 def test_pybullet_is_started_at_the_first_lift(make, boxes):

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from unload import task
-from unload.load.boxes import Load
-from unload.load.contacts import CONTACT_TOLERANCE
+from unload.load.boxes import CONTACT_TOLERANCE, Load
 from unload.load.substacks import CELL
 from unload.physics.situation import Surroundings
 

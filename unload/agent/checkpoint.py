@@ -4,7 +4,6 @@ import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from hashlib import blake2b
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +17,10 @@ from unload.support import checks, files
 
 FORMAT = 5  # of the checkpoints
 # Settings that there were once. A run that has them at these values is as one of today.
-FORMER = {"drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0}
+FORMER = {
+    "drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0,
+    "height_reward": 0.0, "snapshots": 0,
+}  # fmt: skip
 # Of a ``Training``: what has a state besides the generator.
 STATEFUL = ("agent", "curve", "rollout")
 
@@ -50,7 +52,7 @@ class RunFolder:
 
     Raises:
         TypeError: ``run_dir`` is no path.
-        ValueError: ``run_dir`` is empty or a file.
+        ValueError: ``run_dir`` is empty.
         OSError: it cannot be made.
     """
 
@@ -60,12 +62,7 @@ class RunFolder:
         self.path = Path(run_dir)
         if self.path == Path():
             raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
-        if self.path.exists() and not self.path.is_dir():
-            raise ValueError(f"run_dir is {str(run_dir)!r}, a file; expected a folder")
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise OSError(f"run_dir is {str(run_dir)!r}, which cannot be made: {error}") from error
+        self.path.mkdir(parents=True, exist_ok=True)
         self.checkpoint = self.path / "checkpoint.npz"
         self._policy, self._curve = self.path / "policy.safetensors", self.path / "curve.csv"
         self._config = self.path / "config.json"
@@ -74,11 +71,12 @@ class RunFolder:
     def locked(self) -> Iterator[None]:
         """Keep other processes out of the folder, see ``files.locked``.
 
-        What a killed process has left half written there is removed.
+        What a killed process has left half written of the run's files is removed.
         """
         with files.locked(self.path):
-            for leftover in self.path.rglob("*.partial"):
-                leftover.unlink()
+            for path in (self.checkpoint, self._policy, self._curve, self._config):
+                for leftover in self.path.glob(f"{path.name}.*.partial"):
+                    leftover.unlink()
             yield
 
     @property
@@ -143,11 +141,6 @@ class RunFolder:
         except (IndexError, OverflowError, TypeError, ValueError, RuntimeError) as error:
             raise ValueError(f"{self.checkpoint}: {error}") from error
 
-    def save_snapshot(self, run) -> None:
-        """Keep the policy learned so far by a ``Training``."""
-        path = self.path / f"snapshots/{run.rollout.picks:09d}.safetensors"
-        save_policy(run.policy(), path)
-
     def finish(self, run, first_shown: str) -> None:
         """Write what a ``Training`` leaves.
 
@@ -160,8 +153,8 @@ class RunFolder:
         marks = {"first_loads": first_shown}
         marks |= {path.name: files.digest(path) for path in (self._policy, self._curve)}
         content = asdict(run.config) | {"marks": marks}
-        marks[self._config.name] = _digest(content)
-        files.write_json(self._config, content)  # last, because it marks the run as finished
+        # Last, because it marks the run as finished.
+        files.write_json(self._config, content, checked=True)
 
     def result(self, config: TrainConfig, stack: Callable | None = None) -> TrainResult:
         """Read back what a finished run has left.
@@ -176,8 +169,6 @@ class RunFolder:
         marks = stored.get("marks")
         marks = marks if isinstance(marks, dict) else {}
         self._check_same({name: stored[name] for name in stored if name != "marks"}, config)
-        if marks.pop(self._config.name, None) != _digest(stored):
-            raise ValueError(f"{self._config} was changed or damaged")
         rollout = Rollout(config, 1, stack)
         rollout.close()
         if marks.get("first_loads") != rollout.digest():
@@ -205,7 +196,3 @@ class RunFolder:
                 f"run_dir {str(self.path)!r} holds a run of another configuration: {details}; "
                 "expected the same one or an empty folder"
             )
-
-
-def _digest(content: dict) -> str:
-    return blake2b(json.dumps(content).encode(), digest_size=16).hexdigest()

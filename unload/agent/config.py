@@ -9,17 +9,6 @@ from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.variants import HEADS, NETWORKS
 from unload.support import checks
 
-# Largest integers: above, arrays of the run would not fit into any memory of today.
-MOST = {
-    "picks": 10**11,
-    "num_envs": 2**16,
-    "max_picks": 10**9,
-    "batch_size": 2**24,
-    "replay_size": 10**11,
-    "n_features": 2**14,
-    "target_update_interval": 10**11,
-    "log_interval": 10**9,
-}
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
 
@@ -40,8 +29,6 @@ class TrainConfig:
     epsilon_fraction: float = 0.5  # K_ε / K
     gamma: float = 0.0  # Sec. III-E
     beta: float = 1.0  # Sec. III-G
-    # h of Sec. V-A: a failed pick is learned from as -1 + h (z + 1) / 2, z as observed.
-    height_reward: float = 0.0
     # Sec. III-G; the others, in unload.network.variants, take padded rows for items in training.
     network: str = "peq"
     n_features: int = 64  # * n
@@ -53,7 +40,6 @@ class TrainConfig:
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
-    snapshots: int = 0  # * policies kept along the way, evenly spaced
     checkpoint_interval: float = 60.0  # * seconds
 
     def __post_init__(self) -> None:
@@ -64,13 +50,14 @@ class TrainConfig:
             self._set(name, str(getattr(self, name)))
         for name in ("equalize", "mask"):
             self._set(name, checks.boolean(name, getattr(self, name)))
-        for name, most in MOST.items():
-            self._set(name, checks.integer(name, getattr(self, name), 1, most))
-        for name in ("seed", "gradient_steps", "snapshots"):
-            self._set(name, checks.integer(name, getattr(self, name), 0))
         for name in (
-            "epsilon_init", "epsilon_final", "epsilon_fraction", "gamma", "height_reward"
+            "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
+            "target_update_interval", "log_interval",
         ):  # fmt: skip
+            self._set(name, checks.integer(name, getattr(self, name), 1))
+        for name in ("seed", "gradient_steps"):
+            self._set(name, checks.integer(name, getattr(self, name), 0))
+        for name in ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"):
             self._set(name, checks.real(name, getattr(self, name), 0, 1))
         for name in ("learning_rate", "beta", "checkpoint_interval"):
             self._set(name, checks.real(name, getattr(self, name), 0))

@@ -99,10 +99,6 @@ class ReplayBuffer:
     def __len__(self) -> int:
         return min(self.total, self.size)
 
-    def filled(self) -> np.ndarray:
-        """Return the slots that hold a pick, (len,) int64."""
-        return np.arange(len(self))
-
     def add(self, **batch: np.ndarray) -> None:
         """Add a batch of picks; the names are those of ``arrays``, the first axis the batch.
 
@@ -117,27 +113,9 @@ class ReplayBuffer:
         slots = slice(start, start + count)
         if start + count > self.size:  # round the end
             slots = np.arange(start, start + count) % self.size
-        self._write(slots, checked)
+        for name, values in checked.items():
+            self.arrays[name][slots] = values
         self.total += count
-
-    def overwrite(self, slots: np.ndarray, **batch: np.ndarray) -> None:
-        """Put a batch of picks in place of others, which stay as old as they were.
-
-        Args:
-            slots: (batch,) int64.
-            **batch: see ``add``.
-
-        Raises:
-            TypeError, ValueError: as ``add`` does, or a slot is out of range.
-        """
-        checked = self._checked(batch)
-        slots = checks.integer_array("slots", slots, (len(checked["rewards"]),))
-        room = len(self.arrays["rewards"])
-        if slots.size and not 0 <= slots.min() <= slots.max() < room:
-            raise ValueError(
-                f"slots holds {slots.min()} to {slots.max()}; expected 0 to {room - 1}"
-            )
-        self._write(slots, checked)
 
     def _checked(self, batch: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """A batch as the arrays hold it; raise unless it fits."""
@@ -160,10 +138,6 @@ class ReplayBuffer:
             check_next_masks(checked["next_masks"], checked["terminations"])
         return checked
 
-    def _write(self, slots: slice | np.ndarray, checked: dict[str, np.ndarray]) -> None:
-        for name, values in checked.items():
-            self.arrays[name][slots] = values
-
     def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
         """Draw slots uniformly, with replacement, (batch_size,) int64.
 
@@ -178,10 +152,7 @@ class ReplayBuffer:
 
     def sample(self, batch_size: int, rng: np.random.Generator) -> dict[str, np.ndarray]:
         """Copies of picks that ``sample_rows`` draws; raises as it does."""
-        return self.rows(self.sample_rows(batch_size, rng))
-
-    def rows(self, rows: np.ndarray) -> dict[str, np.ndarray]:
-        """Copies of the picks in some slots, (k,) int64, as ``add`` takes them."""
+        rows = self.sample_rows(batch_size, rng)
         # Indexing by ``array[rows]`` would take half as long again.
         batch = {name: array.take(rows, axis=0) for name, array in self.arrays.items()}
         if self.equalized:

@@ -84,7 +84,7 @@ class Rollout:
         transitions = {
             "observations": self.observations,
             "actions": actions,
-            "rewards": self._shaped(rewards, actions),
+            "rewards": rewards,
         }
         if self._config.gamma > 0:
             transitions |= _next_states(following, terminations, infos)
@@ -96,13 +96,6 @@ class Rollout:
             while (self.steps - self._starts[1][0]) * self._config.num_envs >= self._reach:
                 self._starts.popleft()
         return rewards, transitions
-
-    def _shaped(self, rewards: np.ndarray, actions: np.ndarray) -> np.ndarray:
-        """Rewards to learn from: a failed pick is the less bad, the higher its item (Sec. V-A)."""
-        if not self._config.height_reward:
-            return rewards
-        heights = (self.observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
-        return np.where(rewards < 0, rewards + self._config.height_reward * heights, rewards)
 
     def digest(self) -> str:
         """Return a digest of what is seen now."""

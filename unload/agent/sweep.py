@@ -4,7 +4,6 @@ import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
@@ -19,7 +18,6 @@ from unload.agent.training import Training, train_changed, unchanged
 from unload.support import checks, files, provenance
 
 BACKENDS = ("loky", "dask")
-ATTEMPTS = 2  # a run whose process died so often is given up
 
 
 def run_sweep(
@@ -32,10 +30,10 @@ def run_sweep(
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
-    A run that fails, or whose process dies, is reported and does not stop the others. Each
-    run uses one thread, shows its own progress in ``log.txt`` in its folder, and leaves
-    ``record.json`` there: the entries of ``unload.support.provenance.run_record``, ``process``,
-    and ``resumed``, true if they describe only the last part of a run that had been stopped.
+    A run that fails is reported and does not stop the others. Each run uses one thread, shows its
+    own progress in ``log.txt`` in its folder, and leaves ``record.json`` there: the entries of
+    ``unload.support.provenance.run_record``, ``process``, and ``resumed``, true if they describe
+    only the last part of a run that had been stopped.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -57,7 +55,7 @@ def run_sweep(
         TypeError: ``configs`` is not a mapping of names to ``TrainConfig``.
         ValueError: a name is not a plain relative path, the backend is unknown, or there is
             no cluster.
-        BrokenProcessPool: the processes die before they can begin a run.
+        BrokenProcessPool: a process has died, for want of memory, say; call it again to go on.
     """
     checks.entries("configs", configs, ())
     for name, config in configs.items():
@@ -67,9 +65,6 @@ def run_sweep(
             raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
     checks.one_of("backend", backend, BACKENDS)
     folders = {name: Path(folder) / name for name in configs}
-    for place in folders.values():
-        if _mark(place).exists():  # of a sweep that was stopped
-            _mark(place).unlink()
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     jobs = {name: (name, configs[name], folders[name], changes[name]) for name in configs}
     errors = {}
@@ -88,25 +83,6 @@ def run_sweep(
         for name, config in configs.items()
     ]
     return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
-
-
-def run_all(
-    configs: Mapping[str, TrainConfig],
-    folder: str | Path,
-    n_jobs: int,
-    progress: bool,
-    changes: Mapping[str, Callable[[Training], None]] | None = None,
-) -> list[dict]:
-    """Run ``run_sweep`` and return the runs' records.
-
-    Raises:
-        RuntimeError: a run failed; the message says which and why.
-    """
-    report = run_sweep(configs, folder, n_jobs, progress=progress, changes=changes)
-    failed = report[report["error"] != ""]
-    if len(failed):
-        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
-    return [files.read_json(Path(folder) / name / "record.json") for name in configs]
 
 
 def _is_plain(name: object) -> bool:
@@ -143,51 +119,18 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
 
 
 def _on_machine(jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
-    """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``.
-
-    loky gives up all runs when one process dies. Those that were under way then go on alone,
-    one after the other, so that it shows whose process it was.
-    """
-    left = dict(jobs)
-    while left:
-        begun = _begun(left)
-        interrupted = [name for name, (_, _, folder, _) in left.items() if _mark(folder).exists()]
-        chosen = [delayed(_run)(*left[name]) for name in interrupted[:1] or left]
-        try:
-            runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-            for name, error in runs(chosen):
-                del left[name]
-                yield name, error
-        except BrokenProcessPool:
-            if _begun(left) == begun:  # the processes die before they begin a run
-                raise
-
-
-def _begun(left: Mapping[str, tuple]) -> dict[str, str]:
-    """The runs that are left, and the attempts at each."""
-    marks = {name: _mark(folder) for name, (_, _, folder, _) in left.items()}
-    return {name: mark.read_text() if mark.exists() else "" for name, mark in marks.items()}
+    """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``."""
+    runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
+    yield from runs(delayed(_run)(*job) for job in jobs.values())
 
 
 def _run(
     name: str, config: TrainConfig, folder: Path, change: Callable[[Training], None]
 ) -> tuple[str, str]:
     """Train one configuration; its name, and the error's text if it failed."""
+    start = time.monotonic()
     try:
-        return name, _attempt(config, folder, change)
-    except Exception as error:  # whatever it was, the other runs go on
-        return name, f"{type(error).__name__}: {error}"
-
-
-def _attempt(config: TrainConfig, folder: Path, change: Callable[[Training], None]) -> str:
-    """Train one configuration; an error's text if its process has died too often."""
-    start, mark = time.monotonic(), _mark(folder)
-    attempts = mark.read_text() if mark.exists() else ""
-    try:
-        if attempts.count("\n") == ATTEMPTS:
-            return f"its process died, {ATTEMPTS} times"
         folder.mkdir(parents=True, exist_ok=True)
-        mark.write_text(f"{attempts}{os.getpid()}\n")
         resumed = (folder / "checkpoint.npz").exists() or (folder / "config.json").exists()
         with open(folder / "log.txt", "a") as log, one_thread():
             train_changed(config, folder, change, progress=log)
@@ -195,10 +138,9 @@ def _attempt(config: TrainConfig, folder: Path, change: Callable[[Training], Non
             record = {"resumed": resumed, "process": os.getpid()}
             record |= provenance.run_record(time.monotonic() - start)
             files.write_json(folder / "record.json", record, checked=True)
-        return ""
-    finally:
-        if mark.exists():
-            mark.unlink()
+        return name, ""
+    except Exception as error:  # whatever it was, the other runs go on
+        return name, f"{type(error).__name__}: {error}"
 
 
 @contextmanager
@@ -210,8 +152,3 @@ def one_thread() -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(threads)
-
-
-def _mark(folder: Path) -> Path:
-    """The file that is there while a run is under way: one line, a process, per attempt."""
-    return folder / "attempts"

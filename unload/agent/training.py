@@ -23,7 +23,7 @@ from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import Greedy
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
-from unload.load.boxes import Load, check_load, check_stack
+from unload.load.boxes import Load, check_stack
 from unload.network.variants import NETWORKS
 
 CURVE_COLUMNS = (
@@ -185,8 +185,7 @@ def train(
     Args:
         config: what to train.
         run_dir: folder of the run. Holds ``checkpoint.npz`` while it goes on and at the end
-            ``policy.safetensors``, ``curve.csv`` and ``config.json``; with
-            ``config.snapshots`` also ``snapshots/<picks>.safetensors``.
+            ``policy.safetensors``, ``curve.csv`` and ``config.json``.
         progress: show a progress bar with speed, MSR and loss; in a text file if it is one.
         stack: makes the loads, as in ``ContainerEnv``; the paper's if None. It must make the
             same load whenever it is called with a generator in the same state.
@@ -197,8 +196,7 @@ def train(
     Raises:
         TypeError: ``config`` is not a ``TrainConfig``.
         ValueError: ``run_dir`` is empty or a file, or holds another configuration, another
-            stack or a damaged file; ``stack`` is given for an environment without loads, or
-            makes two loads from one seed.
+            stack or a damaged file; ``stack`` is given for an environment without loads.
         OSError: ``run_dir`` cannot be written.
         RuntimeError: another process is training in ``run_dir``; the message names it.
         FloatingPointError: the loss or a weight is no longer finite; the message names the
@@ -236,7 +234,9 @@ def train_changed(
     if not isinstance(progress, bool) and not hasattr(progress, "write"):
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
     if stack is not None:
-        _check_stack(stack, config)
+        check_stack(stack)
+        if config.env != ENVS[0]:
+            raise ValueError(f"stack is given; expected None for env={config.env!r}")
     folder = RunFolder(run_dir)
     with folder.locked(), deferred_interrupts() as interrupts:
         if not folder.finished:
@@ -264,23 +264,17 @@ def _go(run: Training, folder: RunFolder, progress: bool | TextIO, interrupts: l
     for picks in folder.restore(run):
         stop_if_interrupted(picks)
     saved = time.monotonic()
-    steps, snapshots = config.picks // config.num_envs, config.snapshots
-    kept = rollout.steps * snapshots // steps
     with _progress_bar(rollout.picks, config.picks, progress) as bar:
         while not rollout.finished:
             try:
                 run.step()
                 due = interrupts or time.monotonic() - saved > config.checkpoint_interval
-                snapshot = rollout.steps * snapshots // steps > kept
-                if due or snapshot or rollout.finished:
+                if due or rollout.finished:
                     run.agent.check_finite()
             except FloatingPointError as error:
                 raise FloatingPointError(
                     f"after {rollout.picks} picks: {error}; the last checkpoint before is kept"
                 ) from error
-            if snapshot:
-                folder.save_snapshot(run)
-                kept = rollout.steps * snapshots // steps
             if due:
                 folder.save(run)
                 saved = time.monotonic()
@@ -337,19 +331,3 @@ def _progress_bar(picks: int, total: int, progress: bool | TextIO) -> tqdm:
         ncols=100,
         file=sys.stdout if progress is True else progress,
     )
-
-
-def _check_stack(stack: Callable, config: TrainConfig) -> None:
-    """Raise unless ``stack`` can make the run's loads, and the same again for a resumed run."""
-    if config.env != ENVS[0]:
-        raise ValueError(f"stack is given; expected None for env={config.env!r}")
-    check_stack(stack)
-    loads = [stack(np.random.default_rng(config.seeds()[0])) for _ in range(2)]
-    for load in loads:
-        check_load(load)
-    for name in ("positions", "sizes", "packages", "walls"):
-        if not np.array_equal(*(getattr(load, name) for load in loads)):
-            raise ValueError(
-                f"stack is {stack!r}, which made loads of other {name} from the same seed; "
-                "expected the same load from a generator in the same state"
-            )

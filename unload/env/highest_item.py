@@ -50,19 +50,7 @@ class HighestItemEnv(PickingEnv):
     ## Information
     ``action_mask`` and ``item_mask``: (128,) int8, all 1, since no row fails twice or is empty.
 
-    Args:
-        equalize: give equalized observations (Alg. 1).
-        ties: see ``unload.equalize``.
-        max_picks: length of an episode.
-        position_noise: standard deviation of the blur in m, at most 10; 0 also switches off
-            the 1 mm down.
-        render_mode: None; there is nothing to draw.
-
-    Raises:
-        TypeError, ValueError: an argument or an action is not as described.
-        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, ``step`` after
-            the end of an episode, or any of them after an error in the middle of a call.
-        gymnasium.error.ClosedEnvironmentError: use after ``close``.
+    Arguments and errors are as for ``ContainerEnv``, but there is nothing to draw.
     """
 
     metadata = {"render_modes": []}

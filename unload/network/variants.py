@@ -53,21 +53,7 @@ class ScoringNetwork(nn.Module):
     def forward(
         self, observations: torch.Tensor, present: torch.Tensor | None = None
     ) -> torch.Tensor:
-        """Action values.
-
-        Args:
-            observations: (batch, items, 3) of the weights' dtype, float32.
-            present: (batch, items) bool, the rows that hold an item; all if None. The other
-                rows have no influence on the values of these.
-
-        Returns:
-            (batch, items), of the same dtype, in [-1, 1]. Where a row holds no item, the
-            value is finite but means nothing.
-
-        Raises:
-            TypeError: no tensor, or another dtype.
-            ValueError: another shape, or no rows.
-        """
+        """Action values, see ``PEQNetwork``; rows without an item have no influence on others."""
         check_observations(observations, next(self.parameters()).dtype)
         if present is not None:
             check_present(present, observations)

@@ -1,7 +1,7 @@
 """PyBullet, and the only file that imports it.
 
 A ``World`` is one PyBullet client with boxes in it. It knows nothing of loads,
-observations or rewards.
+observations or rewards, and checks nothing: that is done where loads, forces and times enter.
 """
 
 import os
@@ -13,7 +13,6 @@ from importlib.metadata import version
 import numpy as np
 
 from unload import task
-from unload.support import checks
 
 
 @contextmanager
@@ -82,10 +81,6 @@ class World:
         maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
             2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
         iterations: of the contact solver per time step; 50 is PyBullet's default.
-
-    Raises:
-        TypeError, ValueError: ``time_step`` is no number from 1e-6 to 1, or ``iterations`` no
-            integer from 1 to 1000.
     """
 
     def __init__(
@@ -94,8 +89,7 @@ class World:
         maximal_coordinates: bool = True,
         iterations: int = ITERATIONS,
     ) -> None:
-        self.time_step = checks.real("time_step", time_step, 1e-6, 1)
-        self._iterations = checks.integer("iterations", iterations, 1, 1000)
+        self.time_step, self._iterations = time_step, iterations
         self._maximal = maximal_coordinates
         self._client = pybullet.connect(pybullet.DIRECT)
         self._disconnect = weakref.finalize(self, pybullet.disconnect, self._client)
@@ -132,27 +126,19 @@ class World:
             mass: kg.
             orientation: (4,) quaternion x, y, z, w.
             friction: of its surface; Bullet multiplies it with the other body's.
-
-        Raises:
-            TypeError: an argument does not hold numbers.
-            ValueError: a number is not finite, an edge is not > 0, or the mass is < 0.
         """
-        position = checks.finite_array("position", position, (3,)).tolist()
-        size = checks.finite_array("size", size, (3,)).tolist()
-        if min(size) <= 0:
-            raise ValueError(f"size is {size}; expected three edges > 0")
         body = pybullet.createMultiBody(
-            checks.real("mass", mass, 0),
-            self._shape(tuple(size)),
+            mass,
+            self._shape(tuple(map(float, size))),
             basePosition=position,
-            baseOrientation=checks.finite_array("orientation", orientation, (4,)).tolist(),
+            baseOrientation=orientation,
             useMaximalCoordinates=self._maximal,
             physicsClientId=self._client,
         )
         pybullet.changeDynamics(
             body,
             -1,
-            lateralFriction=checks.real("friction", friction, 0),
+            lateralFriction=friction,
             linearDamping=DAMPING,
             angularDamping=DAMPING,
             physicsClientId=self._client,
@@ -194,16 +180,12 @@ class World:
         return float(np.linalg.norm(velocity))
 
     def step(self, seconds: float) -> None:
-        """Let time pass, rounded to whole time steps.
-
-        Raises:
-            TypeError, ValueError: ``seconds`` is no finite number >= 0.
-        """
+        """Let time pass, rounded to whole time steps."""
         for _ in range(self._steps(seconds)):
             pybullet.stepSimulation(physicsClientId=self._client)
 
     def _steps(self, seconds: float) -> int:
-        return round(checks.real("seconds", seconds, 0) / self.time_step)
+        return round(seconds / self.time_step)
 
     def pull(
         self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
@@ -217,11 +199,7 @@ class World:
 
         Returns:
             How far the body moved, in m.
-
-        Raises:
-            TypeError, ValueError: ``force`` or ``seconds`` is no finite number >= 0.
         """
-        force = checks.real("force", force, 0)
         start = np.array(self.pose(body)[0])
         for _ in range(self._steps(seconds)):
             # The force acts for one step only, so it is applied anew before each.
@@ -248,12 +226,7 @@ class World:
 
         Returns:
             How far the body moved along x, in m.
-
-        Raises:
-            TypeError, ValueError: a number is not finite or < 0.
         """
-        for name, value in (("speed", speed), ("force", force), ("distance", distance)):
-            checks.real(name, value, 0)
         mass = pybullet.getDynamicsInfo(body, -1, physicsClientId=self._client)[0]
         start = self.pose(body)[0][0]
         for _ in range(self._steps(seconds)):

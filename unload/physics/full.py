@@ -77,7 +77,7 @@ class FullPhysics(Physics):
             TypeError, ValueError: ``seconds`` is no finite number >= 0.
         """
         self._check_filled()
-        self._world.step(seconds)
+        self._world.step(checks.real("seconds", seconds, 0))
         self._keep()
 
     def _lift(self, item: int) -> float:

@@ -1,15 +1,17 @@
 """What an agent sees, under sliders for exploration, noise and ties, as a Jupyter widget."""
 
+from typing import NamedTuple
+
 import ipywidgets as widgets
 import numpy as np
 
-from unload.env.equalization import TIES
-from unload.env.observation import POSITION_NOISE, drift
+from unload.agent.greedy import Greedy, greedy_actions
+from unload.env.equalization import TIES, equalize
+from unload.env.observation import POSITION_NOISE, drift, scaled
 from unload.load.substacks import stack_load
 from unload.load.view import COLOURS, view
 from unload.play.canvas import ABSENT, Canvas
 from unload.play.players import AGENTS, Run, policy_of
-from unload.play.sight import Sight, look
 from unload.support import checks
 
 HEIGHT = 2  # column of the ranks along z
@@ -17,6 +19,40 @@ LEVELS = 8  # colours of ranks
 # Of the lowest, the middle and the highest rank; none is grey, as the unseen boxes are.
 RANK_COLOURS = np.array([(0.99, 0.91, 0.40), (0.20, 0.65, 0.52), (0.25, 0.05, 0.33)])
 DRAWS = 50  # of the noise, for the share of greedy picks that succeed
+
+
+class Sight(NamedTuple):
+    """What an agent sees of k items, and what it would pick.
+
+    Attributes:
+        ranks: (k, 3) float64, of each item along x, y and z, from 0 to k - 1.
+        greedy: the row of the item with the highest value.
+        chance: probability that the next pick succeeds, exploration included.
+    """
+
+    ranks: np.ndarray
+    greedy: int
+    chance: float
+
+
+def look(seen: np.ndarray, liftable: np.ndarray, agent: Greedy, epsilon: float, ties: str) -> Sight:
+    """Let an agent look at the visible items.
+
+    Args:
+        seen: (k, 3) float64, where their centres are seen to be, in m.
+        liftable: (k,) bool, which of them can be unloaded.
+        agent: the policy; ``ties`` stands in for its own.
+        epsilon: probability of a random pick.
+        ties: see ``unload.equalize``.
+    """
+    seen = scaled(seen)
+    equalized = equalize(seen, ties)
+    features = equalized if agent.equalize else seen
+    everything = np.ones((1, len(seen)), bool)
+    greedy = int(greedy_actions(agent.network, features[None], everything)[0])
+    chance = (1 - epsilon) * liftable[greedy] + epsilon * liftable.mean()
+    ranks = (equalized.astype(np.float64) + 1) / 2 * (len(seen) - 1)
+    return Sight(np.rint(2 * ranks) / 2, greedy, float(chance))  # means of ranks are halves
 
 
 class AgentView(widgets.VBox):
@@ -47,7 +83,6 @@ class AgentView(widgets.VBox):
         self._moment, self._liftable = run.moment(), run.liftable()
         # The environment's blur is drawn once per load. We change its size, not its direction.
         self._offsets = run.observed_positions() - self._load.positions
-        run.close()
         self.canvas = Canvas(self._load, height=420)
         self._make_controls(agent)
         rows = [widgets.HBox(row) for row in self._controls]

@@ -151,13 +151,10 @@ class Episode:
         """(k,) int64, the visible items that could be unloaded after the first ``count`` picks."""
         moment = self.moment(count)
         physics = TablePhysics(shared_table())
-        try:
-            physics.reset(self.load)
-            for item in np.flatnonzero(~moment.present):
-                physics.remove(item)
-            moved = np.array([physics.lift(item) for item in moment.visible])
-        finally:
-            physics.close()
+        physics.reset(self.load)
+        for item in np.flatnonzero(~moment.present):
+            physics.remove(item)
+        moved = np.array([physics.lift(item) for item in moment.visible])
         return moment.visible[moved >= task.LIFT_THRESHOLD]
 
     def unloaded(self, count: int | None = None) -> int:

@@ -44,22 +44,16 @@ class Run(Episode):
         mask: whether items that failed since the last success are excluded.
 
     Attributes:
-        player: as given.
+        mask: as given.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, player: str, load: Load, seed: int = 0, mask: bool = True) -> None:
-        self.player = player
         self._policy = policy_of(player)
-        self._mask = checks.boolean("mask", mask)
+        self.mask = checks.boolean("mask", mask)
         super().__init__(load, seed)
-
-    @property
-    def mask(self) -> bool:
-        """Whether items that failed since the last success are excluded."""
-        return self._mask
 
     def play_to(self, count: int) -> int:
         """Pick until there are ``count`` picks; return how many there are.
@@ -67,7 +61,7 @@ class Run(Episode):
         They are fewer if the container is empty before, or all visible items have failed.
         """
         checks.integer("count", count, 0)
-        while len(self.picks) < count and self.allowed(self._mask).any():
+        while len(self.picks) < count and self.allowed(self.mask).any():
             self.pick(self.choose())
         return min(count, len(self.picks))
 
@@ -78,7 +72,7 @@ class Run(Episode):
         going back changes nothing.
         """
         rng = np.random.default_rng([self._seed, len(self.picks)])
-        allowed = self.allowed(self._mask)
+        allowed = self.allowed(self.mask)
         row = self._policy(self.observation[None], allowed[None], rng)[0]
         return int(self.visible[row])
 
@@ -86,4 +80,4 @@ class Run(Episode):
         """Use the mask, or stop using it, after the first ``count`` picks."""
         mask = checks.boolean("mask", mask)
         self.back_to(count)
-        self._mask = mask
+        self.mask = mask

@@ -45,7 +45,6 @@ class Playground(widgets.VBox):
     ) -> None:
         seed = checks.integer("seed", seed, 0)
         checks.one_of("player", player, (YOU, *PLAYERS))
-        mask = checks.boolean("mask", mask)
         picks = checks.integer("picks", picks, 1, 10_000)
         load = stack_load(np.random.default_rng(seed))
         self.you = Episode(load, seed, physics="local")

@@ -5,7 +5,6 @@ import plotly.graph_objects as go
 
 from unload.load.view import COLOURS, View, buttons, layout, mesh, slider, view
 from unload.play.episode import Episode
-from unload.support import checks
 
 STOPS = 24  # of the slider, at most
 EARLY, LATE = np.array((0.00, 0.30, 0.25)), np.array((0.70, 0.93, 0.85))  # what is unloaded
@@ -20,9 +19,8 @@ def replay(episode: Episode, height: int = 520) -> View:
 
     Args:
         episode: holds the load and the picks.
-        height: of the figure in pixels, 200 to 5000.
+        height: of the figure in pixels.
     """
-    height = checks.integer("height", height, 200, 5000)
     load, picks = episode.load, episode.picks
     stops = np.unique(np.linspace(0, len(picks), STOPS + 1).round().astype(int)).tolist()
     parts = [

@@ -4,24 +4,19 @@ Errors name the file: a damaged one is a ValueError whatever the decoder raises,
 cannot be written an OSError.
 """
 
+import fcntl
 import json
 import os
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import datetime
 from hashlib import blake2b, file_digest
-from io import FileIO
 from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
 
 import numpy as np
-
-try:
-    import fcntl
-except ImportError:  # on Windows
-    fcntl = None
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "data"
@@ -48,23 +43,11 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], None]) -> Non
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, path)
-        _sync_folder(path.parent)
     except OSError as error:
         reason = f"cannot write this file: {error.strerror or error}"
         raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
-
-
-def _sync_folder(folder: Path) -> None:
-    """Let the new name of a file outlast a power cut."""
-    if os.name != "posix":
-        return  # Windows cannot open a folder
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -164,73 +147,26 @@ def _check_equal(path: str | Path, wanted: object, found: str) -> None:
 def locked(folder: str | Path) -> Iterator[None]:
     """Keep all other processes that ask for it out of ``folder``, which is made if missing.
 
-    ``folder/lock`` names the owner while the lock is held, and is removed afterwards. The
-    operating system releases the lock of a process that dies, so that a ``lock`` file which a
-    killed process has left behind stops nobody. (On Windows it does, and has to be removed.)
+    ``folder/lock`` names its owner, or the last one. The operating system releases the lock of a
+    process that dies, so that a killed process stops nobody.
 
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock.
-        OSError: the folder's file system has no locks, or its disk is full; the error names the
-            folder, or the file that could not be written.
+        OSError: the folder's file system has no locks, or its disk is full.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "lock"
-    file = _take_lock(path)
-    if file is None:
-        owner = _read_owner(path)
-        hint = "" if fcntl else f"; if it has ended, remove {path}"
-        raise RuntimeError(f"{folder} is in use by {owner}; wait, or take another folder{hint}")
-    with file:
-        try:
-            _write_owner(path, file)
-            yield
-        finally:
-            if not fcntl:
-                file.close()  # Windows removes no open file
-            path.unlink(missing_ok=True)  # before the lock goes, or it might be the next one's
-
-
-def _take_lock(path: Path) -> FileIO | None:
-    """The lock's file, open and owned by the caller; None if it has another owner.
-
-    It is not buffered, because closing a buffered file tries again to write what failed.
-    """
-    if not fcntl:
-        try:
-            return open(path, "xb", buffering=0)
-        except FileExistsError:
-            return None
-    while True:
-        file = open(path, "ab", buffering=0)
+    # Not buffered, because closing a buffered file tries again to write what failed.
+    with open(folder / "lock", "a+b", buffering=0) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            file.close()
-            if isinstance(error, BlockingIOError):
-                return None
-            reason = f"cannot lock this folder: {error.strerror}"
-            raise OSError(error.errno, reason, str(path.parent)) from error
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
-                return file
-        file.close()  # the owner before has removed this file meanwhile: lock the one that counts
-
-
-def _write_owner(path: Path, file: FileIO) -> None:
-    """Write this process and the time into a lock's file."""
-    started = datetime.now().astimezone().isoformat(timespec="seconds")
-    owner = f"process {os.getpid()} on {socket.gethostname()} since {started}\n"
-    try:
+        except BlockingIOError as error:
+            file.seek(0)
+            owner = file.read().decode().strip() or "another process"
+            raise RuntimeError(
+                f"{folder} is in use by {owner}; wait, or take another folder"
+            ) from error
+        started = datetime.now().astimezone().isoformat(timespec="seconds")
         file.truncate(0)
-        file.write(owner.encode())
-    except OSError as error:
-        reason = f"cannot write this file: {error.strerror or error}"
-        raise OSError(error.errno, reason, str(path)) from error
-
-
-def _read_owner(path: Path) -> str:
-    """What a lock's file says of its owner, who may be about to write it or to leave."""
-    with suppress(OSError):
-        return path.read_text().strip() or "another process"
-    return "another process"
+        file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
+        yield

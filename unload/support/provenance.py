@@ -2,6 +2,7 @@
 
 import os
 import platform
+import resource
 import subprocess
 import sys
 import tomllib
@@ -84,7 +85,7 @@ def joined(records: Iterable[dict]) -> dict:
     return {
         "runs": len(records),
         "wall_time_s": round(sum(record["wall_time_s"] for record in records), 1),
-        "peak_memory_mib": max(record["peak_memory_mib"] or 0 for record in records),
+        "peak_memory_mib": max(record["peak_memory_mib"] for record in records),
         **rest,
     }
 
@@ -124,11 +125,7 @@ def _cpu() -> str:
         return platform.processor() or "unknown processor"
 
 
-def _peak_memory() -> int | None:
-    """Highest memory use of this process so far, in MiB; None where the system does not say."""
-    try:
-        import resource  # not on Windows
-    except ImportError:
-        return None
+def _peak_memory() -> int:
+    """Highest memory use of this process so far, in MiB."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak // (2**20 if sys.platform == "darwin" else 2**10)

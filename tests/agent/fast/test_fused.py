@@ -15,8 +15,10 @@ from hypothesis import strategies as st
 from torch.nn.functional import smooth_l1_loss
 
 from unload.agent.dqn import DQN
-from unload.agent.fast import fused, ranks
+from unload.agent.fast import fused
+from unload.agent.fast.kernel import decode, encode, level
 from unload.env.equalization import equalize
+from unload.env.fast.ranking import LEVELS
 from unload.network.peq import PEQNetwork
 from unload.support import files
 
@@ -52,21 +54,19 @@ def reference(net, batch, beta=1.0):
     return loss.item(), [parameter.grad for parameter in double.parameters()]
 
 
+def gradients(net, batch, *more):
+    """The gradients of all weights, one after the other, and the loss."""
+    return fused.start_gradients(fused.weights_of(net), *batch.values(), *more)()
+
+
 def check(net, batch, beta=1.0, tolerance=1e-5):
     """Loss and gradients agree, the gradients relative to the largest of them."""
-    loss = fused.loss_and_gradients(net, *batch.values(), beta)
+    *found, loss = gradients(net, batch, beta)
     expected_loss, expected = reference(net, batch, beta)
     assert loss == pytest.approx(expected_loss, rel=1e-5)
-    largest = max(gradient.abs().max().item() for gradient in expected)
-    for parameter, gradient in zip(net.parameters(), expected):
-        assert parameter.grad.shape == parameter.shape
-        error = (parameter.grad - gradient).abs().max().item()
-        assert error < tolerance * min(largest, 1)
-
-
-def gradients(net, batch):
-    fused.loss_and_gradients(net, *batch.values())
-    return [parameter.grad.numpy().tobytes() for parameter in net.parameters()]
+    flat = torch.cat([gradient.flatten() for gradient in expected]).numpy()
+    assert len(flat) == len(found)
+    assert np.abs(found - flat).max() < tolerance * min(np.abs(flat).max(), 1)
 
 
 @pytest.mark.parametrize("n_features", [1, 16, 37, 64, 65, 130])
@@ -125,7 +125,8 @@ def test_any_batch_size_will_do(batch, size):
 def test_arrays_that_are_not_contiguous_will_do(batch):
     net = network(16)
     expected = gradients(net, {name: array[::3].copy() for name, array in batch.items()})
-    assert gradients(net, {name: array[::3] for name, array in batch.items()}) == expected
+    found = gradients(net, {name: array[::3] for name, array in batch.items()})
+    assert found.tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -200,11 +201,11 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
         lambda pool, *work: submitted.append(submit(pool, *work)) or submitted[-1],
     )
     net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
-    two = gradients(net, batch)
+    two = gradients(net, batch).tobytes()
     assert len(submitted) == 1 and submitted[0].done()
     torch.set_num_threads(1)
-    assert gradients(net, batch) == two
-    assert gradients(net, batch) == two  # and again
+    assert gradients(net, batch).tobytes() == two
+    assert gradients(net, batch).tobytes() == two  # and again
     assert len(submitted) == 1  # no thread where one is asked for
     torch.set_num_threads(2)
     gradients(net, random_batch(rng, fused.CHUNK * fused.CHUNKS_PER_THREAD))
@@ -216,20 +217,15 @@ def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
     finish = fused.start_gradients(fused.weights_of(net), *batch.values())
     everything = np.ones(batch["observations"].shape[:2], bool)
     fused.best_actions(fused.weights_of(net), batch["observations"], everything)
-    total = finish()
-    assert fused.loss_and_gradients(net, *batch.values()) == total[-1]
-    flat = np.concatenate([parameter.grad.numpy().ravel() for parameter in net.parameters()])
-    assert np.array_equal(flat, total[:-1].astype(np.float32))
+    assert np.array_equal(finish(), gradients(net, batch))
 
 
 def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
     net, batch = network(8), random_batch(rng, FOR_TWO_THREADS)
-    here = fused.loss_and_gradients(net, *batch.values())
+    here = gradients(net, batch)[-1]
     fork = multiprocessing.get_context("fork")
     answers = fork.SimpleQueue()
-    process = fork.Process(
-        target=lambda: answers.put(fused.loss_and_gradients(net, *batch.values()))
-    )
+    process = fork.Process(target=lambda: answers.put(gradients(net, batch)[-1]))
     process.start()
     process.join(60)
     try:
@@ -270,24 +266,19 @@ def test_two_updates_give_equal_bits(batch):
 @pytest.mark.parametrize("name", ["observations", "rewards"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_input_that_is_not_finite_is_refused(batch, name, value):
-    net = network(16)
     batch[name].flat[7] = value
     with pytest.raises(FloatingPointError, match="expected finite"):
-        fused.loss_and_gradients(net, *batch.values())
-    assert all(parameter.grad is None for parameter in net.parameters())
+        gradients(network(16), batch)
 
 
 @pytest.mark.parametrize("parameter", range(4))
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
     net = network(16)
-    fused.loss_and_gradients(net, *batch.values())
-    before = [p.grad.numpy().copy() for p in net.parameters()]
     with torch.no_grad():
         list(net.parameters())[parameter].view(-1)[0] = value
     with pytest.raises(FloatingPointError, match="expected finite"):
-        fused.loss_and_gradients(net, *batch.values())
-    assert all((p.grad.numpy() == kept).all() for p, kept in zip(net.parameters(), before))
+        gradients(net, batch)
 
 
 @pytest.mark.parametrize(
@@ -308,7 +299,7 @@ def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
 )
 def test_bad_batches_are_refused(batch, name, value, message):
     with pytest.raises(ValueError, match=message):
-        fused.loss_and_gradients(network(4), *(batch | {name: value}).values())
+        gradients(network(4), batch | {name: value})
 
 
 def test_choice_among_nothing_finite_is_refused():
@@ -354,7 +345,8 @@ def test_fused_update_is_a_hundred_times_faster(rng):
             times.append(time.perf_counter() - start)
         return min(times[1:])  # without the compilation
 
-    fast = seconds(lambda: fused.loss_and_gradients(net, observations, actions, targets), 100)
+    weights = fused.weights_of(net)
+    fast = seconds(lambda: fused.start_gradients(weights, observations, actions, targets)(), 100)
     assert seconds(plain, 2) > 100 * fast
 
 
@@ -362,13 +354,13 @@ def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bits(tmp_path)
     program = """
 import numpy as np, torch
 from unload import PEQNetwork
-from unload.agent.fast import fused, ranks
+from unload.agent.fast import fused
 rng = np.random.default_rng(0)
 network = PEQNetwork(20, torch.Generator().manual_seed(0))
 observations = rng.uniform(-1, 1, (70, 9, 3)).astype(np.float32)
 targets = rng.choice([-1, 1], 70).astype(np.float32)
-fused.loss_and_gradients(network, observations, rng.integers(9, size=70), targets)
-print(*(p.grad.numpy().tobytes().hex() for p in network.parameters()))
+weights, actions = fused.weights_of(network), rng.integers(9, size=70)
+print(fused.start_gradients(weights, observations, actions, targets)().tobytes().hex())
 """
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(files.ROOT)}
     first, second = (
@@ -381,8 +373,7 @@ print(*(p.grad.numpy().tobytes().hex() for p in network.parameters()))
 def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
     net, rows = network(16), rng.integers(BATCH, size=100)
     expected = gradients(net, {name: array[rows] for name, array in batch.items()})
-    fused.loss_and_gradients(net, *batch.values(), rows=rows)
-    assert [parameter.grad.numpy().tobytes() for parameter in net.parameters()] == expected
+    assert gradients(net, batch, 1.0, rows).tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize(
@@ -390,7 +381,7 @@ def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
 )
 def test_bad_rows_are_refused_by_name(batch, rows):
     with pytest.raises(ValueError, match="rows"):
-        fused.loss_and_gradients(network(4), *batch.values(), rows=rows)
+        gradients(network(4), batch, 1.0, rows)
 
 
 @given(
@@ -423,7 +414,31 @@ def test_bytes_give_the_same_bits_as_floats(batch, ties, rng):
     batch["observations"] = equalize(coarse, ties)
     weights, rows = fused.weights_of(network(70)), rng.integers(BATCH, size=200)
     totals = []
-    for seen in (batch["observations"], ranks.encode(batch["observations"])):
+    for seen in (batch["observations"], encode(batch["observations"])):
         arguments = seen, batch["actions"], batch["rewards"], 1.0, rows
         totals.append(fused.start_gradients(weights, *arguments)())
     assert totals[0].tobytes() == totals[1].tobytes()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_equalized_observations_come_back_to_the_bit(rng, ties):
+    seen = equalize(rng.integers(-20, 20, (50, 128, 3)) / 20, ties)
+    codes = encode(seen)
+    assert codes.dtype == np.uint8 and codes.nbytes == seen.nbytes // 4
+    back = decode(codes)
+    assert back.dtype == np.float32 and back.tobytes() == seen.tobytes()
+
+
+def test_each_byte_means_the_same_everywhere():
+    codes = np.arange(255, dtype=np.uint8)
+    levels = np.array([level(np.float32(code)) for code in codes], np.float32)
+    assert levels.tobytes() == decode(codes).tobytes() == LEVELS[128, :255].tobytes()
+    assert (encode(levels) == codes).all()
+
+
+@pytest.mark.parametrize("value", [0.5, 1.5, -3.0, 1e30, np.nan, np.inf, np.float32(1) / 126])
+def test_other_numbers_are_refused(value):
+    seen = decode(np.full((2, 128, 3), 7, np.uint8))
+    seen[1, 5, 2] = value
+    with pytest.raises(ValueError, match="^observations holds .*expected equalized coordinates"):
+        encode(seen)

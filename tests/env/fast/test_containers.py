@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from tests.load.strategies import loads
 from unload import Load, stack_load
 from unload.env.fast import containers
-from unload.load.contacts import CONTACT_TOLERANCE
-from unload.physics.lift_table import EMPTY, LiftTable, digest_of
+from unload.load.boxes import CONTACT_TOLERANCE
 from unload.physics.situation import Surroundings
-from unload.physics.table import HELD_DOWN
+from unload.physics.table import EMPTY, HELD_DOWN, LiftTable, digest_of
 
 
 def filled(load: Load, present: np.ndarray) -> containers.Containers:
@@ -71,8 +70,8 @@ def test_distances_are_looked_up_or_unknown(boxes):
     state.visible[:], state.masks[:] = -1, 1
     state.visible[1, :3] = range(3)
     table.add(Surroundings(load, everywhere).situation(0), 0.25)
-    for row, item, distance in ((0, 0, 0.25), (1, 1, containers.UNKNOWN), (3, -1, 0), (-1, -1, 0)):
-        items, distances = containers.look_up(state, np.array([-1, row]), *table.slots)
+    for row, item, distance in ((0, 0, 0.25), (1, 1, containers.UNKNOWN), (3, -1, 0)):
+        items, distances = containers.look_up(state, np.array([5, row]), *table.slots)
         assert items.tolist() == [-1, item] and distances.tolist() == [0, distance]
     state.masks[1, 1], state.failed[1, 1] = 0, 0.1  # failed before, by so much
-    assert containers.look_up(state, np.array([-1, 1]), *table.slots)[1].tolist() == [0, 0.1]
+    assert containers.look_up(state, np.array([5, 1]), *table.slots)[1].tolist() == [0, 0.1]

@@ -61,44 +61,6 @@ def weights_of(network: PEQNetwork) -> Weights:
     return Weights(weight, bias, score.reshape(4, -1), score_bias)
 
 
-def loss_and_gradients(
-    network: PEQNetwork,
-    observations: np.ndarray,
-    actions: np.ndarray,
-    targets: np.ndarray,
-    beta: float = 1.0,
-    rows: np.ndarray | None = None,
-) -> float:
-    """Mean smooth-L1 loss of the chosen actions' values, its gradients left in ``.grad``.
-
-    Runs on up to ``torch.get_num_threads()`` threads; the result does not depend on their
-    number.
-
-    Args:
-        network: whose parameters' ``.grad`` are set.
-        observations: (batch, items, 3) float32.
-        actions: (batch,) int64, in 0 … items-1.
-        targets: (batch,) float32.
-        beta: of the smooth-L1 loss, > 0.
-        rows: int64, which rows of these arrays are the batch, so that they need not be copied
-            out of a large memory; None for all.
-
-    Returns:
-        The loss.
-
-    Raises:
-        ValueError: an array's shape or dtype is another, or an action or row is out of range.
-        FloatingPointError: the loss or a gradient is not finite; ``.grad`` stays as it was.
-    """
-    total = start_gradients(weights_of(network), observations, actions, targets, beta, rows)()
-    gradients = torch.from_numpy(total[:-1].astype(np.float32))
-    parameters = _parameters(network)
-    parts = gradients.split([parameter.numel() for parameter in parameters])
-    for parameter, part in zip(parameters, parts):
-        parameter.grad = part.view(parameter.shape)
-    return float(total[-1])
-
-
 def start_gradients(
     weights: Weights,
     observations: np.ndarray,
@@ -107,11 +69,27 @@ def start_gradients(
     beta: float = 1.0,
     rows: np.ndarray | None = None,
 ) -> Callable[[], np.ndarray]:
-    """Begin ``loss_and_gradients`` on all threads but this one, which may do something else.
+    """Begin to compute the mean smooth-L1 loss of the chosen actions' values, and its gradients.
+
+    Up to ``torch.get_num_threads()`` threads do it, all but this one at once, which may do
+    something else meanwhile. The result does not depend on their number.
+
+    Args:
+        weights: of the network.
+        observations: (batch, items, 3) float32, or bytes, see ``kernel.encode``.
+        actions: (batch,) int64, in 0 … items-1.
+        targets: (batch,) float32.
+        beta: of the smooth-L1 loss, > 0.
+        rows: int64, which rows of these arrays are the batch, so that they need not be copied
+            out of a large memory; None for all.
 
     Returns:
         A function that does what is left to do and returns (8n + 2,) float64: the gradients of
-        ``weights``, and the loss. Until then, weights and arrays must stay as they are.
+        ``weights``, one array after the other, and the loss. Until then, weights and arrays must
+        stay as they are. It raises FloatingPointError unless all are finite.
+
+    Raises:
+        ValueError: an array's shape or dtype is another, or an action or row is out of range.
     """
     count, _ = _check(observations, ranks=True)
     if rows is None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from unload.agent.fast.adam import Adam
+from unload.agent.fast.learner import Adam
 
 
 @pytest.mark.parametrize("learning_rate", [1e-3, 0.1])
