@@ -26,7 +26,7 @@ from unload.load.substacks import WALLS
 from unload.physics.local import LocalPhysics
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
 from unload.reproduce.lifts.full import LIVED, NEAR_WALLS, State, drifting_job, fresh_job
-from unload.reproduce.results import COMMAND, JOBS, keep_all, measured, publish
+from unload.reproduce.results import COMMAND, keep_all, measured, publish, read_table
 from unload.reproduce.statistics import share_interval
 from unload.support import checks, files
 
@@ -41,24 +41,10 @@ WHOLE = 5  # of every so many states drawn, one is asked about in the whole cont
 CLOSE = (0.1, 0.3)  # m, distances in local that count as close to the threshold
 DRIFTING = ("keep", "restore_failure")  # in turn, the ``after_pick`` of worlds that drift
 ASKED_FULL = ("drawn", "buried", "close", "drifted")
-DTYPES = {
-    "policy": "str",
-    "seed": "int64",
-    "picks": "int64",
-    "item": "int64",
-    "on_top": "int64",
-    "situation": "int64",
-    "known": "bool",
-    "asked_full": "str",
-    "walls": "int64",
-    "after_pick": "str",
-    "lived": "int64",
-    "drift": "float64",
-    "table": "float64",
-    "local": "float64",
-    "full": "float64",
-}
-OPTIONS = JOBS
+COLUMNS = [
+    "policy", "seed", "picks", "item", "on_top", "situation", "known",
+    "asked_full", "walls", "after_pick", "lived", "drift", "table", "local", "full",
+]  # fmt: skip
 UNLOADED_BY = {
     "random": policies.random,
     "nearest": policies.nearest,
@@ -133,7 +119,7 @@ def agreement_data(
     publish(
         folder,
         NAME,
-        {NAME: frame[list(DTYPES)]},
+        {NAME: frame[COLUMNS]},
         f"{COMMAND} lifts",
         settings,
         lifts < LIFT_COUNT or full < FULL_COUNT or worlds < WORLDS,
@@ -164,8 +150,8 @@ def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
     Raises:
         FileNotFoundError: there is no such file.
     """
-    path = Path(folder) / f"{NAME}.csv"
-    return pd.read_csv(path, dtype=DTYPES).fillna({"asked_full": "", "after_pick": ""})
+    frame = read_table(Path(folder) / f"{NAME}.csv", f"{COMMAND} lifts", COLUMNS)
+    return frame.fillna({"asked_full": "", "after_pick": ""})
 
 
 def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:

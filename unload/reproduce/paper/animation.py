@@ -99,13 +99,7 @@ def save_unloading(episodes: Mapping[str, Episode], path: str | Path) -> list[Im
 
     Returns:
         Its frames.
-
-    Raises:
-        TypeError, ValueError: ``episodes`` is no mapping, or empty.
     """
-    checks.entries("episodes", episodes, ())
-    if not episodes:
-        raise ValueError("episodes is empty; expected at least one")
     counts = picks_of_frames(max(len(episode.items) for episode in episodes.values()))
     halves = [_Half(title, episode) for title, episode in episodes.items()]
     frames = [_frame(halves, *span) for span in zip([0, *counts], counts)]
@@ -206,11 +200,10 @@ class _Half:
     def __init__(self, title: str, episode: Episode) -> None:
         self._title, self._episode = title, episode
         self._painter = Painter(episode.load, (WIDTH, HEIGHT), ROOM)
-        self._last: tuple[tuple, Image.Image] | None = None
 
     def picture(self, before: int, now: int) -> Image.Image:
         """The state after ``now`` picks; those after the first ``before`` are marked."""
-        image = self._container(before, now).copy()
+        image = self._container(before, now)
         load, _, items, unloaded = self._episode
         count = int(unloaded[:now].sum())
         draw = ImageDraw.Draw(image)
@@ -245,16 +238,13 @@ class _Half:
         left = np.flatnonzero(present)
         seen = left[observation.nearest(positions[left])] if len(left) else left
         failed = items[-1:] if now > len(items) else items[before:now][~unloaded[before:now]]
-        key = present.tobytes(), rising.tobytes(), failed.tobytes()
-        if self._last is None or self._last[0] != key:
-            colours = np.tile(COLOURS["unseen"], (len(load), 1))
-            for meaning, those in (("visible", seen), ("liftable", rising), ("failed", failed)):
-                colours[those] = COLOURS[meaning]
-            rise = np.zeros(len(load))
-            rise[rising] = RISE
-            shown = np.unique(failed[present[failed]]).tolist()
-            self._last = key, self._painter.paint(present, colours, rise, shown)
-        return self._last[1]
+        colours = np.tile(COLOURS["unseen"], (len(load), 1))
+        for meaning, those in (("visible", seen), ("liftable", rising), ("failed", failed)):
+            colours[those] = COLOURS[meaning]
+        rise = np.zeros(len(load))
+        rise[rising] = RISE
+        shown = np.unique(failed[present[failed]]).tolist()
+        return self._painter.paint(present, colours, rise, shown)
 
 
 def _frame(halves: list[_Half], before: int, now: int) -> Image.Image:
