@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 
 from unload.heap.study import table as heap
-from unload.reproduce.falls import laboratory, long
+from unload.reproduce.falls import laboratory, published
 from unload.reproduce.lifts import agreement, table
 from unload.reproduce.paper import observation, training, tuning
 from unload.reproduce.policies import comparison, robustness
@@ -35,7 +35,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
-    "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
+    "falls": ("why runs fall: the long runs", published.falls_data, published.OPTIONS),
     **heap.PARTS,  # goes with the folder unload/heap
 }  # fmt: skip
 

@@ -3,7 +3,6 @@
 python -m unload.reproduce falls
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,8 +13,8 @@ from unload.agent.config import TrainConfig
 from unload.reproduce.falls import changes
 from unload.reproduce.falls.laboratory import POINT, point, train_in_laboratory
 from unload.reproduce.fingerprint import training_fingerprint
-from unload.reproduce.grid import Cell, Grid, train_grid
-from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
+from unload.reproduce.grid import Cell, Grid
+from unload.reproduce.results import COMMAND, keep_all, publish, read_table
 from unload.support import files
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
@@ -39,21 +38,6 @@ LONG = Grid(
         "shuffled_b2048_no_mask": Cell(replace(B2048, mask=False), FEW_SEEDS, changes.shuffled),
     },
 )
-OPTIONS = {"--cells": {"nargs": "+", "choices": LONG.cells}, **JOBS}
-
-
-def falls_data(
-    cells: Sequence[str] | None = None,
-    picks: int | None = None,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = -1,
-    progress: bool = True,
-) -> None:
-    """Train the long runs, see ``train_grid``; then trace two of the cell ``ranks``."""
-    train_grid(LONG, cells, picks, folder, runs_dir, n_jobs, progress)
-    if cells is None:
-        trace_data(CONFIG.picks if picks is None else picks, folder, runs_dir, n_jobs, progress)
 
 
 def trace_data(

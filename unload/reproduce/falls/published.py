@@ -1,5 +1,9 @@
-"""The published policies with a part of what they see blanked, and networks without training."""
+"""The published policies with a part of what they see blanked, and networks without training.
 
+python -m unload.reproduce falls
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,16 +17,36 @@ from unload.env.vector import ContainerVectorEnv
 from unload.network.peq import PEQNetwork
 from unload.reproduce.falls import measures
 from unload.reproduce.falls.laboratory import JUDGED, SLOPES
-from unload.reproduce.falls.long import LONG
+from unload.reproduce.falls.long import CONFIG, LONG, trace_data
 from unload.reproduce.fingerprint import training_fingerprint
-from unload.reproduce.grid import Grid, read_policies
+from unload.reproduce.grid import Grid, read_policies, train_grid
 from unload.reproduce.paper.grids import PAPER
-from unload.reproduce.results import COMMAND, keep_all, publish, read_table
+from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
 from unload.support import files
 
 LOADS = {"episodes": 100, "seed": 1000}
 UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
 COLUMNS = ["cell", "seed", *JUDGED, *SLOPES]
+OPTIONS = {"--cells": {"nargs": "+", "choices": LONG.cells}, **JOBS}
+
+
+def falls_data(
+    cells: Sequence[str] | None = None,
+    picks: int | None = None,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    progress: bool = True,
+) -> None:
+    """Train the long runs, see ``train_grid``; then trace two, and judge all published policies.
+
+    Of some cells, or of shorter runs, nothing is judged.
+    """
+    train_grid(LONG, cells, picks, folder, runs_dir, n_jobs, progress)
+    if cells is None:
+        trace_data(CONFIG.picks if picks is None else picks, folder, runs_dir, n_jobs, progress)
+    if cells is None and picks is None:
+        published_data(folder=folder, runs_dir=runs_dir, n_jobs=n_jobs, progress=progress)
 
 
 def published_data(
