@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 import unload
-from unload.agent.replay import ReplayBuffer
+from unload.agent.replay import ReplayBuffer, shuffle_places
 
 
 def picks(first: int, count: int, items: int = 4, next_state: bool = False) -> dict:
@@ -76,30 +76,6 @@ def test_a_sample_does_not_change_with_the_buffer(rng):
     assert (sample["observations"] == before).all()
 
 
-def test_bad_batches_change_nothing():
-    replay = ReplayBuffer(10, 4)
-    replay.add(**picks(0, 2))
-    good = picks(2, 3)
-    for batch, message in (
-        ({k: v for k, v in good.items() if k != "actions"}, "batch has .*expected"),
-        (good | {"masks": np.ones(3)}, "batch has .*expected"),
-        (good | {"actions": np.zeros(2, int)}, r"actions has shape \(2,\); expected \(3,\)"),
-        (picks(2, 3, items=5), r"observations has shape \(3, 5, 3\); expected \(3, 4, 3\)"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            replay.add(**batch)
-    for changes, error, message in (
-        ({"actions": np.full(3, 1.7)}, TypeError, "actions has dtype float64; expected integers"),
-        ({"rewards": np.full(3, np.nan)}, ValueError, "rewards holds nan"),
-        ({"observations": np.full((3, 4, 3), np.inf)}, ValueError, "observations holds inf"),
-        ({"rewards": 1.0}, ValueError, r"rewards has shape \(\)"),
-    ):
-        with pytest.raises(error, match=message):
-            replay.add(**good | changes)
-    assert len(replay) == replay.total == 2
-    assert (replay.arrays["observations"][:2] == picks(0, 2)["observations"]).all()
-
-
 def test_sampling_refuses(rng):
     replay = ReplayBuffer(10, 4)
     with pytest.raises(ValueError, match="the replay buffer is empty"):
@@ -109,15 +85,6 @@ def test_sampling_refuses(rng):
         replay.sample(0, rng)
     with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
         replay.sample(1, None)
-
-
-def test_masks_and_ends_are_flags():
-    replay = ReplayBuffer(10, 4, next_state=True)
-    good = picks(0, 3, next_state=True)
-    replay.add(**good | {"next_masks": good["next_masks"].astype(np.int8)})
-    assert (replay.arrays["next_masks"][:3] == good["next_masks"]).all()
-    with pytest.raises(ValueError, match="next_masks holds 2"):
-        replay.add(**good | {"next_masks": np.full((3, 4), 2)})
 
 
 @pytest.mark.parametrize(("size", "items", "name"), [(0, 4, "size"), (4, 0, "items")])
@@ -141,6 +108,12 @@ def test_a_memory_that_does_not_fit_is_refused_by_name(size):
         ({"next_observations": np.full((2, 5, 3), -np.inf, np.float32)}, "next_.* holds -inf"),
         ({"actions": np.array([0, 5])}, "actions holds 0 to 5; expected 0 to 4"),
         ({"next_masks": np.zeros((2, 5), bool)}, "next_masks is all zero in row 0"),
+        ({"next_masks": np.full((2, 5), 2)}, "next_masks holds 2"),
+        ({"masks": np.ones(2)}, "batch has .*expected"),
+        ({"actions": np.zeros(3, int)}, r"actions has shape \(3,\); expected \(2,\)"),
+        ({"actions": np.zeros(2)}, "actions has dtype float64; expected integers"),
+        ({"observations": np.zeros((2, 4, 3))}, r"observations has shape \(2, 4, 3\)"),
+        ({"rewards": 1.0}, r"rewards has shape \(\)"),
     ],
 )
 def test_what_would_spoil_learning_is_refused_where_it_enters(rng, change, message):
@@ -153,7 +126,7 @@ def test_what_would_spoil_learning_is_refused_where_it_enters(rng, change, messa
         "next_masks": np.ones((2, 5), bool),
         "terminations": np.array([False, False]),
     }
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((TypeError, ValueError), match=message):
         replay.add(**batch | change)
     assert len(replay) == 0
     replay.add(**batch)
@@ -192,3 +165,23 @@ def test_bytes_hold_equalized_observations_only(rng):
     for items, next_state in ((64, False), (129, False), (128, True)):
         with pytest.raises(ValueError, match="^equalized is True with items="):
             ReplayBuffer(20, items, next_state, equalized=True)
+
+
+def test_places_are_shuffled_among_the_items_of_each_observation():
+    rng = np.random.default_rng(0)
+    seen = rng.random((5, 128, 3)).astype(np.float32)
+    found = shuffle_places(seen, rng)
+    assert (found[..., 2] == seen[..., 2]).all()
+    assert (found[..., 0] != seen[..., 0]).mean() > 0.9
+    for before, after in zip(seen[..., :2], found[..., :2]):  # x and y stay together
+        assert sorted(map(tuple, before.tolist())) == sorted(map(tuple, after.tolist()))
+
+
+def test_rows_without_an_item_keep_their_places():
+    rng = np.random.default_rng(0)
+    seen = rng.random((3, 128, 3)).astype(np.float32)
+    present = np.arange(128) < np.array([[128], [50], [1]])
+    found = shuffle_places(seen, rng, present)
+    assert (found[~present] == seen[~present]).all()
+    assert (found[1, :50, 0] != seen[1, :50, 0]).any()
+    assert sorted(found[1, :50, 0]) == sorted(seen[1, :50, 0])

@@ -16,10 +16,11 @@ from unload.agent.rollout import Rollout
 from unload.support import checks, files
 
 FORMAT = 5  # of the checkpoints
-# Settings that there were once. A run that has them at these values is as one of today.
+# Settings that there were once, or not yet. A run with these values, or without these settings, is
+# as one of today.
 FORMER = {
     "drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0,
-    "height_reward": 0.0, "snapshots": 0,
+    "height_reward": 0.0, "snapshots": 0, "shuffle_places": False,
 }  # fmt: skip
 # Of a ``Training``: what has a state besides the generator.
 STATEFUL = ("agent", "curve", "rollout")

@@ -37,6 +37,9 @@ class TrainConfig:
     # * m, see ContainerEnv; 0 leaves equal coordinates equal, and ranks them in the items' order.
     position_noise: float = POSITION_NOISE
     mask: bool = False  # * whether failed items are masked in training's choices, too
+    # * x and y of each stored pick are permuted among its items, so that no place can be learned,
+    # and no preference for one can grow (notebook 10). Choices see the places as they are.
+    shuffle_places: bool = False
     gradient_steps: int = 1  # * updates per step of all environments
     target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
     log_interval: int = 500  # * steps of all environments per point of the curves
@@ -48,7 +51,7 @@ class TrainConfig:
         checks.one_of("network", self.network, NETWORKS)
         for name in ("env", "ties", "network"):
             self._set(name, str(getattr(self, name)))
-        for name in ("equalize", "mask"):
+        for name in ("equalize", "mask", "shuffle_places"):
             self._set(name, checks.boolean(name, getattr(self, name)))
         for name in (
             "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
@@ -68,6 +71,11 @@ class TrainConfig:
             raise ValueError(
                 f"n_features is {self.n_features}; expected a multiple of {HEADS} for "
                 "network='attention'"
+            )
+        if self.shuffle_places and self.gamma > 0:
+            raise ValueError(
+                f"gamma is {self.gamma}; expected 0 with shuffle_places=True, because values of "
+                "next observations rest on their places"
             )
         if self.picks % self.num_envs:
             raise ValueError(

@@ -34,6 +34,25 @@ def check_next_masks(masks: np.ndarray, terminations: np.ndarray) -> None:
         )
 
 
+def shuffle_places(
+    observations: np.ndarray, rng: np.random.Generator, present: np.ndarray | None = None
+) -> np.ndarray:
+    """Permute the places (x, y) of each observation among its items; heights stay.
+
+    Args:
+        observations: (batch, items, 3); not changed.
+        rng: draws a permutation for each observation.
+        present: (batch, items) bool, the rows that hold an item, the first ones; all if None.
+    """
+    keys = rng.random(observations.shape[:2])
+    if present is not None:
+        keys = np.where(present, keys, 1.0)  # rows without an item stay behind the others
+    order = keys.argsort(axis=1, kind="stable")[..., np.newaxis]
+    shuffled = observations.copy()
+    shuffled[..., :2] = np.take_along_axis(observations[..., :2], order, axis=1)
+    return shuffled
+
+
 class ReplayBuffer:
     """The last ``size`` picks, in arrays.
 

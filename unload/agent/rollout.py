@@ -15,6 +15,7 @@ import gymnasium
 import numpy as np
 
 from unload.agent.config import TrainConfig
+from unload.agent.replay import shuffle_places
 
 
 class Rollout:
@@ -55,7 +56,8 @@ class Rollout:
 
     def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
         self.observations, self.masks = observations, infos["action_mask"]
-        self.allowed = infos["action_mask" if self._config.mask else "item_mask"].astype(bool)
+        self._present = infos["item_mask"].astype(bool)
+        self.allowed = self.masks.astype(bool) if self._config.mask else self._present
 
     @property
     def picks(self) -> int:
@@ -82,7 +84,7 @@ class Rollout:
         """
         following, rewards, terminations, truncations, infos = self.envs.step(actions)
         transitions = {
-            "observations": self.observations,
+            "observations": self._stored_observations(),
             "actions": actions,
             "rewards": rewards,
         }
@@ -96,6 +98,15 @@ class Rollout:
             while (self.steps - self._starts[1][0]) * self._config.num_envs >= self._reach:
                 self._starts.popleft()
         return rewards, transitions
+
+    def _stored_observations(self) -> np.ndarray:
+        """What is remembered of what is seen now."""
+        config = self._config
+        if not config.shuffle_places:
+            return self.observations
+        # By the pick's number, so that a resumed run draws the same permutation again.
+        rng = np.random.default_rng((config.seed, self.picks))
+        return shuffle_places(self.observations, rng, self._present)
 
     def digest(self) -> str:
         """Return a digest of what is seen now."""

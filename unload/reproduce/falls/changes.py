@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import torch
 
+from unload.agent.replay import shuffle_places
 from unload.agent.training import Training, unchanged
 from unload.env.equalization import equalize
 
@@ -21,13 +22,6 @@ def mirror(observations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Give x and y of each observation random signs: a pick and its mirror images are alike."""
     signs = rng.choice(np.array([-1, 1], np.float32), (len(observations), 1, 2))
     observations[..., :2] *= signs
-    return observations
-
-
-def shuffle(observations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Deal the places anew: permute the pairs (x, y) of each observation among its items."""
-    order = rng.random(observations.shape[:2]).argsort(axis=1)[..., np.newaxis]
-    observations[..., :2] = np.take_along_axis(observations[..., :2], order, axis=1)
     return observations
 
 
@@ -140,4 +134,4 @@ def _each(makes: tuple[Callable[[Training], None], ...], run: Training) -> None:
 
 
 mirrored = partial(store, change=mirror)
-shuffled = partial(store, change=shuffle)
+shuffled = partial(store, change=shuffle_places)  # as TrainConfig(shuffle_places=True)
