@@ -1,8 +1,4 @@
 import json
-import os
-import re
-import subprocess
-import sys
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,12 +11,9 @@ from hypothesis import strategies as st
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
-    Breakdown,
     assert_same,
     at_pick,
-    at_step,
     begun,
-    crash,
     interrupt,
     interrupt_run,
 )
@@ -43,35 +36,6 @@ def test_an_interrupted_run_goes_on_to_the_same_result(tmp_path, config, steps):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-def test_a_crashed_run_goes_on_from_its_last_checkpoint(tmp_path):
-    config = TrainConfig(**CONTAINER, checkpoint_interval=0)
-    train(config, tmp_path / "straight", progress=False)
-    for number in (9, 14):  # twice
-        with at_step(number, crash), pytest.raises(Breakdown):
-            train(config, tmp_path / "broken", progress=False)
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-
-
-def test_a_killed_run_ends_as_if_nothing_had_happened(tmp_path):
-    fields = CONTAINER | {"picks": 400, "checkpoint_interval": 0}
-    train(TrainConfig(**fields), tmp_path / "straight", progress=False)
-    done = subprocess.run(
-        [sys.executable, KILLED_RUN, tmp_path / "killed", json.dumps(fields)],
-        env=os.environ | {"PYTHONPATH": str(files.ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
-    print(done.stdout)
-    kills, inside = map(int, re.search(r"(\d+) kills, (\d+) inside a save", done.stdout).groups())
-    assert kills >= 20 and inside >= 5
-    assert_same(tmp_path / "straight", tmp_path / "killed")
-    left = {path.name for path in (tmp_path / "killed").iterdir()}
-    assert left == {"policy.safetensors", "curve.csv", "config.json", "lock"}
-
-
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("changes", [{}, {"replay_size": 61}, {"replay_size": 5000}])
 def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):
@@ -92,16 +56,6 @@ def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):
                 assert (run.agent.state()["network.scorer.weight"]
                         == other.agent.state()["network.scorer.weight"]).all()  # fmt: skip
                 assert run.rollout.state()["start"] == other.rollout.state()["start"]
-
-
-def test_a_checkpoint_is_small(tmp_path):
-    config = TrainConfig(num_envs=64, picks=6400, replay_size=6400, batch_size=8, n_features=4)
-    with begun(config, tmp_path) as run:
-        for _ in range(100):
-            run.step()
-        folder = RunFolder(tmp_path)
-        folder.save(run)
-        assert folder.checkpoint.stat().st_size < 0.04 * run.replay.arrays["observations"].nbytes
 
 
 def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):
@@ -208,19 +162,6 @@ def test_every_flipped_bit_is_noticed(finished, rng, name):
             RunFolder(finished).result(TrainConfig(**CONTAINER))
     path.write_bytes(whole)
     RunFolder(finished).result(TrainConfig(**CONTAINER))
-
-
-@pytest.mark.parametrize("name", ["policy.safetensors", "curve.csv"])
-def test_a_truncated_or_missing_file_is_named(finished, name):
-    path = finished / name
-    whole = path.read_bytes()
-    path.write_bytes(whole[: whole.rindex(b"\n", 0, -1) + 1] if b"\n" in whole else whole[:-8])
-    with pytest.raises(ValueError, match=name):
-        train(TrainConfig(**CONTAINER), finished, progress=False)
-    path.unlink()
-    with pytest.raises(FileNotFoundError, match=name):
-        train(TrainConfig(**CONTAINER), finished, progress=False)
-    path.write_bytes(whole)
 
 
 def test_a_checkpoint_that_lacks_an_array_is_refused_by_name(tmp_path):

@@ -5,7 +5,6 @@ from torch.nn.functional import smooth_l1_loss
 
 from tests.agent.networks import HeightNetwork, peq, weights
 from unload import DQN, Greedy
-from unload.agent.greedy import greedy_actions
 
 
 def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> dict:
@@ -69,15 +68,6 @@ def test_bad_calls_of_act_are_refused(rng, masks, epsilon, message):
         DQN(HeightNetwork()).act(np.zeros((2, 4, 3), np.float32), masks, epsilon, rng)
 
 
-def test_act_takes_lists_and_needs_a_generator(rng):
-    agent, observations = DQN(HeightNetwork()), np.zeros((2, 3, 3))
-    observations[:, 1, 2] = 1
-    masks = [[1, 1, 1], [1, 0, 1]]
-    assert agent.act(observations.tolist(), masks, 0.0, rng).tolist() == [1, 0]
-    with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
-        agent.act(observations, masks, 0.0, None)
-
-
 # --- learning -----------------------------------------------------------------------
 
 
@@ -116,19 +106,6 @@ def test_learning_from_some_rows_is_learning_from_a_copy_of_them(rng, gamma, fus
     assert agents[1].update(batch, rows) == loss
     for one, other in zip(*(weights(agent.network) for agent in agents)):
         assert torch.equal(one, other)
-
-
-def test_choosing_unchecked_is_acting(rng):
-    observations = rng.uniform(-1, 1, (50, 12, 3)).astype(np.float32)
-    masks = rng.integers(2, size=(50, 12)).astype(bool)
-    masks[:, 3] = True
-    agent = DQN(peq())
-    for epsilon in (0.0, 0.5, 1.0):
-        acted, chosen = (
-            method(observations, masks, epsilon, np.random.default_rng(1))
-            for method in (agent.act, agent.choose)
-        )
-        assert (acted == chosen).all()
 
 
 def test_choosing_from_nothing_is_refused(rng):
@@ -170,18 +147,6 @@ def test_the_bootstrap_maximum_obeys_the_mask_and_the_end(mask, terminated, best
     assert DQN(HeightNetwork(), gamma=0.5).update(batch) == pytest.approx(target**2 / 2)
 
 
-def test_the_target_network_lags_behind(rng):
-    batch = make_batch(rng)
-    agent = DQN(peq(), learning_rate=0.05, gamma=0.9)
-    fresh = {name: value.clone() for name, value in agent.network.state_dict().items()}
-    agent.update(batch)
-    assert all(torch.equal(agent.target[name], fresh[name]) for name in fresh)
-    agent.update_target()
-    moved = agent.network.state_dict()
-    assert all(torch.equal(agent.target[name], moved[name]) for name in moved)
-    assert not torch.equal(agent.target["scorer.weight"], fresh["scorer.weight"])
-
-
 @pytest.mark.parametrize("fused", [False, True])
 @pytest.mark.parametrize("name", ["observations", "rewards"])
 def test_a_loss_that_is_not_finite_leaves_the_weights(rng, fused, name):
@@ -211,22 +176,6 @@ def test_a_state_goes_on_bit_by_bit(rng, fused):
     assert losses[0] == losses[1]
     assert all(torch.equal(a, b) for a, b in zip(weights(agent.network), weights(other.network)))
     assert agent.state().keys() == other.state().keys()
-
-
-def test_learning_finds_the_highest_item(rng):
-    observations = rng.uniform(-1, 1, (4000, 10, 3)).astype(np.float32)
-    actions = rng.integers(10, size=4000)
-    highest = observations[..., 2].argmax(axis=1)
-    rewards = np.where(actions == highest, 1, -1).astype(np.float32)
-    agent = DQN(peq(n_features=16), learning_rate=0.01)
-    for _ in range(300):
-        rows = rng.integers(4000, size=256)
-        loss = agent.update(
-            {"observations": observations[rows], "actions": actions[rows], "rewards": rewards[rows]}
-        )
-    assert loss < 0.12
-    chosen = greedy_actions(agent.network, observations, np.ones((4000, 10)))
-    assert (chosen == highest).mean() > 0.9
 
 
 @pytest.mark.parametrize(
@@ -271,11 +220,6 @@ def test_bootstrapping_needs_what_follows(rng):
     batch = without_next(make_batch(rng))
     with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
         DQN(peq(), gamma=0.9).update(batch)
-
-
-def test_a_fused_update_of_another_network_is_refused():
-    with pytest.raises(ValueError, match="fused_update is True; expected a PEQNetwork"):
-        DQN(HeightNetwork(), fused_update=True)
 
 
 @pytest.mark.parametrize("fused", [True, False])

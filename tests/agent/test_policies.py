@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from unload import policies
-from unload.env.observation import PADDING
 
 POLICIES = [policies.random, policies.nearest, policies.highest]
 
@@ -29,14 +28,6 @@ def test_random_is_uniform_over_the_allowed(rng):
     assert shares == pytest.approx([1 / 3, 0, 1 / 3, 1 / 3], abs=0.015)
 
 
-def test_random_depends_on_the_generator_only(rng):
-    observations, masks = batch(rng)
-    first, same, other = (
-        policies.random(observations, masks, np.random.default_rng(seed)) for seed in (1, 1, 2)
-    )
-    assert (first == same).all() and (first != other).any()
-
-
 def test_nearest_takes_the_first_allowed_row(rng):
     masks = np.array([[0, 0, 1, 1], [1, 1, 0, 0], [0, 0, 0, 1]])
     assert policies.nearest(np.zeros((3, 4, 3)), masks, rng).tolist() == [2, 0, 3]
@@ -53,26 +44,11 @@ def test_highest_takes_the_highest_allowed_row(rng):
 @pytest.mark.parametrize(
     ("observations", "masks", "error", "message"),
     [
-        (
-            np.zeros((2, 4, 3)),
-            [[1, 0, 0, 0], [0, 0, 0, 0]],
-            ValueError,
-            "masks is all zero in row 1",
-        ),
-        (
-            np.zeros((2, 4, 3)),
-            np.ones((2, 5)),
-            ValueError,
-            r"masks has shape \(2, 5\); expected \(2, 4\)",
-        ),
-        (np.zeros((2, 4, 3)), np.ones(4), ValueError, r"masks has shape \(4,\)"),
-        (np.zeros((4, 3)), np.ones(4), ValueError, r"observations has shape \(4, 3\)"),
+        (np.zeros((2, 2, 3)), [[1, 0], [0, 0]], ValueError, "masks is all zero in row 1"),
+        (np.zeros((2, 4, 3)), np.ones((2, 5)), ValueError, r"shape \(2, 5\); expected \(2, 4\)"),
         (np.zeros((2, 4, 2)), np.ones((2, 4)), ValueError, r"observations has shape \(2, 4, 2\)"),
         (np.full((1, 1, 3), np.nan), [[1]], ValueError, "observations holds nan"),
-        (np.zeros((1, 2, 3)), [[1, np.nan]], ValueError, "masks holds nan; expected bool, or 0"),
         (np.zeros((1, 2, 3)), [[1, -1]], ValueError, "masks holds -1"),
-        (np.zeros((1, 2, 3)), [["0", "1"]], TypeError, "masks has dtype <U1"),
-        ([[["a", "b", "c"]]], [[1]], TypeError, "observations has dtype <U1"),
     ],
 )
 def test_bad_batches_are_refused(policy, observations, masks, error, message, rng):
@@ -94,13 +70,3 @@ def test_a_mixed_policy_picks_at_random_now_and_then(rng):
         assert abs((actions != best).mean() - share * 127 / 128) < 0.03
     with pytest.raises(ValueError, match="share is 2"):
         policies.mixed(policies.highest, 2)
-
-
-@pytest.mark.parametrize("policy", POLICIES)
-def test_rows_without_an_item_are_never_picked(policy, rng):
-    observations = rng.uniform(-1, 1, (300, 8, 3)).astype(np.float32)
-    counts = rng.integers(1, 9, 300)
-    masks = np.arange(8) < counts[:, None]
-    observations[~masks] = PADDING
-    observations[:100, :, 2] = -1  # as low as padding
-    assert (policy(observations, masks, rng) < counts).all()

@@ -1,8 +1,6 @@
 import json
 import os
-import signal
 
-import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,7 +20,7 @@ from tests.agent.runs import (
 )
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
-from unload.agent.training import CURVE_COLUMNS, Curve, deferred_interrupts
+from unload.agent.training import CURVE_COLUMNS, Curve
 from unload.network.variants import NETWORKS
 from unload.support import files
 
@@ -224,36 +222,6 @@ def test_a_point_holds_the_means_since_the_last_one():
     assert table["wall_time"].is_monotonic_increasing
 
 
-def test_a_state_goes_on_in_the_middle_of_a_point():
-    curves = Curve(), Curve()
-    curves[0].add(np.array([1.0]), np.array([False]), [0.5])
-    curves[0].end_point(1, 1.0)
-    curves[0].add(np.array([-1.0]), np.array([True]), [0.25])
-    curves[1].load_state(curves[0].state())
-    for curve in curves:
-        curve.add(np.array([1.0]), np.array([False]), [])
-        curve.end_point(3, 0.9)
-    columns = list(CURVE_COLUMNS[:-1])
-    assert curves[0].table()[columns].equals(curves[1].table()[columns])
-
-
-def test_ctrl_c_while_the_environments_are_made(tmp_path, monkeypatch):
-    config, make_vec = TrainConfig(**CONTAINER), gymnasium.make_vec
-    train(config, tmp_path / "straight", progress=False)
-
-    def interrupted(*arguments, **keywords):
-        interrupt()
-        return make_vec(*arguments, **keywords)
-
-    monkeypatch.setattr(gymnasium, "make_vec", interrupted)
-    message = "stopped after 4 picks; call train again with run_dir="
-    with pytest.raises(KeyboardInterrupt, match=message):
-        train(config, tmp_path / "broken", progress=False)
-    monkeypatch.setattr(gymnasium, "make_vec", make_vec)
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-
-
 def test_a_second_ctrl_c_stops_at_once(tmp_path):
     config = TrainConfig(**CONTAINER, checkpoint_interval=0)
     train(config, tmp_path / "straight", progress=False)
@@ -269,12 +237,6 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-def test_ctrl_c_works_again_after_a_run(tmp_path):
-    handler = signal.getsignal(signal.SIGINT)
-    train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    assert signal.getsignal(signal.SIGINT) is handler
-
-
 @pytest.mark.parametrize("method", ["finish", "result"])
 def test_ctrl_c_in_the_last_moments_is_not_swallowed(tmp_path, method):
     config = TrainConfig(**CONTAINER)
@@ -282,16 +244,3 @@ def test_ctrl_c_in_the_last_moments_is_not_swallowed(tmp_path, method):
         train(config, tmp_path, progress=False)
     with at_step(1, crash):  # it is finished
         assert len(train(config, tmp_path, progress=False).curve) == 10
-
-
-def test_a_second_ctrl_c_inside_compiled_code_is_a_keyboard_interrupt():
-    """There, the exception raised by the signal comes out as a SystemError."""
-    with pytest.raises(KeyboardInterrupt), deferred_interrupts() as received:
-        interrupt()
-        try:
-            interrupt()
-        except KeyboardInterrupt:
-            raise SystemError("returned a result with an exception set") from None
-    assert len(received) == 2
-    with pytest.raises(SystemError), deferred_interrupts():
-        raise SystemError("of another reason")

@@ -10,8 +10,6 @@ import pybullet
 import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.env.comparing import CONTAINER, HIGHEST, FailingStack, assert_same
 from unload import ContainerEnv, HighestItemEnv
@@ -55,13 +53,6 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     env = make(position_noise=10.0)
     seen, _ = env.reset(seed=0)
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
-
-
-@pytest.mark.parametrize("make", ALL)
-def test_settings_are_pythons_own_numbers(make):
-    env = make(max_picks=np.int64(3), position_noise=np.float32(0.5), equalize=np.bool_(True))
-    kinds = [type(value) for value in (env.max_picks, env.position_noise, env.equalize)]
-    assert kinds == [int, float, bool]
 
 
 @pytest.mark.parametrize("make", [container, HighestItemEnv])
@@ -139,17 +130,6 @@ def test_spaces_and_metadata():
     single.close()
 
 
-def test_results_are_fresh_arrays():
-    envs = gymnasium.make_vec(CONTAINER, 2)
-    observations, infos = envs.reset(seed=0)
-    kept = observations.copy(), infos["action_mask"].copy()
-    for _ in range(30):
-        envs.step(np.array([100, 3]))
-    assert (observations == kept[0]).all() and (infos["action_mask"] == kept[1]).all()
-    observations[:] = 9
-    assert envs.step(np.array([100, 3]))[0].max() <= 1
-
-
 def test_seeds():
     envs = gymnasium.make_vec(CONTAINER, 2)
     first, _ = envs.reset(seed=4)
@@ -164,41 +144,7 @@ def test_seeds():
     assert not (unseeded[0] == unseeded[1]).all()
 
 
-def test_a_numpy_seed_is_a_seed():
-    envs, other = (HighestItemVectorEnv(3) for _ in range(2))
-    assert_same(envs.reset(seed=np.uint8(255)), other.reset(seed=255))  # 255 + 2 does not wrap
-
-
 # --- resets that fail ---------------------------------------------------------------
-
-
-CALLS = st.one_of(
-    st.tuples(st.just("reset"), st.none() | st.integers(-1, 3)),
-    st.tuples(st.just("step"), st.lists(st.integers(-2, 129), min_size=2, max_size=2)),
-    st.tuples(st.just("step"), st.lists(st.integers(0, 127), min_size=2, max_size=2)),
-    st.tuples(st.just("starts"), st.none()),
-    st.tuples(st.just("close"), st.none()),
-)
-
-
-@settings(derandomize=True, deadline=None, max_examples=40)
-@given(
-    make=st.sampled_from([ContainerVectorEnv, HighestItemVectorEnv]),
-    failing=st.lists(st.integers(1, 12), max_size=4),
-    calls=st.lists(CALLS, max_size=15),
-)
-def test_whatever_is_called_it_works_or_says_why_not(make, failing, calls):
-    """In particular, compiled code never meets arrays that are not filled."""
-    stack = {"stack": FailingStack(*failing, walls=2)} if make is ContainerVectorEnv else {}
-    envs = make(2, max_picks=2, **stack)
-    for name, argument in calls:
-        arguments = {"reset": {"seed": argument}, "step": {"actions": argument}}.get(name, {})
-        try:
-            result = getattr(envs, name)(**arguments)
-        except (ValueError, OSError, ResetNeeded, ClosedEnvironmentError):
-            continue
-        if name == "step":
-            assert set(result[1].tolist()) <= {1.0, -1.0} and np.isfinite(result[0]).all()
 
 
 # --- states -------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """The array environments, against Gymnasium's loop over single ones."""
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -146,22 +145,6 @@ def test_episodes_that_end_at_once(few_items):
     assert 3 in together and {1, 2} & set(together.tolist())
 
 
-def test_a_whole_load_to_the_last_item():
-    envs, side_by_side = make_pair(CONTAINER, 2, equalize=True, max_picks=2000)
-    results = envs.reset(seed=0)
-    side_by_side.reset(seed=0)
-    ended = np.zeros(2, bool)
-    while not ended.all():
-        heights = np.where(results[-1]["item_mask"], results[0][..., 2], -2)
-        results = envs.step(heights.argmax(axis=1))
-        assert_same(results, side_by_side.step(heights.argmax(axis=1)))
-        ended |= results[2]
-        for number in np.flatnonzero(results[2]):
-            final = results[4]["final_info"]
-            assert final["unloaded"][number] >= 800 and not final["item_mask"][number].any()
-            assert (results[4]["final_obs"][number] == -1).all()
-
-
 def test_visible_items_and_masks():
     envs, side_by_side = make_pair(CONTAINER, 3)
     envs.reset(seed=0)
@@ -227,9 +210,3 @@ def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch):
 def test_bad_settings_are_refused(kwargs, error, message):
     with pytest.raises(error, match=message):
         ContainerVectorEnv(**kwargs)
-
-
-def test_a_stack_of_something_else_is_refused():
-    envs = gymnasium.make_vec(CONTAINER, 2, stack=lambda rng: "boxes")
-    with pytest.raises(TypeError, match="load is 'boxes'; expected an unload.Load"):
-        envs.reset(seed=0)

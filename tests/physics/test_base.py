@@ -7,7 +7,6 @@ import pytest
 
 from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES
 from unload.load.boxes import SMALLEST_EDGE, Load
-from unload.load.substacks import stack_load
 from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
 from unload.physics.situation import Surroundings
@@ -40,33 +39,12 @@ def test_free_boxes_of_a_neat_wall_do_not_jam(make, small_load, kind):
     assert lifts(physics, free[:8]) == pytest.approx([ONE_BOX] * 8, rel=0.02)
 
 
-@pytest.mark.parametrize("scale", [0.8, 1.2])
-@pytest.mark.parametrize("kind", KINDS)
-def test_boxes_of_another_scale_lift_alike(make, rng, kind, scale):
-    load = stack_load(rng, walls=1, scale=scale)
-    physics = make(kind, load)
-    around = Surroundings(load, physics.present)
-    on_top = np.array([len(around.on_top(item)) for item in range(len(load))])
-    assert lifts(physics, np.flatnonzero(on_top == 0)[:3]) == pytest.approx([ONE_BOX] * 3, rel=0.05)
-    assert max(lifts(physics, np.flatnonzero(on_top > 2)[:3])) < 0.02
-
-
 def test_removing_a_box_frees_the_one_below(make, boxes):
     for kind in KINDS:
         physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
         physics.remove(1)
         assert physics.present.tolist() == [True, False]
         assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
-
-
-def test_interleaved_containers_answer_as_separate_ones(make, rng):
-    loads = [stack_load(rng, walls=1) for _ in range(2)]
-    items = (0, 30, 60)
-    for kind in ("local", "full"):
-        separate = [lifts(make(kind, load), items) for load in loads]
-        first, second = (make(kind, load) for load in loads)
-        together = [(first.lift(item), second.lift(item)) for item in items]
-        assert list(zip(*separate)) == together
 
 
 @pytest.mark.parametrize("kind", KINDS)

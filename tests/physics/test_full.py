@@ -3,23 +3,14 @@
 import numpy as np
 import pytest
 
-from tests.physics.kinds import ONE_BOX
 from unload import task
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
 from unload.physics.bullet import World
-from unload.physics.situation import Surroundings
 
 
 def lifts(physics: Physics, items) -> list[float]:
     return [physics.lift(int(item)) for item in items]
-
-
-def test_boxes_of_a_full_world_at_rest_for_long_still_lift(make, small_load):
-    physics = make("full", small_load)
-    top = int(np.argmax(small_load.positions[:, 2]))
-    physics.settle(3.0)
-    assert physics.lift(top) == pytest.approx(ONE_BOX, rel=0.02)
 
 
 # --- effects of a lift --------------------------------------------------------------
@@ -64,15 +55,6 @@ def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(make, small_load)
     assert 0 < drift.max() < 0.01
     physics.lift(0)
     assert (physics.positions() == settled).all()
-
-
-def test_the_ways_to_simulate_a_full_world_lift_alike(make, rng):
-    """Rigid bodies, which only ``"keep"`` uses, and multibodies."""
-    load = stack_load(rng, walls=1)
-    around = Surroundings(load, np.ones(len(load), dtype=bool))
-    for item in np.argsort([len(around.on_top(item)) for item in range(len(load))])[::20]:
-        kept, restored = (make("full", load, after_pick=how) for how in ("keep", "restore"))
-        assert kept.lift(item) == pytest.approx(restored.lift(item), abs=0.005)
 
 
 @pytest.mark.parametrize("after_pick", ["restore", "restore_failure", "keep"])

@@ -63,18 +63,6 @@ def test_a_situation_is_simulated_once(known, monkeypatch):
         physics.close()
 
 
-def test_boxes_under_three_others_are_held_down_in_local_physics_too(situations):
-    local, physics = LocalPhysics(), TablePhysics()
-    heavy = [each for each in situations if each.on_top >= HELD_DOWN][::3]
-    assert len(heavy) > 15
-    for situation in heavy:
-        assert physics.simulate(situation) == 0
-        assert local.simulate(situation) < task.LIFT_THRESHOLD
-    assert len(physics.table) == 0
-    local.close()
-    physics.close()
-
-
 def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
     tower = boxes((1.2, 0.2), (1.2, 0.6), (1.2, 1.0), (1.2, 1.4))
     around = Surroundings(tower, np.ones(4, dtype=bool))
@@ -118,11 +106,6 @@ def test_shipped_table_fits_this_physics(known):
     assert all(distance in (None, answer) for distance, answer in found)
 
 
-def test_a_table_is_needed():
-    with pytest.raises(TypeError, match="table is 3; expected a LiftTable or None"):
-        TablePhysics(3)
-
-
 def situation(number: int) -> Situation:
     """One of many different situations."""
     return Situation(np.array([[0, 0, 0, number, 2, 3]], np.int32), 1, None, ())
@@ -139,17 +122,6 @@ def table() -> LiftTable:
     for number in range(50):
         table.add(situation(number), number / 1000)
     return table
-
-
-def test_a_table_finds_what_was_added(table):
-    for number in range(50):
-        assert table.find(situation(number)) == number / 1000
-    assert table.find(situation(50)) is None and len(table) == 50
-
-
-def test_a_known_situation_keeps_its_distance(table):
-    table.add(situation(3), 0.4)
-    assert table.find(situation(3)) == 0.003 and len(table) == 50
 
 
 def test_a_table_grows_and_forgets_nothing(table):
@@ -225,11 +197,6 @@ def test_a_saved_table_finds_the_same(table, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "lifts.npz").read_bytes()
     read.add(situation(50), 0.05)
     assert len(read) == 51 and read.find(situation(50)) == 0.05
-
-
-def test_an_empty_table_is_saved_too(tmp_path):
-    LiftTable().save(tmp_path / "lifts.npz")
-    assert len(LiftTable.load(tmp_path / "lifts.npz")) == 0
 
 
 def test_a_damaged_file_is_refused(tmp_path):

@@ -88,13 +88,6 @@ def test_ranks_are_the_order_along_each_axis(seen, rng):
     assert sight.ranks == pytest.approx(order, abs=1e-4)
 
 
-def test_ties_share_a_rank(seen):
-    agent = policy_of("the paper's agent")
-    heights = np.unique(seen[0][:, 2].round(3))
-    assert len(np.unique(look(*seen, agent, 0, "noise").ranks[:, 2])) == len(seen[0])
-    assert len(np.unique(look(*seen, agent, 0, "average").ranks[:, 2])) == len(heights)
-
-
 @pytest.mark.parametrize("player", ["the paper's agent", "the recommended agent"])
 def test_greedy_is_what_the_agent_picks(seen, player):
     agent = policy_of(player)

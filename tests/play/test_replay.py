@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from unload.load.view import PLOTLY_MIMETYPE
 from unload.play.episode import Episode
 from unload.play.players import Run
 from unload.play.replay import STOPS, replay
@@ -42,15 +41,6 @@ def test_slider_and_frames_have_the_same_stops(full_load):
     steps = figure.layout.sliders[0].steps
     assert [step.args[0][0] for step in steps] == [frame.name for frame in figure.frames]
     assert steps[-1].label == f"50 picks, {run.unloaded()} unloaded"
-
-
-@pytest.mark.parametrize("picks", [0, 1, 3])
-def test_a_short_episode_has_a_replay(boxes, picks):
-    episode = Episode(boxes((1.0, 0.2), (1.0, 0.6), (2.0, 0.2)))
-    for item in (1, 0, 2)[:picks]:
-        episode.pick(item)
-    bundle = replay(episode)._repr_mimebundle_()
-    assert {"image/png", PLOTLY_MIMETYPE} <= set(bundle)
 
 
 def test_bad_input_is_refused(boxes):

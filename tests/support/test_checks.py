@@ -38,15 +38,6 @@ def test_integer_without_an_upper_bound():
             checks.integer("n", value, 1)
 
 
-@pytest.mark.parametrize("value", NO_NUMBERS, ids=repr)
-def test_other_kinds_of_numbers_are_refused(value):
-    """A caller could not rely on them: NumPy and PyTorch take no Fraction, for example."""
-    with pytest.raises(TypeError, match=r"^n is .*; expected an integer >= 0$"):
-        checks.integer("n", value, 0)
-    with pytest.raises(TypeError, match=r"^x is .*; expected a number in \[0, 1\]$"):
-        checks.real("x", value, 0, 1)
-
-
 @pytest.mark.parametrize("value", [0, 1, 0.25, np.float32(0.25), np.int8(1), np.longdouble(0.25)])
 def test_real_returns_a_python_float(value):
     result = checks.real("x", value, 0, 1)
@@ -100,12 +91,6 @@ def test_entries_names_what_is_missing():
         checks.entries("state", ["a"], ())
 
 
-@pytest.mark.parametrize("value", [None, 0, np.random, np.random.RandomState(0)])
-def test_generator_refuses(value):
-    with pytest.raises(TypeError, match="rng is .*expected a numpy.random.Generator"):
-        checks.generator("rng", value)
-
-
 def test_finite_array_returns_a_float64_copy():
     given = np.array([[1, 2, 3]])
     array = checks.finite_array("a", given, (None, 3))
@@ -135,11 +120,6 @@ def test_finite_array_returns_a_float64_copy():
 def test_finite_array_refuses(value, error, message):
     with pytest.raises(error, match=message):
         checks.finite_array("a", value, (None, 3))
-
-
-def test_finite_array_of_any_shape():
-    for value in (1.0, [1, 2], np.ones((2, 0, 3))):
-        assert checks.finite_array("a", value, None).shape == np.shape(value)
 
 
 def test_integer_array():

@@ -92,21 +92,3 @@ def test_an_enclosing_repositorys_commit_is_not_the_revision(copy, with_project)
         shutil.copy(files.ROOT / "pyproject.toml", copy)
     commit(copy.parent)
     assert revision_of_copy(copy) == "unknown"
-
-
-@pytest.mark.parametrize("project", [None, '[project]\nname = "theirs"\n', "[tool]\n", "["])
-def test_a_repository_of_another_project_is_not_ours(copy, project):
-    if project is not None:
-        (copy / "pyproject.toml").write_text(project)
-    commit(copy)
-    assert revision_of_copy(copy) == "unknown"
-
-
-def test_a_repository_named_by_the_environment_is_not_ours(copy, tmp_path):
-    """Git sets GIT_DIR for its hooks."""
-    shutil.copy(files.ROOT / "pyproject.toml", copy)
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "file").touch()
-    commit(other)
-    assert revision_of_copy(copy, GIT_DIR=str(other / ".git")) == "unknown"

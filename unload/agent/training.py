@@ -310,10 +310,6 @@ def deferred_interrupts() -> Iterator[list[int]]:
     previous = signal.signal(signal.SIGINT, receive)
     try:
         yield received
-    except SystemError as error:  # of compiled code in which the second one was raised
-        if len(received) > 1:
-            raise KeyboardInterrupt from error
-        raise
     finally:
         signal.signal(signal.SIGINT, previous)
     if received:

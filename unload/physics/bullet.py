@@ -145,11 +145,6 @@ class World:
         )
         return body
 
-    @property
-    def shapes(self) -> int:
-        """Number of different box sizes so far."""
-        return len(self._shapes)
-
     def _shape(self, size: tuple[float, ...]) -> int:
         if size not in self._shapes:
             self._shapes[size] = pybullet.createCollisionShape(

@@ -8,10 +8,6 @@ from unload.physics.base import Physics
 from unload.physics.bullet import World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
-# A world keeps the shape of every box size that it has met, 3.4 kB each, and cannot free
-# one. At this number it is replaced by a new one, which gives the same distances.
-MOST_SHAPES = 10_000
-
 
 class LocalPhysics(Physics):
     """Simulates the situation of the chosen box, on the load's exact grid.
@@ -31,8 +27,7 @@ class LocalPhysics(Physics):
             RuntimeError: the physics is closed.
         """
         self._check_open()
-        if self._world is None or self._world.shapes >= MOST_SHAPES:
-            self._stop()
+        if self._world is None:
             self._world = World()
         return lift(self._world, situation)
 

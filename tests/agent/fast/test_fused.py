@@ -4,7 +4,6 @@ import multiprocessing
 import os
 import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -75,14 +74,6 @@ def test_gradients_are_those_of_pytorch(batch, n_features, beta):
     check(network(n_features), batch, beta)
 
 
-@pytest.mark.parametrize("ties", ["noise", "average"])
-@pytest.mark.parametrize("seed", range(3))
-def test_gradients_on_equalized_observations(batch, ties, seed):
-    coarse = np.round(batch["observations"] * 8) / 8  # many items at the same height
-    batch["observations"] = equalize(coarse, ties)
-    check(network(64, seed), batch)
-
-
 @pytest.mark.parametrize("bias", [3.0, -3.0])
 @pytest.mark.parametrize("items", [5, ITEMS])
 def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
@@ -98,15 +89,6 @@ def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
     check(net, batch)
 
 
-@pytest.mark.parametrize("scale", [0.1, 3.0])
-def test_gradients_of_quiet_and_of_saturated_networks(batch, scale):
-    net = network(64)
-    with torch.no_grad():
-        for parameter in net.parameters():
-            parameter *= scale
-    check(net, batch)
-
-
 @pytest.mark.parametrize("items", [1, 2, 5, 127, 200])
 def test_any_number_of_items_will_do(rng, items):
     batch = {
@@ -115,11 +97,6 @@ def test_any_number_of_items_will_do(rng, items):
         "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
     }
     check(network(16), batch)
-
-
-@pytest.mark.parametrize("size", [1, 31, 32, 33, 100])
-def test_any_batch_size_will_do(batch, size):
-    check(network(16), {name: array[:size] for name, array in batch.items()})
 
 
 def test_arrays_that_are_not_contiguous_will_do(batch):
@@ -247,22 +224,6 @@ def test_choice_is_that_of_the_network(batch, rng):
     assert allowed[rows, actions].all()
 
 
-def test_fused_and_plain_updates_learn_the_same(batch):
-    agents = [DQN(network(16), fused_update=choice) for choice in (True, False)]
-    losses = [[agent.update(batch) for _ in range(20)] for agent in agents]
-    assert losses[0] == pytest.approx(losses[1], abs=1e-5)
-    assert losses[0][-1] < losses[0][0]
-
-
-def test_two_updates_give_equal_bits(batch):
-    states = []
-    for _ in range(2):
-        agent = DQN(network(37), fused_update=True)
-        agent.update(batch)
-        states.append([p.detach().numpy().tobytes() for p in agent.network.parameters()])
-    assert states[0] == states[1]
-
-
 @pytest.mark.parametrize("name", ["observations", "rewards"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_input_that_is_not_finite_is_refused(batch, name, value):
@@ -302,13 +263,6 @@ def test_bad_batches_are_refused(batch, name, value, message):
         gradients(network(4), batch | {name: value})
 
 
-def test_choice_among_nothing_finite_is_refused():
-    observations = np.full((2, ITEMS, 3), np.nan, np.float32)
-    with pytest.raises(FloatingPointError, match="no allowed action of a finite value"):
-        weights = fused.weights_of(network(4))
-        fused.best_actions(weights, observations, np.ones((2, ITEMS), bool))
-
-
 class Subclass(PEQNetwork):
     pass
 
@@ -321,33 +275,6 @@ def test_rule_of_where_it_applies(other):
     assert not fused.applies(other)
     with pytest.raises(ValueError, match="fused_update is True"):
         DQN(other, fused_update=True)
-
-
-@pytest.mark.slow
-def test_fused_update_is_a_hundred_times_faster(rng):
-    """Than plain PyTorch, one thread each, at the paper's batch size."""
-    size = 2048
-    observations = rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32)
-    actions = rng.integers(ITEMS, size=size)
-    targets = rng.choice(np.array([-1, 1], np.float32), size)
-    net = network(64)
-
-    def plain():
-        values = net(torch.from_numpy(observations))
-        chosen = values.gather(1, torch.from_numpy(actions)[:, None]).squeeze(1)
-        smooth_l1_loss(chosen, torch.from_numpy(targets)).backward()
-
-    def seconds(function, repeats):
-        times = []
-        for _ in range(repeats + 1):
-            start = time.perf_counter()
-            function()
-            times.append(time.perf_counter() - start)
-        return min(times[1:])  # without the compilation
-
-    weights = fused.weights_of(net)
-    fast = seconds(lambda: fused.start_gradients(weights, observations, actions, targets)(), 100)
-    assert seconds(plain, 2) > 100 * fast
 
 
 def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bits(tmp_path):
