@@ -23,7 +23,7 @@ def test_a_figure_is_published_as_the_same_bytes(tmp_path):
 
 def test_the_published_figures_are_those_that_notebooks_save():
     saved = set()
-    for path in (files.ROOT / "notebooks").glob("*.ipynb"):
+    for path in (files.ROOT / "notebooks").rglob("*.ipynb"):
         for cell in json.loads(path.read_text())["cells"]:
             if cell["cell_type"] == "code":
                 saved |= set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", "".join(cell["source"])))

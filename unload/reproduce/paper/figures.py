@@ -126,15 +126,13 @@ def draw_curves(axes: Axes, curves: Mapping[str, tuple[Curves, int]], label: str
 
     Args:
         axes: where.
-        curves: by name: the curves of all runs, and the number of the strong one; the first
-            one if that is missing.
+        curves: by name: the curves of all runs, and the number of the strong one.
         label: of the vertical axis.
     """
     for number, (name, (runs, shown)) in enumerate(curves.items()):
-        strong = shown if shown in runs else min(runs)
         for run, values in runs.items():
             smooth = running_mean(values)
-            if run == strong:
+            if run == shown:
                 axes.plot(smooth, color=f"C{number}", label=name, zorder=3)
             else:
                 axes.plot(smooth, color=f"C{number}", linewidth=0.5, alpha=0.4)

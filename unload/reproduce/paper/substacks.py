@@ -145,21 +145,12 @@ def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
         width, height = PACKAGES[package]
         inside[left + 1 : left + width + 1, lower + 1 : lower + height + 1] = True
     style = {"color": INK, "lw": 1.8, "solid_capstyle": "projecting"}
-    for i, change in enumerate(inside[1:] != inside[:-1]):
-        for first, last in _runs(change):
-            axes.plot([x + i * CELL] * 2, [z + first * CELL, z + last * CELL], **style)
-    for k, change in enumerate((inside[:, 1:] != inside[:, :-1]).T):
-        for first, last in _runs(change):
-            axes.plot([x + first * CELL, x + last * CELL], [z + k * CELL] * 2, **style)
-
-
-def _runs(change: np.ndarray) -> list[tuple[int, int]]:
-    """Start and end, in cells, of each run of True; the first entry lies outside at -1."""
-    cells = np.flatnonzero(change)
-    if not len(cells):
-        return []
-    runs = np.split(cells, np.flatnonzero(np.diff(cells) > 1) + 1)
-    return [(int(run[0]) - 1, int(run[-1])) for run in runs]
+    for column, row in np.argwhere(inside[1:] != inside[:-1]):
+        across, up = x + column * CELL, z + row * CELL
+        axes.plot([across, across], [up - CELL, up], **style)
+    for column, row in np.argwhere(inside[:, 1:] != inside[:, :-1]):
+        across, up = x + column * CELL, z + row * CELL
+        axes.plot([across - CELL, across], [up, up], **style)
 
 
 def _scale_bar(axes: Axes, x: float, z: float, length: float = 0.5) -> None:

@@ -139,8 +139,8 @@ def greedy_msr(success_rate: np.ndarray) -> np.ndarray:
     return np.where(greedy < LEAST_GREEDY, np.nan, by_greedy / np.maximum(greedy, LEAST_GREEDY))
 
 
-def reached_at(msr: np.ndarray, level: float = REACHED) -> np.ndarray:
-    """The step from which on an MSR stays at ``level`` or above.
+def reached_at(msr: np.ndarray) -> np.ndarray:
+    """The step from which on an MSR stays at 90 % or above.
 
     Args:
         msr: (..., steps), NaN where it is not known.
@@ -148,19 +148,18 @@ def reached_at(msr: np.ndarray, level: float = REACHED) -> np.ndarray:
     Returns:
         (...) float64, NaN if it does not end there.
     """
-    below = ~(msr[..., ::-1] >= level)  # from the last step back; NaN counts as below
+    below = ~(msr[..., ::-1] >= REACHED)  # from the last step back; NaN counts as below
     since = np.where(below.any(axis=-1), below.argmax(axis=-1), msr.shape[-1])
     return np.where(since > 0, msr.shape[-1] - since, np.nan)
 
 
-def greedy_reached(curves: Iterable[np.ndarray], level: float = REACHED) -> dict[str, float]:
-    """When the mean greedy MSR of a configuration's runs reaches ``level``.
+def greedy_reached(curves: Iterable[np.ndarray]) -> dict[str, float]:
+    """When the mean greedy MSR of a configuration's runs reaches 90 %.
 
     The mean, because at that time one run alone has too few greedy picks.
 
     Args:
         curves: (steps,) MSR while training of each run.
-        level: of the MSR.
 
     Returns:
         ``step``, see ``reached_at``, and ``low`` and ``high``, its 95 % bootstrap interval over
@@ -169,9 +168,9 @@ def greedy_reached(curves: Iterable[np.ndarray], level: float = REACHED) -> dict
     runs = greedy_msr(np.array(list(curves)))
     rng = np.random.default_rng(0)
     drawn = rng.integers(len(runs), size=(RESAMPLES, len(runs)))
-    steps = reached_at(runs[drawn].mean(axis=1), level)
+    steps = reached_at(runs[drawn].mean(axis=1))
     low, high = np.nanpercentile(steps, [2.5, 97.5])
-    return {"step": float(reached_at(runs.mean(axis=0), level)), "low": low, "high": high}
+    return {"step": float(reached_at(runs.mean(axis=0))), "low": low, "high": high}
 
 
 def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
@@ -186,7 +185,6 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
         on the running mean of the MSR stays at 99 % or above, NaN if it does not end there.
         ``loss_start``: the first loss; ``loss_dip`` and ``loss_peak``: where the running mean of
         the loss begins and ends its largest rise; ``loss_end``: mean over the last 100 steps.
-        These are NaN if the run was too short for an update.
     """
     below = np.flatnonzero(running_mean(success_rate) < SOLVED)
     solved_at = below[-1] + 1 if below.size else 0
@@ -199,8 +197,6 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
 
 def _loss_summary(loss: np.ndarray) -> dict[str, float]:
     known = np.isfinite(loss)
-    if not known.any():
-        return dict.fromkeys(LOSSES, np.nan)
     smooth = running_mean(loss)[known]
     lowest = np.minimum.accumulate(smooth)
     peak = np.argmax(smooth - lowest)
