@@ -2,8 +2,9 @@
 
 import re
 
-from unload.reproduce.answer import read_answer, seeds_of
-from unload.reproduce.verdict import cell_table
+from unload.reproduce.falls.published import read_published
+from unload.reproduce.paper.grids import paper_runs
+from unload.reproduce.statistics import cell_table, end_msr, falls, windows
 from unload.support import files
 
 README = (files.ROOT / "README.md").read_text()
@@ -37,15 +38,25 @@ def test_the_way_to_contribute_names_files_that_exist():
     assert not [path for path in paths if not any((place / path).exists() for place in places)]
 
 
-def test_the_answer_is_that_of_the_data():
-    row = r"\| (off|on) \| (256|2048)[^|]* \| (\d+) of (\d+) \| (?:(\d+) %, (\d+)–(\d+) %)? ?\|"
-    found = re.findall(row, README)
-    assert len(found) == 4
-    table = cell_table(read_answer()).set_index("cell")
-    for mask, batch, *numbers in found:
-        cell = f"paper{'_b2048' * (batch == '2048')}_{'mask' if mask == 'on' else 'no_mask'}"
-        runs = table["runs"].get(cell, 0)
-        expected = [runs, len(seeds_of(cell)), "", "", ""]
-        if runs > 1:
-            expected[2:] = (table.loc[cell, ["mean", "low", "high"]] * 100).clip(0, 100).round()
-        assert numbers == [f"{value:.0f}" if value != "" else "" for value in expected], cell
+def test_the_result_is_that_of_the_data():
+    table = cell_table(paper_runs()).set_index("cell")
+    order = ["paper_no_mask", "paper_mask", "paper_b2048_no_mask", "paper_b2048_mask"]
+    means = [f"{100 * mean:.0f}" for mean in table.loc[order, "mean"]]
+    assert f"on average {', '.join(means[:3])} and {means[3]} %" in README
+    text = " ".join(README.split())
+    masked = table.loc[["paper_mask", "paper_b2048_mask"]]
+    low, high = 100 * masked["lowest"].min(), 100 * masked["highest"]
+    fallen = [
+        100 * end_msr(run)
+        for cell, _, run in paper_runs()
+        if cell in masked.index and falls(windows(run)["success_rate"])
+    ]
+    assert (
+        f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, and end at "
+        f"{low:.0f}–{max(fallen):.0f} %"
+    ) in text
+    assert high.max() > 99  # the one that stays up
+    assert f"none of {table['runs'].sum()} runs rises steadily" in text and not table["fig12"].any()
+    published = read_published()
+    blanked = published[published["cell"].isin(order)]["judged_place"]
+    assert (blanked == 1).all() and f"These {len(blanked)} networks" in text

@@ -161,7 +161,7 @@ def test_sentences_state_what_the_data_say():
         "one pick ahead, reaches " + ratio(oracle),
     ):
         assert words in readme, words
-    notebook = text_of("notebooks/14_when_is_learning_worth_it.ipynb")
+    notebook = text_of("notebooks/13_when_is_learning_worth_it.ipynb")
     for words in (
         f'What does "{learned["net_ratio"]:.2f} times" say?',
         "Boxes alone are "
