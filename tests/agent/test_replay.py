@@ -93,12 +93,6 @@ def test_bad_sizes_are_refused(size, items, name):
         ReplayBuffer(size, items)
 
 
-@pytest.mark.parametrize("size", [10**12, 10**18])
-def test_a_memory_that_does_not_fit_is_refused_by_name(size):
-    with pytest.raises(MemoryError, match=f"size is {size}; its arrays do not fit into memory"):
-        ReplayBuffer(size, 128)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

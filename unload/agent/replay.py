@@ -69,7 +69,6 @@ class ReplayBuffer:
 
     Raises:
         ValueError: ``equalized`` with another number of items or with ``next_state``.
-        MemoryError: the arrays do not fit into memory.
 
     Attributes:
         arrays: name → array whose first axis is the slot. ``observations`` (size, items, 3)
@@ -106,14 +105,9 @@ class ReplayBuffer:
         self._dtypes = {name: np.dtype(dtype) for name, (_, dtype) in kinds.items()}  # as given
         if equalized:
             kinds["observations"] = ((items, 3), np.uint8)
-        try:
-            self.arrays = {
-                name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
-            }
-        except (MemoryError, ValueError) as error:  # ValueError: larger than any address
-            raise MemoryError(
-                f"size is {size}; its arrays do not fit into memory: {error}"
-            ) from error
+        self.arrays = {
+            name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
+        }
 
     def __len__(self) -> int:
         return min(self.total, self.size)

@@ -61,7 +61,8 @@ def run_sweep(
     for name, config in configs.items():
         if not isinstance(config, TrainConfig):
             raise TypeError(f"configs[{name!r}] is {config!r}; expected an unload.TrainConfig")
-        if not _is_plain(name):
+        path = PurePosixPath(name)
+        if str(path) != name or path.is_absolute() or {".", ".."} & {name, *path.parts}:
             raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
     checks.one_of("backend", backend, BACKENDS)
     folders = {name: Path(folder) / name for name in configs}
@@ -83,19 +84,6 @@ def run_sweep(
         for name, config in configs.items()
     ]
     return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
-
-
-def _is_plain(name: object) -> bool:
-    """Whether a run's name leads to a folder of its own inside the sweep's."""
-    if not isinstance(name, str):
-        return False
-    path = PurePosixPath(name)
-    return (
-        bool(path.parts)
-        and not path.is_absolute()
-        and ".." not in path.parts
-        and (str(path) == name)
-    )
 
 
 def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:

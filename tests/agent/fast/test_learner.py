@@ -25,15 +25,6 @@ def test_steps_are_those_of_pytorch(rng, learning_rate):
     assert after[3] == before[3]
 
 
-@pytest.mark.parametrize("count", [0, 4, 6])
-def test_a_wrong_number_of_gradients_is_refused(count):
-    weights = np.zeros(2, np.float32), np.zeros(3, np.float32)
-    adam = Adam(weights, 0.01)
-    with pytest.raises(ValueError, match=rf"gradients has shape \({count},\); expected \(5,\)"):
-        adam.step(np.ones(count))
-    assert adam.steps == 0 and not np.concatenate(weights).any()
-
-
 def test_a_gradient_as_small_as_epsilon_moves_a_weight_by_half_as_much():
     """A constant gradient g moves a weight by g / (|g| + 1e-8) of the learning rate."""
     weights = np.zeros(4, np.float32)

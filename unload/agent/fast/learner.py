@@ -84,14 +84,7 @@ class Adam:
 
         Args:
             gradients: float64, of all weights, one array after the other.
-
-        Raises:
-            ValueError: there are more or fewer than weights.
         """
-        if gradients.shape != self.moments.shape[1:]:  # compiled code would read what lies behind
-            raise ValueError(
-                f"gradients has shape {gradients.shape}; expected {self.moments.shape[1:]}"
-            )
         self.steps += 1
         corrections = [1 - beta**self.steps for beta in BETAS]
         settings = self.learning_rate, self.epsilon, *corrections
