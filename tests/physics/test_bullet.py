@@ -155,7 +155,6 @@ def test_a_cleared_world_is_as_good_as_new(make_world):
     fresh, _ = make_world(boxes=0)
     fresh.clear()
     assert fall(used) == fall(fresh)
-    assert used.shapes == 2
 
 
 def test_a_scan_gives_the_distance_and_the_body_of_each_pixel(make_world):
