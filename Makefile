@@ -43,7 +43,7 @@ book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: bui
 	$(BIN)/python -m sphinx -q -E -d build/doctrees -c notebooks/book . build/book
 	$(BIN)/python notebooks/book/links.py build/book
 
-browser: $(VENV)/ready-browser  ## open notebooks in JupyterLab in a browser without a window, run them and look at them
+browser: $(VENV)/ready-browser  ## use notebooks in JupyterLab and the page that trains in a browser without a window
 	$(BIN)/python tests/browser/look.py
 
 mutants: $(VENV)/ready-mutants  ## change the code in small ways and count what the tests notice (an hour)

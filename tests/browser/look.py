@@ -1,7 +1,8 @@
-"""Run notebooks in JupyterLab in a browser without a window, and look at them as a reader does.
+"""Use notebooks in JupyterLab, and the page that trains, in a browser without a window.
 
-    python tests/browser/look.py               00, 01, 07 and 13
-    python tests/browser/look.py 00 04         those whose names start so
+    python tests/browser/look.py               00, 01, 07, 13 and the page
+    python tests/browser/look.py 00 04         notebooks whose names start so
+    python tests/browser/look.py page          the page alone
 
 Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
 nothing on stderr; formulas are typeset; 3D views hold pixels; in 00 a click changes the score
@@ -28,12 +29,14 @@ from playwright.sync_api import Locator, Page
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 from start import browser, jupyterlab  # noqa: E402
+from train_page import look_at_page  # noqa: E402
 
 from notebooks import run  # noqa: E402
 
 BUILD = ROOT / "build" / "browser"
 COPIES = BUILD / "notebooks"
 NOTEBOOKS = ("00", "01", "07", "13")
+PAGE = "page"
 PLAYGROUND = "00_playground"
 RUN_LIMIT = 400  # s, for all cells of a notebook
 DRAW_LIMIT = 60  # s, for a picture, without a graphics card
@@ -73,15 +76,20 @@ CLICK = """async (canvas, [x, y]) => {
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("names", nargs="*", default=NOTEBOOKS, help="beginnings of notebook names")
-    names = tuple(parser.parse_args().names)
+    parser.add_argument("names", nargs="*", help="beginnings of notebook names")
+    names = tuple(parser.parse_args().names or (*NOTEBOOKS, PAGE))
     chosen = [p for p in run.notebooks() if p.parent == run.HERE and p.name.startswith(names)]
-    if not chosen:
+    if not chosen and PAGE not in names:
         parser.error(f"no notebook starts with {names}")
     shutil.rmtree(BUILD, ignore_errors=True)
     problems = []
     with browser() as chromium:
-        for theme in ("Light", "Dark"):
+        if PAGE in names:
+            print("the page that trains …", flush=True)
+            for problem in look_at_page(chromium, BUILD):
+                print(f"  FAILED: {problem}", flush=True)
+                problems.append(problem)
+        for theme in ("Light", "Dark") if chosen else ():
             copy(chosen)
             with jupyterlab(COPIES, BUILD / theme.lower(), theme) as address:
                 for notebook in chosen:

@@ -1,0 +1,96 @@
+// The training loop of unload/agent/training.py: ε-greedy picks, replay, updates, learning curve.
+
+import { Container, Generator, stackLoad } from "./container.mjs";
+import { slopes, tilts } from "./measures.mjs";
+import { Adam, PEQNetwork } from "./network.mjs";
+
+export const N_FEATURES = 16;
+const REPLAY_SIZE = 2 ** 15; // picks
+const POINTS = 60; // of the curve of a run
+
+export class Training {
+  /** A run of a config, see state.mjs, in containers of the exported numbers `task`. */
+  constructor(config, task) {
+    Object.assign(this, { config, task, picks: 0, memory: [], points: [] });
+    this.latest = []; // rewards since the last point of the curve
+    const generators = [0, 1, 2].map((part) => new Generator(3 * config.seed + part));
+    [this.loads, this.choices] = generators;
+    this.network = new PEQNetwork(N_FEATURES, generators[2]);
+    this.optimizer = new Adam(this.network);
+    this.fill();
+  }
+
+  /** Fill all containers anew. */
+  fill() {
+    const full = () => new Container(stackLoad(this.loads, this.task), this.task, this.loads);
+    this.containers = Array.from({ length: this.task.num_envs }, full);
+    this.change(this.config);
+  }
+
+  /** Go on with other settings. */
+  change(config) {
+    this.config = config;
+    for (const container of this.containers) container.show(config);
+  }
+
+  /** Pick once in every container, and learn from the picks before. */
+  step() {
+    const { choices, config, memory, network } = this;
+    if (this.containers[0].picks === this.task.max_picks) this.fill();
+    const epsilon = Math.max(0, 1 - this.picks / (config.picks / 2));
+    const picks = this.containers.map((container) => {
+      const { observation, visible } = container;
+      const explore = choices.uniform() < epsilon;
+      const draws = () => visible.map(() => choices.uniform());
+      const scores = explore ? draws() : compared(network, observation, config);
+      const action = highest(scores, container, config);
+      return { observation, action, reward: container.pick(visible[action]) ? 1 : -1 };
+    });
+    if (memory.length >= config.batch_size) {
+      const draw = () => memory[choices.integer(memory.length)];
+      network.loss(Array.from({ length: config.batch_size }, draw));
+      this.optimizer.step(config.learning_rate);
+    }
+    for (const pick of picks) {
+      const observation = CHANGES[config.replay](pick.observation, choices);
+      memory[this.picks++ % REPLAY_SIZE] = { ...pick, observation };
+      this.latest.push(pick.reward);
+    }
+    if (this.latest.length >= config.picks / POINTS) this.addPoint(epsilon);
+  }
+
+  addPoint(epsilon) {
+    const { network, containers, latest, picks } = this;
+    const success_rate = latest.filter((reward) => reward > 0).length / latest.length;
+    const measured = { slopes: slopes(network, containers), tilts: tilts(containers) };
+    this.points.push({ picks, success_rate, epsilon, ...measured });
+    this.latest = [];
+  }
+}
+
+/** The scores that a choice compares, (items); with `blank`, x and y count as 0. */
+export function compared(network, observation, { blank }) {
+  const seen = blank ? observation.map((value, i) => (i % 3 === 2 ? value : 0)) : observation;
+  return network.scores(seen);
+}
+
+/** The row of the highest score; with `mask`, of those that have not failed. */
+function highest(scores, { visible, failed }, { mask }) {
+  const allowed = scores.map((score, row) => (mask && failed.has(visible[row]) ? -Infinity : score));
+  return allowed.indexOf(Math.max(...allowed));
+}
+
+/** What is remembered of an observation, by the name of the setting. */
+const CHANGES = {
+  as_is: (observation) => observation,
+  mirrored: (observation, choices) => {
+    const signs = [1 - 2 * choices.integer(2), 1 - 2 * choices.integer(2), 1];
+    return observation.map((value, i) => signs[i % 3] * value);
+  },
+  shuffled: (observation, choices) => {
+    const draws = Array.from({ length: observation.length / 3 }, () => choices.uniform());
+    const order = [...draws.keys()].sort((a, b) => draws[a] - draws[b]);
+    const from = (i) => 3 * order[Math.floor(i / 3)] + (i % 3);
+    return observation.map((value, i) => (i % 3 === 2 ? value : observation[from(i)]));
+  },
+};
