@@ -316,10 +316,11 @@ def test_the_address_holds_all_settings():
         result.back = fromText(toText(chosen));
         result.chosen = chosen;
         result.bad = fromText("seed=x&replay=gone&picks=5");
+        result.zero = fromText("seed=0").seed;
         result.plain = fromText("");
         """
     )
-    assert got["back"] == got["chosen"] and got["bad"] == got["plain"]
+    assert got["back"] == got["chosen"] and got["bad"] == got["plain"] and got["zero"] == 0
 
 
 # What a preset's name says of its last tenth, and of its best moment.

@@ -34,7 +34,7 @@ function set(text, anew) {
   if (begin) {
     const generator = new Generator(config.seed);
     mine = new Container(stackLoad(generator, task), task, generator);
-    [chosen, element("status").textContent] = [-1, ""];
+    [chosen, element("status").textContent] = [-1, "\u00a0"]; // a line that is empty
   }
   mine.show(config);
   send(begin ? "reset" : "change");
@@ -42,22 +42,22 @@ function set(text, anew) {
 
 function pick(item) {
   if (!element("mine").checked || !mine.visible.includes(item)) return;
-  const end = mine.pick(item) ? "Unloaded." : "A box lies on it: failed.";
+  const how = mine.pick(item) ? "Unloaded." : "Failed: a box lies on it.";
   const unloaded = mine.present.filter((here) => !here).length;
-  element("status").textContent = `${end} ${unloaded} of ${mine.picks} picks succeeded.`;
+  element("status").textContent = `${how} ${unloaded} of ${mine.picks} picks succeeded.`;
   render();
 }
 
-/** Choose, by an arrow key, the nearest box in its direction, across or upwards. */
+/** Choose, by an arrow key, the next box in its direction, across or upwards, rather in front. */
 function move([right, up]) {
   const from = mine.seen[chosen] ?? mine.seen[mine.visible[0]];
   const far = (item) => {
-    const [y, z] = [1, 2].map((axis) => mine.seen[item][axis] - from[axis]);
+    const [x, y, z] = mine.seen[item].map((value, axis) => value - from[axis]);
     const ahead = y * right + z * up;
-    return ahead > 0.01 ? ahead + 3 * Math.abs(y * up - z * right) : 1e9;
+    return ahead > 0.01 ? ahead + 3 * Math.abs(y * up - z * right) - x : Infinity;
   };
   const next = mine.visible.reduce((best, item) => (far(item) < far(best) ? item : best));
-  if (far(next) < 1e9) chosen = next;
+  if (far(next) < Infinity) chosen = next;
   render();
 }
 
@@ -79,9 +79,8 @@ function render() {
   const last = run.points.at(-1);
   element("rate").textContent = last ? `${Math.round(100 * last.success_rate)} %` : "";
   ["x", "y"].forEach((name, axis) => {
-    const turn = (kind, radians) => {
+    const turn = (kind, radians) =>
       Object.assign(element(`${kind}-${name}`).style, { rotate: `${radians}rad`, opacity: last ? 1 : 0 });
-    };
     turn("needle", last ? Math.atan2(last.slopes[axis], last.slopes[2]) : 0);
     turn("surface", last ? Math.atan(2 * last.tilts[axis]) : 0);
   });
