@@ -51,10 +51,8 @@ def test_the_result_is_that_of_the_data():
         for cell, _, run in paper_runs()
         if cell in masked.index and falls(windows(run)["success_rate"])
     ]
-    assert (
-        f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, and end at "
-        f"{low:.0f}–{max(fallen):.0f} %"
-    ) in text
+    sentence = f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, "
+    assert sentence + f"and end at {low:.0f}–{max(fallen):.0f} %" in text
     assert high.max() > 99  # the one that stays up
     assert f"none of {table['runs'].sum()} runs rises steadily" in text and not table["fig12"].any()
     published = read_published()

@@ -13,14 +13,20 @@ from unload import stack_load, task
 from unload.env.observation import nearest
 from unload.load.view import COLOURS
 from unload.reproduce import style
+from unload.reproduce.falls import figures as falls
+from unload.reproduce.falls.laboratory import read_laboratory, read_trace
+from unload.reproduce.falls.long import read_long_trace
+from unload.reproduce.grid import read_grid
 from unload.reproduce.lifts import figures as lifts
 from unload.reproduce.lifts.agreement import read_agreement
 from unload.reproduce.paper import containers, figures, mdp, network, observation, substacks
+from unload.reproduce.paper.grids import PAPER
 from unload.reproduce.paper.tuning import read_curves, running_mean
 from unload.reproduce.policies.figures import comparison_msr
 from unload.reproduce.policies.speed import speed_ratios
 from unload.reproduce.variants.figures import variants_msr
 from unload.reproduce.variants.grids import GRIDS
+from unload.support import files
 
 matplotlib.use("Agg")
 
@@ -43,6 +49,14 @@ FROM_DATA = {
     "fig12_reward": figures.fig12_reward,
     **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
     "comparison": comparison_msr,
+    "why_60": lambda folder=files.DATA: falls.four_cells(read_grid(PAPER, folder)),
+    "why_runs_fall": lambda folder=files.DATA: falls.loop(
+        read_trace(folder), read_laboratory(folder)
+    ),
+    "a_fall": lambda folder=files.DATA: falls.fall(read_long_trace(folder).head(40)),
+    "what_holds_runs": lambda folder=files.DATA: falls.ends(
+        read_laboratory(folder), {"ranks": "ranks", "shuffled": "places dealt anew"}
+    ),
 }
 # The others, with what they are given here.
 FIGURES = FROM_DATA | {
@@ -66,6 +80,10 @@ FIGURES = FROM_DATA | {
     "lift_sequences": lambda: lifts.lift_sequences({"a": (np.ones((2, 2)), POSES)}, [0.0, 0.3]),
     "agreement_scatter": lambda: lifts.agreement_scatter(read_agreement()),
     "speed_ratios": speed_ratios,
+    "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
+    "laboratory_runs": lambda: falls.laboratory_runs(
+        {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}
+    ),
 }
 
 

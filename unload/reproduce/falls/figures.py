@@ -134,6 +134,7 @@ def fall(points: pd.DataFrame) -> Figure:
     panels[0].plot(
         picks, 100 * points["wrong_without_place"], "C0", label="the same with x = y = 0"
     )
+    panels[0].plot(picks, 50 * (1 + points["height_of_wrong"]), "C1.", ms=3, label="its height")
     panels[0].set(ylabel="%", ylim=(-2, 102))
     for axis, style in (("x", ":"), ("y", "-")):
         preference = points[f"slope_{axis}"] / points["slope_z"].abs()
