@@ -23,7 +23,7 @@ NO_MASK, B2048 = replace(CONFIG, mask=False), TrainConfig(mask=True)
 SEEDS, FEW_SEEDS = range(20, 25), range(20, 23)
 EXPLORED = 10_000_000  # picks after which the agent no longer explores
 TRACED_SEEDS = (20, 21)
-TRACE_EVERY = 256_000  # picks: eight episodes of all containers
+TRACE_EVERY = 32_000  # picks: an episode of all containers
 LONG = Grid(
     "falls/long",
     f"{COMMAND} falls",
@@ -60,11 +60,11 @@ def falls_data(
 def trace_data(
     picks: int, folder: str | Path, runs_dir: str | Path, n_jobs: int, progress: bool
 ) -> None:
-    """Trace runs with the mask, every 256,000 picks: ``falls/long_trace.csv``."""
+    """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``."""
     fingerprint = training_fingerprint()
     jobs = [
         (
-            {"seed": seed, "picks": picks, "fingerprint": fingerprint},
+            {"seed": seed, "picks": picks, "every": TRACE_EVERY, "fingerprint": fingerprint},
             partial(trace, replace(CONFIG, seed=seed, picks=picks)),
         )
         for seed in TRACED_SEEDS
@@ -77,7 +77,7 @@ def trace_data(
     publish(
         Path(folder) / ("reduced/falls" if reduced else "falls"),
         "long_trace",
-        {"long_trace": pd.concat(tables)[["seed", *POINT]]},
+        {"long_trace": pd.concat(tables)[["seed", *POINT]].astype({"picks": int})},
         f"{COMMAND} falls",
         {"seeds": list(TRACED_SEEDS), "picks": picks},
         reduced,
