@@ -147,6 +147,16 @@ def test_each_room_names_its_files():
         assert files <= named, f"{path} does not name {sorted(files - named)}"
 
 
+def test_the_reference_describes_each_module():
+    for page in (ROOT / "notebooks/book/reference").glob("*.md"):
+        if page.stem == "index":
+            continue
+        described = re.findall(r"automodule:: (\S+)", page.read_text())
+        folder = PACKAGE / page.stem
+        there = {module_name(path) for path in folder.glob("*.py")} - {f"unload.{page.stem}"}
+        assert set(described) == there and len(described) == len(there), page.name
+
+
 def test_the_way_to_contribute_has_a_row_for_each_room():
     lines = (ROOT / "CONTRIBUTING.md").read_text().splitlines()
     rows = [line.split("`")[1] for line in lines if line.startswith("| `unload/")]
