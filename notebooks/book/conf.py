@@ -1,5 +1,4 @@
-"""Settings of Sphinx for ``make book``: the README, the notebooks, their solutions and the package's
-docstrings as one site.
+"""Settings of Sphinx for ``make book``: README, notebooks, solutions and docstrings as one site.
 
 The source folder is the root of the repository, so that a link between the README, notebooks and
 figures leads to the same place in the site as in the files. Nothing is executed: the site shows
