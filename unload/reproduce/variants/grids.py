@@ -53,11 +53,11 @@ GRIDS = {
             for name in ("peq", "two_layer", "stack", "attention")
         },
     ),
-    # The paper's outlook: failing at a higher item is less bad.
+    # The paper's outlook: failing at a higher item is less bad. What stays as it is, its control,
+    # is a cell of the settings.
     "rewards": _grid(
         "variants/rewards",
-        cells={"unchanged": Cell(CONFIG, SEEDS)}
-        | {f"height_{share}": Cell(CONFIG, SEEDS, height_reward(share)) for share in SHARES},
+        cells={f"height_{share}": Cell(CONFIG, SEEDS, height_reward(share)) for share in SHARES},
     ),
     "settings": _grid(
         "variants/settings",
