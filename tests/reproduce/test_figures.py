@@ -1,5 +1,7 @@
 """Every figure is drawn, and saved as the same bytes; and what some of them show."""
 
+import json
+import re
 from functools import partial
 
 import matplotlib
@@ -7,7 +9,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_rgb
 
 from unload import stack_load, task
 from unload.env.observation import nearest
@@ -19,13 +20,12 @@ from unload.reproduce.falls.long import read_long_trace
 from unload.reproduce.grid import read_grid
 from unload.reproduce.lifts import figures as lifts
 from unload.reproduce.lifts.agreement import read_agreement
-from unload.reproduce.paper import containers, figures, mdp, network, observation, substacks
+from unload.reproduce.paper import diagrams, figures, loads, observation
 from unload.reproduce.paper.grids import PAPER
 from unload.reproduce.paper.tuning import read_curves, running_mean
 from unload.reproduce.policies.figures import comparison_msr
 from unload.reproduce.policies.speed import speed_ratios
-from unload.reproduce.variants.figures import variants_msr
-from unload.reproduce.variants.grids import GRIDS
+from unload.reproduce.variants.grids import GRIDS, variants_msr
 from unload.support import files
 
 matplotlib.use("Agg")
@@ -34,7 +34,6 @@ LOAD = stack_load(np.random.default_rng(0))
 VISIBLE = nearest(LOAD.positions)
 POSES = np.zeros((2, 2, 3))
 LINE = np.arange(3.0)
-FIELD = np.add.outer(LINE, LINE)
 
 # Figures that are drawn from data/, and take its folder.
 FROM_DATA = {
@@ -60,20 +59,17 @@ FROM_DATA = {
 }
 # The others, with what they are given here.
 FIGURES = FROM_DATA | {
-    "fig01_mdp": mdp.fig01_mdp,
-    "fig02_containers": lambda: containers.fig02_containers(
+    "fig01_mdp": diagrams.fig01_mdp,
+    "fig02_containers": lambda: loads.fig02_containers(
         np.arange(3 * 48).reshape(3, 4, 4, 3).astype(np.uint8), [1, 2, 3]
     ),
-    "fig03_substacks": substacks.fig03_substacks,
-    "fig07_network": network.fig07_network,
-    "packages": substacks.packages,
-    "rows": lambda: substacks.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
-    "side_views": lambda: containers.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
-    "wall_views": lambda: containers.wall_views(LOAD, [10, 11]),
+    "fig03_substacks": loads.fig03_substacks,
+    "fig07_network": diagrams.fig07_network,
+    "packages": loads.packages,
+    "rows": lambda: loads.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
+    "side_views": lambda: loads.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
+    "wall_views": lambda: loads.wall_views(LOAD, [10, 11]),
     "visibility": lambda: observation.visibility(LOAD.positions, VISIBLE),
-    "score_landscapes": lambda: network.score_landscapes(
-        np.zeros((4, 3)), LINE, [FIELD, -FIELD], [2, 0], ["first", "second"]
-    ),
     "distance_curves": lambda: lifts.distance_curves(
         {"force (N)": {"one box": (LINE, LINE, LINE)}}, {"force (N)": 20}
     ),
@@ -157,34 +153,14 @@ def test_picks_and_values_are_drawn_by_their_meaning():
     assert unloaded.get_offsets().tolist() == [[2, 9]]
 
 
-def test_the_wall_of_a_stuck_item():
-    present = np.ones(len(LOAD), bool)
-    wall = np.flatnonzero(LOAD.walls == 1)
-    present[wall[-1]] = False
-    _, axes = plt.subplots()
-    figures.draw_stuck(axes, LOAD, present, int(wall[0]), wall[1:3])
-    colours = [to_rgb(box.get_facecolor()) for box in axes.patches]
-    assert len(colours) == len(wall) - 1
-    assert colours.count(COLOURS["blocked"]) == 1
-    assert colours.count(COLOURS["on top of it"]) == 2
-
-
 def test_the_networks_figure_counts_its_parameters():
-    texts = [text.get_text() for axes in network.fig07_network(17).axes for text in axes.texts]
+    texts = [text.get_text() for axes in diagrams.fig07_network(17).axes for text in axes.texts]
     assert any("(68 for n = 17)" in text for text in texts)
     assert any("(69 for n = 17)" in text for text in texts)
 
 
-def test_score_gradients_are_those_of_the_front_wall():
-    observed = np.array([[0.95, 0.1, 0.2], [0.5, 0.0, 0.0], [0.92, -0.3, 0.4]])
-    jacobian = np.arange(27.0).reshape(3, 3, 3)
-    arrows = network.score_gradients(observed, np.zeros(3), jacobian).axes[0].collections[1]
-    assert np.array_equal(arrows.U, jacobian[[0, 2], [0, 2], 1])
-    assert np.array_equal(arrows.V, jacobian[[0, 2], [0, 2], 2])
-
-
 def test_every_package_has_its_number_and_size():
-    texts = [text.get_text() for text in substacks.packages().axes[0].texts]
+    texts = [text.get_text() for text in loads.packages().axes[0].texts]
     assert [text for text in texts if text.isdigit()] == [str(number) for number in range(13)]
     assert sum("×" in text for text in texts) == 13
 
@@ -212,3 +188,13 @@ def test_the_agreement_is_drawn_with_all_lifts():
     for axes, physics in zip(lifts.agreement_scatter(frame).axes, ("table", "full")):
         shown = sum(len(points.get_offsets()) for points in axes.collections)
         assert shown == frame[physics].notna().sum()
+
+
+def test_the_published_figures_are_those_that_notebooks_save():
+    saved = set()
+    for path in (files.ROOT / "notebooks").rglob("*.ipynb"):
+        for cell in json.loads(path.read_text())["cells"]:
+            if cell["cell_type"] == "code":
+                saved |= set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", "".join(cell["source"])))
+    assert {path.stem for path in files.FIGURES.glob("*.png")} == saved
+    assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in saved}

@@ -11,6 +11,7 @@ from unload.heap.network import FateNetwork
 from unload.heap.study import table as study
 from unload.heap.study.recording import FULL, WEIGHTS
 from unload.heap.study.table import FAMILY_COLUMNS, best_rule, compared, family, plan
+from unload.reproduce.statistics import bootstrap_interval
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -37,6 +38,23 @@ def test_compared_gives_means_and_ratios_over_pairs(episodes):
     assert learned["boxes_low"] < 2.5 < learned["boxes_high"]
     assert learned[["net_more", "net_more_low", "net_more_high"]].tolist() == [0.5, 0.5, 0.5]
     assert learned[["boxes_more", "falls_more"]].tolist() == [0.5, 0.0]
+
+
+def test_pairs_make_the_interval_narrow():
+    reference = np.array([1.0, 5.0, 2.0, 8.0])
+    ratio, low, high = study.ratio_interval(1.3 * reference, reference)
+    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
+    assert np.isnan(study.ratio_interval(reference, -reference)).all()
+    assert np.isnan(study.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
+
+
+def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
+    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
+    mean, low, high = study.mean_interval(values)
+    percentile = bootstrap_interval(values)
+    assert mean == 4.1 and low < mean < high
+    assert low > percentile[0] and high > percentile[1]
+    assert study.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
 
 
 def test_the_family_holds_each_rule_once_and_none_without_weights():
@@ -113,15 +131,6 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
     assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
     weights = [player["falls_weight"] for player in players if "networks" in player]
     assert weights == [0.0, 0.0, 1.0, 1.0]
-
-
-def test_the_command_makes_everything_about_heaps(monkeypatch):
-    called = []
-    steps = "make_heaps", "make_networks", "choose_rules", "compare"
-    for name in steps:
-        monkeypatch.setattr(study, name, lambda *given, name=name: called.append((name, given)))
-    study.heap_data(FULL, "data", "runs", 2, False)
-    assert called == [(name, (FULL, "data", "runs", 2, False)) for name in steps]
 
 
 def test_data_of_heaps_are_those_that_are_read():
