@@ -116,18 +116,6 @@ def test_choosing_from_nothing_is_refused(rng):
             DQN(peq()).choose(observations, allowed, epsilon, rng)
 
 
-def test_with_gamma_zero_the_target_is_the_reward(rng):
-    """One item, a value of 0.5 and a reward of -1: the loss is 1.5 - 0.5."""
-    observations = np.full((1, 1, 3), 0.5, np.float32)
-    batch = {
-        "observations": observations,
-        "actions": np.array([0]),
-        "rewards": np.array([-1.0], np.float32),
-    }
-    assert DQN(HeightNetwork()).update(batch) == pytest.approx(1.0)
-    assert DQN(HeightNetwork(-1.0)).update(batch) == pytest.approx(0.5 * 0.5**2)
-
-
 @pytest.mark.parametrize(
     ("mask", "terminated", "best"),
     [([1, 1, 1], False, 0.8), ([1, 0, 1], False, 0.4), ([1, 1, 1], True, 0.0)],
@@ -191,17 +179,6 @@ def test_a_state_goes_on_bit_by_bit(rng, fused):
 def test_bad_settings_are_refused(kwargs, message):
     with pytest.raises(ValueError, match=message):
         DQN(peq(), **kwargs)
-
-
-def test_the_defaults_are_those_of_the_paper(rng):
-    batch = make_batch(rng)
-    batch["rewards"] *= 3  # errors on both sides of beta
-    paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0}
-    states = []
-    for agent in (DQN(peq()), DQN(peq(), **paper)):
-        losses = [agent.update(batch) for _ in range(20)]
-        states.append([losses, *(array.tobytes() for array in agent.state().values())])
-    assert states[0] == states[1]
 
 
 def test_what_is_no_network_or_no_batch_is_refused():

@@ -23,7 +23,7 @@ from unload.reproduce.lifts.agreement import read_agreement
 from unload.reproduce.paper import diagrams, figures, loads, observation
 from unload.reproduce.paper.grids import PAPER
 from unload.reproduce.paper.tuning import read_curves, running_mean
-from unload.reproduce.policies.figures import comparison_msr
+from unload.reproduce.policies import figures as policies
 from unload.reproduce.policies.speed import speed_ratios
 from unload.reproduce.variants.grids import GRIDS, variants_msr
 from unload.support import files
@@ -47,7 +47,7 @@ FROM_DATA = {
     "fig11_loss": figures.fig11_loss,
     "fig12_reward": figures.fig12_reward,
     **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
-    "comparison": comparison_msr,
+    "comparison": policies.comparison_msr,
     "why_60": lambda folder=files.DATA: falls.four_cells(read_grid(PAPER, folder)),
     "why_runs_fall": lambda folder=files.DATA: falls.loop(
         read_trace(folder), read_laboratory(folder)
@@ -76,6 +76,17 @@ FIGURES = FROM_DATA | {
     "lift_sequences": lambda: lifts.lift_sequences({"a": (np.ones((2, 2)), POSES)}, [0.0, 0.3]),
     "agreement_scatter": lambda: lifts.agreement_scatter(read_agreement()),
     "speed_ratios": speed_ratios,
+    "learning": lambda: policies.learning(
+        pd.DataFrame({"picks": LINE, "success_rate": 0.5, "epsilon": 1.0, "loss": 0.1}),
+        pd.Series(LINE / 3),
+    ),
+    "preferences": lambda: policies.preferences(
+        LINE, {"front": LINE}, LINE, np.add.outer(LINE, LINE)
+    ),
+    "steps": lambda: policies.steps(np.full((2, 2), 0.3), 0.4, np.ones((3, 3))),
+    "noise": lambda: policies.noise(
+        pd.DataFrame({("highest", True): LINE, ("highest", False): LINE}), pd.Series(LINE)
+    ),
     "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
     "laboratory_runs": lambda: falls.laboratory_runs(
         {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}
@@ -124,12 +135,6 @@ def test_greedy_curves_are_means_over_the_runs():
     assert axes.lines[0].get_ydata()[70:] == pytest.approx(0.5)
 
 
-def test_each_seed_of_the_training_has_a_colour_and_a_label():
-    lines = figures.fig12_reward().axes[0].lines
-    assert [line.get_label() for line in lines] == [f"seed {seed}" for seed in range(4)]
-    assert len({line.get_color() for line in lines}) == 4
-
-
 def test_a_learning_curve_is_drawn_over_whole_episodes():
     picks = np.arange(1, 101) * 640
     curve = pd.DataFrame({"picks": picks, "success_rate": np.tile([0.2, 0.6], 50)})
@@ -153,12 +158,6 @@ def test_picks_and_values_are_drawn_by_their_meaning():
     assert unloaded.get_offsets().tolist() == [[2, 9]]
 
 
-def test_the_networks_figure_counts_its_parameters():
-    texts = [text.get_text() for axes in diagrams.fig07_network(17).axes for text in axes.texts]
-    assert any("(68 for n = 17)" in text for text in texts)
-    assert any("(69 for n = 17)" in text for text in texts)
-
-
 def test_every_package_has_its_number_and_size():
     texts = [text.get_text() for text in loads.packages().axes[0].texts]
     assert [text for text in texts if text.isdigit()] == [str(number) for number in range(13)]
@@ -173,21 +172,6 @@ def test_the_colour_of_the_chosen_box_says_whether_it_was_lifted():
     colours = [axes.patches[0].get_facecolor()[:3] for axes in figure.axes]
     blocked, liftable = COLOURS["blocked"], COLOURS["liftable"]
     assert np.allclose(colours, [blocked, blocked, liftable, liftable])
-
-
-def test_distance_curves_show_formula_and_measurement():
-    curves = {"one box": (LINE, LINE / 10, LINE / 9), "two boxes": (LINE, LINE / 20, LINE / 21)}
-    (axes,) = lifts.distance_curves({"force (N)": curves}, {"force (N)": 20}).axes
-    shown = [line.get_ydata().tolist() for line in axes.lines[:4]]
-    assert shown == [values.tolist() for _, *both in curves.values() for values in both]
-    assert len(axes.lines) == 4 + 2  # threshold, and the mark
-
-
-def test_the_agreement_is_drawn_with_all_lifts():
-    frame = read_agreement()
-    for axes, physics in zip(lifts.agreement_scatter(frame).axes, ("table", "full")):
-        shown = sum(len(points.get_offsets()) for points in axes.collections)
-        assert shown == frame[physics].notna().sum()
 
 
 def test_the_published_figures_are_those_that_notebooks_save():

@@ -1,4 +1,4 @@
-"""Policies compared on heaps, at reduced size, and what sentences say of the full one."""
+"""Policies compared on heaps, at reduced size."""
 
 import numpy as np
 import pandas as pd
@@ -138,14 +138,3 @@ def test_data_of_heaps_are_those_that_are_read():
     assert names == {"networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == FULL.test).all() and len(table) == 19
-
-
-def test_the_table_supports_what_the_notebook_says():
-    by = study.read_heap_table().set_index(["policy", "falls_weight"])
-    learned, oracle = (by.loc[(name, 1.0)] for name in ("learned", "oracle"))
-    assert -learned["falls_more"] > learned["boxes_more"] > 0, "mostly fewer falls"
-    assert learned["falls_more_high"] > 0 > learned["boxes_more_low"], "neither alone is shown"
-    assert by.loc[("learned", 4.0), "net_more_low"] < 0 < by.loc[("learned", 2.0), "net_more_low"]
-    assert oracle["boxes_low"] > learned["boxes"] and oracle["falls"] < learned["falls"]
-    simple = by.loc[[(name, 1.0) for name in study.RULES], "net"].droplevel("falls_weight")
-    assert simple["highest"] < simple["random"] < simple.max() == simple["lowest"]

@@ -26,20 +26,6 @@ def committed():
     return agreement.read_agreement()
 
 
-def test_table_decides_as_local(asker):
-    states, frame = agreement.collect_lifts(300, 7, asker)
-    assert len(frame) >= 300 and len(states) == 6 * 5
-    assert set(frame["policy"]) == set(agreement.UNLOADED_BY)
-    assert set(frame["picks"]) == set(agreement.STAGES)
-    assert not len(agreement.disagreements(frame, "table", "local"))
-    few = frame[frame["on_top"] < 3]
-    assert (few["table"] == few["local"]).all()
-    many = frame[frame["on_top"] >= 3]
-    assert len(many) > 30 and (many["table"] == 0).all()
-    for _, same in frame.groupby("situation"):
-        assert same["local"].nunique() == 1
-
-
 def test_lifts_are_asked_about_in_the_state_they_name(asker):
     states, frame = agreement.collect_lifts(100, 3, asker)
     for state, rows in frame.groupby("state"):
