@@ -181,6 +181,17 @@ def test_bad_settings_are_refused(kwargs, message):
         DQN(peq(), **kwargs)
 
 
+def test_the_defaults_are_those_of_the_paper(rng):
+    batch = make_batch(rng)
+    batch["rewards"] *= 3  # errors on both sides of beta
+    paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0}
+    states = []
+    for agent in (DQN(peq()), DQN(peq(), **paper)):
+        losses = [agent.update(batch) for _ in range(20)]
+        states.append([losses, *(array.tobytes() for array in agent.state().values())])
+    assert states[0] == states[1]
+
+
 def test_what_is_no_network_or_no_batch_is_refused():
     for kind in (DQN, lambda network: Greedy(network, equalize=False)):
         with pytest.raises(TypeError, match="network is None; expected a torch.nn.Module"):

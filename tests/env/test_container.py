@@ -8,6 +8,7 @@ from tests.env.comparing import FailingStack, assert_same, state_of
 from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
 from unload.load.substacks import build_load
+from unload.load.view import snapshot
 
 ENV_ID = "unload/Container-v0"
 
@@ -108,7 +109,7 @@ def test_failures_add_up_and_a_success_forgives_them(make_env):
     env = make_env()
     seen, _ = env.reset(seed=0)
     for row in np.argsort(seen[:, 2])[:3]:
-        _, _, _, _, info = env.step(int(row))
+        _, _, _, _, info = env.step(np.array(row))  # as Stable-Baselines3's predict returns it
     assert info["action_mask"].sum() == 125
     _, reward, _, _, info = env.step(int(np.argmax(seen[:, 2])))
     assert reward == 1 and info["action_mask"].tolist() == [1] * 128
@@ -143,7 +144,8 @@ def test_truncation_after_max_picks(make_env):
 
 
 def test_drifting_boxes_are_seen_where_they_are(make_env):
-    env = make_env(physics="full", after_pick="keep", stack=lambda rng: tall_load(), max_picks=3)
+    settings = {"physics": "full", "after_pick": "keep", "render_mode": "rgb_array"}
+    env = make_env(**settings, stack=lambda rng: tall_load(), max_picks=3)
     env.reset(seed=0)
     container = env.unwrapped
     neat = container.physics.load.positions
@@ -153,6 +155,11 @@ def test_drifting_boxes_are_seen_where_they_are(make_env):
     assert 0 < np.abs(drift).max() < 0.02
     expected = observation.scale((neat + drift)[container.visible])
     assert (seen == expected).all()
+    present = container.physics.present
+    pictures = [
+        snapshot(container.physics.load, present, places) for places in (neat + drift, neat)
+    ]
+    assert [(picture == env.render()).all() for picture in pictures] == [True, False]
     with pytest.raises(ValueError, match="after_pick lets .*expected 'restore'"):
         container.liftable()
 

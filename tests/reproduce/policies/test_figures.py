@@ -2,6 +2,7 @@
 
 import matplotlib
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -42,6 +43,13 @@ def test_a_table_says_100_only_if_no_pick_failed():
     assert table.loc["500 picks", "recommended, no mask"] == "100"
     assert table.loc["500 picks", "paper"].startswith("100.0 (")
     assert table.loc["full, restored", "paper"] == figures.NOT_PLAYED
+
+
+def test_bars_are_the_measured_ratios():
+    table = speed.read_speeds()
+    bars = [bar.get_width() for axes in speed.speed_ratios().axes for bar in axes.patches]
+    grouped = [ratio for _, group in table.groupby("what", sort=False) for ratio in group["ratio"]]
+    assert np.allclose(bars, grouped)
 
 
 def test_ways_are_compared_with_the_first():
