@@ -1,8 +1,5 @@
 """The benchmarks: what they measure is what they say."""
 
-import subprocess
-import sys
-
 import gymnasium
 import numpy as np
 import pandas as pd
@@ -18,7 +15,6 @@ from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
 from benchmarks.timing import best_times
 from benchmarks.updates import update_times
 from unload.reproduce.policies.speed import FOLDER
-from unload.support import files
 from unload.support.provenance import read_provenance
 
 
@@ -117,14 +113,3 @@ def test_speeds_are_printed_with_their_units(capsys):
     row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
     show(pd.DataFrame([row]))
     assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_the_command_measures_everything_and_keeps_nothing_when_quick():
-    path = FOLDER / "speeds.csv"
-    before = path.read_bytes()
-    command = [sys.executable, str(files.ROOT / "benchmarks" / "run.py"), "--quick"]
-    printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    for part in ("lifts", "random picks", "update", "training"):
-        assert part in printed
-    assert path.read_bytes() == before

@@ -38,12 +38,9 @@ COVERED_BY = {
     "reproduce/falls/figures.py": "reproduce/test_figures.py",
     "reproduce/lifts/figures.py": "reproduce/test_figures.py",
     "reproduce/paper/figures.py": "reproduce/test_figures.py",
-    "reproduce/paper/mdp.py": "reproduce/test_figures.py",
-    "reproduce/paper/network.py": "reproduce/test_figures.py",
-    "reproduce/paper/substacks.py": "reproduce/test_figures.py",
-    "reproduce/policies/inside.py": "reproduce/policies/test_figures.py",
+    "reproduce/paper/diagrams.py": "reproduce/test_figures.py",
     "reproduce/policies/speed.py": "reproduce/policies/test_figures.py",
-    "reproduce/variants/figures.py": "reproduce/variants/test_grids.py",
+    "reproduce/style.py": "reproduce/test_figures.py",
 }
 
 

@@ -26,16 +26,6 @@ KILLED_RUN = Path(__file__).with_name("killed_run.py")
 LEFT = ("policy.safetensors", "curve.csv", "config.json")
 
 
-@pytest.mark.parametrize("steps", [1, 17, 31])
-def test_an_interrupted_run_goes_on_to_the_same_result(tmp_path, config, steps):
-    train(config, tmp_path / "straight", progress=False)
-    interrupt_run(config, tmp_path / "broken", steps)
-    assert (tmp_path / "broken" / "checkpoint.npz").exists()
-    assert not (tmp_path / "broken" / "config.json").exists()
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-
-
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("changes", [{}, {"replay_size": 61}, {"replay_size": 5000}])
 def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):

@@ -116,18 +116,6 @@ def test_choosing_from_nothing_is_refused(rng):
             DQN(peq()).choose(observations, allowed, epsilon, rng)
 
 
-def test_with_gamma_zero_the_target_is_the_reward(rng):
-    """One item, a value of 0.5 and a reward of -1: the loss is 1.5 - 0.5."""
-    observations = np.full((1, 1, 3), 0.5, np.float32)
-    batch = {
-        "observations": observations,
-        "actions": np.array([0]),
-        "rewards": np.array([-1.0], np.float32),
-    }
-    assert DQN(HeightNetwork()).update(batch) == pytest.approx(1.0)
-    assert DQN(HeightNetwork(-1.0)).update(batch) == pytest.approx(0.5 * 0.5**2)
-
-
 @pytest.mark.parametrize(
     ("mask", "terminated", "best"),
     [([1, 1, 1], False, 0.8), ([1, 0, 1], False, 0.4), ([1, 1, 1], True, 0.0)],

@@ -46,18 +46,6 @@ def test_the_oldest_picks_are_overwritten(rng):
     assert set(kept.tolist()) == set(range(14, 24))
 
 
-def test_length_grows_to_the_size():
-    replay = ReplayBuffer(5, 4)
-    lengths = []
-    for first in range(0, 8, 2):
-        lengths.append(len(replay))
-        replay.add(**picks(first, 2))
-    assert lengths == [0, 2, 4, 5]
-    last = ReplayBuffer(1, 4)
-    last.add(**picks(0, 3))
-    assert len(last) == 1 and last.arrays["actions"].tolist() == [2]
-
-
 def test_samples_are_uniform_and_seeded(rng):
     replay = ReplayBuffer(8, 4)
     replay.add(**picks(0, 8))
@@ -65,15 +53,6 @@ def test_samples_are_uniform_and_seeded(rng):
     assert counts / 40_000 == pytest.approx(np.full(8, 1 / 8), abs=0.01)
     first, same = (replay.sample(50, np.random.default_rng(1))["rewards"] for _ in range(2))
     assert (first == same).all()
-
-
-def test_a_sample_does_not_change_with_the_buffer(rng):
-    replay = ReplayBuffer(4, 4)
-    replay.add(**picks(0, 4))
-    sample = replay.sample(20, rng)
-    before = sample["observations"].copy()
-    replay.add(**picks(100, 4))
-    assert (sample["observations"] == before).all()
 
 
 def test_sampling_refuses(rng):

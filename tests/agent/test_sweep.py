@@ -5,10 +5,8 @@ import os
 import pandas as pd
 import pytest
 
-from unload import TrainConfig
 from unload.agent import sweep
 from unload.agent.training import train
-from unload.physics.table import LiftTable
 from unload.reproduce.paper.grids import tuning_config
 from unload.support import files
 
@@ -67,33 +65,6 @@ def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
     report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
     assert "n_features (5, not 4)" in report["error"].iloc[0]
     assert report["error"].iloc[1] == ""
-
-
-@pytest.mark.slow
-def test_threads_of_one_dask_worker_equal_single_runs(tmp_path, monkeypatch):
-    """They share one table of lifts, empty here, and once shared one simulator as well."""
-    distributed = pytest.importorskip("distributed")
-    table = LiftTable()
-    monkeypatch.setattr("unload.env.vector.shared_table", lambda: table)
-    configs = {
-        f"run_{seed}": TrainConfig(
-            picks=640, num_envs=8, batch_size=64, n_features=4, seed=seed, log_interval=10
-        )
-        for seed in range(4)
-    }
-    cluster = distributed.LocalCluster(
-        n_workers=1, threads_per_worker=4, processes=False, dashboard_address=None
-    )
-    with cluster, distributed.Client(cluster):
-        report = sweep.run_sweep(configs, tmp_path / "threads", backend="dask", progress=False)
-    assert (report["error"] == "").all()
-    for name, config in configs.items():
-        train(config, tmp_path / "alone" / name, progress=False)
-        curves = [
-            without_times(tmp_path / way / name / "curve.csv") for way in ("threads", "alone")
-        ]
-        assert curves[0] == curves[1]
-        assert "640/640" in (tmp_path / "threads" / name / "log.txt").read_text()
 
 
 @pytest.mark.slow

@@ -16,8 +16,6 @@ from unload.load.boxes import (
     CONTACT_TOLERANCE,
     SMALLEST_EDGE,
     Load,
-    check_load,
-    check_stack,
     contacts,
     slabs,
 )
@@ -94,18 +92,6 @@ def test_the_box_that_sticks_out_is_named():
     assert len(Load(positions, sizes, label, label)) == 3
 
 
-@pytest.mark.parametrize("load", [None, "walls", np.zeros((3, 3))])
-def test_something_else_is_no_load(load):
-    with pytest.raises(TypeError, match="(?s)load is .*; expected an unload.Load"):
-        check_load(load)
-
-
-@pytest.mark.parametrize("stack", [None, "walls", np.zeros(3)])
-def test_something_else_is_no_stack(stack):
-    with pytest.raises(TypeError, match="stack is .*; expected a function from a Generator"):
-        check_stack(stack)
-
-
 # --- properties of random loads -----------------------------------------------------
 
 
@@ -148,21 +134,6 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
         load_of(np.vstack([low, other_low]), np.vstack([high, other_high]))
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
-@given(corners(), st.data())
-def test_a_box_that_sticks_out_is_refused(boxes, data):
-    low, high = boxes
-    box = data.draw(st.integers(0, len(low) - 1))
-    step = np.zeros(3)
-    axis, far = data.draw(st.integers(0, 2)), data.draw(st.booleans())
-    step[axis] = task.CONTAINER[axis] - high[box, axis] if far else -low[box, axis]
-    step[axis] += data.draw(st.sampled_from([2e-6, 0.001, 10.0])) * (1 if far else -1)
-    low[box] += step
-    high[box] += step
-    with pytest.raises(ValueError, match=f"^box {box} reaches from .* expected it inside"):
-        load_of(low, high)
-
-
 def corners_of(load):
     return load.positions - load.sizes / 2, load.positions + load.sizes / 2
 
@@ -175,21 +146,6 @@ def test_slabs_are_the_walls(full_load):
 def test_slabs_join_what_overlaps_in_a_chain():
     groups = slabs(np.array([0.0, 5.0, 0.5, 1.5]), np.array([1.0, 6.0, 2.0, 3.0]))
     assert groups.tolist() == [0, 1, 0, 0]
-
-
-def test_contacts_are_those_found_pair_by_pair(full_load):
-    low, high = corners_of(full_load)
-    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low) > CONTACT_TOLERANCE
-    # [i, j]: j begins where i ends.
-    ends_where_begins = np.abs(high[:, None] - low) <= CONTACT_TOLERANCE
-    in_line = shared[..., 0]
-    above = in_line & shared[..., 1] & ends_where_begins[..., 2]
-    beside = in_line & shared[..., 2] & (ends_where_begins[..., 1] | ends_where_begins[..., 1].T)
-    found = contacts(low, high)
-    for box in range(len(full_load)):
-        for kind, wanted in ((ABOVE, above[box]), (BELOW, above[:, box]), (BESIDE, beside[box])):
-            assert sorted(found.of(kind, box)) == np.flatnonzero(wanted).tolist()
-    assert len(found.boxes) == 2 * above.sum() + beside.sum()
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ import pytest
 
 from unload import task
 from unload.env import observation
-from unload.env.container import ContainerEnv
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
@@ -147,17 +146,6 @@ def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
         load = stack_load(rng)
         seen = observation.nearest(load.positions, task.N_VISIBLE + 100)
         assert load.walls[seen].min() > WALLS - FRONT_WALLS
-
-
-def test_the_front_is_picked_as_the_whole_load(full_load):
-    envs = [ContainerEnv("table", max_picks=100, position_noise=0) for _ in range(2)]
-    for env, load in zip(envs, (full_load, front_walls(full_load))):
-        env.reset(options={"load": load})
-    rng = np.random.default_rng(0)
-    for _ in range(100):
-        action = int(rng.integers(40))
-        (seen, reward, *_), (also_seen, same_reward, *_) = (env.step(action) for env in envs)
-        assert (seen == also_seen).all() and reward == same_reward
 
 
 # --- bad input ----------------------------------------------------------------------

@@ -1,5 +1,7 @@
 """Every figure is drawn, and saved as the same bytes; and what some of them show."""
 
+import json
+import re
 from functools import partial
 
 import matplotlib
@@ -7,7 +9,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_rgb
 
 from unload import stack_load, task
 from unload.env.observation import nearest
@@ -19,13 +20,12 @@ from unload.reproduce.falls.long import read_long_trace
 from unload.reproduce.grid import read_grid
 from unload.reproduce.lifts import figures as lifts
 from unload.reproduce.lifts.agreement import read_agreement
-from unload.reproduce.paper import containers, figures, mdp, network, observation, substacks
+from unload.reproduce.paper import diagrams, figures, loads, observation
 from unload.reproduce.paper.grids import PAPER
 from unload.reproduce.paper.tuning import read_curves, running_mean
-from unload.reproduce.policies.figures import comparison_msr
+from unload.reproduce.policies import figures as policies
 from unload.reproduce.policies.speed import speed_ratios
-from unload.reproduce.variants.figures import variants_msr
-from unload.reproduce.variants.grids import GRIDS
+from unload.reproduce.variants.grids import GRIDS, variants_msr
 from unload.support import files
 
 matplotlib.use("Agg")
@@ -34,7 +34,6 @@ LOAD = stack_load(np.random.default_rng(0))
 VISIBLE = nearest(LOAD.positions)
 POSES = np.zeros((2, 2, 3))
 LINE = np.arange(3.0)
-FIELD = np.add.outer(LINE, LINE)
 
 # Figures that are drawn from data/, and take its folder.
 FROM_DATA = {
@@ -48,7 +47,7 @@ FROM_DATA = {
     "fig11_loss": figures.fig11_loss,
     "fig12_reward": figures.fig12_reward,
     **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
-    "comparison": comparison_msr,
+    "comparison": policies.comparison_msr,
     "why_60": lambda folder=files.DATA: falls.four_cells(read_grid(PAPER, folder)),
     "why_runs_fall": lambda folder=files.DATA: falls.loop(
         read_trace(folder), read_laboratory(folder)
@@ -60,26 +59,34 @@ FROM_DATA = {
 }
 # The others, with what they are given here.
 FIGURES = FROM_DATA | {
-    "fig01_mdp": mdp.fig01_mdp,
-    "fig02_containers": lambda: containers.fig02_containers(
+    "fig01_mdp": diagrams.fig01_mdp,
+    "fig02_containers": lambda: loads.fig02_containers(
         np.arange(3 * 48).reshape(3, 4, 4, 3).astype(np.uint8), [1, 2, 3]
     ),
-    "fig03_substacks": substacks.fig03_substacks,
-    "fig07_network": network.fig07_network,
-    "packages": substacks.packages,
-    "rows": lambda: substacks.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
-    "side_views": lambda: containers.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
-    "wall_views": lambda: containers.wall_views(LOAD, [10, 11]),
+    "fig03_substacks": loads.fig03_substacks,
+    "fig07_network": diagrams.fig07_network,
+    "packages": loads.packages,
+    "rows": lambda: loads.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
+    "side_views": lambda: loads.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
+    "wall_views": lambda: loads.wall_views(LOAD, [10, 11]),
     "visibility": lambda: observation.visibility(LOAD.positions, VISIBLE),
-    "score_landscapes": lambda: network.score_landscapes(
-        np.zeros((4, 3)), LINE, [FIELD, -FIELD], [2, 0], ["first", "second"]
-    ),
     "distance_curves": lambda: lifts.distance_curves(
         {"force (N)": {"one box": (LINE, LINE, LINE)}}, {"force (N)": 20}
     ),
     "lift_sequences": lambda: lifts.lift_sequences({"a": (np.ones((2, 2)), POSES)}, [0.0, 0.3]),
     "agreement_scatter": lambda: lifts.agreement_scatter(read_agreement()),
     "speed_ratios": speed_ratios,
+    "learning": lambda: policies.learning(
+        pd.DataFrame({"picks": LINE, "success_rate": 0.5, "epsilon": 1.0, "loss": 0.1}),
+        pd.Series(LINE / 3),
+    ),
+    "preferences": lambda: policies.preferences(
+        LINE, {"front": LINE}, LINE, np.add.outer(LINE, LINE)
+    ),
+    "steps": lambda: policies.steps(np.full((2, 2), 0.3), 0.4, np.ones((3, 3))),
+    "noise": lambda: policies.noise(
+        pd.DataFrame({("highest", True): LINE, ("highest", False): LINE}), pd.Series(LINE)
+    ),
     "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
     "laboratory_runs": lambda: falls.laboratory_runs(
         {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}
@@ -128,12 +135,6 @@ def test_greedy_curves_are_means_over_the_runs():
     assert axes.lines[0].get_ydata()[70:] == pytest.approx(0.5)
 
 
-def test_each_seed_of_the_training_has_a_colour_and_a_label():
-    lines = figures.fig12_reward().axes[0].lines
-    assert [line.get_label() for line in lines] == [f"seed {seed}" for seed in range(4)]
-    assert len({line.get_color() for line in lines}) == 4
-
-
 def test_a_learning_curve_is_drawn_over_whole_episodes():
     picks = np.arange(1, 101) * 640
     curve = pd.DataFrame({"picks": picks, "success_rate": np.tile([0.2, 0.6], 50)})
@@ -157,34 +158,8 @@ def test_picks_and_values_are_drawn_by_their_meaning():
     assert unloaded.get_offsets().tolist() == [[2, 9]]
 
 
-def test_the_wall_of_a_stuck_item():
-    present = np.ones(len(LOAD), bool)
-    wall = np.flatnonzero(LOAD.walls == 1)
-    present[wall[-1]] = False
-    _, axes = plt.subplots()
-    figures.draw_stuck(axes, LOAD, present, int(wall[0]), wall[1:3])
-    colours = [to_rgb(box.get_facecolor()) for box in axes.patches]
-    assert len(colours) == len(wall) - 1
-    assert colours.count(COLOURS["blocked"]) == 1
-    assert colours.count(COLOURS["on top of it"]) == 2
-
-
-def test_the_networks_figure_counts_its_parameters():
-    texts = [text.get_text() for axes in network.fig07_network(17).axes for text in axes.texts]
-    assert any("(68 for n = 17)" in text for text in texts)
-    assert any("(69 for n = 17)" in text for text in texts)
-
-
-def test_score_gradients_are_those_of_the_front_wall():
-    observed = np.array([[0.95, 0.1, 0.2], [0.5, 0.0, 0.0], [0.92, -0.3, 0.4]])
-    jacobian = np.arange(27.0).reshape(3, 3, 3)
-    arrows = network.score_gradients(observed, np.zeros(3), jacobian).axes[0].collections[1]
-    assert np.array_equal(arrows.U, jacobian[[0, 2], [0, 2], 1])
-    assert np.array_equal(arrows.V, jacobian[[0, 2], [0, 2], 2])
-
-
 def test_every_package_has_its_number_and_size():
-    texts = [text.get_text() for text in substacks.packages().axes[0].texts]
+    texts = [text.get_text() for text in loads.packages().axes[0].texts]
     assert [text for text in texts if text.isdigit()] == [str(number) for number in range(13)]
     assert sum("×" in text for text in texts) == 13
 
@@ -199,16 +174,11 @@ def test_the_colour_of_the_chosen_box_says_whether_it_was_lifted():
     assert np.allclose(colours, [blocked, blocked, liftable, liftable])
 
 
-def test_distance_curves_show_formula_and_measurement():
-    curves = {"one box": (LINE, LINE / 10, LINE / 9), "two boxes": (LINE, LINE / 20, LINE / 21)}
-    (axes,) = lifts.distance_curves({"force (N)": curves}, {"force (N)": 20}).axes
-    shown = [line.get_ydata().tolist() for line in axes.lines[:4]]
-    assert shown == [values.tolist() for _, *both in curves.values() for values in both]
-    assert len(axes.lines) == 4 + 2  # threshold, and the mark
-
-
-def test_the_agreement_is_drawn_with_all_lifts():
-    frame = read_agreement()
-    for axes, physics in zip(lifts.agreement_scatter(frame).axes, ("table", "full")):
-        shown = sum(len(points.get_offsets()) for points in axes.collections)
-        assert shown == frame[physics].notna().sum()
+def test_the_published_figures_are_those_that_notebooks_save():
+    saved = set()
+    for path in (files.ROOT / "notebooks").rglob("*.ipynb"):
+        for cell in json.loads(path.read_text())["cells"]:
+            if cell["cell_type"] == "code":
+                saved |= set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", "".join(cell["source"])))
+    assert {path.stem for path in files.FIGURES.glob("*.png")} == saved
+    assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in saved}

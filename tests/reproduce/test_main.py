@@ -3,7 +3,6 @@
 import sys
 from functools import partial
 
-import pandas as pd
 import pytest
 
 from unload.reproduce import __main__ as command
@@ -70,8 +69,3 @@ def test_no_committed_file_is_too_large():
     sizes = [path.stat().st_size for path in files.DATA.rglob("*") if path.is_file()]
     assert max(sizes) <= 1_000_000
     assert sum(sizes) <= 25_000_000
-
-
-@pytest.mark.parametrize("name", ["loss_function_agent", "total_rew_function_agent"])
-def test_the_papers_curves_have_their_columns(name):
-    assert list(pd.read_csv(files.DATA / f"{name}.csv")) == ["Wall time", "Step", "Value"]

@@ -107,13 +107,6 @@ def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
     assert interval == pytest.approx((middle - reach, middle + reach))
 
 
-def test_fishers_test_asks_whether_fewer_runs_fall():
-    # Of the 10 runs 6 fall; that at most 1 of them is among 5 runs: 6 of 252 ways, p = 6 / 252.
-    assert statistics.fisher_p(1, 5, 5, 5) == pytest.approx(6 / 252)
-    assert statistics.fisher_p(5, 5, 1, 5) == pytest.approx(1)
-    assert statistics.fisher_p(0, 5, 5, 5) == pytest.approx(1 / 252)
-
-
 def course(msr, loss):
     return pd.DataFrame(
         {"picks": 500_000 * np.arange(1, len(msr) + 1), "success_rate": msr, "loss": loss}
@@ -167,23 +160,6 @@ def test_share_intervals_are_those_of_the_binomial_distribution():
     assert stats.binom.cdf(4, 50, high) == pytest.approx(0.025)
 
 
-def test_pairs_make_the_interval_narrow():
-    reference = np.array([1.0, 5.0, 2.0, 8.0])
-    ratio, low, high = statistics.ratio_interval(1.3 * reference, reference)
-    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
-    assert np.isnan(statistics.ratio_interval(reference, -reference)).all()
-    assert np.isnan(statistics.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
-
-
-def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
-    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
-    mean, low, high = statistics.mean_interval(values)
-    percentile = statistics.bootstrap_interval(values)
-    assert mean == 4.1 and low < mean < high
-    assert low > percentile[0] and high > percentile[1]
-    assert statistics.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
-
-
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
@@ -193,7 +169,6 @@ def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
         (statistics.welch_interval, ([1, 2], [np.nan, 1]), "second"),
         (statistics.share_interval, (3, 2), "count is 3"),
         (statistics.share_interval, (0, 0), "total is 0"),
-        (statistics.fisher_p, (0, 5, 6, 5), "control_fallen is 6; expected an integer >= 0"),
         (statistics.with_intervals, (pd.DataFrame({"cell": [1]}), ["cell"], ["msr"]), "msr"),
     ],
 )

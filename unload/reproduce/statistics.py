@@ -1,7 +1,6 @@
 """How a run ends and falls, whether it is like the paper's, and how sure means and shares are."""
 
-import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -171,22 +170,6 @@ def welch_interval(first: Sequence[float], second: Sequence[float]) -> tuple[flo
     return tuple(map(float, test.confidence_interval(LEVEL)))
 
 
-def fisher_p(fallen: int, runs: int, control_fallen: int, control_runs: int) -> float:
-    """Return the p-value of Fisher's one-sided test that fewer runs fall than in the control.
-
-    Args:
-        fallen, runs: how many runs with the change fell, of how many.
-        control_fallen, control_runs: the same without it.
-
-    Raises:
-        TypeError, ValueError: a number is no integer, or more runs fell than there are.
-    """
-    checks.integer("fallen", fallen, 0, runs)
-    checks.integer("control_fallen", control_fallen, 0, control_runs)
-    rows = [[fallen, runs - fallen], [control_fallen, control_runs - control_fallen]]
-    return float(stats.fisher_exact(rows, alternative="less").pvalue)
-
-
 def bootstrap_interval(values: Sequence[float]) -> tuple[float, float]:
     """Return the 95 % percentile bootstrap interval of the mean.
 
@@ -245,47 +228,3 @@ def with_intervals(table: pd.DataFrame, by: Sequence[str], measures: Sequence[st
             row |= {name: group[name].mean(), f"{name}_low": low, f"{name}_high": high}
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
-    values = checks.finite_array("values", values, (None,))
-    if np.ptp(values) < 1e-12:
-        return (float(values.mean()),) * 3
-    return float(values.mean()), *_bca((values,), np.mean)
-
-
-def ratio_interval(
-    values: Sequence[float], reference: Sequence[float]
-) -> tuple[float, float, float]:
-    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
-
-    NaN where the reference's mean is not > 0 in every resample, because such a ratio means
-    nothing. If all pairs have the same ratio, the interval has no width.
-    """
-    values = checks.finite_array("values", values, (None,))
-    reference = checks.finite_array("reference", reference, values.shape)
-    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
-    if (reference[rows].mean(axis=1) <= 0).any():
-        return np.nan, np.nan, np.nan
-    ratio = float(values.mean() / reference.mean())
-    if np.abs(values - ratio * reference).max() < 1e-12:
-        return ratio, ratio, ratio
-    return ratio, *_bca((values, reference), _ratio)
-
-
-def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
-    return values.mean(axis=axis) / reference.mean(axis=axis)
-
-
-def _bca(samples: tuple[np.ndarray, ...], statistic: Callable) -> tuple[float, float]:
-    """BCa interval of a statistic of one sample, or of pairs; NaN of fewer than two values."""
-    if len(samples[0]) < 2:
-        return np.nan, np.nan
-    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
-        warnings.simplefilter("ignore")
-        interval = stats.bootstrap(
-            samples, statistic, n_resamples=RESAMPLES, paired=True, confidence_level=LEVEL,
-            method="BCa", vectorized=True, axis=-1, rng=np.random.default_rng(0),
-        ).confidence_interval  # fmt: skip
-    return float(interval.low), float(interval.high)

@@ -1,9 +1,6 @@
 """The fused update and choice against PyTorch."""
 
 import multiprocessing
-import os
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -19,7 +16,6 @@ from unload.agent.fast.kernel import decode, encode, level
 from unload.env.equalization import equalize
 from unload.env.fast.ranking import LEVELS
 from unload.network.peq import PEQNetwork
-from unload.support import files
 
 BATCH, ITEMS = 300, 128
 FOR_TWO_THREADS = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
@@ -75,7 +71,7 @@ def test_gradients_are_those_of_pytorch(batch, n_features, beta):
 
 
 @pytest.mark.parametrize("bias", [3.0, -3.0])
-@pytest.mark.parametrize("items", [5, ITEMS])
+@pytest.mark.parametrize("items", [5, 200])
 def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
     batch = {
         "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
@@ -87,16 +83,6 @@ def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
         net.extractor.bias[:] = bias
         net.scorer.weight /= 10  # so that tanh does not saturate
     check(net, batch)
-
-
-@pytest.mark.parametrize("items", [1, 2, 5, 127, 200])
-def test_any_number_of_items_will_do(rng, items):
-    batch = {
-        "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
-        "actions": rng.integers(items, size=BATCH),
-        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
-    }
-    check(network(16), batch)
 
 
 def test_arrays_that_are_not_contiguous_will_do(batch):
@@ -131,15 +117,6 @@ def test_a_near_tie_is_decided_as_in_double_precision(sign, first):
             "rewards": np.ones(1, np.float32),
         }
         check(net, batch, tolerance=1e-6)
-
-
-def test_items_that_tie_share_the_gradient_evenly(batch):
-    net = network(8)
-    with torch.no_grad():
-        net.extractor.weight[:, :2] = 0  # only the height counts
-        net.extractor.bias[:] = 1
-    batch["observations"][:, :, 2] = np.sign(batch["observations"][:, :, 2])  # two heights
-    check(net, batch)
 
 
 def test_a_dead_network_has_no_gradients_but_the_last_bias(batch):
@@ -275,26 +252,6 @@ def test_rule_of_where_it_applies(other):
     assert not fused.applies(other)
     with pytest.raises(ValueError, match="fused_update is True"):
         DQN(other, fused_update=True)
-
-
-def test_code_compiled_anew_and_code_from_the_cache_give_the_same_bits(tmp_path):
-    program = """
-import numpy as np, torch
-from unload import PEQNetwork
-from unload.agent.fast import fused
-rng = np.random.default_rng(0)
-network = PEQNetwork(20, torch.Generator().manual_seed(0))
-observations = rng.uniform(-1, 1, (70, 9, 3)).astype(np.float32)
-targets = rng.choice([-1, 1], 70).astype(np.float32)
-weights, actions = fused.weights_of(network), rng.integers(9, size=70)
-print(fused.start_gradients(weights, observations, actions, targets)().tobytes().hex())
-"""
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(files.ROOT)}
-    first, second = (
-        subprocess.check_output([sys.executable, "-c", program], env=environment) for _ in range(2)
-    )
-    assert any(tmp_path.rglob("kernel.add_chunks*"))
-    assert first == second
 
 
 def test_only_some_rows_of_a_large_memory_are_used(batch, rng):

@@ -1,4 +1,4 @@
-"""Policies compared on heaps, at reduced size, and what sentences say of the full one."""
+"""Policies compared on heaps, at reduced size."""
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from unload.heap.network import FateNetwork
 from unload.heap.study import table as study
 from unload.heap.study.recording import FULL, WEIGHTS
 from unload.heap.study.table import FAMILY_COLUMNS, best_rule, compared, family, plan
+from unload.reproduce.statistics import bootstrap_interval
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -37,6 +38,23 @@ def test_compared_gives_means_and_ratios_over_pairs(episodes):
     assert learned["boxes_low"] < 2.5 < learned["boxes_high"]
     assert learned[["net_more", "net_more_low", "net_more_high"]].tolist() == [0.5, 0.5, 0.5]
     assert learned[["boxes_more", "falls_more"]].tolist() == [0.5, 0.0]
+
+
+def test_pairs_make_the_interval_narrow():
+    reference = np.array([1.0, 5.0, 2.0, 8.0])
+    ratio, low, high = study.ratio_interval(1.3 * reference, reference)
+    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
+    assert np.isnan(study.ratio_interval(reference, -reference)).all()
+    assert np.isnan(study.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
+
+
+def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
+    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
+    mean, low, high = study.mean_interval(values)
+    percentile = bootstrap_interval(values)
+    assert mean == 4.1 and low < mean < high
+    assert low > percentile[0] and high > percentile[1]
+    assert study.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
 
 
 def test_the_family_holds_each_rule_once_and_none_without_weights():
@@ -115,28 +133,8 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
     assert weights == [0.0, 0.0, 1.0, 1.0]
 
 
-def test_the_command_makes_everything_about_heaps(monkeypatch):
-    called = []
-    steps = "make_heaps", "make_networks", "choose_rules", "compare"
-    for name in steps:
-        monkeypatch.setattr(study, name, lambda *given, name=name: called.append((name, given)))
-    study.heap_data(FULL, "data", "runs", 2, False)
-    assert called == [(name, (FULL, "data", "runs", 2, False)) for name in steps]
-
-
 def test_data_of_heaps_are_those_that_are_read():
     names = {path.name.split(".")[0] for path in (files.DATA / "heap").iterdir()}
     assert names == {"networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == FULL.test).all() and len(table) == 19
-
-
-def test_the_table_supports_what_the_notebook_says():
-    by = study.read_heap_table().set_index(["policy", "falls_weight"])
-    learned, oracle = (by.loc[(name, 1.0)] for name in ("learned", "oracle"))
-    assert -learned["falls_more"] > learned["boxes_more"] > 0, "mostly fewer falls"
-    assert learned["falls_more_high"] > 0 > learned["boxes_more_low"], "neither alone is shown"
-    assert by.loc[("learned", 4.0), "net_more_low"] < 0 < by.loc[("learned", 2.0), "net_more_low"]
-    assert oracle["boxes_low"] > learned["boxes"] and oracle["falls"] < learned["falls"]
-    simple = by.loc[[(name, 1.0) for name in study.RULES], "net"].droplevel("falls_weight")
-    assert simple["highest"] < simple["random"] < simple.max() == simple["lowest"]

@@ -26,20 +26,6 @@ def committed():
     return agreement.read_agreement()
 
 
-def test_table_decides_as_local(asker):
-    states, frame = agreement.collect_lifts(300, 7, asker)
-    assert len(frame) >= 300 and len(states) == 6 * 5
-    assert set(frame["policy"]) == set(agreement.UNLOADED_BY)
-    assert set(frame["picks"]) == set(agreement.STAGES)
-    assert not len(agreement.disagreements(frame, "table", "local"))
-    few = frame[frame["on_top"] < 3]
-    assert (few["table"] == few["local"]).all()
-    many = frame[frame["on_top"] >= 3]
-    assert len(many) > 30 and (many["table"] == 0).all()
-    for _, same in frame.groupby("situation"):
-        assert same["local"].nunique() == 1
-
-
 def test_lifts_are_asked_about_in_the_state_they_name(asker):
     states, frame = agreement.collect_lifts(100, 3, asker)
     for state, rows in frame.groupby("state"):
@@ -202,26 +188,3 @@ def test_unknown_names_are_refused(committed):
         next(agreement.container_states("lowest", 0))
     with pytest.raises(ValueError, match="other is 'mujoco'"):
         agreement.disagreements(committed, "local", "mujoco")
-
-
-def test_buried_boxes_count_once_per_situation_and_in_fresh_worlds_of_full():
-    rows = [  # on_top, situation, after_pick, local, full
-        (3, 1, "restore", 0.01, 0.02),
-        (3, 1, "restore", 0.01, 0.02),
-        (4, 2, "restore", 0.03, 0.25),
-        (5, 3, "", 0.04, np.nan),
-        (3, 4, "keep", 0.05, 0.3),
-        (2, 5, "restore", 0.4, 0.4),
-    ]
-    columns = ["on_top", "situation", "after_pick", "local", "full"]
-    found = agreement.buried_lifts(pd.DataFrame(rows, columns=columns))
-    assert found["situations"].to_dict() == {"local": 4, "full": 2}
-    assert found["farthest"].to_dict() == {"local": 0.05, "full": 0.25}
-    assert found["lifted"].to_dict() == {"local": 0, "full": 1}
-    assert found["high"].tolist() == [share_interval(0, 4)[1], share_interval(1, 2)[1]]
-
-
-def test_buried_boxes_have_the_bound_of_the_errors_of_the_table(committed):
-    bounds = agreement.error_bounds(committed).loc["table, local: three or more on top"]
-    found = agreement.buried_lifts(committed).loc["local"]
-    assert (found["situations"], found["high"]) == (bounds["lifts"], bounds["high"])

@@ -7,15 +7,6 @@ import pytest
 from unload.reproduce.paper import curves
 
 
-def test_of_the_tuning_the_notebook_says_what_differs():
-    agrees = curves.tuning()["agrees"]
-    assert agrees.index[agrees == "no"].tolist() == [
-        "tuning, b = 1024, μ = 0.01", "… faster with larger b"
-    ]  # fmt: skip
-    assert (agrees == "yes").sum() == 6 and (agrees == "").sum() == 4
-    assert agrees["… more stable with FE"] == "not shown"
-
-
 def test_noise_of_the_loss_is_what_the_running_mean_leaves():
     losses = {run: 5 + waves * np.resize([1, -1], 1000) for run, waves in enumerate((0.0, 1.0))}
     left = 24 / 25  # of the waves by a mean over 25 steps

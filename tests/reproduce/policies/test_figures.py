@@ -6,10 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import stack_load
-from unload.load.view import COLOURS
-from unload.physics.situation import Surroundings
-from unload.reproduce.policies import comparison, figures, inside, robustness, speed
+from unload.reproduce.policies import comparison, figures, robustness, speed
 
 matplotlib.use("Agg")
 
@@ -48,38 +45,6 @@ def test_a_table_says_100_only_if_no_pick_failed():
     assert table.loc["full, restored", "paper"] == figures.NOT_PLAYED
 
 
-@pytest.mark.parametrize(
-    "draw", [figures.comparison_means, figures.comparison_table, figures.comparison_msr]
-)
-def test_missing_data_name_their_command(tmp_path, draw):
-    with pytest.raises(FileNotFoundError, match="python -m unload.reproduce policies makes it"):
-        draw(tmp_path)
-
-
-def test_learning_preferences_and_noise_are_drawn_as_given():
-    curve = pd.DataFrame({"picks": [1000, 2000], "success_rate": 0.5, "epsilon": 1.0, "loss": 0.1})
-    left, _ = inside.learning(curve, pd.Series([0.1, 1.0], [1500, 2000])).axes
-    assert left.lines[2].get_xydata().tolist() == [[1.5, 0.1], [2, 1]]
-    z, y = np.linspace(0, 2, 5), np.linspace(0, 1, 3)
-    left, *_ = inside.preferences(z, {"front": z, "rear": 2 * z}, y, np.add.outer(z, y)).axes
-    assert [text.get_text() for text in left.get_legend().get_texts()] == ["front", "rear"]
-    sigmas, columns = [0.0, 0.05], pd.MultiIndex.from_product([["highest"], [True, False]])
-    rates = pd.DataFrame([[1, 1], [0.8, 0.4]], sigmas, columns)
-    (axes,) = inside.noise(rates, pd.Series([0, 0.01], sigmas)).axes
-    assert [line.get_label() for line in axes.lines][:2] == ["highest", "highest, no mask"]
-    assert axes.lines[2].get_xdata().tolist() == [0, 5]
-
-
-def test_the_flattest_step_is_drawn():
-    metres = np.array([[0.3, 0.2], [-0.1, 0.3], [0.0, 0.25]])
-    left, right = inside.steps(metres, 0.4, np.array([[1, 20, 3], [0, -5, 8]])).axes
-    dots, flattest, slope = left.lines
-    assert np.array_equal(dots.get_xydata(), metres)
-    assert flattest.get_ydata() == pytest.approx([0.4, 0, 0.4])  # 2/3 of 0.6 m
-    assert slope.get_ydata() == pytest.approx([0.24, 0, 0.24])
-    assert right.lines[1].get_xydata().tolist() == [[20, 3], [-5, 8]]
-
-
 def test_bars_are_the_measured_ratios():
     table = speed.read_speeds()
     bars = [bar.get_width() for axes in speed.speed_ratios().axes for bar in axes.patches]
@@ -97,34 +62,3 @@ def test_ways_are_compared_with_the_first():
 )
 def test_three_digits(value, text):
     assert speed.three_digits(value) == text
-
-
-def test_a_situation_is_drawn_where_its_boxes_stand():
-    load = stack_load(np.random.default_rng(0))
-    surroundings = Surroundings(load, np.ones(len(load), bool))
-    item = next(item for item in range(len(load)) if len(surroundings.on_top(item)) == 2)
-    situation = surroundings.situation(item)
-    (axes,) = speed.situation_in_its_wall(load, item, situation, 0.01).axes
-    wall = np.flatnonzero(load.walls == load.walls[item])
-    background, boxes = axes.patches[: len(wall)], axes.patches[len(wall) :]
-    assert len(boxes) == len(situation.boxes)
-    assert boxes[0].get_facecolor()[:3] == COLOURS["blocked"]
-    assert boxes[1].get_facecolor()[:3] == COLOURS["on top of it"]
-    lifted = speed.situation_in_its_wall(load, item, situation, 0.2).axes[0].patches[len(wall)]
-    assert lifted.get_facecolor()[:3] == COLOURS["liftable"]
-    corners = {tuple(np.round(box.get_xy(), 3)) for box in background}
-    assert tuple(np.round(boxes[0].get_xy(), 3)) in corners
-
-
-@pytest.mark.parametrize(
-    ("content", "error", "message"),
-    [
-        (None, FileNotFoundError, "is missing; python benchmarks/run.py makes it"),
-        ("a,b\n1,2\n", ValueError, "expected what, how, value, unit, ratio"),
-    ],
-)
-def test_bad_tables_of_speeds_are_refused(tmp_path, content, error, message):
-    if content is not None:
-        (tmp_path / "speeds.csv").write_text(content)
-    with pytest.raises(error, match=message):
-        speed.speed_ratios(tmp_path)

@@ -8,8 +8,13 @@ from unload import TrainConfig, evaluate, load_policy
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.grid import read_measures
 from unload.reproduce.variants import grids
-from unload.reproduce.variants.figures import variants_msr
-from unload.reproduce.variants.grids import GRIDS, judged, variants_data
+from unload.reproduce.variants.grids import (
+    GRIDS,
+    judged,
+    read_variants,
+    variants_data,
+    variants_msr,
+)
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -44,6 +49,13 @@ def test_each_cell_differs_from_the_paper_in_little(name, varied):
     assert len(changes) == len(GRIDS[name].cells)
 
 
+def test_rewards_stand_beside_the_setting_that_changes_nothing():
+    rows = read_variants("rewards")
+    control = read_measures(GRIDS["settings"]).query("cell == 'unchanged'")
+    assert rows.head(3).to_dict("list") == control.to_dict("list")
+    assert rows["cell"].unique().tolist() == ["unchanged", *GRIDS["rewards"].cells]
+
+
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
     monkeypatch.setattr(grids, "LOADS", {"episodes": 3, "seed": 1000})
     policy = load_policy(files.DATA / "policies/paper_seed_2.safetensors")
@@ -71,7 +83,7 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "n_jobs": 1, "progress": False}
     variants_data(["rewards"], 40, **folders)
     rows = read_measures(GRIDS["rewards"], tmp_path / "reduced")
-    assert rows["cell"].nunique() == 4 and rows["msr_mask"].between(0, 1).all()
+    assert rows["cell"].nunique() == 3 and rows["msr_mask"].between(0, 1).all()
     variants_data(["recommended"], **folders)
     provenance = read_provenance(tmp_path, "variants/recommended")
     assert provenance["fingerprint"] == training_fingerprint()

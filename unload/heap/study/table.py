@@ -7,7 +7,8 @@ stands here. Each episode is kept in ``runs/heap``: a command that was stopped g
 the whole physics takes 0.55 s of CPU, and the whole experiment about a day.
 """
 
-from collections.abc import Callable, Iterable
+import warnings
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import torch
+from scipy import stats
 
 from unload.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from unload.heap.learning import Learned, load_networks
@@ -29,9 +31,9 @@ from unload.heap.study.recording import (
     make_heaps,
     make_networks,
 )
-from unload.reproduce.results import COMMAND, JOBS, Result, keep_all, publish, read_table
-from unload.reproduce.statistics import mean_interval, ratio_interval
-from unload.support import files
+from unload.reproduce.results import COMMAND, Result, keep_all, publish, read_table
+from unload.reproduce.statistics import LEVEL, RESAMPLES
+from unload.support import checks, files
 
 # A box near the front takes many along if others lie before it and on it; how much each of these
 # counts is what the family of linear rules varies.
@@ -281,6 +283,50 @@ def _ends(name: str, value: float, low: float, high: float) -> dict[str, float]:
     return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
+    values = checks.finite_array("values", values, (None,))
+    if np.ptp(values) < 1e-12:
+        return (float(values.mean()),) * 3
+    return float(values.mean()), *_bca((values,), np.mean)
+
+
+def ratio_interval(
+    values: Sequence[float], reference: Sequence[float]
+) -> tuple[float, float, float]:
+    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
+
+    NaN where the reference's mean is not > 0 in every resample, because such a ratio means
+    nothing. If all pairs have the same ratio, the interval has no width.
+    """
+    values = checks.finite_array("values", values, (None,))
+    reference = checks.finite_array("reference", reference, values.shape)
+    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    if (reference[rows].mean(axis=1) <= 0).any():
+        return np.nan, np.nan, np.nan
+    ratio = float(values.mean() / reference.mean())
+    if np.abs(values - ratio * reference).max() < 1e-12:
+        return ratio, ratio, ratio
+    return ratio, *_bca((values, reference), _ratio)
+
+
+def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
+    return values.mean(axis=axis) / reference.mean(axis=axis)
+
+
+def _bca(samples: tuple[np.ndarray, ...], statistic: Callable) -> tuple[float, float]:
+    """BCa interval of a statistic of one sample, or of pairs; NaN of fewer than two values."""
+    if len(samples[0]) < 2:
+        return np.nan, np.nan
+    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
+        warnings.simplefilter("ignore")
+        interval = stats.bootstrap(
+            samples, statistic, n_resamples=RESAMPLES, paired=True, confidence_level=LEVEL,
+            method="BCa", vectorized=True, axis=-1, rng=np.random.default_rng(0),
+        ).confidence_interval  # fmt: skip
+    return float(interval.low), float(interval.high)
+
+
 def read_heap_table(folder: str | Path = files.DATA) -> pd.DataFrame:
     """``heap/table.csv``, see ``compared``.
 
@@ -324,6 +370,3 @@ def heap_data(
     """Make all data of heaps."""
     for step in (make_heaps, make_networks, choose_rules, compare):
         step(size, folder, runs_dir, n_jobs, progress)
-
-
-PARTS = {NAME: ("heaps, of which a rake picks several boxes at once", heap_data, JOBS)}

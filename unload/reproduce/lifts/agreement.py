@@ -209,37 +209,6 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows.values(), index=rows)
 
 
-def buried_lifts(frame: pd.DataFrame) -> pd.DataFrame:
-    """How far boxes with three or more on top move, which ``table`` does not simulate.
-
-    Each distinct situation counts once; of ``full``, in fresh worlds only, because in a drifted
-    one it is another situation.
-
-    Args:
-        frame: see ``read_agreement``.
-
-    Returns:
-        Indexed by ``local`` and ``full``: ``situations``; ``farthest`` in m; ``lifted``; ``high``,
-        the 95 % bound on the share that may be lifted.
-
-    Raises:
-        ValueError: one of the two was asked about no such box.
-    """
-    buried = frame[frame["on_top"] >= HELD_DOWN]
-    asked = {"local": buried, "full": buried[buried["after_pick"] == "restore"]}
-    rows = {}
-    for physics, lifts in asked.items():
-        moved = lifts.dropna(subset=physics).drop_duplicates("situation")[physics]
-        lifted = int((moved >= task.LIFT_THRESHOLD).sum())
-        rows[physics] = {
-            "situations": len(moved),
-            "farthest": moved.max(),
-            "lifted": lifted,
-            "high": share_interval(lifted, len(moved))[1],
-        }
-    return pd.DataFrame(rows.values(), index=rows)
-
-
 def table_digest() -> str:
     """Name of the lift table that ships: a digest of ``data/lifts.npz``."""
     return blake2b(LIFTS_FILE.read_bytes(), digest_size=8).hexdigest()

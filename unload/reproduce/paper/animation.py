@@ -5,36 +5,27 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib import get_data_path
-from PIL import Image, ImageDraw, ImageFont
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+from PIL import Image
 
 from unload import task
 from unload.agent.evaluation import Policy
 from unload.env import observation
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
-from unload.load.view import COLOURS, CORNERS, FACES, back_to_front, corners, css, project
+from unload.load.view import COLOURS, back_to_front, corners, draw, pixels
+from unload.reproduce.style import styled
 from unload.support import checks, files
 
-WIDTH, HEIGHT = 440, 410  # of one agent's half, in pixels
-ROOM = 14, 92, 14, 8  # around its container
-LEGEND_HEIGHT = 34
+WIDTH, HEIGHT = 4.4, 4.4  # of one agent's half, in inches at 100 pixels each
 RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
 STUCK = task.N_VISIBLE  # failed picks in a row after which an agent counts as stuck
 SLOW, STEP = 10, 9  # frames of one pick each at the beginning, and picks per frame at last
 FIRST, EARLY, LATE, LAST = 1500, 240, 80, 5000  # ms that frames are shown
-INK, FAINT, RAIL = "#222222", "#6f6f6f", "#e4e4e1"
+FAINT, RAIL = "#6f6f6f", "#e4e4e1"
 PALETTE = 127  # colours of all frames, besides white
-FINE = 3  # times finer is painted than shown, so that edges are smooth
-EDGE = 0.7  # brightness of the edge of a face, as a share of that of the face
-# The insides of the container that are seen: corners, and brightness of the grey.
-INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
-LEGEND = {
-    "unseen": "unseen",
-    "visible": "visible",
-    "liftable": "unloaded",
-    "failed": "failed",
-}
+LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
 
 
 class Episode(NamedTuple):
@@ -101,8 +92,7 @@ def save_unloading(episodes: Mapping[str, Episode], path: str | Path) -> list[Im
         Its frames.
     """
     counts = picks_of_frames(max(len(episode.items) for episode in episodes.values()))
-    halves = [_Half(title, episode) for title, episode in episodes.items()]
-    frames = [_frame(halves, *span) for span in zip([0, *counts], counts)]
+    frames = [_frame(episodes, *span) for span in zip([0, *counts], counts)]
     palette = _palette(frames)
     first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
     late = len(frames) - 2 - SLOW
@@ -135,137 +125,62 @@ def _palette(frames: list[Image.Image]) -> Image.Image:
     return palette
 
 
-class Painter:
-    """Paints the boxes of one load as ``unload.load.view`` draws it, but fast enough for a film.
-
-    Args:
-        load: the boxes.
-        size: width and height of the pictures in pixels.
-        room: pixels kept free at the left, the upper, the right and the lower edge.
-    """
-
-    def __init__(self, load: Load, size: tuple[int, int], room: tuple[int, int, int, int]) -> None:
-        self._size = size
-        self._low, self._high = corners(load, np.arange(len(load)))
-        self._order = back_to_front(self._low, self._high)
-        self._container = project(CORNERS * task.CONTAINER)
-        self._fit(room)
-
-    def paint(
-        self, present: np.ndarray, colours: np.ndarray, rise: np.ndarray, shown: list[int]
-    ) -> Image.Image:
-        """One picture.
-
-        Args:
-            present: (n,) bool, the boxes that are painted.
-            colours: (n, 3) float, RGB in [0, 1].
-            rise: (n,) float, how far above its place a box is painted, m.
-            shown: boxes that are seen through all others.
-        """
-        image = Image.new("RGB", tuple(FINE * side for side in self._size), "white")
-        draw = ImageDraw.Draw(image)
-        inside = self._pixels(self._container)
-        for face, brightness in INSIDES:
-            draw.polygon(inside[list(face)].ravel().tolist(), (round(255 * brightness),) * 3)
-        order = [*self._order[present[self._order]].tolist(), *shown]
-        fills = np.rint(255 * colours[:, None] * [[brightness] for _, brightness in FACES])
-        edges = np.rint(EDGE * fills).astype(int)
-        fills = fills.astype(int)
-        for item, box in zip(order, self._pixels(self._boxes(order, rise))):
-            for (face, _), fill, edge in zip(FACES, fills[item], edges[item]):
-                points = box[list(face)].ravel().tolist()
-                draw.polygon(points, tuple(fill.tolist()), tuple(edge.tolist()))
-        return image.resize(self._size, Image.Resampling.BOX)
-
-    def _boxes(self, items: list[int], rise: np.ndarray) -> np.ndarray:
-        """Where the corners of boxes are seen, (k, 8, 2)."""
-        low, high = self._low[items, None], self._high[items, None]
-        return project(low + CORNERS * (high - low) + rise[items, None, None] * [0, 0, 1])
-
-    def _fit(self, room: tuple[int, int, int, int]) -> None:
-        """Choose scale and shift such that the container fills what ``room`` leaves."""
-        seen = self._container * [1, -1]  # pixels count downwards
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        free = np.subtract(self._size, np.add(room[:2], room[2:]))
-        self._scale = FINE * (free / (high - low)).min()
-        self._shift = FINE * (room[:2] + free / 2) - self._scale * (low + high) / 2
-
-    def _pixels(self, seen: np.ndarray) -> np.ndarray:
-        return self._shift + self._scale * seen * [1, -1]
+@styled
+def _frame(episodes: Mapping[str, Episode], before: int, now: int) -> Image.Image:
+    """All agents after ``now`` picks; those after the first ``before`` are marked."""
+    figure = Figure((WIDTH * len(episodes), HEIGHT), dpi=100, layout="none")
+    for half, (title, episode) in zip(figure.subfigures(1, len(episodes), squeeze=False)[0],
+                                      episodes.items()):  # fmt: skip
+        _draw_half(half, title, episode, before, now)
+    handles = [Patch(color=COLOURS[meaning], label=text) for meaning, text in LEGEND.items()]
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles))
+    return Image.fromarray(pixels(figure))
 
 
-class _Half:
-    """One agent's half of the picture."""
-
-    def __init__(self, title: str, episode: Episode) -> None:
-        self._title, self._episode = title, episode
-        self._painter = Painter(episode.load, (WIDTH, HEIGHT), ROOM)
-
-    def picture(self, before: int, now: int) -> Image.Image:
-        """The state after ``now`` picks; those after the first ``before`` are marked."""
-        image = self._container(before, now)
-        load, _, items, unloaded = self._episode
-        count = int(unloaded[:now].sum())
-        draw = ImageDraw.Draw(image)
-        draw.text((16, 12), self._title, INK, _font(17, bold=True))
-        draw.text((WIDTH - 16, 12), f"{count} of {len(load)}", INK, _font(17, bold=True), "ra")
-        draw.rounded_rectangle((16, 41, WIDTH - 16, 48), 3, RAIL)
-        if count:
-            end = 22 + (WIDTH - 38) * count / len(load)
-            draw.rounded_rectangle((16, 41, end, 48), 3, css(COLOURS["liftable"]))
-        text, colour = self._state(now)
-        draw.text((16, 56), text, colour, _font(14, bold=colour != FAINT))
-        return image
-
-    def _state(self, now: int) -> tuple[str, str]:
-        """What to say of the last pick, and the colour to say it in."""
-        _, _, items, unloaded = self._episode
-        if unloaded[-1] and now >= len(items):
-            text = f"empty after {len(items)} picks, {(~unloaded).sum()} of them failed"
-            return text, css(COLOURS["liftable"])
-        picked = items[:now]
-        others = np.flatnonzero(unloaded[:now] | (picked != picked[-1:]))
-        fails = now - (int(others[-1]) + 1 if len(others) else 0)  # of the same box, at the end
-        if fails > 1:
-            return f"deadlock: the same box fails, {fails} times", css(COLOURS["failed"])
-        return f"pick {now}", FAINT
-
-    def _container(self, before: int, now: int) -> Image.Image:
-        load, positions, items, unloaded = self._episode
-        present = np.ones(len(load), dtype=bool)
-        present[items[:before][unloaded[:before]]] = False
-        rising = items[before:now][unloaded[before:now]]
-        left = np.flatnonzero(present)
-        seen = left[observation.nearest(positions[left])] if len(left) else left
-        failed = items[-1:] if now > len(items) else items[before:now][~unloaded[before:now]]
-        colours = np.tile(COLOURS["unseen"], (len(load), 1))
-        for meaning, those in (("visible", seen), ("liftable", rising), ("failed", failed)):
-            colours[those] = COLOURS[meaning]
-        rise = np.zeros(len(load))
-        rise[rising] = RISE
-        shown = np.unique(failed[present[failed]]).tolist()
-        return self._painter.paint(present, colours, rise, shown)
+def _draw_half(half: Figure, title: str, episode: Episode, before: int, now: int) -> None:
+    """One agent: its title, how far it has come, what its last pick was, and its container."""
+    load, _, items, unloaded = episode
+    count, bold = int(unloaded[:now].sum()), {"fontsize": 13, "fontweight": "bold"}
+    half.text(0.04, 0.94, title, **bold)
+    half.text(0.96, 0.94, f"{count} of {len(load)}", ha="right", **bold)
+    for length, colour in ((1, RAIL), (count / len(load), COLOURS["liftable"])):
+        half.add_artist(Rectangle((0.04, 0.9), 0.92 * length, 0.015, color=colour))
+    text, colour = _state(episode, now)
+    half.text(0.04, 0.84, text, color=colour, fontsize=11)
+    low, high, colours = _boxes(episode, before, now)
+    draw(half.add_axes((0.02, 0.08, 0.96, 0.75)), low, high, colours)
 
 
-def _frame(halves: list[_Half], before: int, now: int) -> Image.Image:
-    width = WIDTH * len(halves)
-    frame = Image.new("RGB", (width, HEIGHT + LEGEND_HEIGHT), "white")
-    for place, half in enumerate(halves):
-        frame.paste(half.picture(before, now), (place * WIDTH, 0))
-    draw = ImageDraw.Draw(frame)
-    for place in range(1, len(halves)):
-        draw.line((place * WIDTH, 14, place * WIDTH, HEIGHT - 14), RAIL)
-    font = _font(13)
-    lengths = [26 + font.getlength(text) + 28 for text in LEGEND.values()]
-    x, y = (width - sum(lengths) + 28) / 2, HEIGHT + 8
-    for (meaning, text), length in zip(LEGEND.items(), lengths):
-        draw.rectangle((x, y, x + 14, y + 14), css(COLOURS[meaning]))
-        draw.text((x + 22, y - 1), text, INK, font)
-        x += length
-    return frame
+def _state(episode: Episode, now: int) -> tuple[str, str | tuple]:
+    """What to say of the last pick, and the colour to say it in."""
+    items, unloaded = episode.items, episode.unloaded
+    if unloaded[-1] and now >= len(items):
+        text = f"empty after {len(items)} picks, {(~unloaded).sum()} of them failed"
+        return text, COLOURS["liftable"]
+    picked = items[:now]
+    others = np.flatnonzero(unloaded[:now] | (picked != picked[-1:]))
+    fails = now - (int(others[-1]) + 1 if len(others) else 0)  # of the same box, at the end
+    if fails > 1:
+        return f"deadlock: the same box fails, {fails} times", COLOURS["failed"]
+    return f"pick {now}", FAINT
 
 
-def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """The font that comes with Matplotlib."""
-    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    return ImageFont.truetype(Path(get_data_path()) / "fonts" / "ttf" / name, size)
+def _boxes(episode: Episode, before: int, now: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners and colours of the boxes in the order in which they are drawn, see ``draw``."""
+    load, positions, items, unloaded = episode
+    present = np.ones(len(load), dtype=bool)
+    present[items[:before][unloaded[:before]]] = False
+    rising = items[before:now][unloaded[before:now]]
+    left = np.flatnonzero(present)
+    seen = left[observation.nearest(positions[left])] if len(left) else left
+    failed = items[-1:] if now > len(items) else items[before:now][~unloaded[before:now]]
+    colours = np.tile(COLOURS["unseen"], (len(load), 1))
+    for meaning, those in (("visible", seen), ("liftable", rising), ("failed", failed)):
+        colours[those] = COLOURS[meaning]
+    low, high = corners(load, np.arange(len(load)))
+    order = back_to_front(low, high)
+    for corner in (low, high):
+        corner[rising, 2] += RISE
+    # What fails is drawn last, so that it is seen through all others.
+    order = np.concatenate([order[present[order]], np.unique(failed[present[failed]])])
+    return low[order], high[order], colours[order]

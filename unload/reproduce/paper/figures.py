@@ -8,11 +8,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from matplotlib.ticker import EngFormatter
 
 from unload import task
-from unload.load.boxes import Load
 from unload.load.view import COLOURS
 from unload.reproduce.paper.grids import PAPER, TUNING
 from unload.reproduce.paper.training import default_curves, episode_means
@@ -234,35 +232,6 @@ def draw_picks(axes: Axes, items: np.ndarray, unloaded: np.ndarray) -> None:
     for name, rows, colour in (("failed", ~unloaded, "failed"), ("unloaded", unloaded, "liftable")):
         axes.scatter(picks[rows], items[rows], s=6, color=COLOURS[colour], label=name)
     axes.set(xlabel="pick of the episode", ylabel="item")
-
-
-def draw_stuck(axes: Axes, load: Load, present: np.ndarray, item: int, above: np.ndarray) -> None:
-    """Draw the wall of an item that is stuck, as seen from the entrance.
-
-    Args:
-        axes: where.
-        load: of the container.
-        present: (items,) bool, the items that have not been unloaded.
-        item: the number of the item.
-        above: numbers of the items that rest on it.
-    """
-    wall = np.flatnonzero((load.walls == load.walls[item]) & present)
-    kinds = {
-        f"item {item}, which is blocked": (COLOURS["blocked"], wall == item),
-        "on top of it": (COLOURS["on top of it"], np.isin(wall, above)),
-        "other items of the wall": (COLOURS["unseen"], (wall != item) & ~np.isin(wall, above)),
-    }
-    for name, (colour, chosen) in kinds.items():
-        for number in wall[chosen]:
-            corner = load.positions[number, 1:] - load.sizes[number, 1:] / 2
-            box = Rectangle(corner, *load.sizes[number, 1:], facecolor=colour, edgecolor="white")
-            axes.add_patch(box).set_label(name)
-            name = None  # the legend needs it once
-    axes.set(
-        xlim=(0, task.CONTAINER[1]), ylim=(0, task.CONTAINER[2]), xlabel="y (m)", ylabel="z (m)"
-    )
-    axes.set_aspect("equal")
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), fontsize=8)
 
 
 def _over_picks(

@@ -16,7 +16,7 @@ from unload import task
 from unload.env import observation
 from unload.env.equalization import equalize
 from unload.load.view import COLOURS
-from unload.reproduce.paper.containers import draw_items
+from unload.reproduce.paper.loads import draw_items
 from unload.reproduce.results import COMMAND, measured, publish, read_table
 from unload.reproduce.style import styled
 from unload.support import files

@@ -50,27 +50,30 @@ def training_data(
     if picks is None and (cells is None or DEFAULTS in cells):
         config = replace(PAPER.cells[DEFAULTS].config, seed=DEFAULT_SEEDS[0])
         run = RunFolder(kept / DEFAULTS / f"seed_{config.seed}")
-        export_training(run.result(config).curve, folder)
+        export_training(run.result(config).curve["wall_time"], folder)
         for seed, name in PLAYERS.items():
             policy = default_policies(folder)[seed]
             save_policy(policy, Path(folder) / "policies" / f"{name}.safetensors")
 
 
-def export_training(curve: pd.DataFrame, folder: str | Path) -> None:
-    """Write a run as TensorBoard exports it: columns ``Wall time``, ``Step`` and ``Value``.
+def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
+    """Write the first run as TensorBoard exports it: ``Wall time``, ``Step`` and ``Value``.
 
     ``loss_function_agent.csv`` has the loss, ``total_rew_function_agent.csv`` the rewards summed
-    over an episode of 500 picks, a mean over the environments.
+    over an episode of 500 picks, a mean over the environments; both as they are published.
+
+    Args:
+        wall_time: of each point of its curve, s since the epoch.
+        folder: of the data.
     """
-    episodes = episode_means(curve)
-    episodes["reward"] = episodes["mean_reward"] * task.MAX_PICKS
-    for name, points, value in (
-        ("loss_function_agent", curve, "loss"),
-        ("total_rew_function_agent", episodes, "reward"),
+    curve = default_curves(folder)[DEFAULT_SEEDS[0]]
+    for name, values in (
+        ("loss_function_agent", curve["loss"]),
+        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
     ):
-        columns = {"wall_time": "Wall time", "picks": "Step", value: "Value"}
-        table = points[list(columns)].rename(columns=columns).dropna()
-        write_table(Path(folder) / f"{name}.csv", table, "%.12g")
+        columns = {"Wall time": wall_time, "Step": curve["picks"], "Value": values}
+        table = pd.DataFrame({each: np.asarray(column) for each, column in columns.items()})
+        write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
 
 
 def default_curves(folder: str | Path = files.DATA) -> dict[int, pd.DataFrame]:

@@ -1,8 +1,13 @@
-"""The policies compared, under all conditions: by the lift table, and with every box simulated."""
+"""The policies compared, by the lift table and with every box simulated; and one from inside.
 
+From inside: how it learned, what it prefers, and what noise does to it.
+"""
+
+from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -133,3 +138,103 @@ def _panel(axes: Axes, means: pd.DataFrame) -> None:
         axes.plot([low, high], [row, row], color=colour)
         axes.plot(mean, row, "o", color=colour, markerfacecolor=colour if mask else "white",
                   markersize=5, clip_on=False, zorder=3)  # fmt: skip
+
+
+@styled
+def learning(curve: pd.DataFrame, greedy: pd.Series) -> Figure:
+    """A training run: MSR of the exploring agent and of its greedy policy, and the loss.
+
+    Args:
+        curve: of ``unload.train``.
+        greedy: MSR of the greedy policy on fresh containers, indexed by picks.
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3))
+    thousands = curve["picks"] / 1000
+    left.plot(thousands, curve["success_rate"], label="exploring agent")
+    left.plot(thousands, curve["epsilon"], color="0.6", label="exploration rate ε")
+    left.plot(greedy.index / 1000, greedy, "o-", markersize=4, label="greedy, fresh containers")
+    left.set(xlabel="picks (thousands)", ylabel="MSR", ylim=(0, 1.03))
+    left.yaxis.set_major_formatter(PercentFormatter(1))
+    left.legend()
+    right.plot(thousands, curve["loss"], color="C3")
+    right.set(xlabel="picks (thousands)", ylabel=r"loss $\ell$", ylim=(0, None))
+    return figure
+
+
+@styled
+def preferences(
+    z: np.ndarray, by_height: Mapping[str, np.ndarray], y: np.ndarray, field: np.ndarray
+) -> Figure:
+    """What a policy prefers: over the height, and across the front wall.
+
+    Args:
+        z: (m,) heights in m.
+        by_height: name of a place → (m,) preference over the height.
+        y: (k,) places across the container in m.
+        field: (m, k) preference at the front wall.
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
+    for name, values in by_height.items():
+        left.plot(z, values, label=name)
+    left.set(xlabel="height z (m)", ylabel=r"preference $a \cdot f$")
+    left.set_title("in the middle of the width")
+    left.legend()
+    lines = right.contour(y, z, field, levels=20)
+    right.set(xlabel="width y (m)", ylabel="height z (m)", title="front wall, from the entrance")
+    right.set_aspect("equal")
+    figure.colorbar(lines, label=r"preference $a \cdot f$")
+    return figure
+
+
+@styled
+def steps(metres: np.ndarray, slope: float, ranks: np.ndarray) -> Figure:
+    """Steps from a box to one that lies on it, in metres and in ranks.
+
+    Args:
+        metres: (n, 2) float, to the side and up, in m.
+        slope: height in m that a metre to the side is worth to the policy, at most.
+        ranks: (m, 3) float, differences of the ranks of x, y and z.
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
+    left.plot(*metres.T, "o", markersize=4)
+    flattest = (metres[:, 1] / np.abs(metres[:, 0]).clip(1e-9)).min()
+    side = np.array([-0.6, 0, 0.6])
+    left.plot(side, flattest * np.abs(side), color="0.5", linestyle="--", label="flattest step")
+    left.plot(side, slope * np.abs(side), color="C2", label="the policy's slope, at most")
+    left.set(xlabel="to the side (m)", ylabel="up (m)", ylim=(0, 0.45), title="steps in metres")
+    for axis, colour, name in ((0, "0.5", "along x"), (1, "C1", "along y")):
+        right.plot(ranks[:, axis], ranks[:, 2], "o", markersize=1.5, alpha=0.3, color=colour,
+                   label=name)  # fmt: skip
+    right.set(xlabel="to the side or along the container (ranks)", ylabel="up (ranks)")
+    right.set(ylim=(0, None), title="steps in ranks")
+    for axes in (left, right):
+        axes.legend(
+            loc="upper right",
+            fontsize=8,
+            framealpha=1,
+            frameon=True,
+            markerscale=3 if axes is right else 1,
+        )
+    return figure
+
+
+@styled
+def noise(rates: pd.DataFrame, upside_down: pd.Series) -> Figure:
+    """MSR over the error of the observed positions.
+
+    Args:
+        rates: indexed by σ in m; a column for each policy and mask, with (name, bool) as labels.
+        upside_down: share of pairs whose upper box looks lower, with the same index.
+    """
+    figure, axes = plt.subplots(figsize=(5.4, 3.4))
+    names = list(dict.fromkeys(name for name, _ in rates))
+    for name, mask in rates:
+        axes.plot(100 * rates.index, rates[name, mask], "o-" if mask else "o--",
+                  color=f"C{2 - 2 * names.index(name)}", markersize=4,
+                  label=name if mask else f"{name}, no mask")  # fmt: skip
+    axes.plot(100 * upside_down.index, upside_down, color="0.5",
+              label="pairs that look upside down")  # fmt: skip
+    axes.set(xlabel="σ (cm)", ylabel="MSR; share of pairs", ylim=(0, 1.03))
+    axes.yaxis.set_major_formatter(PercentFormatter(1))
+    axes.legend(fontsize=8)
+    return figure

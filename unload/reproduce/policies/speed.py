@@ -5,14 +5,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
 
-from unload import task
-from unload.load.boxes import Load
-from unload.load.view import COLOURS
-from unload.physics.situation import RESOLUTION, Situation
 from unload.reproduce.results import read_table
 from unload.reproduce.style import styled
 from unload.support import files
@@ -70,39 +64,6 @@ def speed_ratios(folder: str | Path = FOLDER) -> Figure:
         axes.grid(False, axis="y")
     axes.set_xlabel("times as fast as the first way of its kind")
     return figure
-
-
-@styled
-def situation_in_its_wall(load: Load, item: int, situation: Situation, distance: float) -> Figure:
-    """The boxes that decide the lift of an item, before its item wall, seen from the entrance.
-
-    Args:
-        load: the boxes.
-        item: the chosen box.
-        situation: of the item.
-        distance: how far its lift moves it, in m.
-    """
-    figure, axes = plt.subplots(figsize=(4.6, 4))
-    for box in np.flatnonzero(load.walls == load.walls[item]):
-        _draw(axes, load.positions[box], load.sizes[box], COLOURS["unseen"], "white")
-    outcome = "liftable" if distance >= task.LIFT_THRESHOLD else "blocked"
-    chosen, on_top, fixed = f"chosen box, {outcome}", "on top of it", "cannot move"
-    names = {chosen: COLOURS[outcome], on_top: COLOURS[on_top], fixed: COLOURS[fixed]}
-    for row, box in enumerate(situation.boxes * RESOLUTION):
-        name = fixed if row >= situation.dynamic else on_top if row else chosen
-        _draw(axes, load.positions[item] + box[:3], box[3:], names[name], "0.2")
-    _, width, height = task.CONTAINER
-    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
-    axes.set_title(f"{len(situation.boxes)} of {len(load)} boxes matter")
-    handles = [Patch(color=colour, label=name) for name, colour in names.items()]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
-    return figure
-
-
-def _draw(axes: Axes, centre: np.ndarray, size: np.ndarray, colour: tuple, edge: str) -> None:
-    """A box seen from the entrance."""
-    corner = centre[1:] - size[1:] / 2
-    axes.add_patch(Rectangle(corner, *size[1:], facecolor=colour, edgecolor=edge))
 
 
 @styled

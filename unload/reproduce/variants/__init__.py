@@ -1,4 +1,4 @@
 """The paper's outlook: other networks, rewards and settings, and the agent that never fails.
 
-Read ``grids`` (what is trained, and how the policies are judged), then ``figures``.
+``grids`` says what is trained, how the policies are judged, and draws what comes of it.
 """

@@ -12,12 +12,20 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import evaluate
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.reproduce.changes import height_reward
-from unload.reproduce.grid import Cell, Grid, train_grid
+from unload.reproduce.grid import Cell, Grid, read_measures, train_grid
 from unload.reproduce.results import COMMAND, JOBS
+from unload.reproduce.statistics import bootstrap_interval
+from unload.reproduce.style import styled
 from unload.support import checks, files
 
 CONFIG = TrainConfig(picks=1_000_000, batch_size=256)
@@ -26,6 +34,7 @@ SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32)
 LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
 SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
 RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False)
+APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", "without the mask")}
 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
@@ -107,3 +116,47 @@ def variants_data(
         if name == "recommended" and picks is None:
             best = load_policy(kept / "positions/seed_0/policy.safetensors")
             save_policy(best, Path(folder) / "policies/recommended.safetensors")
+
+
+def read_variants(grid: str, folder: str | Path = files.DATA) -> pd.DataFrame:
+    """What the policies of a grid reach, see ``read_measures``; before rewards their control.
+
+    Args:
+        grid: a name in ``GRIDS``.
+        folder: of the data.
+
+    Raises:
+        ValueError: an unknown grid.
+        FileNotFoundError: it has not been published.
+    """
+    checks.one_of("grid", grid, GRIDS)
+    rows = read_measures(GRIDS[grid], folder)
+    if grid != "rewards":
+        return rows
+    settings = read_measures(GRIDS["settings"], folder)
+    return pd.concat([settings[settings["cell"] == "unchanged"], rows], ignore_index=True)
+
+
+@styled
+def variants_msr(grid: str, folder: str | Path = files.DATA) -> Figure:
+    """MSR of the policies of a grid: each seed pale, their mean strong, with its 95 % interval.
+
+    Arguments and errors as for ``read_variants``.
+    """
+    cells = dict(list(read_variants(grid, folder).groupby("cell", sort=False)))
+    figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
+    for row, cell in enumerate(cells.values()):
+        for place, (name, (colour, marker, label)) in enumerate(APPLIED.items()):
+            y = row + (0.15 if place else -0.15)
+            style = {"color": colour, "marker": marker, "linestyle": "none"}
+            axes.plot(cell[name], np.full(len(cell), y), **style, alpha=0.3, markersize=3)
+            low, high = bootstrap_interval(cell[name].to_numpy())
+            axes.plot([low, high], [y, y], color=colour, linewidth=1.2)
+            label = None if row else label
+            axes.plot(cell[name].mean(), y, **style, markersize=6, label=label)
+    axes.set_yticks(range(len(cells)), [name.replace("_", " ") for name in cells])
+    axes.set_ylim(len(cells) - 0.5, -0.5)
+    axes.set(xlabel="MSR of the trained policy on fresh loads", xlim=(0, 1.02))
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+    return figure

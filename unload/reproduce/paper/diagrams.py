@@ -1,6 +1,4 @@
-"""The permutation-equivariant network (Fig. 7), and what its scores look like."""
-
-from collections.abc import Sequence
+"""Two diagrams: the task as a Markov decision process (Fig. 1), and the network (Fig. 7)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,11 +10,62 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 from unload import task
 from unload.reproduce.style import styled
 
-ROWS, FEATURES = 7, 6  # items and features that are drawn, of 128 and n
+INK = "#333333"
+PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
+WIDTH, HEIGHT = 14, 6.5  # of a block of Fig. 1
+COLUMNS = (15, 35, 55, 75)  # left edges of the blocks
+# From left to right: what a block is called, and what it does.
+AGENT = (
+    ("equalization", "ranks, Alg. 1"),
+    ("PEQ network", "one score per item"),
+    ("action mask", "failed items are out"),
+    ("choice", "ε-greedy"),
+)
+ENVIRONMENT = (
+    ("observation", "128 nearest, scaled"),
+    ("container", "800–1000 items"),
+    ("moved ≥ 0.2 m?", "yes: unload, no: leave"),
+    ("lift", "PyBullet: 20 N, 0.3 s"),
+)
+ROWS, FEATURES = 7, 6  # of Fig. 7: items and features that are drawn, of 128 and n
 TOP, CELL_HEIGHT = 6.2, 0.36  # of the tensors
 MIDDLE = TOP - ROWS * CELL_HEIGHT / 2  # height of the main line of arrows
-INK = "#333333"
 BLUE, GREEN, RED, OCHRE, PURPLE = "#2878b5", "#45a661", "#de5638", "#c98a1b", "#9467bd"
+
+
+@styled
+def fig01_mdp() -> Figure:
+    """Fig. 1: agent and environment of the task, and what passes between them."""
+    figure, axes = plt.subplots(figsize=(10.4, 3.7))
+    axes.set(xlim=(0, 104), ylim=(0, 37), aspect="equal")
+    axes.axis("off")
+    for name, (low, colour) in PANELS.items():
+        _rounded(axes, 12, low, 80, 17, fc=colour, ec="none")
+        axes.text(13.5, low + 15.8, name, fontsize=12, fontweight="bold", va="top")
+    upper, lower = 25.5, 3  # lower edges of the blocks
+    for blocks, low in ((AGENT, upper), (ENVIRONMENT, lower)):
+        for x, (title, text) in zip(COLUMNS, blocks):
+            _block(axes, x, low, title, text)
+    middle, below = upper + HEIGHT / 2, lower + HEIGHT / 2
+    for left, right in zip(COLUMNS, COLUMNS[1:]):
+        _path(axes, [(left + WIDTH, middle), (right, middle)])
+        _path(axes, [(right, below), (left + WIDTH, below)])
+    axes.text(52, middle + 0.5, r"$\hat{q}$", ha="center", va="bottom", color=INK)
+    _rounded(axes, 20, 20.2, 32, 3, fc="white", ec=INK)
+    text = r"learning: replay buffer, smooth-$L_1$ loss ($\gamma = 0$)"
+    axes.text(36, 21.7, text, ha="center", va="center", fontsize=8)
+    _path(axes, [(42, 23.2), (42, upper)], (0, (3, 2)))
+
+    # Action on the right, observation on the left, reward and mask between the panels.
+    _path(axes, [(89, middle), (98, middle), (98, below), (89, below)])
+    axes.text(99, 17.5, "action\n$u_k$: row of\nthe item\nto pick", va="center")
+    _path(axes, [(15, below), (6, below), (6, middle), (15, middle)])
+    axes.text(5, 17.5, "next\nobservation\n$x_{k+1}$", va="center", ha="right")
+    _path(axes, [(58, lower + HEIGHT), (58, 21.7), (52, 21.7)])
+    axes.text(57, 14, r"reward $r_{k+1} = \pm 1$", va="center", ha="right")
+    _path(axes, [(66, lower + HEIGHT), (66, upper)])
+    axes.text(67, 14, "mask of failed items", va="center")
+    return figure
 
 
 @styled
@@ -59,12 +108,12 @@ def fig07_network(n_features: int = 64) -> Figure:
     _operation(axes, 8.3, 1.75, "global relation\nextractor $f_2$", width=3.3, height=1.5)
     down, up = 6.88, own_left + 2.5 * FEATURES * width
     shapes_low = TOP - ROWS * CELL_HEIGHT - 0.75
-    _line(axes, [(down, shapes_low), (down, 1.75), (8.3, 1.75)])
-    _line(axes, [(11.6, 1.75), (up, 1.75), (up, shapes_low)])
+    _path(axes, [(down, shapes_low), (down, 1.75), (8.3, 1.75)])
+    _path(axes, [(11.6, 1.75), (up, 1.75), (up, shapes_low)])
     axes.text(11.75, 1.9, r"$x_{\mathrm{GC}}$  [3n], to each item", size=9, color=INK)
 
     for start, end in ((1.7, 2.4), (4.9, 5.8), (8.05, 11.5), (16.95, 17.6), (20.1, 20.7)):
-        _line(axes, [(start, MIDDLE), (end, MIDDLE)])
+        _path(axes, [(start, MIDDLE), (end, MIDDLE)])
     for x, formula, count in (
         (3.65, "linear 3 → n, ReLU\nper item", f"3n + n parameters\n({4 * n} for n = {n})"),
         (9.95, "min, max, mean\nover the items", "no parameters"),
@@ -76,66 +125,16 @@ def fig07_network(n_features: int = 64) -> Figure:
     return figure
 
 
-@styled
-def score_landscapes(
-    observed: np.ndarray,
-    grid: np.ndarray,
-    fields: Sequence[np.ndarray],
-    choices: Sequence[int],
-    titles: Sequence[str],
-) -> Figure:
-    """Scores that networks give to an imagined item, over the side view of an observation.
-
-    Args:
-        observed: (items, 3) float, scaled positions, drawn as dots.
-        grid: (k,) float, the imagined item's places along both axes.
-        fields: of each network the scores, (k, k) float, rows along z, columns along x.
-        choices: of each network the row of ``observed`` that it picks, drawn as a star.
-        titles: one for each network.
-    """
-    figure, panels = plt.subplots(
-        1, len(fields), figsize=(3.5 * len(fields), 3.4), sharey=True, squeeze=False
-    )
-    for axes, field, choice, title in zip(panels[0], fields, choices, titles):
-        drawn = axes.contourf(grid, grid, field, levels=20, cmap="viridis")
-        axes.plot(observed[:, 0], observed[:, 2], "k.", ms=4, label="items")
-        star = {"ms": 16, "color": "white", "mec": "black", "mew": 1.2, "ls": "none"}
-        axes.plot(*observed[choice, [0, 2]], "*", label="choice", **star)
-        axes.set(title=title, xlabel=r"$\tilde p_\mathrm{x}$", aspect="equal")
-        figure.colorbar(drawn, ax=axes, format="%.2f")
-    panels[0, 0].set_ylabel(r"$\tilde p_\mathrm{z}$")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
-    return figure
+def _rounded(axes: Axes, x: float, y: float, width: float, height: float, **look) -> None:
+    shape = "round,pad=0,rounding_size=0.8"
+    axes.add_patch(FancyBboxPatch((x, y), width, height, shape, **look))
 
 
-@styled
-def score_gradients(observed: np.ndarray, scores: np.ndarray, jacobian: np.ndarray) -> Figure:
-    """What scores depend on: arrows at the items of the front wall, and the size of all entries.
-
-    Args:
-        observed: (items, 3) float, scaled positions; the front wall is where x is above 0.9.
-        scores: (items,) float.
-        jacobian: (items, items, 3) float, entry [i, j] is the gradient of the score of item i
-            in the position of item j.
-    """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.9))
-    front = observed[:, 0] > 0.9
-    y, z = observed[front, 1], observed[front, 2]
-    own = jacobian.diagonal(axis1=0, axis2=1).T[front]
-    dots = left.scatter(y, z, c=scores[front], s=30, cmap="viridis")
-    left.quiver(y, z, own[:, 1], own[:, 2], color=INK, width=0.004)
-    left.set(xlabel=r"$\tilde p_\mathrm{y}$", ylabel=r"$\tilde p_\mathrm{z}$")
-    left.set_title("front wall: scores, and gradients in the own position")
-    left.margins(0.08)
-    figure.colorbar(dots, ax=left, label="score")
-    size = np.linalg.norm(jacobian, axis=2)
-    drawn = right.imshow(np.log10(np.maximum(size, 1e-8)), cmap="magma")
-    right.set(xlabel="position of item j", ylabel="score of item i")
-    right.set_title("size of the gradient")
-    right.grid(False)
-    figure.colorbar(drawn, ax=right, label="power of ten")
-    return figure
+def _block(axes: Axes, x: float, y: float, title: str, text: str) -> None:
+    _rounded(axes, x, y, WIDTH, HEIGHT, fc="white", ec=INK, lw=1)
+    middle = x + WIDTH / 2
+    axes.text(middle, y + 4.2, title, ha="center", va="center", fontweight="bold", fontsize=9)
+    axes.text(middle, y + 1.9, text, ha="center", va="center", fontsize=7.5, color="#555555")
 
 
 def _forward_pass() -> tuple[np.ndarray, ...]:
@@ -180,12 +179,8 @@ def _operation(
     axes.text(left + width / 2, middle, name, ha="center", va="center", size=10)
 
 
-def _line(axes: Axes, corners: list[tuple[float, float]]) -> None:
+def _path(axes: Axes, corners: list[tuple[float, float]], style: str | tuple = "-") -> None:
     """A line along the corners that ends in an arrow head."""
-    axes.plot(*np.transpose(corners[:-1]), color=INK, lw=1.1, solid_capstyle="butt")
-    axes.annotate(
-        "",
-        xy=corners[-1],
-        xytext=corners[-2],
-        arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.1, "shrinkA": 0, "shrinkB": 0},
-    )
+    axes.plot(*np.transpose(corners[:-1]), color=INK, lw=1.2, solid_capstyle="butt")
+    look = {"arrowstyle": "-|>", "color": INK, "lw": 1.2, "ls": style, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=corners[-1], xytext=corners[-2], arrowprops=look)

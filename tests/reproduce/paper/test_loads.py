@@ -1,11 +1,11 @@
-"""Fig. 2, views from the side and from the entrance."""
+"""Fig. 2, and views from the side and from the entrance."""
 
 import numpy as np
 import pytest
 
 from unload.load.substacks import front_walls, package_colour, stack_load
 from unload.load.view import COLOURS
-from unload.reproduce.paper.containers import fig02_containers, side_views, wall_views
+from unload.reproduce.paper.loads import fig02_containers, side_views, wall_views
 
 
 @pytest.fixture
