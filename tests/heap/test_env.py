@@ -246,8 +246,8 @@ BAD_INPUT = {
     "picks is empty": lambda r: fit(r.none, 0),
     "networks is empty": lambda r: Learned([]),
     "row is 96": lambda r: Learned([FateNetwork(2)]).fates(r.seen[0], 96),
-    "none.safetensors is missing": lambda r: load_networks(r.folder / "none.safetensors"),
-    "holds no networks of heaps": lambda r: load_networks(r.folder / "other.safetensors"),
+    "none.safetensors": lambda r: load_networks(r.folder / "none.safetensors"),
+    "other.safetensors is not a safetensors file": lambda r: load_networks(r.folder / "other.safetensors"),
 }
 
 
