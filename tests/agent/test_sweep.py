@@ -131,7 +131,7 @@ def test_dask_without_a_client_is_refused(configs, tmp_path):
 def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(sweep, "WORKER_WAIT", 0.2)
-    message = "^2 runs wait for a worker of the Dask cluster .*, which has had none for 0.2 s; start"
+    message = "^2 runs wait for a worker of the Dask cluster .* has had none for 0.2 s; start one"
     cluster = distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None)
     with cluster, distributed.Client(cluster), pytest.raises(TimeoutError, match=message):
         sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)

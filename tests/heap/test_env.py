@@ -247,7 +247,7 @@ BAD_INPUT = {
     "networks is empty": lambda r: Learned([]),
     "row is 96": lambda r: Learned([FateNetwork(2)]).fates(r.seen[0], 96),
     "none.safetensors": lambda r: load_networks(r.folder / "none.safetensors"),
-    "other.safetensors is not a safetensors file": lambda r: load_networks(r.folder / "other.safetensors"),
+    "is not a safetensors file": lambda r: load_networks(r.folder / "other.safetensors"),
 }
 
 

@@ -113,8 +113,9 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
             seen = time.monotonic()
         elif time.monotonic() - seen > WORKER_WAIT:
             raise TimeoutError(
-                f"{len(left)} runs wait for a worker of the Dask cluster {client.scheduler.address}, "
-                f"which has had none for {WORKER_WAIT} s; start one and call again to go on"
+                f"{len(left)} runs wait for a worker of the Dask cluster "
+                f"{client.scheduler.address}, which has had none for {WORKER_WAIT} s; "
+                "start one and call again to go on"
             )
         for name, future in [pair for pair in left.items() if pair[1].done()]:
             del left[name]
