@@ -19,6 +19,8 @@ from pathlib import Path
 import nbformat
 import papermill
 
+from unload.support import files
+
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
@@ -102,13 +104,14 @@ def main() -> int:
         print(f"[{number}/{len(chosen)}] {label} …", end=" ", flush=True)
         start = time.monotonic()
         parameters = {} if options.in_place else reduced_parameters(path)
-        output = path if options.in_place else BUILD / label
         try:
-            run(path, output, parameters)
+            run(path, BUILD / label, parameters)
         except papermill.PapermillExecutionError as error:
             print("failed")
             print(error, file=sys.stderr)
             return 1
+        if options.in_place:  # only now, so that a run that is stopped leaves it as it was
+            files.write_text(path, (BUILD / label).read_text())
         print(f"{time.monotonic() - start:.0f} s", flush=True)
     return 0
 

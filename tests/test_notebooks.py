@@ -2,7 +2,10 @@
 
 import json
 import re
+import sys
 import tomllib
+from contextlib import nullcontext
+from pathlib import Path
 
 import pytest
 
@@ -96,6 +99,30 @@ def test_failing_cell_fails_the_run(tmp_path):
     run.nbformat.write(broken, tmp_path / "broken.ipynb")
     with pytest.raises(run.papermill.PapermillExecutionError, match="broken with 2"):
         run.run(tmp_path / "broken.ipynb", tmp_path / "out.ipynb", {"X": 2})
+
+
+@pytest.mark.parametrize("stopped", [True, False])
+def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(
+    tmp_path, monkeypatch, stopped
+):
+    path = tmp_path / "00_some.ipynb"
+    run.nbformat.write(run.nbformat.v4.new_notebook(), path)
+    before, result = path.read_text(), run.nbformat.v4.new_notebook(metadata={"title": "run"})
+
+    def execute(source: str, output: str, **settings) -> None:
+        Path(output).write_text("")  # as papermill does first of all
+        if stopped:
+            raise KeyboardInterrupt
+        run.nbformat.write(result, output)
+
+    monkeypatch.setattr(run, "HERE", tmp_path)
+    monkeypatch.setattr(run, "BUILD", tmp_path / "build")
+    monkeypatch.setattr(run, "RUNS", tmp_path / "runs")
+    monkeypatch.setattr(run.papermill, "execute_notebook", execute)
+    monkeypatch.setattr(sys, "argv", ["run.py", "--in-place"])
+    with pytest.raises(KeyboardInterrupt) if stopped else nullcontext():
+        assert run.main() == 0
+    assert (path.read_text() == before) == stopped
 
 
 def test_a_widget_leaves_what_stands_beside_it(tmp_path):

@@ -25,7 +25,7 @@ LIBRARIES = {
     "pandas": ("agent/", "heap/study/", "reproduce/"),
     "plotly": ("load/view.py", "play/replay.py", "heap/study/replay.py"),
     "pybullet": ("physics/bullet.py",),
-    "safetensors": ("agent/greedy.py", "heap/learning.py", "reproduce/grid.py"),
+    "safetensors": ("network/weights.py", "reproduce/grid.py"),
     "scipy": ("heap/", "reproduce/"),
     "torch": ("network/", "agent/", "heap/", "reproduce/"),
     "tqdm": ("agent/", "reproduce/"),

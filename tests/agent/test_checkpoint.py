@@ -1,4 +1,6 @@
+import errno
 import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -22,7 +24,6 @@ from unload.agent import checkpoint
 from unload.agent.checkpoint import RunFolder
 from unload.support import files
 
-KILLED_RUN = Path(__file__).with_name("killed_run.py")
 LEFT = ("policy.safetensors", "curve.csv", "config.json")
 
 
@@ -137,6 +138,17 @@ def finished(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("finished") / "run"
     train(TrainConfig(**CONTAINER), folder, progress=False)
     return folder
+
+
+def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypatch):
+    """Not even a lock, or the checkpoint that a killed process has left."""
+
+    def refuse(path: Path) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with files.locked(finished):
+        assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
 
 
 @pytest.mark.parametrize("name", ["policy.safetensors", "curve.csv", "config.json"])

@@ -38,7 +38,7 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
         assert not record["resumed"]
         assert record["peak_memory_mib"] > 50
         assert "256/256" in (folder / "log.txt").read_text()
-    written = sorted(tmp_path.glob("many/set/*/*.[!t]*"))  # all but log.txt and the lock
+    written = sorted(tmp_path.glob("many/set/*/*"))
     before = [path.stat().st_mtime_ns for path in written]
     sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
     assert [path.stat().st_mtime_ns for path in written] == before
@@ -99,6 +99,15 @@ def test_dask_without_a_client_is_refused(configs, tmp_path):
         sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
 
 
+def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(sweep, "WORKER_WAIT", 0.2)
+    message = "^2 runs wait for a worker of the Dask cluster .* has had none for 0.2 s; start one"
+    cluster = distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None)
+    with cluster, distributed.Client(cluster), pytest.raises(TimeoutError, match=message):
+        sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
+
+
 @pytest.mark.parametrize(
     ("configs", "error", "message"),
     [
@@ -119,3 +128,16 @@ def test_bad_configurations_are_refused(configs, error, message, tmp_path):
 def test_unknown_backend_is_refused(configs, tmp_path):
     with pytest.raises(ValueError, match="backend is 'spark'; expected one of 'loky', 'dask'"):
         sweep.run_sweep(configs, tmp_path, backend="spark")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
+        ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
+    ],
+)
+def test_bad_arguments_are_refused_before_anything_runs(configs, tmp_path, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        sweep.run_sweep(configs, tmp_path, progress=False, **arguments)
+    assert not list(tmp_path.iterdir())

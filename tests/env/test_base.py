@@ -1,6 +1,8 @@
 """What the two single environments have in common: settings, and the order of calls."""
 
+import copy
 import gc
+import pickle
 import subprocess
 import sys
 
@@ -70,6 +72,12 @@ def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
         with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
             call()
     assert (env.reset(seed=4)[0] == same.reset(seed=4)[0]).all()
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_copy_that_would_share_the_simulator_is_refused(again):
+    with pytest.raises(TypeError, match="a ContainerEnv cannot be copied or pickled; make another"):
+        again(ContainerEnv("local"))
 
 
 def clients() -> int:

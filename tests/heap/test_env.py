@@ -1,3 +1,5 @@
+import copy
+import pickle
 from types import SimpleNamespace
 
 import gymnasium
@@ -184,6 +186,12 @@ def test_bad_actions_and_states_change_nothing(make_heap_env):
         env.reset()
 
 
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_copy_that_would_share_the_simulator_is_refused(make_heap_env, again):
+    with pytest.raises(TypeError, match="a HeapEnv cannot be copied or pickled; make another one"):
+        again(make_heap_env())
+
+
 @pytest.fixture
 def room(cubes, pile, make_rake, make_heap_env, tmp_path, rng) -> SimpleNamespace:
     """What the cases below need."""
@@ -238,8 +246,8 @@ BAD_INPUT = {
     "picks is empty": lambda r: fit(r.none, 0),
     "networks is empty": lambda r: Learned([]),
     "row is 96": lambda r: Learned([FateNetwork(2)]).fates(r.seen[0], 96),
-    "none.safetensors is missing": lambda r: load_networks(r.folder / "none.safetensors"),
-    "holds no networks of heaps": lambda r: load_networks(r.folder / "other.safetensors"),
+    "none.safetensors": lambda r: load_networks(r.folder / "none.safetensors"),
+    "is not a safetensors file": lambda r: load_networks(r.folder / "other.safetensors"),
 }
 
 

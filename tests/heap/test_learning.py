@@ -133,3 +133,21 @@ def test_stored_networks_are_the_same(tmp_path, learned):
     assert [each.n_features for each in read] == [64, 8, 8]
     before, after = (Learned(each).expected(unseen.observations) for each in (several, read))
     assert np.array_equal(before, after)
+
+
+def test_damaged_networks_are_refused(tmp_path, rng):
+    """154 of 200 flipped bits, and weights that are not a number, were once loaded."""
+    path = tmp_path / "networks.safetensors"
+    save_networks([FateNetwork(8)], path)
+    whole = path.read_bytes()
+    for place in rng.choice(len(whole), 200, replace=False):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="networks.safetensors"):
+            load_networks(path)
+    network = FateNetwork(8)
+    torch.nn.init.constant_(network.own.bias, float("nan"))
+    save_networks([network], path)
+    with pytest.raises(ValueError, match="holds no heap networks .*: a weight is not finite"):
+        load_networks(path)

@@ -13,8 +13,8 @@ def episode(full_load):
 
 
 def test_picks_are_those_of_the_environment(full_load, make_env):
-    episode = Episode(full_load, seed=3, physics="local")
-    env = make_env(physics="local").unwrapped
+    episode = Episode(full_load, seed=3)
+    env = make_env().unwrapped
     observation, info = env.reset(seed=3, options={"load": full_load})
     for row in (0, 20, 20, 40, 60, 5):
         assert np.array_equal(episode.observation, observation)
@@ -62,9 +62,8 @@ def test_failed_items_are_kept_until_the_next_success(boxes):
     assert not episode.pick(0).deadlocked
 
 
-@pytest.mark.parametrize("physics", ["table", "local"])
-def test_picks_can_be_taken_back(full_load, physics):
-    episode, states = Episode(full_load, seed=3, physics=physics), []
+def test_picks_can_be_taken_back(episode):
+    states = []
     for row in (3, 60, 40, 0):
         states.append((episode.observation.copy(), episode.allowed().copy(), episode.visible))
         episode.pick(int(episode.visible[row]))
@@ -111,8 +110,6 @@ def test_bad_input_is_refused(episode):
         episode.pick(unseen)
     with pytest.raises(ValueError, match="count is 1; expected an integer >= 0 and <= 0"):
         episode.back_to(1)
-    with pytest.raises(ValueError, match="physics is 'full'; expected one of"):
-        Episode(episode.load, physics="full")
     with pytest.raises(TypeError, match="expected an unload.Load"):
         Episode("load")
     assert episode.picks == [] and isinstance(episode.load, unload.Load)

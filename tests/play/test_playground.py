@@ -54,6 +54,14 @@ def test_a_click_lifts_a_box_and_changes_the_score(game):
     assert "therefore the pick failed" in game.message.value
 
 
+def test_a_playground_opens_no_simulator(monkeypatch):
+    """Of 30 MiB each, which nobody would close: notebooks make one after the other."""
+    monkeypatch.setattr("unload.physics.local.World", None)
+    game = Playground(seed=4)
+    click(game, game.you.visible[0])
+    assert score(game)[1] == 1
+
+
 def test_undo_takes_picks_back_one_by_one(game):
     before = bytes(game.canvas.colours)
     assert game.undo.disabled

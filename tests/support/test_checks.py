@@ -122,6 +122,14 @@ def test_finite_array_refuses(value, error, message):
         checks.finite_array("a", value, (None, 3))
 
 
+def test_a_number_of_processes():
+    assert [checks.jobs("n_jobs", count) for count in (-2, -1, 1, 8)] == [-2, -1, 1, 8]
+    with pytest.raises(ValueError, match="n_jobs is 0; expected a number of processes, or -1"):
+        checks.jobs("n_jobs", 0)
+    with pytest.raises(TypeError, match="n_jobs is 2.0; expected an integer"):
+        checks.jobs("n_jobs", 2.0)
+
+
 def test_integer_array():
     array = checks.integer_array("a", np.array([1, 2], np.int8), (None,))
     assert array.dtype == np.int64 and array.tolist() == [1, 2]

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
@@ -70,10 +70,13 @@ class RunFolder:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other processes out of the folder, see ``files.locked``.
+        """Keep other processes out of the folder, see ``files.locked``, unless it is finished.
 
         What a killed process has left half written of the run's files is removed.
         """
+        if self.finished:  # to be read only, perhaps where nothing can be written
+            yield
+            return
         with files.locked(self.path):
             for path in (self.checkpoint, self._policy, self._curve, self._config):
                 for leftover in self.path.glob(f"{path.name}.*.partial"):
@@ -179,7 +182,8 @@ class RunFolder:
             )
         for path in (self._policy, self._curve):
             files.check_digest(path, marks.get(path.name))
-        self.checkpoint.unlink(missing_ok=True)
+        with suppress(OSError):  # it is gone already, or the folder is read-only
+            self.checkpoint.unlink()
         return TrainResult(load_policy(self._policy), pd.read_csv(self._curve))
 
     def _check_same(self, stored: dict, config: TrainConfig) -> None:

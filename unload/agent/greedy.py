@@ -1,13 +1,9 @@
 """The greedy choice among the allowed items; the policy of a trained network, and its file."""
 
-import json
-from hashlib import blake2b
 from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 
 from unload.agent.fast import fused
 from unload.agent.learner import action_values, highest_values
@@ -15,7 +11,8 @@ from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
 from unload.network.variants import NETWORKS
-from unload.support import checks, files
+from unload.network.weights import read_weights, write_weights
+from unload.support import checks
 
 
 def check_network(network: object) -> torch.nn.Module:
@@ -114,18 +111,13 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
         known = ", ".join(kind.__name__ for kind in NETWORKS.values())
         raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
-    tensors = policy.network.state_dict()
-    _check_dtypes("policy", tensors)
     settings = {
         "network": type(policy.network).__name__,
         "n_features": policy.network.n_features,
         "equalize": policy.equalize,
         "ties": policy.ties,
     }
-    settings["digest"] = _digest(settings, tensors)
-    # One entry only: safetensors writes several in random order.
-    content = save(tensors, metadata={"policy": json.dumps(settings)})
-    files.write_atomically(path, lambda file: file.write(content))
+    write_weights(path, "policy", settings, policy.network.state_dict())
 
 
 def load_policy(path: str | Path) -> Greedy:
@@ -135,41 +127,14 @@ def load_policy(path: str | Path) -> Greedy:
         FileNotFoundError: there is no such file.
         ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
     """
-    path = Path(path)
-    if not path.is_file():
+    if not Path(path).is_file():
         raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
-    try:
-        with safe_open(path, framework="pt") as file:
-            metadata = file.metadata() or {}
-            tensors = {name: file.get_tensor(name) for name in file.keys()}
-    except (SafetensorError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path} is not a safetensors file: {error}") from error
-    try:
-        settings = json.loads(metadata["policy"])
-        if settings.pop("digest") != _digest(settings, tensors):
-            raise ValueError("its digest is not that of its content; it is damaged")
-        kinds = {kind.__name__: kind for kind in NETWORKS.values()}
-        network = kinds[settings["network"]](settings["n_features"])
-        _check_dtypes("it", tensors)
-        network.load_state_dict(tensors)
-        if not all(tensor.isfinite().all() for tensor in tensors.values()):
-            raise ValueError("a weight is not finite")
-        return Greedy(network, settings["equalize"], settings["ties"])
-    except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise ValueError(f"{path} does not hold a policy of unload: {error}") from error
+    return read_weights(path, "policy", _policy)
 
 
-def _check_dtypes(name: str, tensors: dict[str, torch.Tensor]) -> None:
-    for key, tensor in tensors.items():
-        if tensor.dtype != torch.float32:
-            raise TypeError(f"{name} has {key} of dtype {tensor.dtype}; expected torch.float32")
-
-
-def _digest(settings: dict, tensors: dict[str, torch.Tensor]) -> str:
-    """Digest of a policy's settings and weights."""
-    digest = blake2b(json.dumps(settings, sort_keys=True).encode(), digest_size=16)
-    for name in sorted(tensors):
-        tensor = tensors[name]
-        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
-        digest.update(tensor.contiguous().numpy().tobytes())
-    return digest.hexdigest()
+def _policy(settings: dict, tensors: dict[str, torch.Tensor]) -> Greedy:
+    """The policy of a file."""
+    kinds = {kind.__name__: kind for kind in NETWORKS.values()}
+    network = kinds[settings["network"]](settings["n_features"])
+    network.load_state_dict(tensors)
+    return Greedy(network, settings["equalize"], settings["ties"])

@@ -13,11 +13,13 @@ import torch
 from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
+from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train_changed, unchanged
 from unload.support import checks, files, provenance
 
 BACKENDS = ("loky", "dask")
+WORKER_WAIT = 60  # s that a cluster may be without workers, which may be restarting
 
 
 def run_sweep(
@@ -53,8 +55,9 @@ def run_sweep(
 
     Raises:
         TypeError: ``configs`` is not a mapping of names to ``TrainConfig``.
-        ValueError: a name is not a plain relative path, the backend is unknown, or there is
-            no cluster.
+        ValueError: a name is not a plain relative path, ``changes`` has another name, ``n_jobs``
+            is 0, the backend is unknown, or there is no cluster.
+        TimeoutError: the cluster has had no worker for ``WORKER_WAIT`` seconds.
         BrokenProcessPool: a process has died, for want of memory, say; call it again to go on.
     """
     checks.entries("configs", configs, ())
@@ -65,6 +68,9 @@ def run_sweep(
         if str(path) != name or path.is_absolute() or {".", ".."} & {name, *path.parts}:
             raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
     checks.one_of("backend", backend, BACKENDS)
+    checks.jobs("n_jobs", n_jobs)
+    for name in changes or ():
+        checks.one_of("changes", name, configs)
     folders = {name: Path(folder) / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     jobs = {name: (name, configs[name], folders[name], changes[name]) for name in configs}
@@ -96,9 +102,21 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
     Args:
         client: the ``distributed.Client``.
         jobs: the arguments of ``_run`` by the run's name.
+
+    Raises:
+        TimeoutError: see ``run_sweep``.
     """
     left = {name: client.submit(_run, *job, pure=False) for name, job in jobs.items()}
+    seen = time.monotonic()  # a worker, last
     while left:
+        if client.scheduler_info()["workers"]:
+            seen = time.monotonic()
+        elif time.monotonic() - seen > WORKER_WAIT:
+            raise TimeoutError(
+                f"{len(left)} runs wait for a worker of the Dask cluster "
+                f"{client.scheduler.address}, which has had none for {WORKER_WAIT} s; "
+                "start one and call again to go on"
+            )
         for name, future in [pair for pair in left.items() if pair[1].done()]:
             del left[name]
             error = future.exception()
@@ -118,9 +136,11 @@ def _run(
     """Train one configuration; its name, and the error's text if it failed."""
     start = time.monotonic()
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        resumed = (folder / "checkpoint.npz").exists() or (folder / "config.json").exists()
-        with open(folder / "log.txt", "a") as log, one_thread():
+        run = RunFolder(folder)
+        resumed = run.checkpoint.exists() or run.finished
+        # A finished run is only read, perhaps where nothing can be written.
+        log_path = os.devnull if run.finished else folder / "log.txt"
+        with open(log_path, "a") as log, one_thread():
             train_changed(config, folder, change, progress=log)
         if not (folder / "record.json").exists():
             record = {"resumed": resumed, "process": os.getpid()}

@@ -68,6 +68,11 @@ class EpisodeEnv(gymnasium.Env):
 
     _state = "not started"
 
+    def __reduce_ex__(self, protocol: int):
+        """Refuse to be copied or pickled, because both would step the same simulator."""
+        kind = type(self).__name__
+        raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
+
     def _check_open(self) -> None:
         if self._state == "closed":
             raise ClosedEnvironmentError("the environment is closed; make a new one")

@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from safetensors.torch import load_file, save
 from torch import nn
 
 from unload.heap.network import FateNetwork, expected_of, fate_loss
 from unload.heap.observation import COLUMN, COLUMNS, ROWS
 from unload.heap.policies import check_batch
-from unload.support import checks, files
+from unload.network.weights import read_weights, write_weights
+from unload.support import checks
 
 BATCH = 128
 LEARNING_RATE = 5e-3  # with 0.001, STEPS are far too few; with 0.01 it learns less again
@@ -198,13 +198,14 @@ class Learned:
 
 
 def save_networks(networks: Sequence[FateNetwork], path: str | Path) -> None:
-    """Write the weights of several networks as one ``.safetensors``, in one atomic step."""
+    """Write the weights of several networks into one file, see ``write_weights``."""
     weights = {
         f"{number}.{name}": weight
         for number, network in enumerate(networks)
         for name, weight in network.state_dict().items()
     }
-    files.write_atomically(path, lambda file: file.write(save(weights)))
+    settings = {"n_features": [network.n_features for network in networks]}
+    write_weights(path, "heap networks", settings, weights)
 
 
 def load_networks(path: str | Path) -> list[FateNetwork]:
@@ -212,19 +213,17 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: it holds something else.
+        ValueError: it is damaged or holds something else.
     """
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"{path} is missing")
-    try:
-        weights = load_file(path)
-        networks = []
-        for number in range(1 + max(int(name.partition(".")[0]) for name in weights)):
-            start = f"{number}."
-            own = {k.removeprefix(start): w for k, w in weights.items() if k.startswith(start)}
-            network = FateNetwork(len(own["own.bias"]))
-            network.load_state_dict(own)
-            networks.append(network.eval())
-    except Exception as error:
-        raise ValueError(f"{path} holds no networks of heaps: {error}") from error
+    return read_weights(path, "heap networks", _networks)
+
+
+def _networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
+    """The networks of a file."""
+    networks = []
+    for number, n_features in enumerate(settings["n_features"]):
+        network, start = FateNetwork(n_features), f"{number}."
+        own = {name: weights[name] for name in weights if name.startswith(start)}
+        network.load_state_dict({name.removeprefix(start): own[name] for name in own})
+        networks.append(network.eval())
     return networks

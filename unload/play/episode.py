@@ -63,7 +63,6 @@ class Episode:
     Args:
         load: the items.
         seed: of the blur of their observed positions, see ``ContainerEnv``.
-        physics: ``"local"`` or ``"table"``, see ``ContainerEnv``.
 
     Attributes:
         load: the items.
@@ -73,9 +72,8 @@ class Episode:
         TypeError, ValueError: an argument is not as described.
     """
 
-    def __init__(self, load: Load, seed: int = 0, physics: str = "table") -> None:
-        checks.one_of("physics", physics, ("local", "table"))
-        self._env = ContainerEnv(physics, max_picks=sys.maxsize)
+    def __init__(self, load: Load, seed: int = 0) -> None:
+        self._env = ContainerEnv("table", max_picks=sys.maxsize)
         self.load, self._seed = load, checks.integer("seed", seed, 0)
         self._begin()
 

@@ -32,7 +32,7 @@ class Playground(widgets.VBox):
         picks: that a player who is watched may make.
 
     Attributes:
-        you: your ``Episode``; PyBullet lifts each box that you click.
+        you: your ``Episode``; PyBullet has lifted each box that you click, see ``TablePhysics``.
         runs: player → ``Run``.
         canvas: the drawing of the container, whose boxes can be clicked.
 
@@ -47,7 +47,7 @@ class Playground(widgets.VBox):
         checks.one_of("player", player, (YOU, *PLAYERS))
         picks = checks.integer("picks", picks, 1, 10_000)
         load = stack_load(np.random.default_rng(seed))
-        self.you = Episode(load, seed, physics="local")
+        self.you = Episode(load, seed)
         self.runs = {name: Run(name, load, seed, mask) for name in PLAYERS}
         self._warm_up()
         self.canvas = Canvas(load)
@@ -103,7 +103,7 @@ class Playground(widgets.VBox):
         return rows
 
     def _clicked(self, _, content: dict, __) -> None:
-        """Let PyBullet lift the box on which the reader has clicked."""
+        """Lift the box on which the reader has clicked."""
         item = content.get("item")
         if self._run is not None:
             self._tell("To pick boxes yourself, choose the player “you”.")

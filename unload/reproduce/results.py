@@ -84,7 +84,11 @@ def keep_all(
         jobs: pairs of ``question`` and ``compute``.
         n_jobs: processes, as in joblib.
         progress: show a progress bar.
+
+    Raises:
+        TypeError, ValueError: ``n_jobs`` is no number of processes.
     """
+    checks.jobs("n_jobs", n_jobs)
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question, compute) for question, compute in jobs
     )

@@ -40,6 +40,14 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
     return value
 
 
+def jobs(name: str, value: object) -> int:
+    """Return a number of processes as int, as joblib counts them; -1 stands for one per core."""
+    count = integer(name, value, -LARGEST)
+    if count == 0:
+        raise ValueError(f"{name} is 0; expected a number of processes, or -1 for one per core")
+    return count
+
+
 def real(name: str, value: object, low: float, high: float = np.inf) -> float:
     """Return ``value`` as float; raise unless it is a finite number in [low, high].
 

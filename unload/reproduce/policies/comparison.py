@@ -57,6 +57,7 @@ def comparison_data(
         FileNotFoundError: a policy's file is absent; the message names it.
     """
     checks.integer("loads", loads, 1)
+    checks.jobs("n_jobs", n_jobs)
     found = {name: find_policy(name, folder) for name in (*SIMPLE, *LEARNED)}
     results = Parallel(n_jobs)(
         delayed(measured)(partial(compare, name, found[name], mask, condition, loads))

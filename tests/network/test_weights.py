@@ -1,0 +1,47 @@
+"""Files of weights; those of policies and of heap networks have tests beside them, too."""
+
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from unload.network.weights import read_weights, write_weights
+
+WEIGHTS = {"a.bias": torch.arange(3.0), "b.weight": torch.full((2, 2), 0.5)}
+
+
+@pytest.fixture
+def path(tmp_path):
+    write_weights(tmp_path / "w.safetensors", "pair", {"sizes": [3, 2]}, WEIGHTS)
+    return tmp_path / "w.safetensors"
+
+
+def test_they_come_back_as_they_were(path):
+    settings, tensors = read_weights(path, "pair", lambda *made: made)
+    assert settings == {"sizes": [3, 2]} and tensors.keys() == WEIGHTS.keys()
+    assert all(torch.equal(tensors[name], WEIGHTS[name]) for name in WEIGHTS)
+
+
+def test_every_flipped_bit_is_noticed(path, rng):
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="w.safetensors (is not a safetensors file|holds no)"):
+            read_weights(path, "pair", lambda *made: made)
+
+
+def test_files_without_a_digest_or_of_another_kind_are_refused(path):
+    with pytest.raises(ValueError, match="w.safetensors holds no policy of unload"):
+        read_weights(path, "policy", print)
+    for metadata in (None, {"pair": '{"sizes": [3, 2]}'}):
+        save_file(load_file(path), path, metadata)
+        with pytest.raises(ValueError, match="w.safetensors holds no pair of unload"):
+            read_weights(path, "pair", print)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_weights_that_are_not_finite_are_refused(path, value):
+    write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, value])})
+    with pytest.raises(ValueError, match="w.safetensors holds no pair .* is not finite"):
+        read_weights(path, "pair", print)

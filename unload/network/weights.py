@@ -1,0 +1,84 @@
+"""Files of weights: safetensors with settings, and with a digest of both."""
+
+import json
+from collections.abc import Callable
+from hashlib import blake2b
+from pathlib import Path
+from typing import TypeVar
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+
+from unload.support import files
+
+Made = TypeVar("Made")
+
+
+def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) -> None:
+    """Write weights and how to use them, in one atomic step.
+
+    Args:
+        path: of the file.
+        kind: what the file holds, such as ``"policy"``.
+        settings: as JSON can hold them.
+        tensors: by name, float32.
+
+    Raises:
+        TypeError: a tensor is not float32; the message begins with ``kind``.
+        OSError: the file cannot be written.
+    """
+    _check_dtypes(kind, tensors)
+    settings = settings | {"digest": _digest(settings, tensors)}
+    # One entry only: safetensors writes several in random order.
+    content = save(tensors, metadata={kind: json.dumps(settings)})
+    files.write_atomically(path, lambda file: file.write(content))
+
+
+def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]) -> Made:
+    """Read what ``write_weights`` wrote.
+
+    Args:
+        path: of the file.
+        kind: as it was written.
+        make: is called with the settings and the tensors; what it raises is a fault of the file.
+
+    Returns:
+        What ``make`` returns.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file is damaged, of another kind, or not of this version.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}
+    except (SafetensorError, UnicodeDecodeError) as error:
+        raise ValueError(f"{path} is not a safetensors file: {error}") from error
+    try:
+        settings = json.loads(metadata[kind])
+        if settings.pop("digest") != _digest(settings, tensors):
+            raise ValueError("its digest is not that of its content; it is damaged")
+        _check_dtypes("it", tensors)
+        if not all(tensor.isfinite().all() for tensor in tensors.values()):
+            raise ValueError("a weight is not finite")
+        return make(settings, tensors)
+    except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise ValueError(f"{path} holds no {kind} of unload: {error}") from error
+
+
+def _check_dtypes(name: str, tensors: dict[str, torch.Tensor]) -> None:
+    for key, tensor in tensors.items():
+        if tensor.dtype != torch.float32:
+            raise TypeError(f"{name} has {key} of dtype {tensor.dtype}; expected torch.float32")
+
+
+def _digest(settings: dict, tensors: dict[str, torch.Tensor]) -> str:
+    """Digest of settings and weights."""
+    digest = blake2b(json.dumps(settings, sort_keys=True).encode(), digest_size=16)
+    for name in sorted(tensors):
+        tensor = tensors[name]
+        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}".encode())
+        digest.update(tensor.contiguous().numpy().tobytes())
+    return digest.hexdigest()
