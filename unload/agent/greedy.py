@@ -12,7 +12,10 @@ from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
 from unload.network.variants import NETWORKS
 from unload.network.weights import read_weights, write_weights
-from unload.support import checks
+from unload.support import checks, files
+from unload.support.provenance import VERSION
+
+POLICIES = files.SHIPPED / "policies"
 
 
 def check_network(network: object) -> torch.nn.Module:
@@ -60,16 +63,35 @@ class Greedy:
         network: the trained network.
         equalize: whether the network expects equalized observations.
         ties: see ``unload.equalize``.
+        card: what is known of the policy, as JSON can hold it, such as the ``configuration``
+            that it was trained with, the ``loads``, and its ``msr``; None if nothing is.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
 
-    def __init__(self, network: torch.nn.Module, equalize: bool, ties: str = "noise") -> None:
+    def __init__(
+        self,
+        network: torch.nn.Module,
+        equalize: bool,
+        ties: str = "noise",
+        card: dict | None = None,
+    ) -> None:
         self.network = check_network(network).eval()
         self.equalize = checks.boolean("equalize", equalize)
         checks.one_of("ties", ties, TIES)
         self.ties = ties
+        if card is not None:
+            checks.entries("card", card, ())
+        self.card = card
+
+    def __repr__(self) -> str:
+        """The settings, and the card with a line per entry."""
+        kind = type(self.network).__name__
+        head = f"Greedy({kind}, equalize={self.equalize}, ties={self.ties!r})"
+        if self.card is None:
+            return f"{head}, no card"
+        return "\n".join([head, *(f"  {name}: {value}" for name, value in self.card.items())])
 
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
@@ -101,7 +123,8 @@ class Greedy:
 def save_policy(policy: Greedy, path: str | Path) -> None:
     """Write a policy's weights and how to use them, as safetensors, in one atomic step.
 
-    The file holds a digest of both, so that a damaged one is not read.
+    So is its card, to which the version of unload is added. The file holds a digest of all
+    this, so that a damaged one is not read.
 
     Raises:
         TypeError: ``policy`` is no ``Greedy`` of one of ``unload.network.variants.NETWORKS``,
@@ -111,30 +134,48 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
         known = ", ".join(kind.__name__ for kind in NETWORKS.values())
         raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
-    settings = {
+    settings = settings_of(policy) | {"card": {"version": VERSION} | (policy.card or {})}
+    write_weights(path, "policy", settings, policy.network.state_dict())
+
+
+def load_policy(path: str | Path) -> Greedy:
+    """Read a policy that ``save_policy`` wrote; printed, it shows its card.
+
+    Args:
+        path: of the file, or the name of a policy that comes with the package, such as
+            ``"recommended"``.
+
+    Raises:
+        FileNotFoundError: there is no such file; the message lists the known names.
+        ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
+    """
+    known = {file.stem: file for file in sorted(POLICIES.glob("*.safetensors"))}
+    path = known.get(str(path), Path(path))
+    if not path.is_file():
+        raise FileNotFoundError(
+            f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "
+            + ", ".join(map(repr, known))
+        )
+    return read_weights(path, "policy", policy_of)
+
+
+def settings_of(policy: Greedy) -> dict:
+    """What ``policy_of`` needs of a policy besides its weights, as JSON can hold it."""
+    return {
         "network": type(policy.network).__name__,
         "n_features": policy.network.n_features,
         "equalize": policy.equalize,
         "ties": policy.ties,
     }
-    write_weights(path, "policy", settings, policy.network.state_dict())
 
 
-def load_policy(path: str | Path) -> Greedy:
-    """Read a policy that ``save_policy`` wrote.
+def policy_of(settings: dict, tensors: dict[str, torch.Tensor]) -> Greedy:
+    """The policy of ``settings_of``, with its ``card`` if they hold one, and of its weights.
 
     Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
+        KeyError, TypeError, RuntimeError: they do not fit.
     """
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
-    return read_weights(path, "policy", _policy)
-
-
-def _policy(settings: dict, tensors: dict[str, torch.Tensor]) -> Greedy:
-    """The policy of a file."""
     kinds = {kind.__name__: kind for kind in NETWORKS.values()}
     network = kinds[settings["network"]](settings["n_features"])
     network.load_state_dict(tensors)
-    return Greedy(network, settings["equalize"], settings["ties"])
+    return Greedy(network, settings["equalize"], settings["ties"], settings.get("card"))

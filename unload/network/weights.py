@@ -28,11 +28,16 @@ def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) ->
         TypeError: a tensor is not float32; the message begins with ``kind``.
         OSError: the file cannot be written.
     """
+    content = weights_file(kind, settings, tensors)
+    files.write_atomically(path, lambda file: file.write(content))
+
+
+def weights_file(kind: str, settings: dict, tensors: dict) -> bytes:
+    """The content of the file that ``write_weights`` writes."""
     _check_dtypes(kind, tensors)
     settings = settings | {"digest": _digest(settings, tensors)}
     # One entry only: safetensors writes several in random order.
-    content = save(tensors, metadata={kind: json.dumps(settings)})
-    files.write_atomically(path, lambda file: file.write(content))
+    return save(tensors, metadata={kind: json.dumps(settings)})
 
 
 def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]) -> Made:

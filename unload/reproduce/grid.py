@@ -9,22 +9,20 @@ A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<tab
 curves are published in a table of that name, so that no file of a large grid becomes large.
 """
 
-import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
-from safetensors import safe_open
-from safetensors.torch import save
+import torch
 
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
-from unload.agent.greedy import Greedy
+from unload.agent.greedy import Greedy, policy_of, settings_of
 from unload.agent.sweep import run_sweep
 from unload.agent.training import Training, unchanged
-from unload.network.variants import NETWORKS
+from unload.network.weights import read_weights, write_weights
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, read_table, write_table
 from unload.support import checks, files
@@ -252,18 +250,12 @@ def read_measures(grid: Grid, folder: str | Path = files.DATA) -> pd.DataFrame:
 
 
 def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
-    """Write many policies into one safetensors file, by name."""
+    """Write many policies into one file of weights, by name."""
     tensors, settings = {}, {}
     for name, policy in policies.items():
         tensors |= {f"{name}/{k}": v.clone() for k, v in policy.network.state_dict().items()}
-        settings[name] = {
-            "network": type(policy.network).__name__,
-            "n_features": policy.network.n_features,
-            "equalize": policy.equalize,
-            "ties": policy.ties,
-        }
-    content = save(tensors, metadata={"policies": json.dumps(settings)})
-    files.write_atomically(path, lambda file: file.write(content))
+        settings[name] = settings_of(policy)
+    write_weights(path, "policies", settings, tensors)
 
 
 def read_policies(path: str | Path) -> dict[str, Greedy]:
@@ -271,17 +263,18 @@ def read_policies(path: str | Path) -> dict[str, Greedy]:
 
     Raises:
         FileNotFoundError: there is no such file.
+        ValueError: the file was changed or damaged.
     """
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} is missing; {COMMAND} makes it")
-    kinds = {kind.__name__: kind for kind in NETWORKS.values()}
-    policies = {}
-    with safe_open(path, framework="pt") as file:
-        for name, each in json.loads(file.metadata()["policies"]).items():
-            network = kinds[each["network"]](each["n_features"])
-            network.load_state_dict(
-                {k: file.get_tensor(f"{name}/{k}") for k in network.state_dict()}
-            )
-            policies[name] = Greedy(network, each["equalize"], each["ties"])
-    return policies
+    return read_weights(path, "policies", _policies)
+
+
+def _policies(settings: dict, tensors: dict[str, torch.Tensor]) -> dict[str, Greedy]:
+    """The policies of a file."""
+    of_run: dict[str, dict] = {name: {} for name in settings}
+    for name, tensor in tensors.items():
+        run, _, part = name.rpartition("/")
+        of_run[run][part] = tensor
+    return {name: policy_of(each, of_run[name]) for name, each in settings.items()}

@@ -92,6 +92,7 @@ def variants_data(
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
     progress: bool = True,
+    shipped: str | Path = files.SHIPPED,
 ) -> None:
     """Train some grids, see ``train_grid``.
 
@@ -104,6 +105,7 @@ def variants_data(
         runs_dir: where the runs are kept.
         n_jobs: processes, see ``run_sweep``.
         progress: show a progress bar.
+        shipped: folder of the policy.
 
     Raises:
         ValueError: an unknown grid.
@@ -115,7 +117,7 @@ def variants_data(
         kept = train_grid(GRIDS[name], None, picks, folder, runs_dir, n_jobs, progress)
         if name == "recommended" and picks is None:
             best = load_policy(kept / "positions/seed_0/policy.safetensors")
-            save_policy(best, Path(folder) / "policies/recommended.safetensors")
+            save_policy(best, Path(shipped) / "policies/recommended.safetensors")
 
 
 def read_variants(grid: str, folder: str | Path = files.DATA) -> pd.DataFrame:
