@@ -88,7 +88,7 @@ def clients() -> int:
 )
 def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monkeypatch, boxes):
     """28 MB each. By counting references: the garbage collector may come too late."""
-    load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2))
+    load = boxes((0.3, 0.2), (0.3, 0.6))
     monkeypatch.setattr("unload.env.container.shared_table", LiftTable)
     monkeypatch.setattr("unload.env.vector.shared_table", LiftTable)
     before = clients()
@@ -97,7 +97,7 @@ def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monke
         env = make()
         env.stack = lambda rng: load
         env.reset(seed=0)
-        env.step(np.zeros(64, int) if make is ContainerVectorEnv else 0)
+        env.step(np.ones(64, int) if make is ContainerVectorEnv else 1)  # the lower box
         if getattr(env, "render_mode", None) == "rgb_array":
             env.render()
         assert clients() > before

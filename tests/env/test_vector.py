@@ -177,8 +177,8 @@ def test_unknown_lifts_are_simulated_once_and_remembered(monkeypatch):
     assert runs[0] == runs[1]
 
 
-def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch):
-    envs = ContainerVectorEnv(2)
+def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch, boxes):
+    envs = ContainerVectorEnv(2, stack=lambda rng: boxes((1.2, 0.2), (1.2, 0.6)))
     envs.table = LiftTable()
     envs.reset(seed=0)
 
@@ -187,7 +187,7 @@ def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch):
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("unload.physics.bullet.World.pull", interrupted)
-        envs.step(np.array([0, 0]))
+        envs.step(np.array([1, 1]))  # the lower box, which is not known
     with pytest.raises(ResetNeeded, match="the episodes are broken off; call reset first"):
         envs.step(np.array([0, 0]))
     assert len(envs.table) == 0

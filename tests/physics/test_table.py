@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 
 import unload.physics.table
+from tests.load.walls import KINDS, own_load
 from unload import task
+from unload.load.boxes import OVERLAP
 from unload.load.substacks import stack_load
-from unload.physics.bullet import SETTINGS, World
+from unload.physics.bullet import GAP, SETTINGS, World
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation, Surroundings
 from unload.physics.table import (
     FEWEST_SLOTS,
+    FREE_LIFT,
     HELD_DOWN,
     LIFTS_FILE,
     LiftTable,
@@ -26,9 +29,9 @@ from unload.support import files
 
 @pytest.fixture(scope="module")
 def known(situations):
-    """Situations with at most two boxes on top, and their distances in ``LocalPhysics``."""
+    """Situations with one or two boxes on top, and their distances in ``LocalPhysics``."""
     local = LocalPhysics()
-    light = [each for each in situations if each.on_top < HELD_DOWN]
+    light = [each for each in situations if 0 < each.on_top < HELD_DOWN]
     yield [(situation, local.simulate(situation)) for situation in light]
     local.close()
 
@@ -71,6 +74,32 @@ def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
     distance = physics.simulate(around.situation(1))
     assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
     physics.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
+    """5,001 boxes of three kinds of loads, of which a part has been unloaded."""
+    local, asked = LocalPhysics(), 0
+    while asked < 1667:
+        load = own_load(rng, kind)
+        around = Surroundings(load, rng.random(len(load)) < rng.choice([1.0, 0.7, 0.4]))
+        for item in rng.permutation(np.flatnonzero(around.present))[:200].tolist():
+            if not around.on_top(item) and asked < 1667:
+                assert local.simulate(around.situation(item)) == FREE_LIFT
+                asked += 1
+    local.close()
+
+
+@pytest.mark.parametrize(("overlap", "free"), [(GAP, True), (GAP + 1e-4, False)])
+def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap, free):
+    """A load allows a thousandth of that."""
+    assert OVERLAP < GAP / 100
+    side = round((0.4 - overlap) * 1e6)
+    boxes = np.array([[0, y, 0, 400_000, 400_000, 400_000] for y in (0, side, -side)], np.int32)
+    local = LocalPhysics()
+    assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
+    local.close()
 
 
 def test_threads_that_share_a_table_get_the_right_answers(known, rng):
