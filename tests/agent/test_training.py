@@ -18,10 +18,12 @@ from tests.agent.runs import (
     interrupt,
     interrupt_run,
 )
+from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
 from unload.agent.training import CURVE_COLUMNS, Curve
 from unload.network.variants import NETWORKS
+from unload.physics.table import LiftTable, shared_table
 from unload.support import files
 
 LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
@@ -140,10 +142,38 @@ def test_own_loads_are_trained_on_and_gone_on_with(tmp_path):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-def test_loads_for_an_environment_without_loads_are_refused(tmp_path):
+def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
+    """The second run asks PyBullet nothing, and gives the same."""
+    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    for name in ("first", "second"):
+        table = LiftTable()
+        for place in ("unload.agent.training", "unload.env.vector"):
+            monkeypatch.setattr(f"{place}.shared_table", lambda table=table: table)
+        train(
+            config, tmp_path / name, progress=False, lifts=lifts,
+            stack=lambda rng: own_load(rng, "continuous sizes"),
+        )  # fmt: skip
+        assert len(LiftTable.load(lifts)) == len(table) > 10
+        monkeypatch.setattr("unload.physics.local.lift", None)
+    assert_same(tmp_path / "first", tmp_path / "second")
+
+
+def test_lifts_are_kept_when_a_run_is_stopped_and_refused_before_it_begins(tmp_path):
+    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "run", progress=False, lifts=lifts)
+    assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
+    lifts.write_bytes(b"no table")
+    with pytest.raises(ValueError, match="lifts.npz is not a readable"):
+        train(config, tmp_path / "other", progress=False, lifts=lifts)
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize("given", [{"stack": stack_load}, {"lifts": "lifts.npz"}])
+def test_what_an_environment_without_loads_does_not_need_is_refused(tmp_path, given):
     config = TrainConfig(**RUNS["highest item"])
-    with pytest.raises(ValueError, match="stack is given"):
-        train(config, tmp_path, progress=False, stack=stack_load)
+    with pytest.raises(ValueError, match="(stack|lifts) is given; expected None for env="):
+        train(config, tmp_path, progress=False, **given)
 
 
 def test_without_updates_the_weights_stay(tmp_path):

@@ -1,7 +1,9 @@
 """Local physics with a memory."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
 from threading import Barrier
 
 import numpy as np
@@ -226,6 +228,47 @@ def test_a_saved_table_finds_the_same(table, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "lifts.npz").read_bytes()
     read.add(situation(50), 0.05)
     assert len(read) == 51 and read.find(situation(50)) == 0.05
+
+
+def test_tables_exchange_their_lifts_by_a_file(table, tmp_path):
+    path, other = tmp_path / "new" / "lifts.npz", LiftTable()
+    table.exchange(path)
+    other.add(situation(99), 0.099)
+    other.exchange(path)
+    assert len(other) == 51 and other.find(situation(7)) == 0.007
+    assert entries_of(LiftTable.load(path)) == entries_of(other)
+    table.exchange(path)
+    assert entries_of(table) == entries_of(other)
+    before = path.stat().st_mtime_ns
+    table.exchange(path)
+    assert path.stat().st_mtime_ns == before  # it lacks nothing
+
+
+def exchange_some(path: Path, first: int) -> None:
+    """Fill a table with ten lifts in ten turns; run in a process of its own."""
+    table = LiftTable()
+    for number in range(first, first + 10):
+        table.add(situation(number), number / 1000)
+        table.exchange(path)
+
+
+def test_processes_that_share_a_file_lose_no_lift(tmp_path):
+    path = tmp_path / "lifts.npz"
+    with ProcessPoolExecutor(3, get_context("spawn")) as pool:
+        list(pool.map(exchange_some, [path] * 3, (0, 10, 20)))
+    stored = LiftTable.load(path)
+    assert all(stored.find(situation(number)) == number / 1000 for number in range(30))
+
+
+def test_an_exchange_that_is_refused_changes_nothing(table, tmp_path):
+    other = {"digests": np.ones(1, np.uint64), "micrometres": np.ones(1, np.int32)}
+    files.write_arrays(tmp_path / "lifts.npz", other | {"settings": settings_of(friction=0.7)})
+    before = (tmp_path / "lifts.npz").read_bytes()
+    with pytest.raises(ValueError, match="lifts.npz is of another physics"):
+        table.exchange(tmp_path / "lifts.npz")
+    with pytest.raises(TypeError, match="path is 3; expected the path of a lift table"):
+        table.exchange(3)
+    assert len(table) == 50 and (tmp_path / "lifts.npz").read_bytes() == before
 
 
 def test_a_damaged_file_is_refused(tmp_path):

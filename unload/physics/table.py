@@ -140,6 +140,29 @@ class LiftTable:
         table._hold(arrays["digests"], arrays["micrometres"])
         return table
 
+    def exchange(self, path: str | Path) -> None:
+        """Take in the lifts of a file, and write those that it lacks; it may be missing.
+
+        Any number of processes may share one file: each waits for its turn, which it takes by
+        the folder ``<path>.lock``.
+
+        Raises:
+            TypeError: ``path`` is no path.
+            ValueError: as ``load``; nothing is changed then.
+            OSError: the file cannot be written.
+        """
+        if not isinstance(path, (str, Path)):
+            raise TypeError(f"path is {path!r}; expected the path of a lift table")
+        with files.locked(f"{path}.lock", wait=True):
+            stored = LiftTable.load(path) if Path(path).exists() else LiftTable()
+            with self._adding:
+                digests, micrometres = map(np.concatenate, zip(self.entries(), stored.entries()))
+                digests, first = np.unique(digests, return_index=True)
+                if len(digests) > self._count:
+                    self._hold(digests, micrometres[first])
+            if len(digests) > len(stored):
+                self.save(path)
+
 
 class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
