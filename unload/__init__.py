@@ -7,11 +7,13 @@ from unload.agent.config import TrainConfig
 from unload.agent.dqn import DQN
 from unload.agent.evaluation import evaluate, success_rate
 from unload.agent.greedy import Greedy, load_policy, save_policy
+from unload.agent.order import picking_order
 from unload.agent.training import train
 from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
 from unload.env.highest_item import HighestItemEnv
 from unload.load.boxes import Load
+from unload.load.packing_list import read_load
 from unload.load.substacks import build_load, stack_load
 from unload.load.view import view
 from unload.network.peq import PEQNetwork
@@ -33,7 +35,9 @@ __all__ = [
     "equalize",
     "evaluate",
     "load_policy",
+    "picking_order",
     "policies",
+    "read_load",
     "save_policy",
     "stack_load",
     "success_rate",
