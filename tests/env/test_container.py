@@ -255,6 +255,7 @@ def test_the_last_item_may_go_with_the_last_pick(small_env):
 def test_every_physics_goes_to_the_last_item(small_env, kwargs):
     env = small_env(3, render_mode="rgb_array", **kwargs)
     seen, _ = env.reset(seed=0)
+    before = env.render()
     env.step(100)
     rewards, terminated = [], False
     while not terminated:
@@ -262,6 +263,7 @@ def test_every_physics_goes_to_the_last_item(small_env, kwargs):
         seen, reward, terminated, _, _ = env.step(row)
         rewards.append(reward)
     assert rewards == [1, 1, 1] and env.render().shape == (480, 640, 3)
+    assert (env.render() != before).any()
 
 
 # --- seeds, loads and states --------------------------------------------------------
@@ -394,3 +396,9 @@ def test_a_reset_whose_stack_fails_needs_another_one(number):
         env.step(0)
     assert_same(env.reset(seed=0), other.reset(seed=0))
     assert_same(env.step(3), other.step(3))
+
+
+def test_without_a_render_mode_there_is_no_picture(make_env):
+    env = make_env()
+    env.reset(seed=0)
+    assert env.unwrapped.render() is None

@@ -10,7 +10,6 @@ from IPython.core.formatters import DisplayFormatter
 from matplotlib.image import imread
 
 from unload import view
-from unload.load.substacks import package_colour
 from unload.load.view import (
     COLOURS,
     EYE,
@@ -19,6 +18,7 @@ from unload.load.view import (
     buttons,
     css,
     slider,
+    snapshot,
     still,
 )
 
@@ -193,17 +193,16 @@ def test_boxes_in_a_circle_are_all_drawn():
     assert sorted(back_to_front(low, low + 0.9)) == [0, 1, 2]
 
 
-def test_the_colours_of_boxes_and_of_the_ground_are_kept():
-    """Although many colours are reduced to few."""
-    low = np.array([(1 + number / 3, 0, 0) for number in range(13)])
-    names = {f"package {number}": package_colour(number) for number in range(13)}
-    png = still(low, low + (0.3, 2, 1), np.array([*names.values()]), names, 4.0)
-    shown = np.rint(255 * imread(io.BytesIO(png))[:, :, :3])
-    legend, boxes = shown[:, :110], shown[:, 110:]
-    for colour in names.values():
-        for part in (legend, boxes):
-            assert (part == np.rint(255 * np.array(colour))).all(axis=2).any()
-    assert (shown[-1] == 255).all()
+def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
+    load, moved = boxes((0.8, 0.2), (0.8, 0.6)), boxes((1.6, 0.2), (1.6, 0.6))
+    both, one, none = (np.arange(2) < count for count in (2, 1, 0))
+    picture = snapshot(load, both, load.positions)
+    assert picture.shape == (480, 640, 3) and picture.dtype == np.uint8
+    boxes_drawn = [(snapshot(load, some, load.positions) != snapshot(load, none, load.positions))
+                   .any(axis=2).sum() for some in (one, both)]  # fmt: skip
+    assert 100 < boxes_drawn[0] < boxes_drawn[1]
+    assert (snapshot(load, both, moved.positions) == snapshot(moved, both, moved.positions)).all()
+    assert (snapshot(load, both, moved.positions) != picture).any()
 
 
 def test_plotly_takes_both_and_they_name_the_frames():

@@ -110,28 +110,15 @@ def test_a_world_to_which_nothing_refers_is_disconnected():
     assert not pybullet.isConnected(client)
 
 
-@pytest.mark.parametrize("speed", [0.5, 1.0])
-def test_a_free_box_is_dragged_at_its_speed_and_stops(make_world, speed):
+def test_a_push_lasts_one_step_and_a_stop_ends_it(make_world):
     world, (box,) = make_world()
-    start = world.pose(box)[0][0]
-    moved = world.drag(box, speed, force=60, distance=0.7, seconds=0.4)
-    assert moved == pytest.approx(0.4 * speed, abs=0.02)
-    assert moved == world.pose(box)[0][0] - start
-    world.step(0.5)
-    assert world.pose(box)[0][0] - start == pytest.approx(moved, abs=0.002)
-    assert world.speed(box) < 0.01
-
-
-def test_a_drag_ends_after_its_distance(make_world):
-    world, (box,) = make_world()
-    assert world.drag(box, 1, force=60, distance=0.3, seconds=5) == pytest.approx(0.3, abs=0.01)
-
-
-def test_a_drag_weaker_than_friction_moves_nothing(make_world):
-    """Friction of 0.5 on both sides holds 0.25 of the weight."""
-    world, (box,) = make_world()
-    assert world.drag(box, 1, force=0.2 * task.GRAVITY, distance=1, seconds=0.5) < 0.002
-    assert world.drag(box, 1, force=0.3 * task.GRAVITY, distance=1, seconds=0.5) > 0.05
+    world.push(box, (60.0, 0.0, 0.0))
+    friction = 0.25 * task.GRAVITY
+    assert world.velocity(box) == pytest.approx(((60 - friction) * TIME_STEP, 0, 0), abs=0.005)
+    world.stop(box)
+    assert world.velocity(box)[0] == 0
+    world.step(0.1)
+    assert world.pose(box)[0][0] < 0.002
 
 
 def test_a_box_can_be_turned_and_have_its_own_friction(make_world):
@@ -139,7 +126,9 @@ def test_a_box_can_be_turned_and_have_its_own_friction(make_world):
     turn = (0.0, 0.0, np.sin(0.3), np.cos(0.3))
     box = world.add_box((2, 0, 0.15), (0.3, 0.3, 0.3), 1.0, turn, friction=0.0)
     assert world.pose(box)[1] == pytest.approx(turn)
-    assert world.drag(box, 1, force=0.05 * task.GRAVITY, distance=1, seconds=0.5) > 0.05
+    for _ in range(120):
+        world.push(box, (0.05 * task.GRAVITY, 0.0, 0.0))
+    assert world.pose(box)[0][0] > 2.03
 
 
 def test_a_cleared_world_is_as_good_as_new(make_world):
@@ -163,15 +152,6 @@ def test_a_scan_gives_the_distance_and_the_body_of_each_pixel(make_world):
     assert depth.shape == bodies.shape == (31, 41)
     assert bodies[15, 20] == box and depth[15, 20] == pytest.approx(2.0, abs=0.01)
     assert bodies[0, 0] == -1 and bodies[30, 20] == 0, "the sky, and the floor"
-
-
-def test_a_picture_shows_the_colour_of_a_box(make_world):
-    world, (box,) = make_world()
-    world.paint(box, (1, 0, 0))
-    pixels = world.picture((2, 0, 0.5), (0, 0, 0.15), 80, 60)
-    assert pixels.shape == (60, 80, 3) and pixels.dtype == np.uint8
-    red, green, blue = pixels[30, 40].astype(int)
-    assert red > 100 and green < 60 and blue < 60
 
 
 def test_importing_is_silent_and_so_is_an_end_with_an_open_world():

@@ -1,5 +1,5 @@
 """The environments: a container, and the choice of the highest item.
 
-Read ``observation``, ``equalization``, ``base``, ``container``, ``highest_item``,
-``vector`` and ``render``, in this order. ``fast`` is the compiled twin.
+Read ``observation``, ``equalization``, ``base``, ``container``, ``highest_item`` and
+``vector``, in this order. ``fast`` is the compiled twin.
 """

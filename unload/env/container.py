@@ -8,9 +8,9 @@ from unload import task
 from unload.env import observation
 from unload.env.base import AllOrReset, PickingEnv
 from unload.env.observation import POSITION_NOISE
-from unload.env.render import Camera
 from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
+from unload.load.view import snapshot
 from unload.physics.base import Physics
 from unload.physics.full import AFTER_PICK, FullPhysics
 from unload.physics.local import LocalPhysics
@@ -86,7 +86,7 @@ class ContainerEnv(PickingEnv):
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
         stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``.
-        render_mode: ``"rgb_array"`` for pictures by PyBullet's TinyRenderer, or None.
+        render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
         visible: (128,) int64, the item in each row of the observation, -1 in rows without.
@@ -115,7 +115,6 @@ class ContainerEnv(PickingEnv):
         check_stack(stack)
         self.stack = stack
         self.physics = _make_physics(physics, after_pick)
-        self._camera: Camera | None = None
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Fill the container anew; ``options={"load": load}`` gives the load to use."""
@@ -183,15 +182,10 @@ class ContainerEnv(PickingEnv):
         self._check_started()
         if self.render_mode is None:
             return None
-        if self._camera is None:
-            self._camera = Camera()
-        physics = self.physics
-        return self._camera.picture(physics.load, physics.present, physics.positions())
+        return snapshot(self.physics.load, self.physics.present, self.physics.positions())
 
     def close(self) -> None:
         self.physics.close()
-        if self._camera is not None:
-            self._camera.close()
         super().close()
 
     def observed_positions(self) -> np.ndarray:

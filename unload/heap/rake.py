@@ -83,6 +83,32 @@ def add_walls(world: World, friction: float = FRICTION) -> None:
         world.add_box(position, size, 0, friction=friction)
 
 
+def drag(world: World, body: int, mass: float) -> float:
+    """Drag a body towards the door by its centre of mass, and stop it in that direction.
+
+    A controller holds ``SPEED``, as far as ``FORCE`` allows, until the body has moved by
+    ``REACH`` or ``TIME`` is over.
+
+    Args:
+        world: which holds it.
+        body: its number there.
+        mass: of it, kg.
+
+    Returns:
+        How far it came along x, in m.
+    """
+    start = world.pose(body)[0][0]
+    for _ in range(round(TIME / world.time_step)):
+        if world.pose(body)[0][0] - start >= REACH:
+            break
+        # What would bring the body to its speed within this step, if nothing resisted.
+        wanted = mass * (SPEED - world.velocity(body)[0]) / world.time_step
+        world.push(body, (min(max(wanted, -FORCE), FORCE), 0, 0))
+    moved = world.pose(body)[0][0] - start
+    world.stop(body)
+    return moved
+
+
 def near_boxes(heap: Heap, box: int) -> tuple[np.ndarray, np.ndarray]:
     """Boxes that may move when ``box`` is dragged, and their fixed neighbours, by distance.
 
@@ -146,7 +172,7 @@ class Rake:
         box = self._check(heap, box)
         world, edge = self._world, heap.edge()
         bodies = self._build(heap, box)
-        moved = world.drag(bodies[box], SPEED, FORCE, REACH, TIME)
+        moved = drag(world, bodies[box], self.mass)
         came = moved >= CAME
         unloaded = np.zeros(len(heap), bool)
         last = Poses(heap)
@@ -156,7 +182,8 @@ class Rake:
             gone = last.positions[:, 0] > edge
             gone[box] |= came
             gone &= ~unloaded
-            if not gone.any() and max(map(world.speed, bodies.values()), default=0) < STILL:
+            speeds = [np.linalg.norm(world.velocity(body)) for body in bodies.values()]
+            if not gone.any() and max(speeds, default=0) < STILL:
                 break
             unloaded |= gone
             for number in np.flatnonzero(gone).tolist():

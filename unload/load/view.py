@@ -1,17 +1,18 @@
 """Views of a load: interactive in 3D with plotly, which works offline in JupyterLab, and still.
 
-The still picture stands where plotly is not drawn. Its boxes are drawn from the back to the front,
-so that nearer ones cover farther ones.
+A still picture stands where plotly is not drawn, and is what environments render. Its boxes are
+drawn from the back to the front, so that nearer ones cover farther ones.
 """
 
 import base64
 import io
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -62,7 +63,10 @@ CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 # The faces whose outer sides point along x, against y and along z: corners, and brightness.
 FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
 WIDTH = 8.0  # inches, at 100 pixels each
-FILE_COLOURS = 128  # of a picture, besides those of the boxes
+# The insides of the container that are seen: corners, and brightness of the grey.
+INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
+EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
+FILE_COLOURS = 128  # of a still picture
 LEGEND = 0.15  # share of the width at the left
 
 
@@ -283,6 +287,24 @@ def css(colour: tuple[float, float, float]) -> str:
     return "rgb({:.0f},{:.0f},{:.0f})".format(*(255 * value for value in colour))
 
 
+def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Return (480, 640, 3) uint8, a picture of some items, coloured by package, all upright.
+
+    Args:
+        load: the items.
+        present: (n,) bool, which of them are drawn.
+        positions: (n, 3) float, where their centres are in m.
+    """
+    items = np.flatnonzero(present)
+    moved = (positions - load.positions)[items]
+    low, high = (corner + moved for corner in corners(load, items))
+    colours = np.array([package_colour(package) for package in load.packages[items]])
+    figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")
+    order = back_to_front(low, high)
+    draw(figure.add_axes((0, 0, 1, 1)), low[order], high[order], colours.reshape(-1, 3)[order])
+    return pixels(figure)
+
+
 def still(
     low: np.ndarray,
     high: np.ndarray,
@@ -290,7 +312,7 @@ def still(
     legend: Mapping[str, tuple[float, float, float]],
     height: float,
 ) -> bytes:
-    """Return a PNG picture of boxes in the container, seen from ``EYE``, with a legend.
+    """Return a PNG picture of boxes in the container with a legend.
 
     Args:
         low, high: (n, 3) float64, corners in m.
@@ -299,47 +321,47 @@ def still(
         height: of the picture in inches.
     """
     figure = Figure((WIDTH, height), dpi=100, facecolor="white", layout="none")
-    axes = figure.add_axes((LEGEND, 0, 1 - LEGEND, 1))
-    walls = np.array([(0, 0, 0), task.CONTAINER])
-    for edge in _edges(*walls):
-        axes.plot(*project(edge).T, color="0.6", linewidth=0.8, zorder=0)
     order = back_to_front(low, high)
-    corners = project(low[order, None] + CORNERS * (high - low)[order, None])
-    polygons = np.stack([corners[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
-    shades = np.array([shade for _, shade in FACES])[:, None] * colours[order, None]
+    draw(figure.add_axes((LEGEND, 0, 1 - LEGEND, 1)), low[order], high[order], colours[order])
+    handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
+    figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
+    file = io.BytesIO()
+    # Few colours take a quarter of the bytes.
+    Image.fromarray(pixels(figure)).quantize(FILE_COLOURS).save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def draw(axes: Axes, low: np.ndarray, high: np.ndarray, colours: np.ndarray) -> None:
+    """Draw boxes in the container, seen from ``EYE``; the container fills the axes.
+
+    Args:
+        axes: Matplotlib's.
+        low, high: (n, 3) float64, corners in m, in an order such as that of ``back_to_front``.
+        colours: (n, 3) float64, RGB in [0, 1].
+    """
+    frame = project(CORNERS * task.CONTAINER)
+    for face, brightness in INSIDES:
+        axes.fill(*frame[list(face)].T, color=str(brightness), zorder=0)
+    seen = project(low[:, None] + CORNERS * (high - low)[:, None])
+    polygons = np.stack([seen[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
+    shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
     axes.add_collection(
         PolyCollection(
             polygons,
             facecolors=shades.reshape(-1, 3),
-            edgecolors=0.55 * shades.reshape(-1, 3),
+            edgecolors=EDGE * shades.reshape(-1, 3),
             linewidths=0.5,
         )
     )
-    frame = project(walls[0] + CORNERS * task.CONTAINER)
     axes.set(aspect="equal", xlim=_wider(frame[:, 0]), ylim=_wider(frame[:, 1]))
     axes.axis("off")
-    handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
-    figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
+
+
+def pixels(figure: Figure) -> np.ndarray:
+    """(height, width, 3) uint8, a Matplotlib figure as it is drawn."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    file = io.BytesIO()
-    picture = np.asarray(canvas.buffer_rgba())[:, :, :3]
-    _with_few_colours(picture, legend.values()).save(file, "PNG", optimize=True)
-    return file.getvalue()
-
-
-def _with_few_colours(picture: np.ndarray, boxes: Iterable) -> Image.Image:
-    """Reduce the colours, which takes a quarter of the bytes; those of boxes stay as they are."""
-    shades = np.multiply.outer([1, *(shade for _, shade in FACES)], np.reshape([*boxes], (-1, 3)))
-    kept = np.unique(np.rint(255 * np.vstack([*shades, (1, 1, 1)])), axis=0)
-    others = Image.fromarray(picture).quantize(FILE_COLOURS).getpalette()[: 3 * FILE_COLOURS]
-    palette = np.vstack([kept, np.reshape(others, (-1, 3))]).astype(int)
-    codes, pixels = np.unique(picture @ np.array((1 << 16, 1 << 8, 1)), return_inverse=True)
-    apart = (codes[:, None] >> (16, 8, 0) & 255)[:, None] - palette
-    nearest = (apart**2).sum(axis=2).argmin(axis=1).astype(np.uint8)
-    image = Image.fromarray(nearest[pixels].reshape(picture.shape[:2]))
-    image.putpalette(palette.ravel().tolist())
-    return image
+    return np.array(canvas.buffer_rgba())[:, :, :3]
 
 
 def project(points: np.ndarray) -> np.ndarray:
@@ -378,13 +400,6 @@ def back_to_front(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 def _separated(low: np.ndarray, high: np.ndarray, axis: int) -> np.ndarray:
     """(n, n) bool, whether box i ends where box j begins, or before."""
     return high[:, None, axis] <= low[None, :, axis] + OVERLAP
-
-
-def _edges(low: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
-    """The twelve edges of a box, (2, 3) each."""
-    corners = low + CORNERS * (high - low)
-    pairs = [(a, b) for a in range(8) for b in range(a) if (CORNERS[a] != CORNERS[b]).sum() == 1]
-    return [corners[list(pair)] for pair in pairs]
 
 
 def _wider(values: np.ndarray, margin: float = 0.04) -> tuple[float, float]:

@@ -169,10 +169,9 @@ class World:
         """Position (m) and orientation (quaternion x, y, z, w) of a body."""
         return pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
 
-    def speed(self, body: int) -> float:
-        """Speed of a body's centre, m/s."""
-        velocity = pybullet.getBaseVelocity(body, physicsClientId=self._client)[0]
-        return float(np.linalg.norm(velocity))
+    def velocity(self, body: int) -> tuple[float, float, float]:
+        """Velocity of a body's centre, m/s."""
+        return pybullet.getBaseVelocity(body, physicsClientId=self._client)[0]
 
     def step(self, seconds: float) -> None:
         """Let time pass, rounded to whole time steps."""
@@ -197,62 +196,26 @@ class World:
         """
         start = np.array(self.pose(body)[0])
         for _ in range(self._steps(seconds)):
-            # The force acts for one step only, so it is applied anew before each.
-            pybullet.applyExternalForce(
-                body,
-                -1,
-                (0, 0, force),
-                self.pose(body)[0],
-                pybullet.WORLD_FRAME,
-                physicsClientId=self._client,
-            )
-            pybullet.stepSimulation(physicsClientId=self._client)
+            self.push(body, (0, 0, force))
         return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
 
-    def drag(self, body: int, speed: float, force: float, distance: float, seconds: float) -> float:
-        """Drag a body along x by its centre of mass, and stop it in that direction.
+    def push(self, body: int, force: tuple[float, float, float]) -> None:
+        """Let one time step pass, in which ``force``, in N, acts at a body's centre of mass."""
+        # PyBullet forgets the force after a step, therefore it is applied anew before each.
+        pybullet.applyExternalForce(
+            body,
+            -1,
+            force,
+            self.pose(body)[0],
+            pybullet.WORLD_FRAME,
+            physicsClientId=self._client,
+        )
+        pybullet.stepSimulation(physicsClientId=self._client)
 
-        Args:
-            body: which one.
-            speed: m/s that a controller holds, as far as the force allows.
-            force: most of it, N, in either direction.
-            distance: m after which the drag ends.
-            seconds: after which it ends in any case, rounded to whole time steps.
-
-        Returns:
-            How far the body moved along x, in m.
-        """
-        mass = pybullet.getDynamicsInfo(body, -1, physicsClientId=self._client)[0]
-        start = self.pose(body)[0][0]
-        for _ in range(self._steps(seconds)):
-            position = self.pose(body)[0]
-            if position[0] - start >= distance:
-                break
-            # What would bring the body to its speed within this step, if nothing resisted.
-            velocity = pybullet.getBaseVelocity(body, physicsClientId=self._client)[0][0]
-            wanted = mass * (speed - velocity) / self.time_step
-            pybullet.applyExternalForce(
-                body,
-                -1,
-                (min(max(wanted, -force), force), 0, 0),
-                position,
-                pybullet.WORLD_FRAME,
-                physicsClientId=self._client,
-            )
-            pybullet.stepSimulation(physicsClientId=self._client)
-        moved = self.pose(body)[0][0] - start
+    def stop(self, body: int) -> None:
+        """Take from a body its velocity along x, and leave it all else."""
         linear, angular = pybullet.getBaseVelocity(body, physicsClientId=self._client)
         pybullet.resetBaseVelocity(body, (0, *linear[1:]), angular, physicsClientId=self._client)
-        return moved
-
-    def paint(self, body: int, colour: tuple[float, float, float]) -> None:
-        """Give a body a colour, RGB in [0, 1]."""
-        pybullet.changeVisualShape(body, -1, rgbaColor=(*colour, 1), physicsClientId=self._client)
-
-    def picture(self, eye, target, width: int, height: int) -> np.ndarray:
-        """(height, width, 3) uint8, the world seen from ``eye`` towards ``target`` (m)."""
-        pixels = self._photograph(eye, target, width, height, 30)[2]
-        return np.reshape(pixels, (height, width, 4))[:, :, :3].astype(np.uint8)
 
     def scan(
         self, eye, target, width: int, height: int, angle: float
@@ -268,25 +231,18 @@ class World:
             ``depth`` (height, width) float64, m along the optical axis, and ``bodies``
             (height, width) int64, the body in each pixel, -1 where there is none.
         """
-        _, _, _, depth, bodies = self._photograph(eye, target, width, height, angle)
+        _, _, _, depth, bodies = pybullet.getCameraImage(
+            width,
+            height,
+            pybullet.computeViewMatrix(eye, target, (0, 0, 1)),
+            pybullet.computeProjectionMatrixFOV(angle, width / height, NEAR_PLANE, FAR_PLANE),
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=self._client,
+        )
         depth = np.reshape(depth, (height, width)).astype(np.float64)
         # The buffer holds the depth of a perspective lens, from 0 to 1.
         depth = FAR_PLANE * NEAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth)
         return depth, np.reshape(bodies, (height, width)).astype(np.int64)
-
-    def _photograph(self, eye, target, width: int, height: int, angle: float) -> tuple:
-        view = pybullet.computeViewMatrix(eye, target, (0, 0, 1))
-        lens = pybullet.computeProjectionMatrixFOV(angle, width / height, NEAR_PLANE, FAR_PLANE)
-        return pybullet.getCameraImage(
-            width,
-            height,
-            view,
-            lens,
-            lightDirection=(6, -8, 12),
-            shadow=0,
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
-        )
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""
