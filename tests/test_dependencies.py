@@ -86,7 +86,8 @@ def test_what_is_installed_is_what_is_pinned():
 
 
 def test_what_is_imported_is_named():
-    assert distributions("unload") <= set(PROJECT["dependencies"])
+    optional = set(PROJECT["optional-dependencies"]["sb3"])  # imported where it is asked for
+    assert distributions("unload") - optional <= set(PROJECT["dependencies"])
     others = distributions("tests") | distributions("benchmarks") | distributions("notebooks")
     others -= on_demand()
     assert others <= set(pinned())

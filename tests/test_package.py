@@ -27,6 +27,7 @@ LIBRARIES = {
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("agent/greedy.py", "heap/learning.py", "reproduce/grid.py"),
     "scipy": ("heap/", "reproduce/"),
+    "stable_baselines3": ("env/sb3.py",),
     "torch": ("network/", "agent/", "heap/", "reproduce/"),
     "tqdm": ("agent/", "reproduce/"),
     "traitlets": ("play/canvas.py",),

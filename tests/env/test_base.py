@@ -125,7 +125,8 @@ def test_spaces_and_metadata():
     assert envs.single_observation_space == single.observation_space
     assert envs.single_action_space == single.action_space
     assert envs.observation_space.shape == (5, 128, 3) and envs.num_envs == 5
-    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    assert envs.spec.max_episode_steps is None  # but max_picks
     assert envs.observation_space.contains(envs.reset(seed=0)[0])
     single.close()
 
@@ -197,8 +198,24 @@ def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
     with pytest.raises(error, match=message):
         envs.reset(seed=seed)
     assert_same(envs.unwrapped.starts(), before)
-    with pytest.raises(ValueError, match="options is {'load': 1}; expected none"):
-        envs.reset(options={"load": 1})
+
+
+@pytest.mark.parametrize(
+    ("env_id", "options", "error", "message"),
+    [
+        (CONTAINER, {"load": 1}, TypeError, "load is 1; expected an unload.Load"),
+        (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
+        (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
+        (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
+    ],
+)
+def test_bad_options_leave_the_episodes_as_they_were(env_id, options, error, message):
+    envs = gymnasium.make_vec(env_id, 2)
+    envs.reset(seed=0)
+    before = envs.unwrapped.starts()
+    with pytest.raises(error, match=message):
+        envs.reset(seed=3, options=options)
+    assert_same(envs.unwrapped.starts(), before)
 
 
 @pytest.mark.parametrize("call", ["step", "starts", "action_masks"])
