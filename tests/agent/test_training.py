@@ -9,6 +9,7 @@ import torch
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
+    Breakdown,
     assert_same,
     at,
     at_pick,
@@ -121,6 +122,39 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_run_can_be_watched(tmp_path, monkeypatch):
+    """At each point, by a callback and on disk; and what is resumed goes on with the next one."""
+    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
+    config, points, on_disk = TrainConfig(**CONTAINER), [], []
+
+    def callback(point):
+        points.append(point)
+        on_disk.append(len(pd.read_csv(tmp_path / "curve.csv")))
+
+    with at_step(33, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path, progress=False, callback=callback)
+    assert len(points) == 6
+    result = train(config, tmp_path, progress=False, callback=callback)
+    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
+    assert on_disk == list(range(1, 11))
+    train(config, tmp_path, progress=False, callback=callback)  # it is finished
+    assert len(points) == 10
+
+
+def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
+    with at_step(49, crash), pytest.raises(Breakdown):  # after nine points
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    assert 1 <= len(written) < 9
+
+
+def test_what_cannot_be_called_is_refused(tmp_path):
+    with pytest.raises(TypeError, match="callback is 3; expected a function of a dict"):
+        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, callback=3)
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_configuration_is_needed(tmp_path):
     with pytest.raises(TypeError, match="config is {}; expected an unload.TrainConfig"):
         train({}, tmp_path)
@@ -193,7 +227,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
-    assert {path.name for path in tmp_path.iterdir()} <= {"checkpoint.npz", "lock"}
+    assert {path.name for path in tmp_path.iterdir()} <= {"checkpoint.npz", "curve.csv", "lock"}
     if interval == 0:
         stored = files.read_arrays(tmp_path / "checkpoint.npz")
         assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
