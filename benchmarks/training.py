@@ -4,15 +4,15 @@ import tempfile
 import time
 from unittest import mock
 
-import gymnasium
 import numpy as np
 import stable_baselines3
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 import unload
-from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
+from benchmarks.stable_baselines import PEQPolicy
 from unload.agent.fast import fused
+from unload.env.sb3 import ContainerVecEnv
 
 
 def training_rates(
@@ -81,10 +81,10 @@ class _Clock(BaseCallback):
 def _their_rate(picks: int, threads: int) -> float:
     torch.set_num_threads(threads)
     config = unload.TrainConfig()
-    envs = gymnasium.make_vec(config.env, config.num_envs, equalize=config.equalize)
+    envs = ContainerVecEnv(config.num_envs, equalize=config.equalize)
     model = stable_baselines3.DQN(
         PEQPolicy,
-        VectorEnvAdapter(envs),
+        envs,
         learning_rate=config.learning_rate,
         buffer_size=config.replay_size,
         learning_starts=config.batch_size,

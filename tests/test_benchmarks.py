@@ -1,36 +1,19 @@
 """The benchmarks: what they measure is what they say."""
 
-import gymnasium
 import numpy as np
 import pandas as pd
-import pytest
 import stable_baselines3
 import torch
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import unload
 from benchmarks.environments import lift_rates, pick_rates
 from benchmarks.run import show
-from benchmarks.stable_baselines import PEQPolicy, VectorEnvAdapter
+from benchmarks.stable_baselines import PEQPolicy
 from benchmarks.timing import best_times
 from benchmarks.updates import update_times
+from unload.env.sb3 import ContainerVecEnv
 from unload.reproduce.policies.speed import FOLDER
 from unload.support.provenance import read_provenance
-
-
-@pytest.fixture
-def make_adapter():
-    """``make_adapter(num_envs)``: array environments for Stable-Baselines3."""
-    made = []
-
-    def make(num_envs):
-        envs = gymnasium.make_vec("unload/Container-v0", num_envs, max_picks=3)
-        made.append(VectorEnvAdapter(envs))
-        return made[-1]
-
-    yield make
-    for envs in made:
-        envs.close()
 
 
 def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
@@ -41,44 +24,10 @@ def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
     assert len(calls) == 4
 
 
-def test_adapter_gives_stable_baselines_what_gymnasium_shows(make_adapter):
-    adapter = make_adapter(2)
-
-    def single():
-        return gymnasium.make("unload/Container-v0", physics="table", max_picks=3)
-
-    loop = SyncVectorEnv([single] * 2, autoreset_mode=AutoresetMode.SAME_STEP)
-    adapter.seed(7)
-    observations, _ = loop.reset(seed=7)
-    assert np.array_equal(adapter.reset(), observations)
-    for step in range(7):
-        actions = np.array([step, 2 * step])
-        observations, rewards, _, truncations, infos = loop.step(actions)
-        seen, earned, dones, each = adapter.step(actions)
-        assert np.array_equal(seen, observations)
-        assert np.array_equal(earned, rewards)
-        assert earned.dtype == np.float32
-        assert np.array_equal(dones, truncations)
-        for env in range(2):
-            if dones[env]:
-                assert np.array_equal(each[env]["terminal_observation"], infos["final_obs"][env])
-                assert each[env]["TimeLimit.truncated"]
-            else:
-                assert each[env] == {}
-    loop.close()
-
-
-def test_adapter_refuses_another_way_of_resetting():
-    envs = gymnasium.make_vec("CartPole-v1", 2, vectorization_mode="sync")
-    with pytest.raises(ValueError, match="envs resets with .*expected AutoresetMode.SAME_STEP"):
-        VectorEnvAdapter(envs)
-    envs.close()
-
-
-def test_stable_baselines_trains_the_papers_network(make_adapter):
+def test_stable_baselines_trains_the_papers_network():
     model = stable_baselines3.DQN(
-        PEQPolicy, make_adapter(4), buffer_size=64, learning_starts=8, batch_size=8, train_freq=1,
-        policy_kwargs={"net_arch": [6]}, seed=0, device="cpu",
+        PEQPolicy, ContainerVecEnv(4, max_picks=3), buffer_size=64, learning_starts=8,
+        batch_size=8, train_freq=1, policy_kwargs={"net_arch": [6]}, seed=0, device="cpu",
     )  # fmt: skip
     network = model.q_net.q_net
     assert type(network) is unload.PEQNetwork
@@ -91,6 +40,7 @@ def test_stable_baselines_trains_the_papers_network(make_adapter):
     values = network(torch.from_numpy(observations))
     chosen, _ = model.predict(observations, deterministic=True)
     assert np.array_equal(chosen, values.argmax(dim=1))
+    model.env.close()
 
 
 def test_rates_are_positive(small_load):

@@ -16,11 +16,13 @@ if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.agent.dqn import DQN
     from unload.agent.evaluation import evaluate, success_rate
     from unload.agent.greedy import Greedy, load_policy, save_policy
+    from unload.agent.order import picking_order
     from unload.agent.training import train
     from unload.env.container import ContainerEnv
     from unload.env.equalization import equalize
     from unload.env.highest_item import HighestItemEnv
     from unload.load.boxes import Load
+    from unload.load.packing_list import read_load
     from unload.load.substacks import build_load, stack_load
     from unload.load.view import view
     from unload.network.peq import PEQNetwork
@@ -42,7 +44,9 @@ _PLACES = {
     "equalize": "env.equalization",
     "evaluate": "agent.evaluation",
     "load_policy": "agent.greedy",
+    "picking_order": "agent.order",
     "policies": "agent.policies",
+    "read_load": "load.packing_list",
     "save_policy": "agent.greedy",
     "stack_load": "load.substacks",
     "success_rate": "agent.evaluation",
@@ -65,7 +69,9 @@ __all__ = [
     "equalize",
     "evaluate",
     "load_policy",
+    "picking_order",
     "policies",
+    "read_load",
     "save_policy",
     "stack_load",
     "success_rate",
@@ -79,7 +85,7 @@ def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module = import_module(f"unload.{_PLACES[name]}")
-    value = module if _PLACES[name].endswith(f".{name}") else getattr(module, name)
+    value = getattr(module, name, module)
     globals()[name] = value  # found without this function the next time
     return value
 

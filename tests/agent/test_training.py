@@ -9,6 +9,7 @@ import torch
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
+    Breakdown,
     assert_same,
     at,
     at_pick,
@@ -18,10 +19,12 @@ from tests.agent.runs import (
     interrupt,
     interrupt_run,
 )
+from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
 from unload.agent.training import CURVE_COLUMNS, Curve
 from unload.network.variants import NETWORKS
+from unload.physics.table import LiftTable, shared_table
 from unload.support import files
 
 LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
@@ -119,6 +122,39 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_run_can_be_watched(tmp_path, monkeypatch):
+    """At each point, by a callback and on disk; and what is resumed goes on with the next one."""
+    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
+    config, points, on_disk = TrainConfig(**CONTAINER), [], []
+
+    def callback(point):
+        points.append(point)
+        on_disk.append(len(pd.read_csv(tmp_path / "curve.csv")))
+
+    with at_step(33, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path, progress=False, callback=callback)
+    assert len(points) == 6
+    result = train(config, tmp_path, progress=False, callback=callback)
+    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
+    assert on_disk == list(range(1, 11))
+    train(config, tmp_path, progress=False, callback=callback)  # it is finished
+    assert len(points) == 10
+
+
+def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
+    with at_step(49, crash), pytest.raises(Breakdown):  # after nine points
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    assert 1 <= len(written) < 9
+
+
+def test_what_cannot_be_called_is_refused(tmp_path):
+    with pytest.raises(TypeError, match="callback is 3; expected a function of a dict"):
+        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, callback=3)
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_configuration_is_needed(tmp_path):
     with pytest.raises(TypeError, match="config is {}; expected an unload.TrainConfig"):
         train({}, tmp_path)
@@ -140,10 +176,38 @@ def test_own_loads_are_trained_on_and_gone_on_with(tmp_path):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-def test_loads_for_an_environment_without_loads_are_refused(tmp_path):
+def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
+    """The second run asks PyBullet nothing, and gives the same."""
+    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    for name in ("first", "second"):
+        table = LiftTable()
+        for place in ("unload.agent.training", "unload.env.vector"):
+            monkeypatch.setattr(f"{place}.shared_table", lambda table=table: table)
+        train(
+            config, tmp_path / name, progress=False, lifts=lifts,
+            stack=lambda rng: own_load(rng, "continuous sizes"),
+        )  # fmt: skip
+        assert len(LiftTable.load(lifts)) == len(table) > 10
+        monkeypatch.setattr("unload.physics.local.lift", None)
+    assert_same(tmp_path / "first", tmp_path / "second")
+
+
+def test_lifts_are_kept_when_a_run_is_stopped_and_refused_before_it_begins(tmp_path):
+    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "run", progress=False, lifts=lifts)
+    assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
+    lifts.write_bytes(b"no table")
+    with pytest.raises(ValueError, match="lifts.npz is not a readable"):
+        train(config, tmp_path / "other", progress=False, lifts=lifts)
+    assert not (tmp_path / "other").exists()
+
+
+@pytest.mark.parametrize("given", [{"stack": stack_load}, {"lifts": "lifts.npz"}])
+def test_what_an_environment_without_loads_does_not_need_is_refused(tmp_path, given):
     config = TrainConfig(**RUNS["highest item"])
-    with pytest.raises(ValueError, match="stack is given"):
-        train(config, tmp_path, progress=False, stack=stack_load)
+    with pytest.raises(ValueError, match="(stack|lifts) is given; expected None for env="):
+        train(config, tmp_path, progress=False, **given)
 
 
 def test_without_updates_the_weights_stay(tmp_path):
@@ -163,7 +227,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
-    assert {path.name for path in tmp_path.iterdir()} <= {"checkpoint.npz", "lock"}
+    assert {path.name for path in tmp_path.iterdir()} <= {"checkpoint.npz", "curve.csv", "lock"}
     if interval == 0:
         stored = files.read_arrays(tmp_path / "checkpoint.npz")
         assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)

@@ -96,7 +96,7 @@ def clients() -> int:
 )
 def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monkeypatch, boxes):
     """28 MB each. By counting references: the garbage collector may come too late."""
-    load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2))
+    load = boxes((0.3, 0.2), (0.3, 0.6))
     monkeypatch.setattr("unload.env.container.shared_table", LiftTable)
     monkeypatch.setattr("unload.env.vector.shared_table", LiftTable)
     before = clients()
@@ -105,7 +105,7 @@ def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monke
         env = make()
         env.stack = lambda rng: load
         env.reset(seed=0)
-        env.step(np.zeros(64, int) if make is ContainerVectorEnv else 0)
+        env.step(np.ones(64, int) if make is ContainerVectorEnv else 1)  # the lower box
         if getattr(env, "render_mode", None) == "rgb_array":
             env.render()
         assert clients() > before
@@ -133,7 +133,8 @@ def test_spaces_and_metadata():
     assert envs.single_observation_space == single.observation_space
     assert envs.single_action_space == single.action_space
     assert envs.observation_space.shape == (5, 128, 3) and envs.num_envs == 5
-    assert envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+    assert envs.spec.max_episode_steps is None  # but max_picks
     assert envs.observation_space.contains(envs.reset(seed=0)[0])
     single.close()
 
@@ -199,8 +200,24 @@ def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
     with pytest.raises(error, match=message):
         envs.reset(seed=seed)
     assert_same(envs.unwrapped.starts(), before)
-    with pytest.raises(ValueError, match="options is {'load': 1}; expected none"):
-        envs.reset(options={"load": 1})
+
+
+@pytest.mark.parametrize(
+    ("env_id", "options", "error", "message"),
+    [
+        (CONTAINER, {"load": 1}, TypeError, "load is 1; expected an unload.Load"),
+        (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
+        (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
+        (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
+    ],
+)
+def test_bad_options_leave_the_episodes_as_they_were(env_id, options, error, message):
+    envs = gymnasium.make_vec(env_id, 2)
+    envs.reset(seed=0)
+    before = envs.unwrapped.starts()
+    with pytest.raises(error, match=message):
+        envs.reset(seed=3, options=options)
+    assert_same(envs.unwrapped.starts(), before)
 
 
 @pytest.mark.parametrize("call", ["step", "starts", "action_masks"])

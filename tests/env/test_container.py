@@ -334,7 +334,7 @@ def test_bad_settings_are_refused(kwargs, error, message):
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"lode": None}, ValueError, "options is 'lode'; expected one of 'load'"),
+        ({"lode": None}, ValueError, "options is {'lode': None}; expected load"),
         ({"load": None}, TypeError, "load is None; expected an unload.Load"),
         (["load"], TypeError, r"options is \['load'\]; expected a dict"),
         ("load", TypeError, "options is 'load'; expected a dict"),

@@ -1,5 +1,6 @@
 """The array environments, against Gymnasium's loop over single ones."""
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_pair
-from unload.env.vector import ContainerVectorEnv
+from unload.env.vector import ContainerVectorEnv, HighestItemVectorEnv
 from unload.physics.table import LiftTable
 
 
@@ -69,6 +70,32 @@ def test_what_can_be_lifted_is_that_of_the_single_environments():
 )
 def test_every_setting_through_several_episodes(env_id, kwargs):
     play_both(env_id, 3, 60, seed=5, max_picks=25, **kwargs)
+
+
+def test_a_load_may_be_given_and_is_drawn(few_items, rng):
+    """The load and the pictures are those of the single environments."""
+    array, side_by_side = make_pair(CONTAINER, 2, max_picks=3, render_mode="rgb_array")
+    load = few_items(rng, 200)
+    given = {"seed": 1, "options": {"load": load}}
+    assert_same(array.reset(**given), side_by_side.reset(**given))
+    for _ in range(4):  # beyond the end of the episode, after which the load is drawn by lot
+        assert_same(array.render(), side_by_side.render())
+        assert_same(array.step(np.array([0, 3])), side_by_side.step(np.array([0, 3])))
+    assert array.unwrapped._containers.left.min() > 700
+    array.close()
+    side_by_side.close()
+
+
+def test_without_a_render_mode_there_is_no_picture():
+    for env_id in (CONTAINER, HIGHEST):
+        envs = gymnasium.make_vec(env_id, 2)
+        with pytest.raises(ResetNeeded):
+            envs.render()
+        envs.reset(seed=0)
+        assert envs.render() is None
+        envs.close()
+    with pytest.raises(ValueError, match="render_mode is 'rgb_array'; expected one of None"):
+        HighestItemVectorEnv(2, render_mode="rgb_array")
 
 
 def test_loads_of_several_sizes_and_kinds():
@@ -177,8 +204,8 @@ def test_unknown_lifts_are_simulated_once_and_remembered(monkeypatch):
     assert runs[0] == runs[1]
 
 
-def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch):
-    envs = ContainerVectorEnv(2)
+def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch, boxes):
+    envs = ContainerVectorEnv(2, stack=lambda rng: boxes((1.2, 0.2), (1.2, 0.6)))
     envs.table = LiftTable()
     envs.reset(seed=0)
 
@@ -187,7 +214,7 @@ def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch):
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("unload.physics.bullet.World.pull", interrupted)
-        envs.step(np.array([0, 0]))
+        envs.step(np.array([1, 1]))  # the lower box, which is not known
     with pytest.raises(ResetNeeded, match="the episodes are broken off; call reset first"):
         envs.step(np.array([0, 0]))
     assert len(envs.table) == 0

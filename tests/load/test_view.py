@@ -87,6 +87,17 @@ def test_a_group_may_be_empty(small_load):
     assert items(figure.data[0]) == [] and len(items(figure.data[1])) == len(small_load)
 
 
+def test_an_order_shows_its_first_ten_picks(full_load):
+    order = np.arange(880, 860, -1)
+    figure = view(full_load, order=order)
+    names = [f"pick {number}" for number in range(1, 11)] + ["picked later"]
+    assert [trace.name for trace in figure.data] == names
+    assert [items(trace) for trace in figure.data[:10]] == [[item] for item in order[:10]]
+    assert len({trace.color for trace in figure.data}) == 11
+    assert len(view(full_load, order=order[:2]).data) == 3
+    assert imread(io.BytesIO(figure.picture())).shape[2] >= 3
+
+
 def test_pointing_at_a_box_names_it_and_its_edges(small_load):
     trace = view(small_load, groups={"failed": [5]}).data[0]
     millimetres = np.rint(1000 * small_load.sizes[5]).tolist()
@@ -123,6 +134,9 @@ def test_ipython_displays_both_and_nothing_that_needs_a_network(small_load):
         ({"groups": {"a": [10**6]}}, ValueError, r"groups\['a'\] holds 1000000 to 1000000"),
         ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to"),
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
+        ({"groups": {}, "order": [0]}, ValueError, "groups and order are given; expected one"),
+        ({"order": [0.5]}, TypeError, "order has dtype float64"),
+        ({"order": [10**6]}, ValueError, r"groups\['pick 1'\] holds 1000000 to"),
         ({"groups": [1]}, TypeError, r"groups is \[1\]; expected a dict"),
         ({"groups": {"a": [0.5]}}, TypeError, r"groups\['a'\] has dtype float64"),
         ({"groups": {"a": [True, False]}}, TypeError, r"groups\['a'\] has dtype bool"),

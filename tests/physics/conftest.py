@@ -28,4 +28,4 @@ def make() -> Iterator[Callable[..., Physics]]:
 def situations(full_load) -> list[Situation]:
     """Situations of a full container, with few boxes on top and with many."""
     surroundings = Surroundings(full_load, np.ones(len(full_load), dtype=bool))
-    return [surroundings.situation(item) for item in range(0, len(full_load), 7)]
+    return [surroundings.situation(item) for item in range(0, len(full_load), 3)]

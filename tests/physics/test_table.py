@@ -1,20 +1,25 @@
 """Local physics with a memory."""
 
 import json
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
 from threading import Barrier
 
 import numpy as np
 import pytest
 
 import unload.physics.table
+from tests.load.walls import KINDS, own_load
 from unload import task
+from unload.load.boxes import OVERLAP
 from unload.load.substacks import stack_load
-from unload.physics.bullet import SETTINGS, World
+from unload.physics.bullet import GAP, SETTINGS, World
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation, Surroundings
 from unload.physics.table import (
     FEWEST_SLOTS,
+    FREE_LIFT,
     HELD_DOWN,
     LIFTS_FILE,
     LiftTable,
@@ -26,9 +31,9 @@ from unload.support import files
 
 @pytest.fixture(scope="module")
 def known(situations):
-    """Situations with at most two boxes on top, and their distances in ``LocalPhysics``."""
+    """Situations with one or two boxes on top, and their distances in ``LocalPhysics``."""
     local = LocalPhysics()
-    light = [each for each in situations if each.on_top < HELD_DOWN]
+    light = [each for each in situations if 0 < each.on_top < HELD_DOWN]
     yield [(situation, local.simulate(situation)) for situation in light]
     local.close()
 
@@ -71,6 +76,32 @@ def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
     distance = physics.simulate(around.situation(1))
     assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
     physics.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
+    """5,001 boxes of three kinds of loads, of which a part has been unloaded."""
+    local, asked = LocalPhysics(), 0
+    while asked < 1667:
+        load = own_load(rng, kind)
+        around = Surroundings(load, rng.random(len(load)) < rng.choice([1.0, 0.7, 0.4]))
+        for item in rng.permutation(np.flatnonzero(around.present))[:200].tolist():
+            if not around.on_top(item) and asked < 1667:
+                assert local.simulate(around.situation(item)) == FREE_LIFT
+                asked += 1
+    local.close()
+
+
+@pytest.mark.parametrize(("overlap", "free"), [(GAP, True), (GAP + 1e-4, False)])
+def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap, free):
+    """A load allows a thousandth of that."""
+    assert OVERLAP < GAP / 100
+    side = round((0.4 - overlap) * 1e6)
+    boxes = np.array([[0, y, 0, 400_000, 400_000, 400_000] for y in (0, side, -side)], np.int32)
+    local = LocalPhysics()
+    assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
+    local.close()
 
 
 def test_threads_that_share_a_table_get_the_right_answers(known, rng):
@@ -197,6 +228,47 @@ def test_a_saved_table_finds_the_same(table, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "lifts.npz").read_bytes()
     read.add(situation(50), 0.05)
     assert len(read) == 51 and read.find(situation(50)) == 0.05
+
+
+def test_tables_exchange_their_lifts_by_a_file(table, tmp_path):
+    path, other = tmp_path / "new" / "lifts.npz", LiftTable()
+    table.exchange(path)
+    other.add(situation(99), 0.099)
+    other.exchange(path)
+    assert len(other) == 51 and other.find(situation(7)) == 0.007
+    assert entries_of(LiftTable.load(path)) == entries_of(other)
+    table.exchange(path)
+    assert entries_of(table) == entries_of(other)
+    before = path.stat().st_mtime_ns
+    table.exchange(path)
+    assert path.stat().st_mtime_ns == before  # it lacks nothing
+
+
+def exchange_some(path: Path, first: int) -> None:
+    """Fill a table with ten lifts in ten turns; run in a process of its own."""
+    table = LiftTable()
+    for number in range(first, first + 10):
+        table.add(situation(number), number / 1000)
+        table.exchange(path)
+
+
+def test_processes_that_share_a_file_lose_no_lift(tmp_path):
+    path = tmp_path / "lifts.npz"
+    with ProcessPoolExecutor(3, get_context("spawn")) as pool:
+        list(pool.map(exchange_some, [path] * 3, (0, 10, 20)))
+    stored = LiftTable.load(path)
+    assert all(stored.find(situation(number)) == number / 1000 for number in range(30))
+
+
+def test_an_exchange_that_is_refused_changes_nothing(table, tmp_path):
+    other = {"digests": np.ones(1, np.uint64), "micrometres": np.ones(1, np.int32)}
+    files.write_arrays(tmp_path / "lifts.npz", other | {"settings": settings_of(friction=0.7)})
+    before = (tmp_path / "lifts.npz").read_bytes()
+    with pytest.raises(ValueError, match="lifts.npz is of another physics"):
+        table.exchange(tmp_path / "lifts.npz")
+    with pytest.raises(TypeError, match="path is 3; expected the path of a lift table"):
+        table.exchange(3)
+    assert len(table) == 50 and (tmp_path / "lifts.npz").read_bytes() == before
 
 
 def test_a_damaged_file_is_refused(tmp_path):

@@ -102,6 +102,10 @@ class RunFolder:
         }
         files.write_arrays(self.checkpoint, arrays)
 
+    def save_curve(self, run) -> None:
+        """Write the learning curve of a ``Training`` so far."""
+        files.write_text(self._curve, run.curve.table().to_csv(index=False))
+
     def restore(self, run) -> Iterator[int]:
         """Let a ``Training`` go on from the checkpoint, if there is one.
 
@@ -153,7 +157,7 @@ class RunFolder:
             first_shown: digest of its first observations, which shows what loads it was on.
         """
         save_policy(run.policy(), self._policy)
-        files.write_text(self._curve, run.curve.table().to_csv(index=False))
+        self.save_curve(run)
         marks = {"first_loads": first_shown}
         marks |= {path.name: files.digest(path) for path in (self._policy, self._curve)}
         content = asdict(run.config) | {"marks": marks}

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -26,10 +27,12 @@ from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.variants import NETWORKS
+from unload.physics.table import shared_table
 
 CURVE_COLUMNS = (
     "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
 )  # fmt: skip
+CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
 SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 
 
@@ -180,6 +183,8 @@ def train(
     run_dir: str | Path,
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
+    lifts: str | Path | None = None,
+    callback: Callable[[dict[str, float]], None] | None = None,
 ) -> TrainResult:
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
@@ -193,10 +198,19 @@ def train(
     Args:
         config: what to train.
         run_dir: folder of the run. Holds ``checkpoint.npz`` while it goes on and at the end
-            ``policy.safetensors``, ``curve.csv`` and ``config.json``.
+            ``policy.safetensors`` and ``config.json``. ``curve.csv`` grows from second to second:
+            ``pandas.read_csv("runs/mine/curve.csv").plot("picks", ["success_rate", "loss"])``
+            draws it at any time.
         progress: show a progress bar with speed, MSR and loss; in a text file if it is one.
         stack: makes the loads, as in ``ContainerEnv``; the paper's if None. It must make the
             same load whenever it is called with a generator in the same state.
+        lifts: file in which the lifts that PyBullet has computed are kept, because loads whose
+            boxes have other sizes need many of them. Read at the start if it exists, and filled
+            up with each checkpoint and at the end; runs, one after the other or side by side,
+            may share it. It changes the speed of a run and nothing else.
+        callback: is called at each point of the curve with that point, a dict by the columns of
+            ``TrainResult.curve``: ``picks``, ``success_rate``, ``loss`` and so on. A run that is
+            resumed calls it for new points only; an error in it ends the run.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
@@ -204,14 +218,15 @@ def train(
     Raises:
         TypeError: ``config`` is not a ``TrainConfig``.
         ValueError: ``run_dir`` is empty or a file, or holds another configuration, another
-            stack or a damaged file; ``stack`` is given for an environment without loads.
+            stack or a damaged file; ``stack`` or ``lifts`` is given for an environment without
+            loads; the file of ``lifts`` is damaged, or of another physics.
         OSError: ``run_dir`` cannot be written.
         RuntimeError: another process is training in ``run_dir``; the message names it.
         FloatingPointError: the loss or a weight is no longer finite; the message names the
             pick, and the last checkpoint is kept.
         KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
     """
-    return train_changed(config, run_dir, unchanged, progress, stack)
+    return train_changed(config, run_dir, unchanged, progress, stack, lifts, callback)
 
 
 def unchanged(run: Training) -> None:
@@ -224,11 +239,13 @@ def train_changed(
     change: Callable[[Training], None],
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
+    lifts: str | Path | None = None,
+    callback: Callable[[dict[str, float]], None] | None = None,
 ) -> TrainResult:
     """``train`` with something changed that no ``TrainConfig`` offers, for an experiment.
 
     Args:
-        config, run_dir, progress, stack: see ``train``.
+        config, run_dir, progress, stack, lifts, callback: see ``train``.
         change: is called with the ``Training`` before its first pick, also where a run is
             resumed, and may replace methods of its parts, such as ``run.replay.add``. What it
             does to a pick may depend on the configuration and on how many picks were made before
@@ -241,23 +258,35 @@ def train_changed(
         raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
     if not isinstance(progress, bool) and not hasattr(progress, "write"):
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
+    if callback is not None and not callable(callback):
+        raise TypeError(f"callback is {callback!r}; expected a function of a dict")
+    for name, value in (("stack", stack), ("lifts", lifts)):
+        if value is not None and config.env != ENVS[0]:
+            raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
-        if config.env != ENVS[0]:
-            raise ValueError(f"stack is given; expected None for env={config.env!r}")
+    keep_lifts = partial(shared_table().exchange, lifts) if lifts is not None else lambda: None
+    keep_lifts()
     folder = RunFolder(run_dir)
     with folder.locked(), deferred_interrupts() as interrupts:
         if not folder.finished:
             run = Training(config, stack)
             change(run)
             try:
-                _go(run, folder, progress, interrupts)
+                _go(run, folder, keep_lifts, callback, progress, interrupts)
             finally:
                 run.rollout.close()
         return folder.result(config, stack)
 
 
-def _go(run: Training, folder: RunFolder, progress: bool | TextIO, interrupts: list[int]) -> None:
+def _go(
+    run: Training,
+    folder: RunFolder,
+    keep_lifts: Callable[[], None],
+    callback: Callable[[dict[str, float]], None] | None,
+    progress: bool | TextIO,
+    interrupts: list[int],
+) -> None:
     """Train to the end, with a checkpoint now and then and on Ctrl-C."""
     config, rollout = run.config, run.rollout
 
@@ -271,7 +300,7 @@ def _go(run: Training, folder: RunFolder, progress: bool | TextIO, interrupts: l
     first_shown = rollout.digest()
     for picks in folder.restore(run):
         stop_if_interrupted(picks)
-    saved = time.monotonic()
+    saved, shown = time.monotonic(), 0.0
     with _progress_bar(rollout.picks, config.picks, progress) as bar:
         while not rollout.finished:
             try:
@@ -285,12 +314,20 @@ def _go(run: Training, folder: RunFolder, progress: bool | TextIO, interrupts: l
                 ) from error
             if due:
                 folder.save(run)
+                keep_lifts()
                 saved = time.monotonic()
             bar.update(config.num_envs)
             if not run.curve.sums["picks"]:
-                _, _, msr, _, loss, *_ = run.curve.points[-1]
+                point = dict(zip(CURVE_COLUMNS, run.curve.points[-1]))
+                msr, loss = point["success_rate"], point["loss"]
                 bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
+                if time.monotonic() - shown > CURVE_INTERVAL:
+                    folder.save_curve(run)
+                    shown = time.monotonic()
+                if callback is not None:
+                    callback(point)
             stop_if_interrupted(rollout.picks)
+    keep_lifts()
     folder.finish(run, first_shown)
 
 

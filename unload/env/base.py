@@ -4,6 +4,9 @@
 Gymnasium's ``SyncVectorEnv`` of the single environments with autoreset in the same step: same
 seeds, same actions, same observations, rewards, masks and infos. Each environment begins its next
 episode when its own has ended.
+
+They are registered without Gymnasium's ``max_episode_steps``, which would wrap them and cut every
+episode there, whatever their own ``max_picks`` is.
 """
 
 import json
@@ -21,6 +24,7 @@ from gymnasium.vector.utils import batch_space
 from unload import task
 from unload.env import observation
 from unload.env.equalization import TIE_TOLERANCE, TIES, equalize
+from unload.load.boxes import Load, check_load
 from unload.support import checks
 
 MOST_ENVS = 2**16  # several GB
@@ -41,6 +45,22 @@ def check_settings(
         checks.integer("max_picks", max_picks, 1, sys.maxsize),
         checks.real("position_noise", position_noise, 0, observation.MOST_NOISE),
     )
+
+
+def check_options(options: object, known: tuple[str, ...]) -> dict[str, Load]:
+    """Return the options of a ``reset``, {} for None.
+
+    Raises:
+        TypeError, ValueError: ``options`` is no dict, has a name that is not in ``known``, or
+            holds something other than a ``Load``.
+    """
+    options = {} if options is None else options
+    checks.entries("options", options, ())
+    for name, value in options.items():
+        if name not in known:
+            raise ValueError(f"options is {options!r}; expected {', '.join(known) or 'none'}")
+        check_load(value)
+    return dict(options)
 
 
 class AllOrReset:
@@ -93,7 +113,12 @@ class PickingEnv(EpisodeEnv):
 
     Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
     episode's end. What changes the episode stands in ``AllOrReset``.
+
+    Attributes:
+        options: names of the options that ``reset`` takes.
     """
+
+    options: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -138,8 +163,11 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
 
     Args:
         num_envs: number of environments.
-        equalize, ties, max_picks, position_noise: as for the single environment.
-        render_mode: None; there are no pictures of many containers.
+        equalize, ties, max_picks, position_noise, render_mode: as for the single environment.
+
+    Attributes:
+        options: names of the options that ``reset`` takes.
+        autoreset_mode: in the same step. TorchRL reads it here, Gymnasium in ``metadata``.
 
     Raises:
         TypeError, ValueError: an argument, a seed or actions are not as described.
@@ -148,7 +176,9 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
-    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+    options: tuple[str, ...] = ()
+    autoreset_mode = AutoresetMode.SAME_STEP
+    metadata = {"render_modes": [], "autoreset_mode": autoreset_mode}
 
     def __init__(
         self,
@@ -157,12 +187,13 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         ties: str = "noise",
         max_picks: int = task.MAX_PICKS,
         position_noise: float = observation.POSITION_NOISE,
-        render_mode: None = None,
+        render_mode: str | None = None,
     ) -> None:
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         checked = check_settings(equalize, ties, max_picks, position_noise)
         self.equalize, self.ties, self.max_picks, self.position_noise = checked
-        checks.one_of("render_mode", render_mode, (None,))
+        checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        self.render_mode = render_mode
         shape = (task.N_VISIBLE, 3)
         self.single_observation_space = gymnasium.spaces.Box(-1, 1, shape, np.float32)
         self.single_action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
@@ -174,16 +205,17 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self._starts = [""] * self.num_envs  # the generators' states before each episode's reset
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
 
-    def reset(self, *, seed: int | Sequence[int | None] | None = None, options=None):
-        """Start an episode in every environment. There are no options.
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict | None = None):
+        """Start an episode in every environment.
 
         Args:
             seed: environment i gets ``seed + i``, or ``seed[i]`` of a sequence; None lets
                 the generators go on, or seeds them at random.
+            options: as for the single environment, the same for all. They hold for these
+                episodes, not for the next ones, nor for ``restart``.
         """
         self._check_open()
-        if options:
-            raise ValueError(f"options is {options!r}; expected none")
+        options = check_options(options, self.options)
         if seed is None:
             seeds = [None] * self.num_envs
         elif isinstance(seed, Sequence):
@@ -198,7 +230,8 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             [
                 rng if one is None and rng is not None else seeding.np_random(one)[0]
                 for one, rng in zip(seeds, old)
-            ]
+            ],
+            **options,
         )
 
     def step(self, actions: np.ndarray):
@@ -267,19 +300,26 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             raise ValueError(f"starts has shape {np.shape(starts)}; expected ({self.num_envs},)")
         return self._restart([rng_of_text("starts", text) for text in starts])
 
-    def _restart(self, rngs: list[np.random.Generator]):
+    def _restart(self, rngs: list[np.random.Generator], **options):
         """Begin an episode in every environment; return ``reset``'s observations and infos."""
-        self._begin(np.arange(self.num_envs), rngs)
+        self._begin(np.arange(self.num_envs), rngs, **options)
         self._rngs, self._state = rngs, "running"
         return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
 
-    def _begin(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+    def _begin(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
         """Begin an episode in each of these environments."""
         with AllOrReset(self):
             for env, rng in zip(envs, rngs):
                 self._starts[env] = text_of_rng(rng)
             self._picks[envs] = 0
-            self._fill(envs, rngs)
+            self._fill(envs, rngs, **options)
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """A picture of each environment for ``render_mode="rgb_array"``, else None."""
+        self._check_started()
+        if self.render_mode is None:
+            return None
+        return tuple(self._picture(env) for env in range(self.num_envs))
 
     def _check_open(self) -> None:
         if self.closed:
@@ -290,9 +330,18 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         if self._state != "running":
             raise ResetNeeded(f"the episodes are {self._state}; call reset first")
 
+    def _picture(self, env: int) -> np.ndarray:
+        """A picture of one environment, where ``metadata`` has render modes."""
+        raise NotImplementedError
+
     @abstractmethod
-    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
-        """Put fresh items into environments, (k,) int64, drawn from the generator of each."""
+    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
+        """Put fresh items into environments, (k,) int64, drawn from the generator of each.
+
+        Args:
+            envs, rngs: which environments, and their generators.
+            **options: what ``reset`` was given of the names in ``self.options``.
+        """
 
     @abstractmethod
     def _pick(self, actions: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import AllOrReset, PickingEnv
+from unload.env.base import AllOrReset, PickingEnv, check_options
 from unload.env.observation import POSITION_NOISE
 from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
@@ -58,7 +58,8 @@ class ContainerEnv(PickingEnv):
 
     ## Episode end
     Termination when the last box has been unloaded; nothing is left to pick then, and every
-    row is padded. Truncation after ``max_picks`` picks. The paper's loads of 800 boxes or
+    row is padded. Truncation after ``max_picks`` picks, which is not Gymnasium's
+    ``max_episode_steps``: ``spec`` has none. The paper's loads of 800 boxes or
     more are never emptied by its 500 picks.
 
     ## Information
@@ -68,12 +69,12 @@ class ContainerEnv(PickingEnv):
       and for rows without a box;
     - ``item_mask``: (128,) int8, 0 for rows without a box only: for learning without the
       mask of failed rows;
-    - ``unloaded``: int, items unloaded in this episode;
+    - ``unloaded``: int64, items unloaded in this episode;
 
     and ``step`` also
 
-    - ``item``: int, the picked item's number in the load, -1 if the row held none;
-    - ``distance``: float, how far it moved in m.
+    - ``item``: int64, the picked item's number in the load, -1 if the row held none;
+    - ``distance``: float64, how far it moved in m.
 
     Args:
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
@@ -101,6 +102,7 @@ class ContainerEnv(PickingEnv):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
+    options = ("load",)
 
     def __init__(
         self,
@@ -121,12 +123,7 @@ class ContainerEnv(PickingEnv):
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Fill the container anew; ``options={"load": load}`` gives the load to use."""
         self._check_open()
-        options = {} if options is None else options
-        checks.entries("options", options, ())
-        for name in options:
-            checks.one_of("options", name, ("load",))
-        if "load" in options:
-            check_load(options["load"])
+        options = check_options(options, self.options)
         super().reset(seed=seed)
         with AllOrReset(self):
             load = options["load"] if "load" in options else self.stack(self.np_random)
@@ -158,7 +155,7 @@ class ContainerEnv(PickingEnv):
             terminated, truncated = self._ends()
             if terminated or truncated:
                 self._state = "finished"
-        info = self._info() | {"item": item, "distance": distance}
+        info = self._info() | {"item": np.int64(item), "distance": np.float64(distance)}
         return self._observation.copy(), 1.0 if success else -1.0, terminated, truncated, info
 
     def action_masks(self) -> np.ndarray:
@@ -213,7 +210,7 @@ class ContainerEnv(PickingEnv):
         return {
             "action_mask": self.action_masks().astype(np.int8),
             "item_mask": (self.visible >= 0).astype(np.int8),
-            "unloaded": self._unloaded,
+            "unloaded": np.int64(self._unloaded),
         }
 
 

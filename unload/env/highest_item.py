@@ -4,7 +4,7 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import AllOrReset, PickingEnv
+from unload.env.base import AllOrReset, PickingEnv, check_options
 from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 
@@ -68,8 +68,7 @@ class HighestItemEnv(PickingEnv):
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Draw the first items. There are no options."""
         self._check_open()
-        if options:
-            raise ValueError(f"options is {options!r}; expected none")
+        check_options(options, self.options)
         super().reset(seed=seed)
         with AllOrReset(self):
             self._picks, self._state = 0, "running"

@@ -13,6 +13,7 @@ from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
 from unload.load.boxes import Load, check_load, check_stack
 from unload.load.substacks import stack_load
+from unload.load.view import snapshot
 from unload.physics.situation import Surroundings
 from unload.physics.table import LiftTable, TablePhysics, shared_table
 from unload.support import checks
@@ -34,6 +35,9 @@ class ContainerVectorEnv(PickingVectorEnv):
             without.
     """
 
+    metadata = PickingVectorEnv.metadata | {"render_modes": ["rgb_array"], "render_fps": 4}
+    options = ("load",)
+
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
@@ -47,6 +51,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.stack = stack
         self._physics = TablePhysics(shared_table())
         self._containers = containers.allocate(self.num_envs, 0, 0)
+        self._packages: dict[int, np.ndarray] = {}  # of each container, if there are pictures
 
     def close_extras(self, **kwargs) -> None:
         """Free the simulator."""
@@ -78,11 +83,13 @@ class ContainerVectorEnv(PickingVectorEnv):
         distances = np.stack([self._look_up(actions)[1] for actions in rows], axis=1)
         return distances >= task.LIFT_THRESHOLD
 
-    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+    def _fill(
+        self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
+    ) -> None:
         for env, rng in zip(envs, rngs):
-            load = self.stack(rng)
-            check_load(load)
-            self._put(env, load, drift(len(load), self.position_noise, rng))
+            chosen = self.stack(rng) if load is None else load
+            check_load(chosen)
+            self._put(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
@@ -100,6 +107,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.seen[env, :count] = scaled(positions)
         state.by_distance[env, :count] = observation.nearest(positions, count)
         containers.start(state, env, *self._features)
+        if self.render_mode is not None:
+            self._packages[env] = load.packages
 
     def _make_room(self, items: int, links: int) -> None:
         """Let the arrays hold loads of so many items and contacts."""
@@ -127,12 +136,22 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _lift(self, env: int, item: int) -> float:
         """Lift an item whose situation the table does not know; return the distance in m."""
-        # The load is built again, because to keep those of all containers makes resets slower.
+        return self._physics.simulate(Surroundings(*self._load(env)).situation(item))
+
+    def _load(self, env: int) -> tuple[Load, np.ndarray]:
+        """A container's load up to the last present item, and which items are present.
+
+        It is built again, because to keep those of all containers makes resets slower.
+        """
         count = np.flatnonzero(self._containers.present[env])[-1] + 1
         boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-        load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
-        present = self._containers.present[env, :count]
-        return self._physics.simulate(Surroundings(load, present).situation(item))
+        packages = self._packages.get(env, labels)[:count]
+        load = Load(boxes[:, :3], boxes[:, 3:], packages, labels)
+        return load, self._containers.present[env, :count]
+
+    def _picture(self, env: int) -> np.ndarray:
+        load, present = self._load(env)
+        return snapshot(load, present, load.positions)
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0

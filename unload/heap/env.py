@@ -101,6 +101,11 @@ class HeapEnv(EpisodeEnv):
     - ``fates``: (96,) int8, what happened to the box in each row of the observation before the
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
+    ## Pictures and arrays
+    There is no render mode: ``unload.heap.study.replay`` draws recorded picks. There is no array
+    of heaps either, because nearly all of a pick is PyBullet's time;
+    ``gymnasium.make_vec(id, n, vectorization_mode="async")`` gives each heap a process.
+
     Args:
         split: ``"train"`` or ``"test"``, which of the stored heaps are played.
         heaps: other heaps to play, instead of a split.

@@ -48,18 +48,20 @@ class Load:
         sizes: (n, 3) float64, edge lengths along x, y and z in m, at least 0.002.
         packages: (n,) int64, package number (0–12 in the paper's loads).
         walls: (n,) int64, number of the item wall, 0 at the rear.
+        ids: (n,) str, what a packing list calls the boxes; None without a list.
         contacts: which boxes touch, computed from positions and sizes.
 
     Raises:
         TypeError: a field's dtype is not numeric.
         ValueError: a field's shape or a value is wrong, a box sticks out of the
-            container, or two boxes overlap.
+            container, two boxes overlap, or an id is given twice.
     """
 
     positions: np.ndarray
     sizes: np.ndarray
     packages: np.ndarray
     walls: np.ndarray
+    ids: np.ndarray | None = None
     contacts: Contacts = field(init=False)
 
     def __post_init__(self) -> None:
@@ -78,6 +80,10 @@ class Load:
             labels[name] = checks.integer_array(name, getattr(self, name), (count,))
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
+        if self.ids is not None:
+            labels["ids"] = np.array(self.ids, dtype=str)
+            if labels["ids"].shape != (count,) or len(np.unique(labels["ids"])) < count:
+                raise ValueError(f"ids is {self.ids!r}; expected {count} different names")
         low, high = positions - sizes / 2, positions + sizes / 2
         _check_inside(low, high)
         touching = contacts(low, high)
@@ -94,11 +100,16 @@ class Load:
         return f"Load({len(self)} items in {len(np.unique(self.walls))} walls)"
 
 
-def _check_inside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> None:
-    if (low >= -tolerance).all() and (high <= task.CONTAINER + tolerance).all():
+def outside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
+    """(n,) bool, which boxes stick out of the container."""
+    return ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
+
+
+def _check_inside(low: np.ndarray, high: np.ndarray) -> None:
+    found = outside(low, high)
+    if not found.any():
         return
-    outside = ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
-    item = int(np.argmax(outside))
+    item = int(np.argmax(found))
     raise ValueError(
         f"box {item} reaches from {low[item]} to {high[item]} m; "
         f"expected it inside the container, [0 0 0] to {task.CONTAINER}"
@@ -144,13 +155,23 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
     Raises:
         ValueError: two boxes overlap.
     """
+    found, *pair = _found(low, high)
+    if pair[0] != pair[1]:
+        raise ValueError(f"boxes {min(pair)} and {max(pair)} overlap; expected disjoint boxes")
+    return Contacts(*_lists(found, len(low)))
+
+
+def overlapping(low: np.ndarray, high: np.ndarray) -> list[int]:
+    """Two boxes that overlap, in increasing order; empty if none do."""
+    _, *pair = _found(low, high)
+    return sorted(pair) if pair[0] != pair[1] else []
+
+
+def _found(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, int, int]:
+    """What ``_find`` returns."""
     groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
     left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
-    found, first, second = _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
-    if first != second:
-        pair = min(first, second), max(first, second)
-        raise ValueError(f"boxes {pair[0]} and {pair[1]} overlap; expected disjoint boxes")
-    return Contacts(*_lists(found, len(low)))
+    return _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
 
 
 @compiled

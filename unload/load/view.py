@@ -7,10 +7,11 @@ drawn from the back to the front, so that nearer ones cover farther ones.
 import base64
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
@@ -45,6 +46,10 @@ TRIANGLES = np.array(
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
 # Of groups whose names are not in COLOURS, in the order in which they are given.
 OTHER_COLOURS = ((0.58, 0.40, 0.74), (0.90, 0.62, 0.00), (0.55, 0.34, 0.16), (0.0, 0.0, 0.0))
+FIRST_PICKS = 10  # that a view of an order shows
+PICK_COLOURS = tuple(
+    map(tuple, colormaps["viridis"](np.linspace(0, 1, FIRST_PICKS))[:, :3].tolist())
+)
 PLOTLY_MIMETYPE = "application/vnd.plotly.v1+json"
 UNIT = task.CONTAINER[0] / 2.8  # m, plotly's unit of length in our views
 LABEL = (
@@ -100,6 +105,7 @@ def view(
     present: np.ndarray | None = None,
     groups: Mapping[str, np.ndarray] | None = None,
     height: int = 520,
+    order: np.ndarray | None = None,
 ) -> View:
     """A load to turn and zoom, in true proportions; pointing at a box says what it is.
 
@@ -113,12 +119,15 @@ def view(
             others; of two groups that share an item the later one wins; items in no group
             have the colour of "unseen". If None, colours mean packages.
         height: of the figure in pixels.
+        order: (k,) item numbers in the order in which they are picked, such as the column
+            ``item`` of ``unload.picking_order``: the first ten have colours from dark to light.
 
     Raises:
         TypeError: ``load`` is not a ``Load``, ``groups`` no dict, or a group does not hold
             integers.
         ValueError: ``present`` has another shape, more than four groups have names that are
-            not in ``COLOURS``, or a group holds a number that is no item.
+            not in ``COLOURS``, a group holds a number that is no item, or both ``groups`` and
+            ``order`` are given.
     """
     check_load(load)
     present = np.ones(len(load), dtype=bool) if present is None else np.asarray(present)
@@ -128,7 +137,14 @@ def view(
             f"expected ({len(load)},) bool"
         )
     height = checks.integer("height", height, 50, 5000)
-    if groups is None:
+    if order is not None:
+        if groups is not None:
+            raise ValueError("groups and order are given; expected one of them")
+        items = checks.integer_array("order", order, (None,))[:FIRST_PICKS]
+        groups = {f"pick {number}": [item] for number, item in enumerate(items.tolist(), 1)}
+        of_item, names = _grouped(present, groups, PICK_COLOURS)
+        names = {name.replace("unseen", "picked later"): names[name] for name in names}
+    elif groups is None:
         names = {f"package {p}": package_colour(p) for p in np.unique(load.packages[present])}
         numbers = np.unique(load.packages[present], return_inverse=True)[1]
         of_item = np.zeros(len(load), dtype=int)
@@ -148,17 +164,26 @@ def view(
     return View(traces, layout(height), picture=picture)
 
 
-def _grouped(present: np.ndarray, groups: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict]:
-    """The number of each item's group, (n,) int, and the colours of all groups by name."""
+def _grouped(
+    present: np.ndarray,
+    groups: Mapping[str, np.ndarray],
+    colours: Sequence[tuple[float, float, float]] = OTHER_COLOURS,
+) -> tuple[np.ndarray, dict]:
+    """The number of each item's group, (n,) int, and the colours of all groups by name.
+
+    Args:
+        present, groups: see ``view``.
+        colours: of the groups whose names are not in ``COLOURS``.
+    """
     checks.entries("groups", groups, ())
     count = len(present)
     others = [name for name in groups if name not in COLOURS]
-    if len(others) > len(OTHER_COLOURS):
+    if len(others) > len(colours):
         raise ValueError(
-            f"groups has the names {others}; expected at most {len(OTHER_COLOURS)} "
+            f"groups has the names {others}; expected at most {len(colours)} "
             f"besides {list(COLOURS)}"
         )
-    named = COLOURS | dict(zip(others, OTHER_COLOURS))
+    named = COLOURS | dict(zip(others, colours))
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
         items = np.asarray(items)

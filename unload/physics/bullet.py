@@ -133,6 +133,11 @@ class World:
             physicsClientId=self._client,
         )
 
+    @property
+    def shapes(self) -> int:
+        """How many sizes of boxes the client holds, at 4 KB each."""
+        return len(self._shapes)
+
     def clear(self) -> None:
         """Take everything out; the next bodies behave, to the bit, as in a new world."""
         pybullet.resetSimulation(physicsClientId=self._client)

@@ -8,6 +8,8 @@ from unload.physics.base import Physics
 from unload.physics.bullet import World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
+MOST_SHAPES = 10_000  # in a world; loads of ever new sizes would fill the memory
+
 
 class LocalPhysics(Physics):
     """Simulates the situation of the chosen box, on the load's exact grid.
@@ -29,6 +31,8 @@ class LocalPhysics(Physics):
         self._check_open()
         if self._world is None:
             self._world = World()
+        elif self._world.shapes > MOST_SHAPES:
+            self._world.clear()
         return lift(self._world, situation)
 
     def _reset(self, load: Load) -> None:

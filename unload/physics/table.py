@@ -2,7 +2,8 @@
 
 A lift depends on its situation alone, so a table of lifts says how far the box of a situation
 moved. The table is only as good as the physics that filled it: a file of another physics is
-refused.
+refused. Two rules answer without it: a box with nothing on top is free, one with three or more
+others on top is held down.
 """
 
 import json
@@ -12,7 +13,8 @@ from threading import Lock
 
 import numpy as np
 
-from unload.physics.bullet import SETTINGS
+from unload import task
+from unload.physics.bullet import DAMPING, SETTINGS, TIME_STEP
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
 from unload.support import checks, files
@@ -23,6 +25,23 @@ LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
 FEWEST_SLOTS = 1024
 FARTHEST = np.iinfo(np.int32).max / 1e6  # m
+
+
+def _free_lift() -> float:
+    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes."""
+    velocity = distance = 0.0
+    for _ in range(round(task.LIFT_TIME / TIME_STEP)):
+        velocity *= (1 - DAMPING) ** TIME_STEP
+        velocity += (task.PICK_FORCE / task.MASS - task.GRAVITY) * TIME_STEP
+        distance += velocity * TIME_STEP
+    return round(distance, 6)
+
+
+# How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
+# whatever the box's size and neighbours: a load's boxes overlap by a micrometre at most, and
+# physics makes them a millimetre narrower. It would not hold for neighbours that overlap by more
+# than this millimetre: they would rub, and hold the box.
+FREE_LIFT = _free_lift()
 
 
 class LiftTable:
@@ -121,13 +140,36 @@ class LiftTable:
         table._hold(arrays["digests"], arrays["micrometres"])
         return table
 
+    def exchange(self, path: str | Path) -> None:
+        """Take in the lifts of a file, and write those that it lacks; it may be missing.
+
+        Any number of processes may share one file: each waits for its turn, which it takes by
+        the folder ``<path>.lock``.
+
+        Raises:
+            TypeError: ``path`` is no path.
+            ValueError: as ``load``; nothing is changed then.
+            OSError: the file cannot be written.
+        """
+        if not isinstance(path, (str, Path)):
+            raise TypeError(f"path is {path!r}; expected the path of a lift table")
+        with files.locked(f"{path}.lock", wait=True):
+            stored = LiftTable.load(path) if Path(path).exists() else LiftTable()
+            with self._adding:
+                digests, micrometres = map(np.concatenate, zip(self.entries(), stored.entries()))
+                digests, first = np.unique(digests, return_index=True)
+                if len(digests) > self._count:
+                    self._hold(digests, micrometres[first])
+            if len(digests) > len(stored):
+                self.save(path)
+
 
 class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
-    A box with three or more others on it is held down, without a simulation. Such
-    situations hardly ever repeat, and of those in ``data/lift_agreement.csv`` PyBullet
-    lifts none by more than 4 cm.
+    A box with nothing on top moves by ``FREE_LIFT``, as in a simulation. One with three or more
+    others on it is held down, without a simulation: such situations hardly ever repeat, and of
+    those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
 
     Args:
         table: filled as situations are met. Share one among environments to share their
@@ -150,6 +192,8 @@ class TablePhysics(LocalPhysics):
             RuntimeError: the physics is closed.
         """
         self._check_open()
+        if situation.on_top == 0:
+            return FREE_LIFT
         if situation.on_top >= HELD_DOWN:
             return 0.0
         distance = self.table.find(situation)

@@ -158,14 +158,19 @@ def _check_equal(path: str | Path, wanted: object, found: str) -> None:
 
 
 @contextmanager
-def locked(folder: str | Path) -> Iterator[None]:
+def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     """Keep all other processes that ask for it out of ``folder``, which is made if missing.
 
     ``folder/lock`` names its owner, or the last one. The operating system releases the lock of a
     process that dies, so that a killed process stops nobody.
 
+    Args:
+        folder: to be locked.
+        wait: until whoever holds the lock gives it back.
+
     Raises:
-        RuntimeError: another process, or another block of this one, holds the lock.
+        RuntimeError: another process, or another block of this one, holds the lock; not if
+            ``wait``.
         OSError: ``folder/lock`` is a link to a file elsewhere, which would be overwritten; the
             folder's file system has no locks, or its disk is full.
     """
@@ -176,7 +181,7 @@ def locked(folder: str | Path) -> Iterator[None]:
         if os.fstat(file.fileno()).st_nlink > 1:
             raise OSError(errno.EMLINK, "has several names; expected a file of its own", file.name)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         except BlockingIOError as error:
             file.seek(0)
             owner = file.read().decode().strip() or "another process"

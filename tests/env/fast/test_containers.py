@@ -10,7 +10,7 @@ from unload import Load, stack_load
 from unload.env.fast import containers
 from unload.load.boxes import CONTACT_TOLERANCE
 from unload.physics.situation import Surroundings
-from unload.physics.table import EMPTY, HELD_DOWN, LiftTable, digest_of
+from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, LiftTable, digest_of
 
 
 def filled(load: Load, present: np.ndarray) -> containers.Containers:
@@ -25,17 +25,17 @@ def filled(load: Load, present: np.ndarray) -> containers.Containers:
 
 
 def assert_digests_agree(load: Load, present: np.ndarray) -> int:
-    """Of all present items; returns how many of them are held down."""
+    """Of all present items that are not held down; returns how many of them are."""
     around, state = Surroundings(load, present), filled(load, present)
     members = np.empty(state.present.shape[1], np.int32)
     held_down = 0
     for item in np.flatnonzero(present).tolist():
-        digest = containers.situation_digest(state, 1, item, members)
-        situation = around.situation(item)
+        dynamic, situation = containers.movers(state, 1, item, members), around.situation(item)
+        assert dynamic == min(situation.dynamic, HELD_DOWN + 1)
         if situation.on_top >= HELD_DOWN:
-            assert digest == EMPTY
             held_down += 1
         else:
+            digest = containers.situation_digest(state, 1, members, dynamic)
             assert digest == digest_of(np.frombuffer(situation.key, np.int32)) != EMPTY
     return held_down
 
@@ -64,13 +64,15 @@ def test_digests_of_situations_in_loads_of_the_paper(rng, share):
 
 
 def test_distances_are_looked_up_or_unknown(boxes):
-    load = boxes((1.0, 0.2), (1.4, 0.2), (1.8, 0.2))
-    everywhere, table = np.ones(3, bool), LiftTable()
+    heights = (0.2, 0.6, 1.0, 1.4)
+    load = boxes(*((1.2, height) for height in heights))
+    everywhere, table = np.ones(4, bool), LiftTable()
     state = filled(load, everywhere)
     state.visible[:], state.masks[:] = -1, 1
-    state.visible[1, :3] = range(3)
-    table.add(Surroundings(load, everywhere).situation(0), 0.25)
-    for row, item, distance in ((0, 0, 0.25), (1, 1, containers.UNKNOWN), (3, -1, 0)):
+    state.visible[1, :4] = range(4)
+    table.add(Surroundings(load, everywhere).situation(2), 0.25)
+    distances = (0, containers.UNKNOWN, 0.25, FREE_LIFT)  # from the lowest box, under three others
+    for row, item, distance in (*zip(range(4), range(4), distances), (4, -1, 0)):
         items, distances = containers.look_up(state, np.array([5, row]), *table.slots)
         assert items.tolist() == [-1, item] and distances.tolist() == [0, distance]
     state.masks[1, 1], state.failed[1, 1] = 0, 0.1  # failed before, by so much

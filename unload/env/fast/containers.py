@@ -14,7 +14,7 @@ from unload import task
 from unload.env.fast.ranking import features, rank, remove, replace
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
 from unload.physics.situation import RESOLUTION
-from unload.physics.table import EMPTY, HELD_DOWN, absorb, slot_of
+from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, absorb, slot_of
 from unload.support.compiled import compiled
 
 CONTAINER_WIDTH = float(task.CONTAINER[1])
@@ -122,10 +122,11 @@ def look_up(containers, actions, digests, micrometres):
         if containers.masks[env, row] == 0:
             distances[env] = containers.failed[env, row]
             continue
-        digest = situation_digest(containers, env, items[env], members)
-        if digest == EMPTY:
-            distances[env] = 0
+        dynamic = movers(containers, env, items[env], members)
+        if dynamic == 1 or dynamic > HELD_DOWN:
+            distances[env] = FREE_LIFT if dynamic == 1 else 0.0
             continue
+        digest = situation_digest(containers, env, members, dynamic)
         slot = slot_of(digests, digest)
         known = digests[slot] != EMPTY
         distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
@@ -169,25 +170,38 @@ def pick(containers, actions, distances, equalize, average, tolerance):
 
 
 @compiled
-def situation_digest(containers, env, item, members):
-    """The digest of ``Surroundings.situation(item)``; ``EMPTY`` if it is held down.
+def movers(containers, env, item, members):
+    """How many boxes a lift moves: the item and all on top of it, at most ``HELD_DOWN + 1``.
 
     Args:
         containers, env, item: which item of which container.
-        members: (capacity,) int32, overwritten.
+        members: (capacity,) int32, overwritten; these boxes come first.
     """
     starts, links = containers.starts[env], containers.links[env]
-    present, geometry = containers.present[env], containers.geometry[env]
     members[0], dynamic, done = item, 1, 0
     while done < dynamic:
         box = members[done]
         done += 1
         for link in range(starts[ABOVE, box], starts[ABOVE, box + 1]):
-            if present[links[link]] and not _holds(members, dynamic, links[link]):
-                if dynamic == HELD_DOWN:
-                    return EMPTY
+            if containers.present[env, links[link]] and not _holds(members, dynamic, links[link]):
                 members[dynamic] = links[link]
                 dynamic += 1
+                if dynamic > HELD_DOWN:
+                    return dynamic
+    return dynamic
+
+
+@compiled
+def situation_digest(containers, env, members, dynamic):
+    """The digest of ``Surroundings.situation``.
+
+    Args:
+        containers, env: which container.
+        members, dynamic: (capacity,) int32, which begins with all the boxes that ``movers``
+            found, and their number; the rest is overwritten.
+    """
+    starts, links = containers.starts[env], containers.links[env]
+    present, geometry, item = containers.present[env], containers.geometry[env], members[0]
     members[1:dynamic].sort()
     count = dynamic
     for mover in range(dynamic):

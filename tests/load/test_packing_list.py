@@ -1,0 +1,94 @@
+"""Packing lists: what they may hold, and what is refused by row and id."""
+
+import numpy as np
+import pytest
+
+from unload import read_load, stack_load
+from unload.load.boxes import SMALLEST_EDGE
+
+CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
+
+
+@pytest.fixture
+def written(tmp_path):
+    """``written(lines, columns)``: the path of a list of these lines."""
+
+    def write(*lines: str, columns: str = f"id,{CORNERS}") -> str:
+        (tmp_path / "boxes.csv").write_text("\n".join([columns, *lines, ""]), encoding="utf-8")
+        return tmp_path / "boxes.csv"
+
+    return write
+
+
+def test_the_example_is_a_load_of_three_walls():
+    load = read_load()
+    assert len(load) == 136 and len(np.unique(load.walls)) == 3
+    assert len(np.unique(load.packages)) == len(np.unique(load.sizes, axis=0))
+    assert load.ids[0] == "M-046" and load.positions[0] == pytest.approx([6.1, 0.15, 0.15])
+
+
+def test_centres_and_corners_are_the_same_boxes(written):
+    corners = read_load(written("a,6,0.1,0,0.5,0.4,0.3", "b,6,0.1,0.3,0.5,0.4,0.2"))
+    columns = "note, size_z, id, x, y, z, size_x, size_y"
+    lines = "heavy, 0.3, a, 6.25, 0.3, 0.15, 0.5, 0.4", ", 0.2, b, 6.25, 0.3, 0.4, 0.5, 0.4"
+    centres = read_load(written(*lines, columns=columns))
+    for name in ("positions", "sizes", "packages", "walls"):
+        assert getattr(centres, name) == pytest.approx(getattr(corners, name))
+    assert corners.ids.tolist() == centres.ids.tolist() == ["a", "b"]
+
+
+def test_without_ids_boxes_are_called_by_their_rows(written):
+    assert read_load(written("0,0,0,1,1,1", "1,0,0,1,1,1", columns=CORNERS)).ids.tolist() == [
+        "1", "2"
+    ]  # fmt: skip
+
+
+def test_ids_stay_as_they_are_written(written):
+    ids = "007", "NA", "7"
+    load = read_load(written(*(f"{name},{row},0,0,1,1,1" for row, name in enumerate(ids))))
+    assert load.ids.tolist() == list(ids)
+
+
+def test_a_load_that_is_written_is_read_again(written, rng):
+    load = stack_load(rng, walls=4)
+    columns = "x,y,z,size_x,size_y,size_z"
+    rows = np.hstack([load.positions, load.sizes]).tolist()
+    read = read_load(written(*(",".join(map(repr, row)) for row in rows), columns=columns))
+    assert np.array_equal(read.positions, load.positions)
+    assert np.array_equal(read.sizes, load.sizes)
+    assert np.array_equal(read.walls, load.walls)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["a,0,0,0,1,1,1", "b,0,0.5,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'b'\) overlap"),
+        (["a,0,0,0,1,1,1", "b,0,0,1.001,1,1,1"], r": row 2 \(id 'b'\) float; expected"),
+        (["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"], r": row 2 \(id 'b'\) stick out of the container"),
+        (["a,0,0,0,1,1,1", "b,1,0,-0.1,1,1,1"], r": row 2 \(id 'b'\) stick out"),
+        (["a,0,0,0,1,1,1", "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\) share an id"),
+        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\) hold no number"),
+        (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\) hold no number"),
+        (["a,0,0,0,1,1,inf"], r": row 1 \(id 'a'\) hold no number"),
+        ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r": row 1 \(id 'a'\) are too small"),
+        (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\) are too small"),
+        ([f"{n},0,0,{n},1,1,1" for n in range(2, 9)], "id '6'.* and 2 more stick out"),
+        ([], "has 0 rows and the columns id, x_min, .*; expected boxes with x, y, z or"),
+        (["a,0,0,0,1,1,1,5,5"], "has more cells in a row than names"),
+    ],
+)
+def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, message):
+    with pytest.raises(ValueError, match=message):
+        read_load(written(*lines))
+
+
+def test_files_that_are_no_lists_are_refused(written, tmp_path):
+    with pytest.raises(ValueError, match="has 1 rows and the columns id, x; expected"):
+        read_load(written("a,1", columns="id,x"))
+    (tmp_path / "picture.csv").write_bytes(b"\x89PNG\xff\xfe")
+    (tmp_path / "empty.csv").write_bytes(b"")
+    for name in ("picture.csv", "empty.csv"):
+        with pytest.raises(ValueError, match=f"{name} is not a readable CSV file"):
+            read_load(tmp_path / name)
+    with pytest.raises(FileNotFoundError):
+        read_load(tmp_path / "missing.csv")

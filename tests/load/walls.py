@@ -1,0 +1,48 @@
+"""Random loads that are not the paper's: walls of layers or of columns, cut at random."""
+
+import numpy as np
+
+from unload import task
+from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, Load
+
+# Drawn for each box: depth of its wall, width, height, in m.
+CONTINUOUS = ((0.3, 0.9), (0.1, 0.6), (0.08, 0.45))
+FEW_SIZES = ((0.5,), (0.2, 0.3, 0.4, 0.5), (0.2, 0.3))
+KINDS = ("continuous sizes", "narrow gaps", "few sizes")
+
+
+def own_load(rng: np.random.Generator, kind: str) -> Load:
+    """A full container of one of ``KINDS``.
+
+    Narrow gaps are 0.3 µm to 3 mm at either side, and up to the tolerance of a contact above;
+    some are overlaps that a load allows.
+    """
+    low, high, walls = [], [], []
+    for wall, (x0, x1) in enumerate(_cut(rng, kind, 0)):
+        layers = rng.random() < 0.7
+        for first in _cut(rng, kind, 2 if layers else 1):
+            for second in _cut(rng, kind, 1 if layers else 2):  # anew in each layer
+                (y0, y1), (z0, z1) = (second, first) if layers else (first, second)
+                low.append((x0, y0, z0))
+                high.append((x1, y1, z1))
+                walls.append(wall)
+    low, high = np.array(low), np.array(high)
+    if kind == "narrow gaps":
+        gaps = 10 ** rng.uniform(-6.5, -2.5, (2, len(low))) - 0.4 * OVERLAP
+        low[:, 1] = np.maximum(low[:, 1] + gaps[0], 0)
+        high[:, 1] = np.minimum(high[:, 1] - gaps[1], task.CONTAINER[1])
+        high[:, 2] -= rng.uniform(-0.4 * OVERLAP, 0.9 * CONTACT_TOLERANCE, len(low))
+    return Load((low + high) / 2, high - low, np.zeros(len(low), int), np.array(walls))
+
+
+def _cut(rng: np.random.Generator, kind: str, axis: int) -> list[tuple[float, float]]:
+    """Neighbouring intervals that fit into the container along an axis, from 0."""
+    ends = [0.0]
+    while True:
+        if kind == "few sizes":
+            step = rng.choice(FEW_SIZES[axis])
+        else:
+            step = rng.uniform(*CONTINUOUS[axis])
+        if ends[-1] + step > task.CONTAINER[axis]:
+            return list(zip(ends, ends[1:]))
+        ends.append(ends[-1] + step)

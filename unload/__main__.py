@@ -1,0 +1,43 @@
+"""The order of picks for a packing list, as CSV."""
+
+import argparse
+import sys
+
+from unload.agent.order import picking_order
+from unload.load.packing_list import EXAMPLE, read_load
+
+DESCRIPTION = """\
+Print in which order the boxes of a packing list are picked, as CSV: pick, id, item,
+distance (m) and unloaded (False for a pick that fails). unload.read_load describes the
+list, unload.picking_order the order.
+"""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line.
+
+    Args:
+        arguments: of the command; those of the process if None.
+    """
+    parser = argparse.ArgumentParser(
+        "python -m unload",
+        description=DESCRIPTION,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("list", nargs="?", default=EXAMPLE, help="CSV file; an example if missing")
+    parser.add_argument("--policy", default="recommended", help="name, or a file of weights")
+    parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
+    options = parser.parse_args(arguments)
+    try:
+        load = read_load(options.list)
+        order = picking_order(load, options.policy)
+        order.to_csv(options.output, index=False, float_format="%.6f")
+    except (OSError, ValueError) as error:
+        parser.exit(1, f"{error}\n")
+    left = len(load) - order["unloaded"].sum()
+    if left:
+        parser.exit(1, f"{left} boxes are left, of which none that is visible can be lifted\n")
+
+
+if __name__ == "__main__":
+    main()

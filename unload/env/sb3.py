@@ -1,0 +1,96 @@
+"""Many containers as Stable-Baselines3 takes them; needs ``pip install unload[sb3]``.
+
+Five lines train a policy that sees the mask, to an MSR of 100 % within seconds:
+
+    from sb3_contrib import MaskablePPO
+    from unload.env.sb3 import ContainerVecEnv
+
+    envs = ContainerVecEnv(num_envs=64)
+    model = MaskablePPO("MlpPolicy", envs, n_steps=16, batch_size=256, gamma=0, learning_rate=1e-3)
+    model.learn(30_000)
+"""
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.vec_env import VecEnv
+
+from unload import task
+from unload.env.vector import ContainerVectorEnv
+
+
+class VectorEnvAdapter(VecEnv):
+    """A Gymnasium ``VectorEnv`` that resets in the same step, as Stable-Baselines3's ``VecEnv``.
+
+    Stable-Baselines3 takes environments of its own kind only.
+
+    Args:
+        envs: the environments.
+
+    Raises:
+        ValueError: they reset in another way.
+    """
+
+    def __init__(self, envs: gymnasium.vector.VectorEnv) -> None:
+        mode = envs.metadata.get("autoreset_mode")
+        if mode != AutoresetMode.SAME_STEP:
+            raise ValueError(f"envs resets with {mode}; expected {AutoresetMode.SAME_STEP}")
+        self.envs = envs
+        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    def reset(self) -> np.ndarray:
+        """Start all episodes, with what ``seed`` and ``set_options`` were given before."""
+        observations, _ = self.envs.reset(seed=self._seeds[0], options=self._options[0] or None)
+        self._reset_seeds()
+        self._reset_options()
+        return observations
+
+    def step_async(self, actions: np.ndarray) -> None:
+        self._actions = actions
+
+    def step_wait(self):
+        """(observations, rewards, dones, one dict per environment)."""
+        observations, rewards, terminations, truncations, infos = self.envs.step(self._actions)
+        dones = terminations | truncations
+        each: list[dict] = [{} for _ in range(self.num_envs)]
+        for env in np.flatnonzero(dones):
+            each[env] = {
+                "terminal_observation": infos["final_obs"][env],
+                "TimeLimit.truncated": bool(truncations[env] and not terminations[env]),
+            }
+        return observations, rewards.astype(np.float32), dones, each
+
+    def close(self) -> None:
+        self.envs.close()
+
+    def get_images(self) -> list[np.ndarray]:
+        """The picture of each environment; none without a render mode."""
+        return list(self.envs.render() or ())
+
+    def get_attr(self, attr_name: str, indices=None) -> list:
+        """What all environments have in common."""
+        return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]
+
+    def env_method(self, method_name: str, *args, indices=None, **kwargs) -> list:
+        """The rows of ``action_masks``, which sb3-contrib asks for; no other method."""
+        if method_name != "action_masks":
+            raise NotImplementedError(f"{method_name} is not of each environment; ask envs itself")
+        return list(self.envs.action_masks()[list(self._get_indices(indices))])
+
+    def env_is_wrapped(self, wrapper_class, indices=None) -> list[bool]:
+        return [False for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value, indices=None) -> None:
+        raise NotImplementedError("the environments are one; make new ones instead")
+
+
+class ContainerVecEnv(VectorEnvAdapter):
+    """``ContainerVectorEnv`` for Stable-Baselines3.
+
+    Args:
+        num_envs: number of containers.
+        **settings: of ``ContainerVectorEnv``.
+    """
+
+    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
+        super().__init__(ContainerVectorEnv(num_envs, **settings))
