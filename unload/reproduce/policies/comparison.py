@@ -7,7 +7,6 @@ blurred positions, and with boxes of other sizes.
 """
 
 from functools import partial
-from hashlib import blake2b
 from pathlib import Path
 
 import pandas as pd
@@ -101,10 +100,7 @@ def find_policy(name: str, folder: str | Path = files.DATA) -> Policy:
 
 def digests(folder: str | Path = files.DATA) -> dict[str, str]:
     """The digest of each learned policy's file."""
-    return {
-        name: blake2b(_file(name, folder).read_bytes(), digest_size=16).hexdigest()
-        for name in LEARNED
-    }
+    return {name: files.digest(_file(name, folder)) for name in LEARNED}
 
 
 def _file(name: str, folder: str | Path) -> Path:
