@@ -128,6 +128,8 @@ def test_only_the_top_imports_the_top():
     assert not users["reproduce"]
     assert users.get("heap", set()) <= {"reproduce"}
     assert not users["play"]
+    of_reproduce = [path for path in MODULES.values() if "reproduce" in path.parts]
+    assert not any(name.startswith("unload.heap") for path in of_reproduce for name in needs(path))
     imported_first = {room(module) for module in needs(PACKAGE / "__init__.py")}
     assert not imported_first & {"reproduce", "heap", "play"}
 

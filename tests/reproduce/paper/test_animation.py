@@ -38,16 +38,6 @@ def test_episode_ends_when_the_container_is_empty_or_the_agent_stuck(episodes):
     assert np.array_equal(stuck.load.positions, empty.load.positions)
 
 
-def test_first_deadlock_is_the_first_seed_that_ends_with_a_failure(episodes, monkeypatch):
-    def record(policy, seed):
-        return episodes["stuck" if seed in (2, 7, 8) else "empty"]
-
-    monkeypatch.setattr(animation, "record_episode", record)
-    assert animation.first_deadlock(lowest, 3) == 7
-    with pytest.raises(ValueError, match="empties the containers of seeds 3 to 6"):
-        animation.first_deadlock(lowest, 3, most=4)
-
-
 def test_frames_begin_slowly_and_show_the_end_twice():
     counts = animation.picks_of_frames(900)
     assert counts[:11] == list(range(11)) and counts[-2:] == [900, 900]

@@ -69,18 +69,6 @@ def record_episode(policy: Policy, seed: int, **env_kwargs) -> Episode:
     return Episode(load, positions, np.array(items), np.array(unloaded))
 
 
-def first_deadlock(policy: Policy, seed: int, most: int = 100, **env_kwargs) -> int:
-    """Return the first seed from ``seed`` on with which the agent gets stuck.
-
-    Raises:
-        ValueError: it empties all of the ``most`` containers that are tried.
-    """
-    for tried in range(seed, seed + most):
-        if not record_episode(policy, tried, **env_kwargs).unloaded[-1]:
-            return tried
-    raise ValueError(f"the policy empties the containers of seeds {seed} to {seed + most - 1}")
-
-
 def save_unloading(episodes: Mapping[str, Episode], path: str | Path) -> list[Image.Image]:
     """Write a GIF of agents that pick at the same pace; the same bytes for the same episodes.
 
