@@ -188,7 +188,8 @@ def situation_digest(containers, env, item, members):
                     return EMPTY
                 members[dynamic] = links[link]
                 dynamic += 1
-    members[1:dynamic].sort()
+    for end in range(1, dynamic):  # sorts them; numba's sort takes a second more to compile
+        _insert(members, 1, end, members[end])
     count = dynamic
     for mover in range(dynamic):
         box = members[mover]
