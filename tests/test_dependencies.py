@@ -86,8 +86,9 @@ def test_what_is_installed_is_what_is_pinned():
 
 
 def test_what_is_imported_is_named():
-    optional = set(PROJECT["optional-dependencies"]["sb3"])  # imported where it is asked for
-    assert distributions("unload") - optional <= set(PROJECT["dependencies"])
+    extras = PROJECT["optional-dependencies"]
+    optional = {*extras["pybullet"], *extras["sb3"]} - {"sb3-contrib"}
+    assert distributions("unload") == set(PROJECT["dependencies"]) | optional
     others = distributions("tests") | distributions("benchmarks") | distributions("notebooks")
     others -= on_demand()
     assert others <= set(pinned())

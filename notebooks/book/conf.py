@@ -1,4 +1,4 @@
-"""Settings of Sphinx for ``make book``: the README, the notebooks and their solutions as one site.
+"""Settings of Sphinx for ``make book``: README, notebooks, solutions and docstrings as one site.
 
 The source folder is the root of the repository, so that a link between the README, notebooks and
 figures leads to the same place in the site as in the files. Nothing is executed: the site shows
@@ -13,7 +13,7 @@ and search, which load MathJax from elsewhere and do not draw plotly's views.
 
 from notebooks.book import pages
 
-extensions = ["myst_nb", "sphinx.ext.mathjax"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
 project = html_title = "unload"
 author = "The unload authors"
 
@@ -21,6 +21,12 @@ author = "The unload authors"
 root_doc = "README"
 include_patterns = ["*.md", "notebooks/**.md", "notebooks/**.ipynb", "data/**.md"]
 exclude_patterns = [".*", "**/.*", "benchmarks", "build", "runs", "tests", "unload"]
+
+autodoc_default_options = {"members": True, "member-order": "bysource"}
+autodoc_inherit_docstrings = False
+autodoc_typehints_format = "short"
+napoleon_use_ivar = True
+napoleon_use_rtype = False
 
 nb_execution_mode = "off"
 nb_custom_formats = {".ipynb": "notebooks.book.pages.read_notebook"}
@@ -43,6 +49,7 @@ mathjax_path = "mathjax/tex-chtml.js"
 
 def setup(app):
     """Connect the functions of pages.py; Sphinx calls this."""
+    app.connect("autodoc-process-docstring", pages.mark_headings)
     app.connect("source-read", pages.add_contents)
     app.connect("doctree-read", pages.resolve_folders)
     app.connect("html-page-context", pages.add_plotly)

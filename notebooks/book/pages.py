@@ -39,14 +39,27 @@ def read_notebook(text: str) -> nbformat.NotebookNode:
     return notebook
 
 
+def mark_headings(app, what: str, name: str, thing, options, lines: list[str]) -> None:
+    """Show the headings of an environment's docstring, which are Markdown as Gymnasium's are."""
+    for number, line in enumerate(lines):
+        if line.startswith("## "):
+            lines[number] = f"**{line.removeprefix('## ')}**\n"
+
+
 def add_contents(app, name: str, source: list[str]) -> None:
     """Append the table of contents to the first page; the theme shows it at the side of each."""
     if name != app.config.root_doc:
         return
-    parts = {"Notebooks": [], "Solutions": [], "More": []}
-    for page in sorted(app.env.found_docs - {name}):
+    parts = {"Notebooks": [], "Solutions": [], "Reference": [], "More": []}
+    captions = {
+        "notebooks": "Notebooks",
+        "notebooks/solutions": "Solutions",
+        "notebooks/book/reference": "Reference",
+    }
+    for page in sorted(
+        app.env.found_docs - {name}, key=lambda page: (not page.endswith("index"), page)
+    ):
         folder = page.rpartition("/")[0]
-        captions = {"notebooks": "Notebooks", "notebooks/solutions": "Solutions"}
         parts[captions.get(folder, "More")].append(f"/{page}")
     for caption, pages in parts.items():
         lines = ["```{toctree}", f":caption: {caption}", ":hidden:", "", *pages, "```"]

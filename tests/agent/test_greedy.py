@@ -7,10 +7,11 @@ from safetensors.torch import save_file
 
 from tests.agent.networks import HeightNetwork, peq, weights
 from unload import Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
-from unload.agent.greedy import greedy_actions
+from unload.agent.greedy import content_of, greedy_actions
 from unload.agent.learner import highest_values
 from unload.env.observation import PADDING
 from unload.network.variants import NETWORKS
+from unload.support.provenance import VERSION
 
 
 @pytest.fixture
@@ -183,3 +184,38 @@ def test_weights_of_another_dtype_are_refused(tmp_path):
     with pytest.raises(TypeError, match="extractor.weight of dtype torch.float64; expected"):
         save_policy(policy, path)
     assert not path.exists()
+
+
+def test_a_card_comes_back_and_is_shown(tmp_path):
+    path = tmp_path / "policy.safetensors"
+    save_policy(Greedy(peq(), True, card={"loads": "my own", "msr": {"these": 0.5}}), path)
+    loaded = load_policy(path)
+    assert loaded.card == {"version": VERSION, "loads": "my own", "msr": {"these": 0.5}}
+    assert "\n  loads: my own\n  msr: {'these': 0.5}" in repr(loaded)
+    save_policy(loaded, tmp_path / "again.safetensors")
+    assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
+    with pytest.raises(TypeError, match="card is 'good'; expected a dict"):
+        Greedy(peq(), True, card="good")
+
+
+def test_a_file_from_before_there_were_cards_says_so(tmp_path):
+    path = tmp_path / "old.safetensors"
+    path.write_bytes(content_of(Greedy(peq(), True), card=False))
+    assert load_policy(path).card is None
+    assert repr(load_policy(path)) == "Greedy(PEQNetwork, equalize=True, ties='noise'), no card"
+
+
+def test_a_file_without_its_digest_is_refused(tmp_path):
+    path = tmp_path / "policy.safetensors"
+    settings = {"network": "PEQNetwork", "n_features": 8, "equalize": True, "ties": "noise"}
+    save_file(peq().state_dict(), path, metadata={"policy": json.dumps(settings)})
+    with pytest.raises(ValueError, match="policy.safetensors does not hold a policy.*'digest'"):
+        load_policy(path)
+
+
+def test_policies_that_ship_have_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert not load_policy("recommended").equalize and load_policy("paper").equalize
+    listed = "path is 'recomended'; expected .* 'paper', .*'recommended'"
+    with pytest.raises(FileNotFoundError, match=listed):
+        load_policy("recomended")

@@ -16,10 +16,8 @@ from unload.physics.local import LocalPhysics
 from unload.support import files
 from unload.task import LIFT_THRESHOLD
 
-RECOMMENDED = str(files.DATA / "policies" / "recommended.safetensors")
 
-
-@pytest.mark.parametrize("policy", [RECOMMENDED, "random", policies.highest])
+@pytest.mark.parametrize("policy", ["recommended", "random", policies.highest])
 def test_every_pick_is_what_pybullet_says(policy):
     load = read_load()
     order = picking_order(load, policy)

@@ -20,7 +20,6 @@ from unload.network.peq import PEQNetwork
 from unload.physics.situation import Surroundings
 from unload.physics.table import TablePhysics, shared_table
 from unload.play import page
-from unload.support import files
 
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed")
@@ -121,7 +120,7 @@ def test_scores_are_those_of_pytorch(name, rng):
     if name is None:
         network = PEQNetwork(16, torch.Generator().manual_seed(0))
     else:
-        network = load_policy(files.DATA / "policies" / f"{name}.safetensors").network
+        network = load_policy(name).network
     seen = observations(rng, 4)
     got = run_js(
         """

@@ -11,9 +11,7 @@ from unload.reproduce.variants.grids import GRIDS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
-NOT_TRAINED = {
-    "benchmarks", "heap", "heaps", "lift_agreement", "lifts", "obs_hist_equal", "policies"
-}  # fmt: skip
+NOT_TRAINED = {"benchmarks", "heap", "lift_agreement", "obs_hist_equal", "policies"}
 
 
 def networks_of(name: str) -> set[str]:

@@ -16,6 +16,9 @@ from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
 from unload.network.variants import NETWORKS
 from unload.support import checks, files
+from unload.support.provenance import VERSION
+
+POLICIES = files.SHIPPED / "policies"
 
 
 def check_network(network: object) -> torch.nn.Module:
@@ -63,16 +66,35 @@ class Greedy:
         network: the trained network.
         equalize: whether the network expects equalized observations.
         ties: see ``unload.equalize``.
+        card: what is known of the policy, as JSON can hold it, such as the ``configuration``
+            that it was trained with, the ``loads``, and its ``msr``; None if nothing is.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
 
-    def __init__(self, network: torch.nn.Module, equalize: bool, ties: str = "noise") -> None:
+    def __init__(
+        self,
+        network: torch.nn.Module,
+        equalize: bool,
+        ties: str = "noise",
+        card: dict | None = None,
+    ) -> None:
         self.network = check_network(network).eval()
         self.equalize = checks.boolean("equalize", equalize)
         checks.one_of("ties", ties, TIES)
         self.ties = ties
+        if card is not None:
+            checks.entries("card", card, ())
+        self.card = card
+
+    def __repr__(self) -> str:
+        """The settings, and the card with a line per entry."""
+        kind = type(self.network).__name__
+        head = f"Greedy({kind}, equalize={self.equalize}, ties={self.ties!r})"
+        if self.card is None:
+            return f"{head}, no card"
+        return "\n".join([head, *(f"  {name}: {value}" for name, value in self.card.items())])
 
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
@@ -104,40 +126,55 @@ class Greedy:
 def save_policy(policy: Greedy, path: str | Path) -> None:
     """Write a policy's weights and how to use them, as safetensors, in one atomic step.
 
-    The file holds a digest of both, so that a damaged one is not read.
+    So is its card, to which the version of unload is added. The file holds a digest of all
+    this, so that a damaged one is not read.
 
     Raises:
         TypeError: ``policy`` is no ``Greedy`` of one of ``unload.network.variants.NETWORKS``,
             or its weights are not float32.
         OSError: the file cannot be written.
     """
+    content = content_of(policy)
+    files.write_atomically(path, lambda file: file.write(content))
+
+
+def content_of(policy: Greedy, card: bool = True) -> bytes:
+    """The file of a policy; without its card, as it was written before there were cards.
+
+    Raises:
+        TypeError: see ``save_policy``.
+    """
     if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
         known = ", ".join(kind.__name__ for kind in NETWORKS.values())
         raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
     tensors = policy.network.state_dict()
     _check_dtypes("policy", tensors)
-    settings = {
-        "network": type(policy.network).__name__,
-        "n_features": policy.network.n_features,
-        "equalize": policy.equalize,
-        "ties": policy.ties,
-    }
-    settings["digest"] = _digest(settings, tensors)
+    settings = settings_of(policy)
+    if card:
+        settings["card"] = {"version": VERSION} | (policy.card or {})
+    settings["digest"] = digest_of(settings, tensors)
     # One entry only: safetensors writes several in random order.
-    content = save(tensors, metadata={"policy": json.dumps(settings)})
-    files.write_atomically(path, lambda file: file.write(content))
+    return save(tensors, metadata={"policy": json.dumps(settings)})
 
 
 def load_policy(path: str | Path) -> Greedy:
-    """Read a policy that ``save_policy`` wrote.
+    """Read a policy that ``save_policy`` wrote; printed, it shows its card.
+
+    Args:
+        path: of the file, or the name of a policy that comes with the package, such as
+            ``"recommended"``.
 
     Raises:
-        FileNotFoundError: there is no such file.
+        FileNotFoundError: there is no such file; the message lists the known names.
         ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
     """
-    path = Path(path)
+    known = {file.stem: file for file in sorted(POLICIES.glob("*.safetensors"))}
+    path = known.get(str(path), Path(path))
     if not path.is_file():
-        raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
+        raise FileNotFoundError(
+            f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "
+            + ", ".join(map(repr, known))
+        )
     try:
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}
@@ -146,17 +183,36 @@ def load_policy(path: str | Path) -> Greedy:
         raise ValueError(f"{path} is not a safetensors file: {error}") from error
     try:
         settings = json.loads(metadata["policy"])
-        if settings.pop("digest") != _digest(settings, tensors):
+        if settings.pop("digest") != digest_of(settings, tensors):
             raise ValueError("its digest is not that of its content; it is damaged")
-        kinds = {kind.__name__: kind for kind in NETWORKS.values()}
-        network = kinds[settings["network"]](settings["n_features"])
-        _check_dtypes("it", tensors)
-        network.load_state_dict(tensors)
-        if not all(tensor.isfinite().all() for tensor in tensors.values()):
-            raise ValueError("a weight is not finite")
-        return Greedy(network, settings["equalize"], settings["ties"])
+        return restored(settings, tensors)
     except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise ValueError(f"{path} does not hold a policy of unload: {error}") from error
+
+
+def settings_of(policy: Greedy) -> dict:
+    """What ``restored`` needs of a policy besides its weights, as JSON can hold it."""
+    return {
+        "network": type(policy.network).__name__,
+        "n_features": policy.network.n_features,
+        "equalize": policy.equalize,
+        "ties": policy.ties,
+    }
+
+
+def restored(settings: dict, tensors: dict[str, torch.Tensor]) -> Greedy:
+    """The policy of ``settings_of``, with its ``card`` if they hold one, and of its weights.
+
+    Raises:
+        KeyError, TypeError, ValueError, RuntimeError: they do not fit.
+    """
+    kinds = {kind.__name__: kind for kind in NETWORKS.values()}
+    network = kinds[settings["network"]](settings["n_features"])
+    _check_dtypes("it", tensors)
+    network.load_state_dict(tensors)
+    if not all(tensor.isfinite().all() for tensor in tensors.values()):
+        raise ValueError("a weight is not finite")
+    return Greedy(network, settings["equalize"], settings["ties"], settings.get("card"))
 
 
 def _check_dtypes(name: str, tensors: dict[str, torch.Tensor]) -> None:
@@ -165,8 +221,8 @@ def _check_dtypes(name: str, tensors: dict[str, torch.Tensor]) -> None:
             raise TypeError(f"{name} has {key} of dtype {tensor.dtype}; expected torch.float32")
 
 
-def _digest(settings: dict, tensors: dict[str, torch.Tensor]) -> str:
-    """Digest of a policy's settings and weights."""
+def digest_of(settings: dict, tensors: dict[str, torch.Tensor]) -> str:
+    """Digest of settings and weights, of one policy or of several."""
     digest = blake2b(json.dumps(settings, sort_keys=True).encode(), digest_size=16)
     for name in sorted(tensors):
         tensor = tensors[name]

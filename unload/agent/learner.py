@@ -43,11 +43,11 @@ class PlainLearner:
         """
         if rows is None:
             rows = np.arange(len(targets))
-        observations, actions, targets = (
+        observations, actions, wanted = (
             torch.from_numpy(array.take(rows, axis=0))
             for array in (batch["observations"], batch["actions"], targets)
         )
-        return lambda: self._update(observations, actions, targets)
+        return lambda: self._update(observations, actions, wanted)
 
     def _update(
         self, observations: torch.Tensor, actions: torch.Tensor, targets: torch.Tensor

@@ -91,7 +91,7 @@ class ReplayBuffer:
             )
         self.equalized = equalized
         self.total = 0
-        kinds = {
+        kinds: dict[str, tuple[tuple[int, ...], type]] = {
             "observations": ((items, 3), np.float32),
             "actions": ((), np.int64),
             "rewards": ((), np.float32),
@@ -123,7 +123,7 @@ class ReplayBuffer:
         checked = self._checked(batch)
         count = len(checked["rewards"])
         start = self.total % self.size
-        slots = slice(start, start + count)
+        slots: slice | np.ndarray = slice(start, start + count)
         if start + count > self.size:  # round the end
             slots = np.arange(start, start + count) % self.size
         for name, values in checked.items():

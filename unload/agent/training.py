@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TextIO
@@ -108,7 +109,7 @@ class Training:
     """
 
     def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
-        self.config = config
+        self.config, self._stack = config, stack
         _, rng_seed, weights_seed = config.seeds()
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
@@ -166,8 +167,15 @@ class Training:
         return self.agent.start_update(self.replay.arrays, rows)
 
     def policy(self) -> Greedy:
-        """Return a copy of what has been learned so far."""
-        return Greedy(deepcopy(self.agent.network), self.config.equalize, self.config.ties)
+        """Return a copy of what has been learned so far, with a card."""
+        config, stack = self.config, self._stack
+        card = {
+            "configuration": asdict(config),
+            "loads": "the paper's" if stack is None else getattr(stack, "__qualname__", "own"),
+            "picks": self.rollout.picks,
+            "msr": {"at the end of its training": self.curve.table()["success_rate"].iloc[-1]},
+        }
+        return Greedy(deepcopy(self.agent.network), config.equalize, config.ties, card)
 
 
 def train(

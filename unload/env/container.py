@@ -36,11 +36,13 @@ class ContainerEnv(PickingEnv):
     ``Box(-1, 1, (128, 3), float32)``: centres of the 128 nearest boxes, nearest first,
     scaled to the container; with ``equalize=True`` their equalized ranks instead.
 
-    | Column | Observation | -1 | 1 |
-    |---|---|---|---|
-    | 0 | x | rear wall | entrance |
-    | 1 | y | left side wall | right side wall |
-    | 2 | z | floor | ceiling |
+    ======  ===========  ==============  ===============
+    Column  Observation  -1              1
+    ======  ===========  ==============  ===============
+    0       x            rear wall       entrance
+    1       y            left side wall  right side wall
+    2       z            floor           ceiling
+    ======  ===========  ==============  ===============
 
     Once fewer than 128 boxes are left, they come first, and each row after them holds -1 in
     all columns, equalized or not. ``info["item_mask"]`` is 0 in these rows; so is

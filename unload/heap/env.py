@@ -57,17 +57,19 @@ class HeapEnv(EpisodeEnv):
     outside the door and 2.4 m high, shows at least four pixels of it. That is true of about 55
     boxes. No row tells of hidden boxes, unless none is visible: then there is a row for each.
 
-    | Column | Observation | unit |
-    |---|---|---|
-    | 0 | distance of the centre behind the conveyor's edge, by the foremost visible face | m |
-    | 1 | y of the centre, from the middle | m |
-    | 2 | z of the centre | m |
-    | 3–5 | extents of the upright block around the box, along x, y, z | m |
-    | 6–8 | edges of the box, longest first | m |
-    | 9 | tilt: angle between the vertical and the nearest axis of the box | rad |
-    | 10 | share of the block's top that no visible block covers | 1 |
-    | 11 | share of the block's front that no visible block covers | 1 |
-    | 12 | visible pixels | 1000 |
+    ======  ===============================================================================  ====
+    Column  Observation                                                                      unit
+    ======  ===============================================================================  ====
+    0       distance of the centre behind the conveyor's edge, by the foremost visible face  m
+    1       y of the centre, from the middle                                                 m
+    2       z of the centre                                                                  m
+    3–5     extents of the upright block around the box, along x, y, z                       m
+    6–8     edges of the box, longest first                                                  m
+    9       tilt: angle between the vertical and the nearest axis of the box                 rad
+    10      share of the block's top that no visible block covers                            1
+    11      share of the block's front that no visible block covers                          1
+    12      visible pixels                                                                   1000
+    ======  ===============================================================================  ====
 
     With ``observation="camera"`` all of this is computed from the points that the camera sees
     of each box, which its segmentation keeps apart; what is hidden of a box is not known.

@@ -154,7 +154,7 @@ def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:
     files.write_arrays(path, arrays)
 
 
-def read_heaps(split: str, path: str | Path = files.DATA / "heaps.npz") -> list[Heap]:
+def read_heaps(split: str, path: str | Path = files.SHIPPED / "heaps.npz") -> list[Heap]:
     """The stored heaps of a split, ``"train"`` or ``"test"``.
 
     Raises:

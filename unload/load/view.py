@@ -78,7 +78,7 @@ class View(go.Figure):
     do not show what is added to the figure later.
 
     Args:
-        *args, **kwargs: of ``plotly.graph_objects.Figure``.
+        args, kwargs: of ``plotly.graph_objects.Figure``.
         picture: returns the PNG file; called when the figure is displayed. None: no picture.
 
     Attributes:

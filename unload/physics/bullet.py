@@ -1,4 +1,4 @@
-"""PyBullet, and the only file that imports it.
+"""PyBullet, and the only file that imports it, with the first ``World``: it is optional.
 
 A ``World`` is one PyBullet client with boxes in it. It knows nothing of loads,
 observations or rewards, and checks nothing: that is done where loads, forces and times enter.
@@ -8,7 +8,8 @@ import os
 import weakref
 from collections.abc import Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -33,8 +34,31 @@ def _quiet_stderr():
         os.close(null)
 
 
-with _quiet_stderr():
-    import pybullet
+@cache
+def _import_pybullet() -> None:
+    """Import PyBullet.
+
+    Raises:
+        ModuleNotFoundError: it is not installed.
+    """
+    global pybullet
+    with _quiet_stderr():
+        try:
+            import pybullet
+        except ModuleNotFoundError as error:
+            raise ModuleNotFoundError(
+                "a lift that no table knows, a whole container or a heap has to be simulated; "
+                "expected PyBullet: pip install 'unload[pybullet]'"
+            ) from error
+
+
+def _version() -> str:
+    """Of PyBullet; without it that of the lifts that ship, because there can be no others."""
+    try:
+        return version("pybullet")
+    except PackageNotFoundError:
+        return "3.2.7"
+
 
 TIME_STEP = 1 / 240  # s; halving it changes no lift, 1/60 changes 2 % of the hard ones
 # Bullet multiplies the friction of the two bodies in contact: 0.5 each gives 0.25.
@@ -46,7 +70,7 @@ DAMPING = 0.04
 GAP = 0.001  # m
 # All that a lift's outcome depends on besides the boxes.
 SETTINGS = {
-    "pybullet": version("pybullet"),
+    "pybullet": _version(),
     "time_step": TIME_STEP,
     "friction": FRICTION,
     "damping": DAMPING,
@@ -81,6 +105,9 @@ class World:
         maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
             2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
         iterations: of the contact solver per time step; 50 is PyBullet's default.
+
+    Raises:
+        ModuleNotFoundError: PyBullet is not installed.
     """
 
     def __init__(
@@ -91,6 +118,7 @@ class World:
     ) -> None:
         self.time_step, self._iterations = time_step, iterations
         self._maximal = maximal_coordinates
+        _import_pybullet()
         self._client = pybullet.connect(pybullet.DIRECT)
         self._disconnect = weakref.finalize(self, pybullet.disconnect, self._client)
         self._set_up()

@@ -21,7 +21,7 @@ from unload.support import checks, files
 from unload.support.compiled import compiled
 
 HELD_DOWN = 3  # boxes on top that no lift moves
-LIFTS_FILE = files.DATA / "lifts.npz"
+LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
 FEWEST_SLOTS = 1024
 FARTHEST = np.iinfo(np.int32).max / 1e6  # m
@@ -205,7 +205,7 @@ class TablePhysics(LocalPhysics):
 
 @cache
 def shared_table() -> LiftTable:
-    """The lifts known to this process: those of ``data/lifts.npz``, and all made since."""
+    """The lifts known to this process: those of ``LIFTS_FILE``, and all made since."""
     return LiftTable.load(LIFTS_FILE) if LIFTS_FILE.exists() else LiftTable()
 
 

@@ -9,7 +9,7 @@ from unload.agent import policies
 from unload.agent.greedy import load_policy
 from unload.load.boxes import Load
 from unload.play.episode import Episode
-from unload.support import checks, files
+from unload.support import checks
 
 RULES = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
 # Four runs trained the paper's configuration; they differ in their seed only.
@@ -27,12 +27,11 @@ def policy_of(player: str) -> Callable:
 
     Raises:
         ValueError: an unknown player.
-        FileNotFoundError: the agent's weights are not there.
     """
     checks.one_of("player", player, PLAYERS)
     if player in RULES:
         return RULES[player]
-    return load_policy(files.DATA / "policies" / f"{AGENTS[player]}.safetensors")
+    return load_policy(AGENTS[player])
 
 
 class Run(Episode):

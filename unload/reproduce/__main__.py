@@ -7,7 +7,7 @@ from unload.heap.study import table as heap
 from unload.reproduce.falls import laboratory, published
 from unload.reproduce.lifts import agreement, table
 from unload.reproduce.paper import observation, training, tuning
-from unload.reproduce.policies import comparison, robustness
+from unload.reproduce.policies import cards, comparison, robustness
 from unload.reproduce.results import COMMAND, JOBS
 from unload.reproduce.variants import grids as variants
 
@@ -19,7 +19,8 @@ def lifts(n_jobs: int) -> None:
 
 
 def policies(n_jobs: int) -> None:
-    """Compare policies where the lift table reaches, and with every box simulated."""
+    """Measure policies, and compare them by the lift table, and with every box simulated."""
+    cards.write_cards()
     comparison.comparison_data(n_jobs=n_jobs)
     robustness.robustness_data(n_jobs=n_jobs)
 

@@ -21,10 +21,9 @@ from safetensors.torch import save
 
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
-from unload.agent.greedy import Greedy
+from unload.agent.greedy import Greedy, digest_of, restored, settings_of
 from unload.agent.sweep import run_sweep
 from unload.agent.training import Training, unchanged
-from unload.network.variants import NETWORKS
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.results import COMMAND, read_table, write_table
 from unload.support import checks, files
@@ -256,12 +255,8 @@ def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
     tensors, settings = {}, {}
     for name, policy in policies.items():
         tensors |= {f"{name}/{k}": v.clone() for k, v in policy.network.state_dict().items()}
-        settings[name] = {
-            "network": type(policy.network).__name__,
-            "n_features": policy.network.n_features,
-            "equalize": policy.equalize,
-            "ties": policy.ties,
-        }
+        settings[name] = settings_of(policy)
+    settings["digest"] = digest_of(settings, tensors)
     content = save(tensors, metadata={"policies": json.dumps(settings)})
     files.write_atomically(path, lambda file: file.write(content))
 
@@ -271,17 +266,18 @@ def read_policies(path: str | Path) -> dict[str, Greedy]:
 
     Raises:
         FileNotFoundError: there is no such file.
+        ValueError: the file was changed or damaged.
     """
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} is missing; {COMMAND} makes it")
-    kinds = {kind.__name__: kind for kind in NETWORKS.values()}
-    policies = {}
     with safe_open(path, framework="pt") as file:
-        for name, each in json.loads(file.metadata()["policies"]).items():
-            network = kinds[each["network"]](each["n_features"])
-            network.load_state_dict(
-                {k: file.get_tensor(f"{name}/{k}") for k in network.state_dict()}
-            )
-            policies[name] = Greedy(network, each["equalize"], each["ties"])
-    return policies
+        settings = json.loads(file.metadata()["policies"])
+        tensors = {name: file.get_tensor(name) for name in file.keys()}
+    if settings.pop("digest", None) != digest_of(settings, tensors):
+        raise ValueError(f"{path} was changed or damaged: its digest is not that of its content")
+    of_run: dict[str, dict] = {name: {} for name in settings}
+    for name, tensor in tensors.items():
+        run, _, part = name.rpartition("/")
+        of_run[run][part] = tensor
+    return {name: restored(each, of_run[name]) for name, each in settings.items()}

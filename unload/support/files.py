@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from hashlib import blake2b, file_digest
+from importlib import resources
 from pathlib import Path
 from typing import BinaryIO
 from uuid import uuid4
@@ -19,7 +20,8 @@ from uuid import uuid4
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT / "data"
+DATA = ROOT / "data"  # what the figures are drawn from
+SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 FIGURES = ROOT / "figures"
 RUNS = ROOT / "runs"  # training runs, not kept in the repository
 

@@ -7,12 +7,14 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from unload.support import files
 
+VERSION = "0.1.0"  # of unload, as in pyproject.toml
 PACKAGES = ("gymnasium", "joblib", "numba", "numpy", "pandas", "pybullet", "torch")
 
 
@@ -62,7 +64,7 @@ def run_record(seconds: float) -> dict:
         "wall_time_s": round(seconds, 1),
         "peak_memory_mib": _peak_memory(),
         "revision": revision(),
-        "versions": {package: version(package) for package in PACKAGES},
+        "versions": _versions(),
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {_cpu()}, {os.cpu_count()} cores",
     }
@@ -88,6 +90,15 @@ def joined(records: Iterable[dict]) -> dict:
         "peak_memory_mib": max(record["peak_memory_mib"] for record in records),
         **rest,
     }
+
+
+def _versions() -> dict[str, str]:
+    """The versions of ``PACKAGES``, by name, without those that are not installed."""
+    found = {}
+    for package in PACKAGES:
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
 
 
 @cache

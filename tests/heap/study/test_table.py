@@ -120,8 +120,11 @@ def test_the_command_makes_everything_about_heaps(monkeypatch):
     steps = "make_heaps", "make_networks", "choose_rules", "compare"
     for name in steps:
         monkeypatch.setattr(study, name, lambda *given, name=name: called.append((name, given)))
-    study.heap_data(FULL, "data", "runs", 2, False)
-    assert called == [(name, (FULL, "data", "runs", 2, False)) for name in steps]
+    study.heap_data(FULL, "data", "shipped", "runs", 2, False)
+    folders = ["shipped", "data", "data", "data"]
+    assert called == [
+        (name, (FULL, folder, "runs", 2, False)) for name, folder in zip(steps, folders)
+    ]
 
 
 def test_data_of_heaps_are_those_that_are_read():

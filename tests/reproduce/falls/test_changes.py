@@ -4,9 +4,11 @@ from functools import partial
 import numpy as np
 import pytest
 
+from unload import task
 from unload.agent.fast.kernel import decode
 from unload.agent.training import Training, train_changed
 from unload.env.equalization import equalize
+from unload.load.substacks import stack_load
 from unload.reproduce.falls import changes
 from unload.reproduce.falls.cells import CONFIG
 
@@ -110,6 +112,45 @@ def test_a_teacher_chooses_by_height_and_its_preference():
     run.rollout.close()
     assert best(seen, np.array([[True, True, True]])) == 2
     assert best(seen, np.array([[True, True, False]])) == 1
+
+
+def test_choices_see_other_signs_than_the_memory_holds():
+    run = Training(SMALL)
+    asked = []
+    run.agent.learner.best_actions = lambda observations, allowed: (
+        asked.append(observations) or np.zeros(len(allowed), np.int64)
+    )
+    changes.untilted(run, axes=(1,))
+    seen = run.rollout.observations.copy()
+    run.agent.choose(seen, run.rollout.allowed, 0.0, run.rng)
+    run.step()
+    run.rollout.close()
+    signs = asked[0][..., 1] / seen[..., 1]
+    assert set(np.unique(signs)) == {-1, 1} and (signs == signs[:, :1]).all()
+    assert (asked[0][..., [0, 2]] == seen[..., [0, 2]]).all()
+    assert (remembered(run) == seen).all()
+
+
+def test_loads_are_dug_to_the_preferred_side():
+    (load,) = changes.dug_loads(0.4, count=1, seed=2)
+    plain = stack_load(np.random.default_rng(2))
+    assert len(plain) - changes.DEEPEST <= len(load) < len(plain)
+    near = load.positions[:, 0] > task.CONTAINER[0] / 2
+    side = load.positions[near, 1] > task.CONTAINER[1] / 2
+    assert side.mean() < 0.45  # more boxes are left on the other side
+
+
+def test_dug_loads_come_from_the_second_episode_on(monkeypatch):
+    (load,) = changes.dug_loads(0.4, count=1, seed=2)
+    monkeypatch.setattr(changes, "dug_loads", lambda preference: [load])
+    run = Training(replace(SMALL, max_picks=2))
+    changes.dug(run, 0.4)
+    counts = []
+    for _ in range(3):
+        counts.append(run.rollout.envs.unwrapped._containers.left.copy())
+        run.step()
+    run.rollout.close()
+    assert (counts[0] > len(load)).all() and (counts[2] == len(load)).all()
 
 
 def test_the_network_that_only_watches_learns_from_the_other_ones_picks():

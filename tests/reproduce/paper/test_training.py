@@ -26,7 +26,8 @@ def small(monkeypatch):
 
 
 def test_a_full_grid_leaves_what_the_papers_plots_and_others_read(small, tmp_path):
-    training.training_data(None, None, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
+    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
+    training.training_data(None, None, **folders, n_jobs=1, progress=False)
     curve = training.default_curves(tmp_path)[0]
     for name in ("loss_function_agent", "total_rew_function_agent"):
         table = pd.read_csv(tmp_path / f"{name}.csv")
@@ -62,7 +63,7 @@ def test_committed_runs_are_those_that_the_papers_plots_read():
 
 def test_committed_policies_are_those_of_the_grid():
     for seed, name in training.PLAYERS.items():
-        stored = load_policy(files.DATA / f"policies/{name}.safetensors").network.state_dict()
+        stored = load_policy(name).network.state_dict()
         weights = training.default_policies()[seed].network.state_dict()
         assert all(stored[key].equal(weights[key]) for key in weights)
 

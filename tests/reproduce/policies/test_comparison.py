@@ -6,7 +6,6 @@ import pytest
 from unload import evaluate, policies
 from unload.reproduce.policies import comparison
 from unload.reproduce.policies.comparison import (
-    LEARNED,
     PLAYERS,
     SIMPLE,
     compare,
@@ -37,10 +36,6 @@ def test_data_and_its_provenance(tmp_path, monkeypatch):
     monkeypatch.setattr(
         comparison, "CONDITIONS", {"500 picks": {}, "σ 2 cm": {"position_noise": 0.02}}
     )
-    (tmp_path / "policies").mkdir()
-    for name in LEARNED:
-        source = files.DATA / f"policies/{name}.safetensors"
-        (tmp_path / f"policies/{name}.safetensors").symlink_to(source)
     comparison_data(1, tmp_path, n_jobs=1)
     table = pd.read_csv(tmp_path / "policies/comparison.csv")
     played = table[["condition", "policy", "mask"]].itertuples(index=False, name=None)
@@ -61,7 +56,6 @@ def test_committed_data_is_of_the_committed_policies(name):
     ("call", "error", "message"),
     [
         (lambda folder: find_policy("lowest"), ValueError, "name is 'lowest'"),
-        (lambda folder: comparison_data(1, folder), FileNotFoundError, "paper.safetensors"),
         (lambda folder: comparison_data(0, folder), ValueError, "loads is 0"),
     ],
 )

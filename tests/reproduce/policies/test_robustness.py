@@ -12,8 +12,6 @@ from unload.load.boxes import Load
 from unload.load.substacks import front_walls, stack_load
 from unload.physics.bullet import World
 from unload.reproduce.policies import robustness
-from unload.reproduce.policies.comparison import LEARNED
-from unload.support import files
 from unload.support.provenance import read_provenance
 
 
@@ -66,10 +64,6 @@ def test_a_box_is_free_once_all_on_it_is_unloaded(monkeypatch):
 def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(robustness, "PLAYED", {"keep": ("highest",), "restore": ("highest",)})
     small = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 1))
-    (tmp_path / "policies").mkdir()
-    for name in LEARNED:
-        source = files.DATA / f"policies/{name}.safetensors"
-        (tmp_path / f"policies/{name}.safetensors").symlink_to(source)
     monkeypatch.setattr(robustness, "play", small)
     robustness.robustness_data(2, 2, tmp_path, tmp_path / "runs", progress=False)
     written = (tmp_path / "policies/robustness.csv").read_text()

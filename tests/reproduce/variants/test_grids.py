@@ -46,7 +46,7 @@ def test_each_cell_differs_from_the_paper_in_little(name, varied):
 
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
     monkeypatch.setattr(grids, "LOADS", {"episodes": 3, "seed": 1000})
-    policy = load_policy(files.DATA / "policies/paper_seed_2.safetensors")
+    policy = load_policy("paper_seed_2")
     expected = [
         evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
     ]
@@ -54,7 +54,7 @@ def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
 
 
 def test_the_recommended_policy_is_judged_as_the_data_say():
-    policy = load_policy(files.DATA / "policies/recommended.safetensors")
+    policy = load_policy("recommended")
     first = read_measures(GRIDS["recommended"]).iloc[0]
     assert judged(policy, grids.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
 
@@ -68,7 +68,8 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
         }
         monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
     monkeypatch.setattr(grids, "LOADS", {"episodes": 1, "seed": 1000})
-    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "n_jobs": 1, "progress": False}
+    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
+    folders |= {"n_jobs": 1, "progress": False}
     variants_data(["rewards"], 40, **folders)
     rows = read_measures(GRIDS["rewards"], tmp_path / "reduced")
     assert rows["cell"].nunique() == 4 and rows["msr_mask"].between(0, 1).all()

@@ -52,7 +52,7 @@ FULL = Size()
 
 def make_heaps(
     size: Size = FULL,
-    folder: str | Path = files.DATA,
+    folder: str | Path = files.SHIPPED,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
     progress: bool = True,

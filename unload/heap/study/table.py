@@ -317,12 +317,14 @@ def by_price(table: pd.DataFrame) -> pd.DataFrame:
 def heap_data(
     size: Size = FULL,
     folder: str | Path = files.DATA,
+    shipped: str | Path = files.SHIPPED,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
     progress: bool = True,
 ) -> None:
-    """Make all data of heaps."""
-    for step in (make_heaps, make_networks, choose_rules, compare):
+    """Make all data of heaps: the heaps in ``shipped``, the rest in ``folder``."""
+    make_heaps(size, shipped, runs_dir, n_jobs, progress)
+    for step in (make_networks, choose_rules, compare):
         step(size, folder, runs_dir, n_jobs, progress)
 
 

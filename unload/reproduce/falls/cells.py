@@ -32,13 +32,15 @@ SEEN: dict[str, Callable] = {
     "averaged_z": partial(changes.ranked, averaged=(2,)),
 }
 PREFERENCES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.2)
+SHORT = {"max_picks": 25}  # episodes in which a load hardly changes
 # Who watches such a policy, and how it learns.
 PUPILS = {
     "taught": (unchanged, {}),
     "shuffled_taught": (changes.shuffled, {}),
     "averaged_taught": (unchanged, AVERAGED),
-    "short_taught": (unchanged, {"max_picks": 25}),  # the load has no time to tilt
+    "level_taught": (partial(changes.dug, preference=0.0), SHORT),
 }
+DUG = 0.4  # the preference that has dug the loads to one side
 
 Change = Callable[[Training], None]
 
@@ -62,6 +64,13 @@ def _seen(name: str) -> Cell:
 def _watching(change: Change) -> Change:
     """Only watch a network that chooses, and that learns with a change of its own."""
     return partial(changes.tandem, change=change, seed=50)
+
+
+def _taught(change: Change, preference: float, **fields) -> Cell:
+    """Only watch a policy that prefers a side, and picks one box in five at random."""
+    change = changes.several(change, partial(changes.taught, preference=preference))
+    exploring = {"epsilon_init": 0.2, "epsilon_final": 0.2}
+    return _cell(change, FEW_SEEDS, picks=128_000, **exploring, **fields)
 
 
 def _perfect(change: Change = unchanged) -> Cell:
@@ -89,16 +98,13 @@ CELLS: dict[str, Cell] = {
     "perfect_shuffled": _perfect(changes.shuffled),
     "perfect_successes": _perfect(partial(changes.successes_only, start=0)),
     **{
-        f"{pupil}_{preference}": _cell(
-            changes.several(change, partial(changes.taught, preference=preference)),
-            FEW_SEEDS,
-            picks=128_000,
-            epsilon_init=0.2,
-            epsilon_final=0.2,
-            **fields,
-        )
+        f"{pupil}_{preference}": _taught(change, preference, **fields)
         for pupil, (change, fields) in PUPILS.items()
         for preference in PREFERENCES
     },
+    "dug_to_y": _taught(partial(changes.dug, preference=DUG), 0.0, **SHORT),
+    "dug_from_y": _taught(partial(changes.dug, preference=-DUG), 0.0, **SHORT),
+    "untilted": _cell(changes.untilted),
+    "untilted_y": _cell(partial(changes.untilted, axes=(1,))),
 }
 TRACED = ("ranks", "ranks_no_mask", "shuffled", "averaged", "positions")

@@ -6,22 +6,29 @@ of them is a function ``(observations, rng) -> observations``; it may write into
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import torch
 
+from unload import task
+from unload.agent.evaluation import Policy
 from unload.agent.replay import shuffle_places
 from unload.agent.training import Training, unchanged
+from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
+from unload.load.boxes import Load
 
 Change = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+DEEPEST = task.MAX_PICKS - 25  # boxes: an episode of 25 picks ends where one of 500 would
 
 
-def mirror(observations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def mirror(
+    observations: np.ndarray, rng: np.random.Generator, axes: tuple[int, ...] = (0, 1)
+) -> np.ndarray:
     """Give x and y of each observation random signs: a pick and its mirror images are alike."""
-    signs = rng.choice(np.array([-1, 1], np.float32), (len(observations), 1, 2))
-    observations[..., :2] *= signs
+    signs = rng.choice(np.array([-1, 1], np.float32), (len(observations), 1, len(axes)))
+    observations[..., axes] *= signs
     return observations
 
 
@@ -41,6 +48,17 @@ def see(run: Training, change: Callable[[np.ndarray], np.ndarray]) -> None:
     choose, add = run.agent.choose, run.replay.add
     run.agent.choose = lambda observations, *rest: choose(change(observations), *rest)
     run.replay.add = lambda observations, **rest: add(observations=change(observations), **rest)
+
+
+def untilted(run: Training, axes: tuple[int, ...] = (0, 1)) -> None:
+    """Choose by what is seen with random signs; the replay memory holds it as it was.
+
+    Whatever side the network prefers, it prefers each side equally often, and digs out none.
+    """
+    choose, rng = run.agent.choose, np.random.default_rng(run.config.seed)
+    run.agent.choose = lambda observations, *rest: choose(
+        mirror(observations.copy(), rng, axes), *rest
+    )
 
 
 def without(observations: np.ndarray, axes: tuple[int, ...] = (0, 1)) -> np.ndarray:
@@ -76,14 +94,48 @@ def successes_only(run: Training, start: int) -> None:
     run.replay.add = add_successes
 
 
+def best_actions(
+    observations: np.ndarray, allowed: np.ndarray, preference: float = 0.0
+) -> np.ndarray:
+    """The choice of a policy that prefers a side: the highest z + ``preference`` · y."""
+    score = observations[..., 2] + preference * observations[..., 1]
+    return np.where(allowed, score, -np.inf).argmax(axis=1)
+
+
 def taught(run: Training, preference: float) -> None:
-    """Let a fixed policy choose: the highest height + ``preference`` · y among the items."""
+    """Let the policy of ``best_actions`` choose."""
+    run.agent.learner.best_actions = partial(best_actions, preference=preference)
 
-    def best_actions(observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
-        score = observations[..., 2] + preference * observations[..., 1]
-        return np.where(allowed, score, -np.inf).argmax(axis=1)
 
-    run.agent.learner.best_actions = best_actions
+def left(policy: Policy, picks: int, seed: int) -> Load:
+    """What a policy leaves of one of the paper's loads after some picks, with the mask."""
+    env, rng = ContainerEnv(physics="table", max_picks=picks + 1), np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed)
+    for _ in range(picks):
+        action = policy(observation[None], info["action_mask"][None], rng)[0]
+        observation, *_, info = env.step(int(action))
+    load, present = env.physics.load, env.physics.present
+    env.close()
+    return Load(
+        *(each[present] for each in (load.positions, load.sizes, load.packages, load.walls))
+    )
+
+
+@cache
+def dug_loads(preference: float, count: int = 128, seed: int = 0) -> list[Load]:
+    """Loads of which the policy of ``best_actions`` has unloaded up to 475 boxes, on ranks."""
+
+    def policy(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        return best_actions(equalize(observations), masks.astype(bool), preference)
+
+    depths = np.random.default_rng(seed).integers(DEEPEST + 1, size=count)
+    return [left(policy, int(depth), seed + each) for each, depth in enumerate(depths)]
+
+
+def dug(run: Training, preference: float) -> None:
+    """From the second episode on, fill the containers with ``dug_loads``."""
+    loads = dug_loads(preference)
+    run.rollout.envs.unwrapped.stack = lambda rng: loads[rng.integers(len(loads))]
 
 
 def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None:

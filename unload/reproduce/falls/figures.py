@@ -15,7 +15,7 @@ from unload.reproduce.statistics import PAPER_MSR, end_msr, t_interval
 from unload.reproduce.style import styled
 
 # One colour, one meaning: what is seen or stored.
-COLOURS = {"ranks": "C1", "shuffled": "C0", "averaged": "C3", "short": "C2"}
+COLOURS = {"ranks": "C1", "shuffled": "C0", "averaged": "C3", "level": "C2"}
 # Name and colour of each of ``PUPILS``.
 PUPIL_LOOKS = list(COLOURS.items())
 TITLES = {

@@ -9,9 +9,8 @@ from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
-from unload.env.container import ContainerEnv
 from unload.network.peq import PEQNetwork
-from unload.reproduce.falls.changes import without
+from unload.reproduce.falls.changes import left, without
 
 Seen = Callable[[np.ndarray], np.ndarray]
 HEIGHT_BINS = 12
@@ -120,19 +119,13 @@ def surface(
         Places across the containers, (100,) in m, and the mean height of the highest box there,
         (100,) in m.
     """
-    env = ContainerEnv(physics="table", max_picks=picks + 1)
     places = (np.arange(100) + 0.5) / 100 * task.CONTAINER[1]
-    heights, rng = np.zeros((containers, len(places))), np.random.default_rng(seed)
+    heights = np.zeros((containers, len(places)))
     for container in range(containers):
-        observation, info = env.reset(seed=seed + container)
-        for _ in range(picks):
-            action = policy(observation[None], info["action_mask"][None], rng)[0]
-            observation, *_, info = env.step(int(action))
-        load = env.physics.load
-        near = env.physics.present & (load.positions[:, 0] > task.CONTAINER[0] - depth)
+        load = left(policy, picks, seed + container)
+        near = load.positions[:, 0] > task.CONTAINER[0] - depth
         for centre, size in zip(load.positions[near], load.sizes[near]):
             above = np.abs(places - centre[1]) < size[1] / 2
             top = np.maximum(heights[container], centre[2] + size[2] / 2)
             heights[container] = np.where(above, top, heights[container])
-    env.close()
     return places, heights.mean(axis=0)

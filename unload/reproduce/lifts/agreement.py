@@ -241,7 +241,7 @@ def buried_lifts(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def table_digest() -> str:
-    """Name of the lift table that ships: a digest of ``data/lifts.npz``."""
+    """Name of the lift table that ships: a digest of its file."""
     return blake2b(LIFTS_FILE.read_bytes(), digest_size=8).hexdigest()
 
 

@@ -31,7 +31,7 @@ RANDOM_SHARE = 40  # episodes of random picks per episode of each other policy
 def lift_data(
     episodes: int = EPISODES,
     seed: int = 0,
-    folder: str | Path = files.DATA,
+    folder: str | Path = files.SHIPPED,
     runs_dir: str | Path = files.RUNS,
     progress: bool = True,
 ) -> None:

@@ -40,11 +40,12 @@ def training_data(
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
     progress: bool = True,
+    shipped: str | Path = files.SHIPPED,
 ) -> None:
     """Train the paper's configuration, see ``train_grid``, and write some of it by other names.
 
-    These are what the paper's plots read, and the policies that play elsewhere:
-    ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
+    These are what the paper's plots read and, in the folder ``shipped``, the policies that play
+    elsewhere: ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
     """
     kept = train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs, progress)
     if picks is None and (cells is None or DEFAULTS in cells):
@@ -53,7 +54,7 @@ def training_data(
         export_training(run.result(config).curve, folder)
         for seed, name in PLAYERS.items():
             policy = default_policies(folder)[seed]
-            save_policy(policy, Path(folder) / "policies" / f"{name}.safetensors")
+            save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
 
 
 def export_training(curve: pd.DataFrame, folder: str | Path) -> None:

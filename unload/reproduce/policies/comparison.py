@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 
 from unload.agent import policies
 from unload.agent.evaluation import Policy, evaluate
-from unload.agent.greedy import load_policy
+from unload.agent.greedy import content_of, load_policy
 from unload.load.substacks import stack_load
 from unload.reproduce.results import COMMAND, measured, publish
 from unload.support import checks, files
@@ -50,14 +50,11 @@ def comparison_data(
 
     Args:
         loads: containers each.
-        folder: of the data; it holds the learned policies.
+        folder: of the data.
         n_jobs: processes, as in joblib.
-
-    Raises:
-        FileNotFoundError: a policy's file is absent; the message names it.
     """
     checks.integer("loads", loads, 1)
-    found = {name: find_policy(name, folder) for name in (*SIMPLE, *LEARNED)}
+    found = {name: find_policy(name) for name in (*SIMPLE, *LEARNED)}
     results = Parallel(n_jobs)(
         delayed(measured)(partial(compare, name, found[name], mask, condition, loads))
         for condition in CONDITIONS
@@ -68,7 +65,7 @@ def comparison_data(
         "comparison",
         {"comparison": pd.concat([result.value for result in results])},
         f"{COMMAND} policies",
-        {"policies": digests(folder), "loads": loads, "seed": SEED},
+        {"policies": digests(), "loads": loads, "seed": SEED},
         loads < COMPARISON_LOADS,
         [result.record for result in results],
     )
@@ -88,24 +85,19 @@ def compare(name: str, policy: Policy, mask: bool, condition: str, loads: int) -
     return table
 
 
-def find_policy(name: str, folder: str | Path = files.DATA) -> Policy:
-    """A policy by its name; a learned one is kept as ``folder/policies/<name>.safetensors``.
+def find_policy(name: str) -> Policy:
+    """A rule, or a policy that ships, by its name.
 
     Raises:
         ValueError: an unknown name.
-        FileNotFoundError: the file of a learned policy is absent; the message names it.
     """
     checks.one_of("name", name, (*SIMPLE, *LEARNED))
-    return SIMPLE[name] if name in SIMPLE else load_policy(_file(name, folder))
+    return SIMPLE[name] if name in SIMPLE else load_policy(name)
 
 
-def digests(folder: str | Path = files.DATA) -> dict[str, str]:
-    """The digest of each learned policy's file."""
+def digests() -> dict[str, str]:
+    """A digest of each learned policy, of its file without the card."""
     return {
-        name: blake2b(_file(name, folder).read_bytes(), digest_size=16).hexdigest()
+        name: blake2b(content_of(load_policy(name), card=False), digest_size=16).hexdigest()
         for name in LEARNED
     }
-
-
-def _file(name: str, folder: str | Path) -> Path:
-    return Path(folder) / "policies" / f"{name}.safetensors"

@@ -48,19 +48,18 @@ def robustness_data(
         episodes: containers per policy and ``after_pick``; only their front walls are
             simulated, see ``front_walls``.
         picks: per container, at most 100.
-        folder: of the data; it holds the learned policies.
+        folder: of the data.
         runs_dir: where finished episodes are kept.
         n_jobs: processes, as in joblib.
         progress: show a progress bar.
 
     Raises:
-        FileNotFoundError: a policy's file is absent; the message names it.
         TypeError, ValueError: an argument is not as described.
     """
     checks.integer("episodes", episodes, 1)
     checks.integer("picks", picks, 1, PICKS)
-    found = {name: find_policy(name, folder) for names in PLAYED.values() for name in names}
-    weights = digests(folder)
+    found = {name: find_policy(name) for names in PLAYED.values() for name in names}
+    weights = digests()
     seeds = np.random.SeedSequence(SEED).generate_state(episodes).tolist()
     containers = [
         {"policy": name, "after_pick": after_pick, "episode": episode}
