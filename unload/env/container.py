@@ -79,7 +79,8 @@ class ContainerEnv(PickingEnv):
     Args:
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
             ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered, and nothing
-            if three or more boxes rest on the chosen one: it moves by 0 m).
+            if no box rests on the chosen one, which always moves by 0.463053 m, or three or
+            more: it moves by 0 m).
         after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.

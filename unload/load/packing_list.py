@@ -16,8 +16,9 @@ from unload.load.boxes import (
     overlapping,
     slabs,
 )
+from unload.support import files
 
-EXAMPLE = Path(__file__).with_name("example.csv")  # of boxes in three walls
+EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
 CENTRE, CORNER, SIZES = (
     tuple(name.format(axis) for axis in "xyz") for name in ("{}", "{}_min", "size_{}")
 )
