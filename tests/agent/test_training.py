@@ -192,7 +192,7 @@ def test_what_makes_no_loads_is_refused(tmp_path, stack):
     ("run_dir", "error", "message"),
     [
         ("", ValueError, "run_dir is ''; expected a folder of the run's own"),
-        (None, TypeError, "run_dir is None; expected the path of a folder"),
+        (None, TypeError, "run_dir is None; expected a path"),
         ("/dev/null/run", OSError, "/dev/null"),
     ],
 )

@@ -127,8 +127,6 @@ def load_policy(path: str | Path) -> Greedy:
         FileNotFoundError: there is no such file.
         ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
     """
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file of a policy")
     return read_weights(path, "policy", _policy)
 
 
