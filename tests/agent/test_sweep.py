@@ -133,11 +133,13 @@ def test_unknown_backend_is_refused(configs, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"folder": None}, "folder is None; expected a path"),
+        ({"changes": 3}, "changes is 3; expected a dict"),
         ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
         ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_runs(configs, tmp_path, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        sweep.run_sweep(configs, tmp_path, progress=False, **arguments)
+    with pytest.raises((TypeError, ValueError), match=message):
+        sweep.run_sweep(configs, **{"folder": tmp_path, "progress": False} | arguments)
     assert not list(tmp_path.iterdir())

@@ -1,5 +1,6 @@
 import json
 import os
+import warnings
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ from tests.agent.runs import (
 from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
-from unload.agent.training import CURVE_COLUMNS, Curve
+from unload.agent.training import CURVE_COLUMNS, Curve, Training, warn_of_other_bits
 from unload.network.variants import NETWORKS
 from unload.physics.table import LiftTable, shared_table
 from unload.support import files
@@ -88,6 +89,18 @@ def test_the_number_of_threads_does_not_change_the_result(tmp_path):
         train(config, tmp_path / str(threads), progress=False)
     torch.set_num_threads(1)
     assert_same(tmp_path / "1", tmp_path / "2")
+
+
+@pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])
+def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, count):
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: found)
+    warn_of_other_bits.cache_clear()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for seed in (0, 1):
+            Training(TrainConfig(**CONTAINER, seed=seed)).rollout.close()
+    assert len(said) == count
+    assert all(f"PyTorch uses {found} instructions" in str(each.message) for each in said)
 
 
 @pytest.mark.parametrize("network", NETWORKS)
@@ -243,7 +256,7 @@ def test_what_makes_no_loads_is_refused(tmp_path, stack):
     ("run_dir", "error", "message"),
     [
         ("", ValueError, "run_dir is ''; expected a folder of the run's own"),
-        (None, TypeError, "run_dir is None; expected the path of a folder"),
+        (None, TypeError, "run_dir is None; expected a path"),
         ("/dev/null/run", OSError, "/dev/null"),
     ],
 )

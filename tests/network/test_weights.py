@@ -40,6 +40,17 @@ def test_files_without_a_digest_or_of_another_kind_are_refused(path):
             read_weights(path, "pair", print)
 
 
+def test_what_is_no_path_is_refused(tmp_path):
+    for call in (
+        lambda: write_weights(None, "pair", {}, WEIGHTS),
+        lambda: read_weights(None, "pair", print),
+    ):
+        with pytest.raises(TypeError, match="path is None; expected a path"):
+            call()
+    with pytest.raises(FileNotFoundError, match=r"expected a .safetensors file \(pair\)"):
+        read_weights(tmp_path, "pair", print)
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_weights_that_are_not_finite_are_refused(path, value):
     write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, value])})

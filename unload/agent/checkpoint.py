@@ -58,9 +58,7 @@ class RunFolder:
     """
 
     def __init__(self, run_dir: str | Path) -> None:
-        if not isinstance(run_dir, (str, Path)):
-            raise TypeError(f"run_dir is {run_dir!r}; expected the path of a folder")
-        self.path = Path(run_dir)
+        self.path = checks.path("run_dir", run_dir)
         if self.path == Path():
             raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
         self.path.mkdir(parents=True, exist_ok=True)

@@ -150,7 +150,7 @@ def load_policy(path: str | Path) -> Greedy:
         ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
     """
     known = {file.stem: file for file in sorted(POLICIES.glob("*.safetensors"))}
-    path = known.get(str(path), Path(path))
+    path = known.get(str(path), checks.path("path", path))
     if not path.is_file():
         raise FileNotFoundError(
             f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "

@@ -54,7 +54,7 @@ def run_sweep(
         or empty), ``folder`` of the run, and the configuration's fields.
 
     Raises:
-        TypeError: ``configs`` is not a mapping of names to ``TrainConfig``.
+        TypeError: an argument is not as described.
         ValueError: a name is not a plain relative path, ``changes`` has another name, ``n_jobs``
             is 0, the backend is unknown, or there is no cluster.
         TimeoutError: the cluster has had no worker for ``WORKER_WAIT`` seconds.
@@ -69,9 +69,11 @@ def run_sweep(
             raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
     checks.one_of("backend", backend, BACKENDS)
     checks.jobs("n_jobs", n_jobs)
-    for name in changes or ():
+    folder = checks.path("folder", folder)
+    checks.entries("changes", changes or {}, ())
+    for name in changes or {}:
         checks.one_of("changes", name, configs)
-    folders = {name: Path(folder) / name for name in configs}
+    folders = {name: folder / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     jobs = {name: (name, configs[name], folders[name], changes[name]) for name in configs}
     errors = {}

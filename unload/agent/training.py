@@ -4,11 +4,12 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import asdict
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import TextIO
 
@@ -34,6 +35,8 @@ CURVE_COLUMNS = (
 )  # fmt: skip
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
 SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
+# PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
+INSTRUCTIONS = ("AVX2", "AVX512")
 
 
 class Curve:
@@ -93,6 +96,17 @@ class Curve:
         self.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
 
 
+@cache  # once; Python's own filter forgets where another module changes filters
+def warn_of_other_bits(instructions: str) -> None:
+    """Warn where PyTorch draws other first weights from a seed than on most processors."""
+    if instructions not in INSTRUCTIONS:
+        warnings.warn(
+            f"PyTorch uses {instructions} instructions of this processor; with the same seed a run "
+            f"starts with other weights than where it uses {' or '.join(INSTRUCTIONS)}",
+            stacklevel=3,
+        )
+
+
 class Training:
     """A training run in progress; ``unload.train`` also keeps it on disk.
 
@@ -110,6 +124,7 @@ class Training:
 
     def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
         self.config, self._stack = config, stack
+        warn_of_other_bits(torch.backends.cpu.get_cpu_capability())
         _, rng_seed, weights_seed = config.seeds()
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
@@ -191,9 +206,10 @@ def train(
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
     for the wall times, as one that was not, and so does one that was killed: it goes on
     from its last checkpoint. Ctrl-C writes one first; pressed again, it stops at once. A
-    finished run is not repeated. The updates use ``torch.get_num_threads()`` threads; with
-    the paper's network they go on while the environments step, and the result does not
-    depend on the number of threads.
+    finished run is not repeated. The same configuration gives the same bits on all x86-64
+    processors with AVX2, with AVX-512 or without; a run on another one warns. The updates use
+    ``torch.get_num_threads()`` threads; with the paper's network they go on while the
+    environments step, and the result does not depend on the number of threads.
 
     Args:
         config: what to train.

@@ -144,6 +144,9 @@ class HeapEnv(EpisodeEnv):
         self.max_picks = checks.integer("max_picks", max_picks, 1)
         checks.one_of("observation", observation, OBSERVATIONS)
         self._boxes_seen = OBSERVATIONS[observation]
+        checks.one_of("split", split, generate.SPLITS)
+        if not isinstance(heaps, Sequence | None):
+            raise TypeError(f"heaps is {heaps!r}; expected a sequence of Heap, or None")
         self.heaps = stored_heaps(split) if heaps is None else tuple(heaps)
         if not self.heaps:
             raise ValueError("heaps is empty; expected at least one Heap")

@@ -10,7 +10,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from unload.support import files
+from unload.support import checks, files
 
 Made = TypeVar("Made")
 
@@ -25,9 +25,10 @@ def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) ->
         tensors: by name, float32.
 
     Raises:
-        TypeError: a tensor is not float32; the message begins with ``kind``.
+        TypeError: ``path`` is none, or a tensor is not float32; the message says of what ``kind``.
         OSError: the file cannot be written.
     """
+    path = checks.path("path", path)
     content = weights_file(kind, settings, tensors)
     files.write_atomically(path, lambda file: file.write(content))
 
@@ -52,9 +53,13 @@ def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]
         What ``make`` returns.
 
     Raises:
+        TypeError: ``path`` is none.
         FileNotFoundError: there is no such file.
         ValueError: the file is damaged, of another kind, or not of this version.
     """
+    path = checks.path("path", path)
+    if not path.is_file():
+        raise FileNotFoundError(f"path is {str(path)!r}; expected a .safetensors file ({kind})")
     try:
         with safe_open(path, framework="pt") as file:
             metadata = file.metadata() or {}

@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable, Iterable, Mapping
 from numbers import Integral
+from pathlib import Path
 
 import numpy as np
 
@@ -46,6 +47,13 @@ def jobs(name: str, value: object) -> int:
     if count == 0:
         raise ValueError(f"{name} is 0; expected a number of processes, or -1 for one per core")
     return count
+
+
+def path(name: str, value: object) -> Path:
+    """Return ``value`` as a Path; raise TypeError unless it is one, or a str."""
+    if not isinstance(value, (str, Path)):
+        raise TypeError(f"{name} is {value!r}; expected a path")
+    return Path(value)
 
 
 def real(name: str, value: object, low: float, high: float = np.inf) -> float:
