@@ -31,12 +31,10 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
     container's axes are x (depth, 0 at the rear wall and 7 at the entrance), y (width, 0 to 2.5)
     and z (height, 0 to 2.5).
 
-    | Columns | |
-    |---|---|
-    | ``x, y, z`` | centre of the box, |
-    | or ``x_min, y_min, z_min`` | or its corner nearest to the origin |
-    | ``size_x, size_y, size_z`` | edge lengths, at least 0.002 |
-    | ``id`` | name of the box; the number of its row if there is no such column |
+    - ``x``, ``y``, ``z``: centre of the box, or ``x_min``, ``y_min``, ``z_min``: its corner nearest
+      to the origin;
+    - ``size_x``, ``size_y``, ``size_z``: edge lengths, at least 0.002;
+    - ``id``: name of the box; the number of its row if there is no such column.
 
     Other columns are left out.
 
