@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test quick lint lab notebooks paper bench book browser mutants clean
+.PHONY: help figures test quick lint lab notebooks paper bench dist book browser mutants clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
@@ -38,6 +38,12 @@ paper: $(VENV)/ready  ## compute data/ at the paper's scale (hours; goes on wher
 bench: $(VENV)/ready  ## measure speeds and print their ratios
 	$(BIN)/python benchmarks/run.py
 
+dist: $(VENV)/ready  ## build the package to install elsewhere: build/dist/*.whl and *.tar.gz
+	rm -rf build/dist
+	$(BIN)/python -c "from setuptools.build_meta import build_sdist; build_sdist('build/dist')"
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+	--wheel-dir build/dist build/dist/unload-*.tar.gz
+
 book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: build/book/index.html
 	rm -rf build/book
 	$(BIN)/python -m sphinx -q -E -d build/doctrees -c notebooks/book . build/book
@@ -55,7 +61,7 @@ clean:  ## remove the virtual environment and all intermediate results
 # The stamp is written last, so that an installation that was broken off is done again.
 $(VENV)/ready: environment.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
-	|| { echo "Python 3.11 is needed (PyBullet has no wheels for later ones)," \
+	|| { echo "Python 3.11 is needed here (PyBullet has no wheels for later ones)," \
 	     "but $(PYTHON) is $$($(PYTHON) --version). Try: make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt

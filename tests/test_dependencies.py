@@ -23,6 +23,7 @@ RUN_ONLY = {
     "jupyterlab": "make lab",
     "pytest-xdist": "make test, in two processes",
     "ruff": "make lint",
+    "setuptools": "make dist",
 }
 
 

@@ -168,6 +168,29 @@ def test_a_folder_that_cannot_be_written(load, tmp_path, monkeypatch):
     assert sum(function.stats.cache_hits.values()) == 1
 
 
+def test_the_first_compilation_of_a_process_is_logged(load, tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(unload.support.compiled._Cache, "logged", False)
+    load().function(5)
+    (record,) = caplog.records
+    assert "made.function.function and what follows is compiled" in record.message
+    assert str(tmp_path / "made/__pycache__") in record.message
+    caplog.clear()
+    monkeypatch.setattr(unload.support.compiled._Cache, "logged", False)
+    load().function(5)
+    assert not caplog.records, "it is loaded"
+
+
+def test_without_a_folder_code_is_kept_in_memory_with_one_warning(load, tmp_path, monkeypatch):
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made/__pycache__").write_text("not a folder")
+    (tmp_path / "user").write_text("not a folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
+    unload.support.compiled._warn_of_no_folder.cache_clear()
+    with pytest.warns(UserWarning, match="set NUMBA_CACHE_DIR") as warned:
+        module = load()
+    assert module.function(5) == 11 and len(warned) == 1
+
+
 def test_every_compiled_function_is_compiled_so():
     here = PACKAGE / "support" / "compiled.py"
     for path in PACKAGE.rglob("*.py"):

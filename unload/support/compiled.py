@@ -8,8 +8,10 @@ of all files of the package that its own one imports, and by the libraries' vers
 
 import ast
 import inspect
+import logging
 import sys
 import uuid
+import warnings
 from collections.abc import Callable
 from functools import cache, partial
 from hashlib import sha256
@@ -19,11 +21,16 @@ import numba
 import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+LOGGER = logging.getLogger(__name__)
 VERSIONS = sys.version, numba.__version__, llvmlite.__version__, np.__version__
 
 
 def compiled(function: Callable | None = None, **options) -> Callable:
     """``numba.njit`` of a function, with a cache on disk that follows all that it is built from.
+
+    The first function of a process that is not in the cache is logged, because a fresh
+    installation compiles for ten seconds. Where no folder can be written, compiled code is kept
+    in memory, with one warning.
 
     Args:
         function: of a module, to be compiled at its first call. What it uses is defined in that
@@ -33,12 +40,26 @@ def compiled(function: Callable | None = None, **options) -> Callable:
     if function is None:
         return partial(compiled, **options)
     dispatcher = numba.njit(**options)(function)
-    dispatcher._cache = _Cache(function)
+    try:
+        dispatcher._cache = _Cache(function)
+    except RuntimeError:  # numba's, of all folders that it tries
+        _warn_of_no_folder()
     return dispatcher
+
+
+@cache
+def _warn_of_no_folder() -> None:
+    warnings.warn(
+        "compiled code cannot be kept, and every process compiles for ten seconds; set "
+        "NUMBA_CACHE_DIR to a folder that can be written",
+        stacklevel=4,
+    )
 
 
 class _Cache(FunctionCache):
     """numba's cache of a function, with the fingerprint of its module in each key."""
+
+    logged = False  # whether this process has said that it compiles
 
     def __init__(self, function):
         super().__init__(function)
@@ -46,6 +67,18 @@ class _Cache(FunctionCache):
         self._fingerprint = fingerprint(function.__module__)
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig, target_context):
+        found = super().load_overload(sig, target_context)
+        if found is None and not _Cache.logged:
+            _Cache.logged = True
+            LOGGER.warning(
+                "%s and what follows is compiled for this processor, in all for about ten seconds; "
+                "later processes find it in %s and the folders beside it",
+                f"{self._py_func.__module__}.{self._py_func.__name__}",
+                self.cache_path,
+            )
+        return found
 
     def _index_key(self, sig, codegen):
         # Of a named tuple numba compares the types of the fields, but not their names.

@@ -91,7 +91,7 @@ def start_gradients(
     Raises:
         ValueError: an array's shape or dtype is another, or an action or row is out of range.
     """
-    count, _ = _check(observations, ranks=True)
+    count, items = _check(observations, ranks=True)
     if rows is None:
         rows = np.arange(count)
     for name, array, shape, dtype in (
@@ -104,6 +104,8 @@ def start_gradients(
                 f"{name} has shape {array.shape} and dtype {array.dtype}; "
                 f"expected {shape if array.size else '(batch,)'} {np.dtype(dtype)}"
             )
+    _check_range("rows", rows, count)
+    _check_range("actions", actions[rows], items)
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
@@ -184,6 +186,13 @@ def _check(observations: np.ndarray, ranks: bool = False) -> tuple[int, int]:
             "expected (batch, items, 3) float32, not empty"
         )
     return observations.shape[:2]
+
+
+def _check_range(name: str, numbers: np.ndarray, end: int) -> None:
+    """Raise ValueError unless all numbers are in 0 … end-1; compiled code does not look."""
+    wrong = numbers[(numbers < 0) | (numbers >= end)]
+    if wrong.size:
+        raise ValueError(f"{name} holds {wrong[0]}; expected 0 to {end - 1}")
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.nn.Parameter, ...]:

@@ -142,7 +142,7 @@ def add_chunks(
         following = next_number(counter)
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
         coming = rows[following * CHUNK : (following + 1) * CHUNK]
-        _look_up(chosen, observations.shape[:2], actions, targets, picked, wanted)
+        _look_up(chosen, actions, targets, picked, wanted)
         largest = ONE if samples.itemsize == 1 else _largest(samples, chosen)
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
@@ -177,14 +177,9 @@ def add_chunks(
 
 
 @compiled
-def _look_up(rows, shape, actions, targets, picked, wanted):
+def _look_up(rows, actions, targets, picked, wanted):
     """Copy the actions and targets of a chunk, so that the memory is asked for all at once."""
-    count, items = shape
     for number, row in enumerate(rows):
-        if not 0 <= row < count:
-            raise ValueError(f"rows holds {row}; expected 0 to {count - 1}")
-        if not 0 <= actions[row] < items:
-            raise ValueError(f"actions holds {actions[row]}; expected 0 to {items - 1}")
         picked[number], wanted[number] = actions[row], targets[row]
 
 

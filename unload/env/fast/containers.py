@@ -202,7 +202,8 @@ def situation_digest(containers, env, members, dynamic):
     """
     starts, links = containers.starts[env], containers.links[env]
     present, geometry, item = containers.present[env], containers.geometry[env], members[0]
-    members[1:dynamic].sort()
+    for end in range(1, dynamic):  # sorts them; numba's sort takes a second more to compile
+        _insert(members, 1, end, members[end])
     count = dynamic
     for mover in range(dynamic):
         box = members[mover]
