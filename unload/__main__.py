@@ -1,6 +1,7 @@
 """The order of picks for a packing list, as CSV."""
 
 import argparse
+import signal
 import sys
 
 from unload.agent.order import picking_order
@@ -32,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
         load = read_load(options.list)
         order = picking_order(load, options.policy)
         order.to_csv(options.output, index=False, float_format="%.6f")
-    except (OSError, ValueError) as error:
+    except (ImportError, OSError, ValueError) as error:  # ImportError: of PyBullet
         parser.exit(1, f"{error}\n")
     left = len(load) - order["unloaded"].sum()
     if left:
@@ -40,4 +41,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # "| head" ends it without an error
     main()

@@ -315,11 +315,9 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
             self._fill(envs, rngs, **options)
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """A picture of each environment for ``render_mode="rgb_array"``, else None."""
+        """None: there is nothing to draw."""
         self._check_started()
-        if self.render_mode is None:
-            return None
-        return tuple(self._picture(env) for env in range(self.num_envs))
+        return None
 
     def _check_open(self) -> None:
         if self.closed:
@@ -329,10 +327,6 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self._check_open()
         if self._state != "running":
             raise ResetNeeded(f"the episodes are {self._state}; call reset first")
-
-    def _picture(self, env: int) -> np.ndarray:
-        """A picture of one environment, where ``metadata`` has render modes."""
-        raise NotImplementedError
 
     @abstractmethod
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:

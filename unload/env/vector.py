@@ -76,6 +76,14 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._check_started()
         return self._containers.masks.astype(bool)
 
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """(480, 640, 3) uint8 of each container for ``render_mode="rgb_array"``, else None."""
+        self._check_started()
+        if self.render_mode is None:
+            return None
+        loads = map(self._load, range(self.num_envs))
+        return tuple(snapshot(load, present, load.positions) for load, present in loads)
+
     def liftable(self) -> np.ndarray:
         """(num_envs, 128) bool, which rows of the observations can be unloaded now."""
         self._check_started()
@@ -148,10 +156,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         packages = self._packages.get(env, labels)[:count]
         load = Load(boxes[:, :3], boxes[:, 3:], packages, labels)
         return load, self._containers.present[env, :count]
-
-    def _picture(self, env: int) -> np.ndarray:
-        load, present = self._load(env)
-        return snapshot(load, present, load.positions)
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0
