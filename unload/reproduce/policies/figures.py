@@ -11,7 +11,7 @@ from matplotlib.ticker import PercentFormatter
 from unload.reproduce.policies.comparison import PLAYERS
 from unload.reproduce.results import COMMAND, read_table
 from unload.reproduce.statistics import with_intervals
-from unload.reproduce.style import styled
+from unload.reproduce.style import COLOURS, styled
 from unload.support import files
 
 KEY = ["policy", "mask", "condition"]
@@ -25,10 +25,7 @@ CONDITIONS = (
 )  # fmt: skip
 COLUMNS = 3
 ROWS = {(policy, mask): policy if mask else f"{policy}, no mask" for policy, mask in PLAYERS}
-COLOURS = {
-    "random": "C5", "nearest": "C3", "highest": "C2",
-    "paper": "C1", "paper_seed_2": "C1", "recommended": "C0",
-}  # fmt: skip
+SEEN = {"paper": "ranks", "paper_seed_2": "ranks", "recommended": "positions"}
 NOT_PLAYED = "–"  # with every box simulated: without the mask, and restored by most policies
 
 
@@ -129,7 +126,7 @@ def _panel(axes: Axes, means: pd.DataFrame) -> None:
             axes.text(0.03, row, NOT_PLAYED, va="center", fontsize=7, color="0.45")
             continue
         _, mean, low, high = means.loc[policy, mask]
-        colour = COLOURS[policy]
+        colour = COLOURS[SEEN.get(policy, policy)]
         axes.plot([low, high], [row, row], color=colour)
         axes.plot(mean, row, "o", color=colour, markerfacecolor=colour if mask else "white",
                   markersize=5, clip_on=False, zorder=3)  # fmt: skip

@@ -8,7 +8,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from unload.reproduce.style import styled
+from unload.reproduce.policies.figures import SEEN
+from unload.reproduce.style import COLOURS, styled
 
 
 @styled
@@ -21,13 +22,16 @@ def learning(curve: pd.DataFrame, greedy: pd.Series) -> Figure:
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3))
     thousands = curve["picks"] / 1000
-    left.plot(thousands, curve["success_rate"], label="exploring agent")
+    colour = COLOURS["positions"]
+    left.plot(thousands, curve["success_rate"], color=colour, alpha=0.45, label="exploring agent")
     left.plot(thousands, curve["epsilon"], color="0.6", label="exploration rate ε")
-    left.plot(greedy.index / 1000, greedy, "o-", markersize=4, label="greedy, fresh containers")
+    left.plot(
+        greedy.index / 1000, greedy, "o-", color=colour, ms=4, label="greedy, fresh containers"
+    )
     left.set(xlabel="picks (thousands)", ylabel="MSR", ylim=(0, 1.03))
     left.yaxis.set_major_formatter(PercentFormatter(1))
     left.legend()
-    right.plot(thousands, curve["loss"], color="C3")
+    right.plot(thousands, curve["loss"], color=colour)
     right.set(xlabel="picks (thousands)", ylabel=r"loss $\ell$", ylim=(0, None))
     return figure
 
@@ -45,8 +49,8 @@ def preferences(
         field: (m, k) preference at the front wall.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
-    for name, values in by_height.items():
-        left.plot(z, values, label=name)
+    for (name, values), line in zip(by_height.items(), ("-", "--", ":")):
+        left.plot(z, values, line, color=COLOURS["positions"], label=name)
     left.set(xlabel="height z (m)", ylabel=r"preference $a \cdot f$")
     left.set_title("in the middle of the width")
     left.legend()
@@ -67,13 +71,13 @@ def steps(metres: np.ndarray, slope: float, ranks: np.ndarray) -> Figure:
         ranks: (m, 3) float, differences of the ranks of x, y and z.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
-    left.plot(*metres.T, "o", markersize=4)
+    left.plot(*metres.T, "o", color=COLOURS["positions"], markersize=4)
     flattest = (metres[:, 1] / np.abs(metres[:, 0]).clip(1e-9)).min()
     side = np.array([-0.6, 0, 0.6])
     left.plot(side, flattest * np.abs(side), color="0.5", linestyle="--", label="flattest step")
-    left.plot(side, slope * np.abs(side), color="C2", label="the policy's slope, at most")
+    left.plot(side, slope * np.abs(side), color="black", label="the policy's slope, at most")
     left.set(xlabel="to the side (m)", ylabel="up (m)", ylim=(0, 0.45), title="steps in metres")
-    for axis, colour, name in ((0, "0.5", "along x"), (1, "C1", "along y")):
+    for axis, colour, name in ((0, "0.5", "along x"), (1, COLOURS["ranks"], "along y")):
         right.plot(ranks[:, axis], ranks[:, 2], "o", markersize=1.5, alpha=0.3, color=colour,
                    label=name)  # fmt: skip
     right.set(xlabel="to the side or along the container (ranks)", ylabel="up (ranks)")
@@ -98,10 +102,9 @@ def noise(rates: pd.DataFrame, upside_down: pd.Series) -> Figure:
         upside_down: share of pairs whose upper box looks lower, with the same index.
     """
     figure, axes = plt.subplots(figsize=(5.4, 3.4))
-    names = list(dict.fromkeys(name for name, _ in rates))
     for name, mask in rates:
         axes.plot(100 * rates.index, rates[name, mask], "o-" if mask else "o--",
-                  color=f"C{2 - 2 * names.index(name)}", markersize=4,
+                  color=COLOURS[SEEN.get(name, name)], markersize=4,
                   label=name if mask else f"{name}, no mask")  # fmt: skip
     axes.plot(100 * upside_down.index, upside_down, color="0.5",
               label="pairs that look upside down")  # fmt: skip
