@@ -54,6 +54,12 @@ def test_chapter_tells_what_one_learns_and_closes_with_exercises(path):
     assert f"solutions/{path.name}" in ending
 
 
+@pytest.mark.parametrize("path", CHAPTERS, ids=name)
+def test_stated_minutes_are_those_of_its_words_figures_and_code(path):
+    stated = re.search(r"\*\*Time\*\*: (\d+) minutes to read", text(cells(path, "markdown")[0]))
+    assert abs(int(stated[1]) - run.measured(path)["minutes"]) <= 5
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
 def test_committed_outputs_are_clean(path):
     code = [cell for cell in cells(path, "code") if text(cell).strip()]
