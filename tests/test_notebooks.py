@@ -72,6 +72,12 @@ def test_committed_outputs_are_clean(path):
     assert path.stat().st_size < 1_500_000
 
 
+def test_a_wrong_answer_stops_every_solution():
+    for path in (path for path in NOTEBOOKS if path.parent.name == "solutions"):
+        for source in map(text, cells(path, "code")):
+            assert len(re.findall(r"\bcheck\(", source)) == source.count("strict=True"), path
+
+
 def test_reduced_parameters_belong_to_notebooks():
     tables = tomllib.loads((run.HERE / "reduced.toml").read_text())
     assert set(tables) <= {run.key(path) for path in NOTEBOOKS}
