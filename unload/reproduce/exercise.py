@@ -4,12 +4,7 @@ from collections.abc import Callable
 
 
 def check(
-    name: str,
-    answer: object,
-    right: Callable[[object], bool],
-    hint: str,
-    *,
-    strict: bool = False,
+    name: str, answer: object, right: Callable[[object], bool], hint: str, *, strict: bool = False
 ) -> None:
     """Print in one line whether an answer is right, or that there is none yet.
 

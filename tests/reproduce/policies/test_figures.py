@@ -1,4 +1,4 @@
-"""Figures and table of the policies, and those of the speeds."""
+"""Figures of the policies, and those of the speeds."""
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -41,16 +41,7 @@ def test_dots_are_the_means_over_the_containers():
         assert len(axes.texts) == len(figures.ROWS) - len(means)
 
 
-def test_a_table_says_100_only_if_no_pick_failed():
-    table = figures.comparison_table()
-    assert table.loc["500 picks", "recommended, no mask"] == "100"
-    assert table.loc["500 picks", "paper"].startswith("100.0 (")
-    assert table.loc["full, restored", "paper"] == figures.NOT_PLAYED
-
-
-@pytest.mark.parametrize(
-    "draw", [figures.comparison_means, figures.comparison_table, figures.comparison_msr]
-)
+@pytest.mark.parametrize("draw", [figures.comparison_means, figures.comparison_msr])
 def test_missing_data_name_their_command(tmp_path, draw):
     with pytest.raises(FileNotFoundError, match="python -m unload.reproduce policies makes it"):
         draw(tmp_path)

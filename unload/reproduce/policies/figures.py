@@ -65,32 +65,6 @@ def comparison_means(folder: str | Path = files.DATA) -> pd.DataFrame:
     return with_intervals(read_comparison(folder), KEY, ["success_rate"]).set_index(KEY)
 
 
-def comparison_table(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """MSR in percent with its 95 % interval, as text to read.
-
-    Returns:
-        One row per condition and one column per policy, learned ones with and without the
-        mask. A cell is such as ``"79.4 (77.2–81.6)"``; ``"100"`` if not a single pick failed,
-        and ``"–"`` if it was not played.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_comparison``.
-    """
-    means = comparison_means(folder)
-    cells = {
-        name: [_cell(means, (policy, mask, condition)) for condition in CONDITIONS]
-        for (policy, mask), name in ROWS.items()
-    }
-    return pd.DataFrame(cells, index=pd.Index(CONDITIONS, name="MSR in %"))
-
-
-def _cell(means: pd.DataFrame, key: tuple[str, bool, str]) -> str:
-    if key not in means.index:
-        return NOT_PLAYED
-    mean, low, high = 100 * means.loc[key].drop("runs")
-    return "100" if mean == 100 else f"{mean:.1f} ({low:.1f}–{high:.1f})"
-
-
 @styled
 def comparison_msr(folder: str | Path = files.DATA) -> Figure:
     """MSR of every policy: a panel for each condition, dots with 95 % intervals.
