@@ -3,6 +3,7 @@
     python notebooks/run.py                    reduced counts, results in build/notebooks
     python notebooks/run.py --in-place         their own counts, results kept in them
     python notebooks/run.py 03 solutions/08    only those whose names start so
+    python notebooks/run.py --measure          words, figures and minutes to read; runs nothing
 
 The reduced counts stand in reduced.toml. A cell that fails ends the run with its error and
 a non-zero exit status.
@@ -17,6 +18,7 @@ import tomllib
 from pathlib import Path
 
 import nbformat
+import pandas as pd
 import papermill
 
 from unload.support import files
@@ -25,6 +27,8 @@ HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
+WORDS_A_MINUTE, LONG_CELL = 180, 20  # a figure, or a cell of more lines, takes a minute
+UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
 
@@ -41,6 +45,24 @@ def key(notebook: Path) -> str:
 def reduced_parameters(notebook: Path) -> dict:
     """The values of reduced.toml for a notebook; none if it is not listed."""
     return tomllib.loads((HERE / "reduced.toml").read_text()).get(key(notebook), {})
+
+
+def measured(notebook: Path) -> dict[str, float]:
+    """Count ``words``, ``figures``, ``long cells`` and the ``minutes`` to read a notebook."""
+    cells = nbformat.read(notebook, as_version=4).cells
+    text = [cell.source for cell in cells if cell.cell_type == "markdown"]
+    code = [cell for cell in cells if cell.cell_type == "code"]
+    counts = {
+        "words": sum(len(source.split()) for source in text),
+        "figures": sum("image/png" in out.get("data", {}) for cell in code for out in cell.outputs),
+        "long cells": sum(
+            len(cell.source.splitlines()) > LONG_CELL
+            for cell in code
+            if not UNREAD & set(cell.metadata.get("tags", []))
+        ),
+    }
+    minutes = counts["words"] / WORDS_A_MINUTE + counts["figures"] + counts["long cells"]
+    return counts | {"minutes": minutes}
 
 
 def run(notebook: Path, output: Path, parameters: dict) -> None:
@@ -90,6 +112,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help="beginnings of notebook names; all if none")
     parser.add_argument("--in-place", action="store_true", help="keep the results in the notebooks")
+    parser.add_argument("--measure", action="store_true", help="say how long each takes to read")
     options = parser.parse_args()
     logging.getLogger("papermill").setLevel(logging.ERROR)
     chosen = [
@@ -99,6 +122,11 @@ def main() -> int:
     ]
     if not chosen:
         parser.error(f"no notebook starts with {options.names}")
+    if options.measure:
+        table = pd.DataFrame({key(path): measured(path) for path in chosen}).T
+        table.loc["all"] = table.sum()
+        print(table.round().astype(int).to_string())
+        return 0
     for number, path in enumerate(chosen, start=1):
         label = path.relative_to(HERE)
         print(f"[{number}/{len(chosen)}] {label} …", end=" ", flush=True)

@@ -57,6 +57,12 @@ def test_chapter_tells_what_one_learns_and_closes_with_exercises(path):
     assert f"solutions/{path.name}" in ending
 
 
+@pytest.mark.parametrize("path", CHAPTERS, ids=name)
+def test_stated_minutes_are_those_of_its_words_figures_and_code(path):
+    stated = re.search(r"\*\*Time\*\*: (\d+) minutes to read", text(cells(path, "markdown")[0]))
+    assert abs(int(stated[1]) - run.measured(path)["minutes"]) <= 5
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
 def test_committed_outputs_are_clean(path):
     code = [cell for cell in cells(path, "code") if text(cell).strip()]
@@ -67,6 +73,12 @@ def test_committed_outputs_are_clean(path):
     assert not [output for output in outputs if run.WIDGET_MIMETYPE in output.get("data", {})]
     assert "widgets" not in json.loads(path.read_text())["metadata"]
     assert path.stat().st_size < 1_500_000
+
+
+def test_a_wrong_answer_stops_every_solution():
+    for path in (path for path in NOTEBOOKS if path.parent.name == "solutions"):
+        for source in map(text, cells(path, "code")):
+            assert len(re.findall(r"\bcheck\(", source)) == source.count("strict=True"), path
 
 
 def test_reduced_parameters_belong_to_notebooks():

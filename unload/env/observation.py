@@ -12,7 +12,7 @@ from unload.support import checks
 
 PADDING = -1.0
 # Drift of the boxes of a settled full simulation, measured in notebook 04: how far they
-# spread around the places they were put at, and how far they sink in the mean (m).
+# spread around the places they were put at, and how far they sink on average (m).
 POSITION_NOISE = 0.0005
 SINK = 0.001
 MOST_NOISE = 10.0  # m, more than the container is long

@@ -137,7 +137,7 @@ class AgentView(widgets.VBox):
             f"The {len(visible)} visible items have <b>{len(np.unique(ranks))}</b> different ranks "
             f"in height. The greedy choice is item <b>{item}</b> of rank "
             f"{ranks[sight.greedy]:.1f}, which <b>{can}</b> be lifted.<br>With this ε, the next "
-            f"pick succeeds with probability <b>{sight.chance:.2f}</b>; in the mean over {DRAWS} "
+            f"pick succeeds with probability <b>{sight.chance:.2f}</b>; on average over {DRAWS} "
             f"draws of the noise, with {others:.2f}."
         )
 

@@ -3,24 +3,30 @@
 from collections.abc import Callable
 
 
-def check(name: str, answer: object, right: Callable[[object], bool], hint: str) -> None:
-    """Print in one line that an answer is right, or that there is none yet.
+def check(
+    name: str, answer: object, right: Callable[[object], bool], hint: str, *, strict: bool = False
+) -> None:
+    """Print in one line whether an answer is right, or that there is none yet.
 
     A notebook stands with ``answer = None`` in its exercises, so that it runs from end to end
-    before they are solved.
+    before they are solved, and a wrong answer does not stop it.
 
     Args:
         name: of the exercise, such as ``"Exercise 1"``.
         answer: the reader's, None while there is none.
         right: whether an answer is right; not asked while there is none.
         hint: what to look at again, for a wrong answer.
+        strict: raise an error for a wrong answer, as the solutions do.
 
     Raises:
-        AssertionError: the answer is wrong; the message gives it and the hint.
+        AssertionError: the answer is missing or wrong, and ``strict``; the message gives the hint.
     """
-    if answer is None:
-        print(f"{name}: not yet")
+    if answer is not None and right(answer):
+        print(f"{name}: right")
         return
-    if not right(answer):
-        raise AssertionError(f"{name}: {answer!r} is not right; {hint}")
-    print(f"{name}: right")
+    message = f"{name}: not yet"
+    if answer is not None:
+        message += f": {answer!r} is not right; {hint}"
+    if strict:
+        raise AssertionError(message)
+    print(message)

@@ -1,4 +1,4 @@
-"""Figures and table of the policies, and those of the speeds."""
+"""Figures of the policies, and those of the speeds."""
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -36,13 +36,6 @@ def test_dots_are_the_means_over_the_containers():
         ]
         assert [line.get_xdata()[0] for line in axes.lines[1::2]] == pytest.approx(means)
         assert len(axes.texts) == len(figures.ROWS) - len(means)
-
-
-def test_a_table_says_100_only_if_no_pick_failed():
-    table = figures.comparison_table()
-    assert table.loc["500 picks", "recommended, no mask"] == "100"
-    assert table.loc["500 picks", "paper"].startswith("100.0 (")
-    assert table.loc["full, restored", "paper"] == figures.NOT_PLAYED
 
 
 def test_bars_are_the_measured_ratios():

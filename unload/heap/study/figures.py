@@ -23,6 +23,7 @@ from unload.heap.study.table import (
     read_heap_table,
 )
 from unload.load.view import COLOURS, CORNERS, EYE, SEAM, project
+from unload.reproduce.style import COLOURS as RULE_COLOURS
 from unload.reproduce.style import mark_reduced, styled
 from unload.support import files
 
@@ -36,7 +37,7 @@ MEANINGS = {
 OUTSIDE = FARTHEST_EDGE + 0.6  # m, how far the pictures reach
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 LIGHT = np.array([0.55, -0.45, 0.7]) / np.linalg.norm([0.55, -0.45, 0.7])
-LINES = {REFERENCE: "C1", LEARNED: "C0", ORACLE: "0.2"}  # colours of policies that are no rules
+LINES = {REFERENCE: RULE_COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
 # Where the names of rules stand that lie close together: offset in points, and alignment.
 NAME_PLACES = {
     "clear above": ((-2, 9), "center"), "nearest": ((0, -13), "center"),

@@ -12,12 +12,10 @@ from unload import task
 from unload.reproduce.falls.cells import PREFERENCES, PUPILS
 from unload.reproduce.paper.grids import PAPER_CELLS
 from unload.reproduce.statistics import PAPER_MSR, end_msr, t_interval
-from unload.reproduce.style import styled
+from unload.reproduce.style import COLOURS, styled
 
-# One colour, one meaning: what is seen or stored.
-COLOURS = {"ranks": "C1", "shuffled": "C0", "averaged": "C3", "level": "C2"}
 # Name and colour of each of ``PUPILS``.
-PUPIL_LOOKS = list(COLOURS.items())
+PUPIL_LOOKS = [(name, COLOURS[name]) for name in ("ranks", "shuffled", "averaged", "level")]
 TITLES = {
     "paper_no_mask": "mask off, b = 256",
     "paper_mask": "mask on, b = 256",
@@ -66,7 +64,7 @@ def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
         curves: name → curve of a run, see ``unload.agent.training``.
     """
     figure, axes = plt.subplots()
-    for (name, curve), colour in zip(curves.items(), COLOURS.values()):
+    for (name, curve), (_, colour) in zip(curves.items(), PUPIL_LOOKS):
         draw_msr(axes, curve["picks"], curve["success_rate"], label=name, color=colour, lw=1)
     axes.legend()
     return figure
@@ -81,7 +79,7 @@ def surfaces(profiles: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
     """
     figure, axes = plt.subplots(figsize=(5.2, 3.4))
     width, _, height = task.CONTAINER[[1, 0, 2]]
-    for (name, (places, heights)), colour in zip(profiles.items(), COLOURS.values()):
+    for (name, (places, heights)), (_, colour) in zip(profiles.items(), PUPIL_LOOKS):
         axes.plot(places, heights, color=colour, label=name)
         axes.fill_between(places, heights, color=colour, alpha=0.1, lw=0)
     axes.set(xlim=(0, width), ylim=(0, height), xlabel="y, across the container (m)",

@@ -1,6 +1,6 @@
 """The learning curves of Figs. 8–12, and what the notebooks draw of runs and policies."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -11,15 +11,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from unload import task
-from unload.load.view import COLOURS
+from unload.load.view import COLOURS as BOX_COLOURS
 from unload.reproduce.paper.grids import PAPER, TUNING
 from unload.reproduce.paper.training import default_curves, episode_means
 from unload.reproduce.paper.tuning import REACHED, greedy_msr, read_curves, running_mean
-from unload.reproduce.style import mark_reduced, styled
+from unload.reproduce.style import COLOURS, mark_reduced, styled
 from unload.support import files
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
-SEED_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")  # told apart by the colour-blind, too
+SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too
+FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
 
 
 @styled
@@ -105,14 +106,12 @@ def draw_greedy(axes: Axes, curves: Mapping[str, Curves]) -> None:
         axes: where.
         curves: MSR while training of all runs, by the configuration's name.
     """
-    for number, (name, runs) in enumerate(curves.items()):
+    for (name, runs), colour in zip(curves.items(), _colours(curves)):
         greedy = greedy_msr(np.array(list(runs.values())))
         mean, error = greedy.mean(axis=0), greedy.std(axis=0, ddof=1) / len(greedy) ** 0.5
         steps = np.arange(len(mean))
-        axes.plot(steps, mean, color=f"C{number}", label=name)
-        axes.fill_between(
-            steps, mean - error, mean + error, color=f"C{number}", alpha=0.25, linewidth=0
-        )
+        axes.plot(steps, mean, color=colour, label=name)
+        axes.fill_between(steps, mean - error, mean + error, color=colour, alpha=0.25, linewidth=0)
     axes.axhline(REACHED, color="0.4", linestyle=":", linewidth=0.8)
     axes.set(xlabel="step $k$", ylim=(0, 1.1))
     axes.legend(loc="lower right", fontsize=8)
@@ -124,20 +123,28 @@ def draw_curves(axes: Axes, curves: Mapping[str, tuple[Curves, int]], label: str
 
     Args:
         axes: where.
-        curves: by name: the curves of all runs, and the number of the strong one.
+        curves: by name: the curves of all runs, and the number of the strong one, which stands
+            in the legend if there are others.
         label: of the vertical axis.
     """
-    for number, (name, (runs, shown)) in enumerate(curves.items()):
+    for (name, (runs, shown)), colour in zip(curves.items(), _colours(curves)):
+        label_of_run = f"{name}, run {shown}" if len(runs) > 1 else name
         for run, values in runs.items():
             smooth = running_mean(values)
             if run == shown:
-                axes.plot(smooth, color=f"C{number}", label=name, zorder=3)
+                axes.plot(smooth, color=colour, label=label_of_run, zorder=3)
             else:
-                axes.plot(smooth, color=f"C{number}", linewidth=0.5, alpha=0.4)
+                axes.plot(smooth, color=colour, linewidth=0.5, alpha=0.4)
     axes.set(xlabel="step $k$", ylabel=label)
     others = any(len(runs) > 1 for runs, _ in curves.values())
     note = "thin: the other runs of the same configuration" if others else None
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4, title=note, title_fontsize=8)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, title=note, title_fontsize=8)
+
+
+def _colours(names: Collection[str]) -> list:
+    """Of what the agents see; else a scale from dark to light, for the values of a setting."""
+    scale = plt.get_cmap("viridis")(np.linspace(0, 0.85, len(names)))
+    return [FE_COLOURS.get(name, colour) for name, colour in zip(names, scale)]
 
 
 def _over_steps(curves: Mapping[str, tuple[Curves, int]], label: str, folder: str | Path) -> Figure:
@@ -176,7 +183,9 @@ def fig12_reward(folder: str | Path = files.DATA) -> Figure:
     return _over_picks(rewards, r"$r_\mathrm{mean}$", (-1, 1), folder)
 
 
-def draw_learning_curve(axes: Axes, curve: pd.DataFrame, name: str, color: str = "C0") -> None:
+def draw_learning_curve(
+    axes: Axes, curve: pd.DataFrame, name: str, color: str = COLOURS["ranks"]
+) -> None:
     """Draw the MSR while training: pale at each point of the curve, strong over whole episodes.
 
     Args:
@@ -193,16 +202,18 @@ def draw_learning_curve(axes: Axes, curve: pd.DataFrame, name: str, color: str =
     axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
 
 
-def draw_by_pick(axes: Axes, curves: dict[str, np.ndarray]) -> None:
+def draw_by_pick(axes: Axes, curves: dict[str, np.ndarray], colours: Sequence[str]) -> None:
     """Draw the MSR over the picks of an episode, means over 20 picks.
 
     Args:
         axes: where.
-        curves: (500,) each by name, see ``msr_by_pick``.
+        curves: (500,) each by name, see ``msr_by_pick``; dashed if it says "without the mask".
+        colours: one for each curve.
     """
-    for name, msr in curves.items():
+    for (name, msr), colour in zip(curves.items(), colours):
         means = msr.reshape(-1, 20).mean(axis=1)
-        axes.plot(np.arange(10, len(msr), 20), means, label=name)
+        line = "--" if "without the mask" in name else "-"
+        axes.plot(np.arange(10, len(msr), 20), means, line, color=colour, label=name)
     axes.set(xlabel="pick of the episode", ylabel="MSR", ylim=(0, 1.02), xlim=(0, task.MAX_PICKS))
 
 
@@ -216,7 +227,7 @@ def draw_values(axes: Axes, heights: np.ndarray, values: np.ndarray, liftable: n
         liftable: (items,) bool, what can be lifted.
     """
     for name, rows in (("blocked", ~liftable), ("liftable", liftable)):
-        axes.scatter(heights[rows], values[rows], s=10, color=COLOURS[name], label=name)
+        axes.scatter(heights[rows], values[rows], s=10, color=BOX_COLOURS[name], label=name)
     axes.set(xlabel=r"height $\tilde p_z$", ylabel="action value", ylim=(-1.1, 1.1))
 
 
@@ -230,7 +241,7 @@ def draw_picks(axes: Axes, items: np.ndarray, unloaded: np.ndarray) -> None:
     """
     picks = np.arange(len(items))
     for name, rows, colour in (("failed", ~unloaded, "failed"), ("unloaded", unloaded, "liftable")):
-        axes.scatter(picks[rows], items[rows], s=6, color=COLOURS[colour], label=name)
+        axes.scatter(picks[rows], items[rows], s=6, color=BOX_COLOURS[colour], label=name)
     axes.set(xlabel="pick of the episode", ylabel="item")
 
 

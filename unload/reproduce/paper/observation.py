@@ -18,12 +18,13 @@ from unload.env.equalization import equalize
 from unload.load.view import COLOURS
 from unload.reproduce.paper.loads import draw_items
 from unload.reproduce.results import COMMAND, measured, publish, read_table
+from unload.reproduce.style import COLOURS as SEEN_COLOURS
 from unload.reproduce.style import styled
 from unload.support import files
 
 FOLDER = "obs_hist_equal"  # of the paper's own plots
 # Of ranks instead of positions; all other colours mean what they mean in every picture.
-EQUALIZED = (0.90, 0.62, 0.00)
+EQUALIZED = SEEN_COLOURS["ranks"]
 # Fig. 5: the paper's histogram. The edges lie just outside [-1, 1].
 BINS = np.linspace(-1.001, 1.001, 111)
 

@@ -16,7 +16,7 @@ from matplotlib.ticker import PercentFormatter
 from unload.reproduce.policies.comparison import PLAYERS
 from unload.reproduce.results import COMMAND, read_table
 from unload.reproduce.statistics import with_intervals
-from unload.reproduce.style import styled
+from unload.reproduce.style import COLOURS, styled
 from unload.support import files
 
 KEY = ["policy", "mask", "condition"]
@@ -30,10 +30,7 @@ CONDITIONS = (
 )  # fmt: skip
 COLUMNS = 3
 ROWS = {(policy, mask): policy if mask else f"{policy}, no mask" for policy, mask in PLAYERS}
-COLOURS = {
-    "random": "C5", "nearest": "C3", "highest": "C2",
-    "paper": "C1", "paper_seed_2": "C1", "recommended": "C0",
-}  # fmt: skip
+SEEN = {"paper": "ranks", "paper_seed_2": "ranks", "recommended": "positions"}
 NOT_PLAYED = "–"  # with every box simulated: without the mask, and restored by most policies
 
 
@@ -73,32 +70,6 @@ def comparison_means(folder: str | Path = files.DATA) -> pd.DataFrame:
     return with_intervals(read_comparison(folder), KEY, ["success_rate"]).set_index(KEY)
 
 
-def comparison_table(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """MSR in percent with its 95 % interval, as text to read.
-
-    Returns:
-        One row per condition and one column per policy, learned ones with and without the
-        mask. A cell is such as ``"79.4 (77.2–81.6)"``; ``"100"`` if not a single pick failed,
-        and ``"–"`` if it was not played.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_comparison``.
-    """
-    means = comparison_means(folder)
-    cells = {
-        name: [_cell(means, (policy, mask, condition)) for condition in CONDITIONS]
-        for (policy, mask), name in ROWS.items()
-    }
-    return pd.DataFrame(cells, index=pd.Index(CONDITIONS, name="MSR in %"))
-
-
-def _cell(means: pd.DataFrame, key: tuple[str, bool, str]) -> str:
-    if key not in means.index:
-        return NOT_PLAYED
-    mean, low, high = 100 * means.loc[key].drop("runs")
-    return "100" if mean == 100 else f"{mean:.1f} ({low:.1f}–{high:.1f})"
-
-
 @styled
 def comparison_msr(folder: str | Path = files.DATA) -> Figure:
     """MSR of every policy: a panel for each condition, dots with 95 % intervals.
@@ -134,7 +105,7 @@ def _panel(axes: Axes, means: pd.DataFrame) -> None:
             axes.text(0.03, row, NOT_PLAYED, va="center", fontsize=7, color="0.45")
             continue
         _, mean, low, high = means.loc[policy, mask]
-        colour = COLOURS[policy]
+        colour = COLOURS[SEEN.get(policy, policy)]
         axes.plot([low, high], [row, row], color=colour)
         axes.plot(mean, row, "o", color=colour, markerfacecolor=colour if mask else "white",
                   markersize=5, clip_on=False, zorder=3)  # fmt: skip
@@ -150,13 +121,16 @@ def learning(curve: pd.DataFrame, greedy: pd.Series) -> Figure:
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3))
     thousands = curve["picks"] / 1000
-    left.plot(thousands, curve["success_rate"], label="exploring agent")
+    colour = COLOURS["positions"]
+    left.plot(thousands, curve["success_rate"], color=colour, alpha=0.45, label="exploring agent")
     left.plot(thousands, curve["epsilon"], color="0.6", label="exploration rate ε")
-    left.plot(greedy.index / 1000, greedy, "o-", markersize=4, label="greedy, fresh containers")
+    left.plot(
+        greedy.index / 1000, greedy, "o-", color=colour, ms=4, label="greedy, fresh containers"
+    )
     left.set(xlabel="picks (thousands)", ylabel="MSR", ylim=(0, 1.03))
     left.yaxis.set_major_formatter(PercentFormatter(1))
     left.legend()
-    right.plot(thousands, curve["loss"], color="C3")
+    right.plot(thousands, curve["loss"], color=colour)
     right.set(xlabel="picks (thousands)", ylabel=r"loss $\ell$", ylim=(0, None))
     return figure
 
@@ -174,8 +148,8 @@ def preferences(
         field: (m, k) preference at the front wall.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
-    for name, values in by_height.items():
-        left.plot(z, values, label=name)
+    for (name, values), line in zip(by_height.items(), ("-", "--", ":")):
+        left.plot(z, values, line, color=COLOURS["positions"], label=name)
     left.set(xlabel="height z (m)", ylabel=r"preference $a \cdot f$")
     left.set_title("in the middle of the width")
     left.legend()
@@ -196,13 +170,13 @@ def steps(metres: np.ndarray, slope: float, ranks: np.ndarray) -> Figure:
         ranks: (m, 3) float, differences of the ranks of x, y and z.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6))
-    left.plot(*metres.T, "o", markersize=4)
+    left.plot(*metres.T, "o", color=COLOURS["positions"], markersize=4)
     flattest = (metres[:, 1] / np.abs(metres[:, 0]).clip(1e-9)).min()
     side = np.array([-0.6, 0, 0.6])
     left.plot(side, flattest * np.abs(side), color="0.5", linestyle="--", label="flattest step")
-    left.plot(side, slope * np.abs(side), color="C2", label="the policy's slope, at most")
+    left.plot(side, slope * np.abs(side), color="black", label="the policy's slope, at most")
     left.set(xlabel="to the side (m)", ylabel="up (m)", ylim=(0, 0.45), title="steps in metres")
-    for axis, colour, name in ((0, "0.5", "along x"), (1, "C1", "along y")):
+    for axis, colour, name in ((0, "0.5", "along x"), (1, COLOURS["ranks"], "along y")):
         right.plot(ranks[:, axis], ranks[:, 2], "o", markersize=1.5, alpha=0.3, color=colour,
                    label=name)  # fmt: skip
     right.set(xlabel="to the side or along the container (ranks)", ylabel="up (ranks)")
@@ -227,10 +201,9 @@ def noise(rates: pd.DataFrame, upside_down: pd.Series) -> Figure:
         upside_down: share of pairs whose upper box looks lower, with the same index.
     """
     figure, axes = plt.subplots(figsize=(5.4, 3.4))
-    names = list(dict.fromkeys(name for name, _ in rates))
     for name, mask in rates:
         axes.plot(100 * rates.index, rates[name, mask], "o-" if mask else "o--",
-                  color=f"C{2 - 2 * names.index(name)}", markersize=4,
+                  color=COLOURS[SEEN.get(name, name)], markersize=4,
                   label=name if mask else f"{name}, no mask")  # fmt: skip
     axes.plot(100 * upside_down.index, upside_down, color="0.5",
               label="pairs that look upside down")  # fmt: skip
