@@ -103,6 +103,8 @@ def test_the_first_box_of_a_load_fails_like_any_other(make_env, boxes):
     row = env.unwrapped.visible.tolist().index(0)
     _, reward, _, _, info = env.step(row)
     assert reward == -1 and info["item"] == 0 and info["action_mask"][row] == 0
+    env.reset(options={"load": boxes((1.2, 0.2), (2.0, 0.2))})
+    assert env.unwrapped.liftable().sum() == 2
 
 
 def test_failures_add_up_and_a_success_forgives_them(make_env):
