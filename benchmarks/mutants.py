@@ -55,7 +55,7 @@ from cosmic_ray.plugins import get_operator
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE, SEED = 40, 0  # mutants per module, and of their choice
-COPIED = ("unload", "tests", "data", "pyproject.toml")
+COPIED = ("unload", "tests", "data", "pyproject.toml", ".gitignore")
 # Tests of the array environment that are quick as plain Python.
 FEW_PICKS = " ".join(
     f"env/test_vector.py::test_{name}"
@@ -87,6 +87,11 @@ MODULES = {
     "agent/fast/fused": "agent/fast/test_fused.py",
     "agent/fast/kernel": "agent/fast/test_fused.py",
     "agent/fast/learner": "agent/fast/test_learner.py agent/test_learner.py agent/test_dqn.py",
+    "support/checks": "support/test_checks.py",
+    "support/files": "support/test_files.py",
+    "network/weights": "network/test_weights.py agent/test_greedy.py",
+    "agent/checkpoint": "agent/test_checkpoint.py",
+    "agent/sweep": "agent/test_sweep.py",
 }
 # Tests that take long, or start processes of their own.
 SLOW = "full or program_ends or processes or 64_containers or agent_learns"

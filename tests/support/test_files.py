@@ -89,7 +89,7 @@ def test_a_full_disk_is_an_error_that_names_the_file(tmp_path):
         (tmp_path / "long.txt", files.write_text, "x" * 10_000),
         (tmp_path / "large.npz", files.write_arrays, {"a": np.ones(10_000)}),
     ):
-        message = f"cannot write this file: .*'{path}'$"
+        message = f"cannot write this file: File too large: '{path}'$"
         with pytest.raises(OSError, match=message), full_disk():
             write(path, content)
     assert not list(tmp_path.iterdir())
