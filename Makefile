@@ -21,9 +21,10 @@ quick: $(VENV)/ready  ## run most tests of the rooms in a minute or so (the Make
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow" -k "not (compiled or killed or full)" \
 	--ignore tests/reproduce --ignore tests/test_notebooks.py --ignore tests/test_benchmarks.py
 
-lint: $(VENV)/ready  ## check style and format with ruff, notebooks included
+lint: $(VENV)/ready  ## check style and format, notebooks included, and the core's types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+	$(BIN)/mypy
 
 lab: $(VENV)/ready  ## open the notebooks in JupyterLab
 	$(BIN)/jupyter lab --notebook-dir=notebooks

@@ -21,6 +21,7 @@ RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
     "ipykernel": "runs the notebooks",
     "jupyterlab": "make lab",
+    "mypy": "make lint",
     "pytest-xdist": "make test, in two processes",
     "ruff": "make lint",
     "setuptools": "make dist",

@@ -59,7 +59,7 @@ class DQN:
         beta = checks.real("beta", beta, 0)
         self.learner: FusedLearner | PlainLearner
         if fused_update:
-            self.learner = FusedLearner(network, learning_rate, beta)
+            self.learner = FusedLearner(network, learning_rate, beta)  # type: ignore[arg-type]
         else:
             self.learner = PlainLearner(network, learning_rate, beta)
         self.update_target()

@@ -123,7 +123,7 @@ def _play(
     rewards, deadlocked = [], []  # of each step, (num_envs,)
     running, emptied = np.ones(len(seeds), bool), np.zeros(len(seeds), bool)
     picks, failures = np.zeros((2, len(seeds)), np.int64)  # so far, and failed ones in a row
-    observations, infos = envs.reset(seed=seeds)
+    observations, infos = envs.reset(seed=seeds)  # type: ignore[arg-type]
     while True:
         allowed = infos["action_mask" if mask else "item_mask"]
         hopeless = ~allowed.any(axis=1)  # the policy knows of every item that it has failed

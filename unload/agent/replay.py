@@ -105,7 +105,7 @@ class ReplayBuffer:
         self._dtypes = {name: np.dtype(dtype) for name, (_, dtype) in kinds.items()}  # as given
         if equalized:
             kinds["observations"] = ((items, 3), np.uint8)
-        self.arrays = {
+        self.arrays: dict[str, np.ndarray] = {
             name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
         }
 

@@ -10,12 +10,14 @@ loads are so small, the picks are repeated from the first one on.
 from collections import deque
 from collections.abc import Callable, Iterator
 from hashlib import blake2b
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
 
 from unload.agent.config import TrainConfig
 from unload.agent.replay import shuffle_places
+from unload.env.base import PickingVectorEnv
 
 
 class Rollout:
@@ -40,15 +42,17 @@ class Rollout:
         shape = (config.picks // config.num_envs, config.num_envs)
         self._actions = np.empty(shape, np.uint8)
         self.steps = 0
-        self.envs = gymnasium.make_vec(
+        options: dict[str, Any] = {} if stack is None else {"stack": stack}
+        envs = gymnasium.make_vec(
             config.env,
             config.num_envs,
             equalize=config.equalize,
             ties=config.ties,
             max_picks=config.max_picks,
             position_noise=config.position_noise,
-            **({} if stack is None else {"stack": stack}),
+            **options,
         )
+        self.envs = cast(PickingVectorEnv, envs)
         self._see(*self.envs.reset(seed=config.seeds()[0]))
         # Of the episodes that the replay memory reaches back to, where all started together: first
         # step, generators there.

@@ -13,6 +13,7 @@ import json
 import sys
 from abc import abstractmethod
 from collections.abc import Sequence
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -47,7 +48,7 @@ def check_settings(
     )
 
 
-def check_options(options: object, known: tuple[str, ...]) -> dict[str, Load]:
+def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Load]:
     """Return the options of a ``reset``, {} for None.
 
     Raises:
@@ -69,7 +70,7 @@ class AllOrReset:
     A class, because ``contextlib.contextmanager`` is three times as slow, and steps are short.
     """
 
-    def __init__(self, env: object) -> None:
+    def __init__(self, env: Any) -> None:
         self._env = env
 
     def __enter__(self) -> None: ...
@@ -88,7 +89,7 @@ class EpisodeEnv(gymnasium.Env):
 
     _state = "not started"
 
-    def __reduce_ex__(self, protocol: int):
+    def __reduce_ex__(self, protocol):
         """Refuse to be copied or pickled, because both would step the same simulator."""
         kind = type(self).__name__
         raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
@@ -217,7 +218,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self._check_open()
         options = check_options(options, self.options)
         if seed is None:
-            seeds = [None] * self.num_envs
+            seeds: Sequence[int | None] = [None] * self.num_envs
         elif isinstance(seed, Sequence):
             seeds = [None if one is None else checks.integer("seed", one, 0) for one in seed]
             if len(seeds) != self.num_envs:
@@ -269,7 +270,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         """
         envs = np.flatnonzero(ended)
         self._begin(envs, [self._rngs[env] for env in envs])
-        infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
+        infos: dict[str, Any] = _flagged(self._infos(), np.ones(self.num_envs, bool))
         if not ended.all():  # a reset has no infos about a pick
             picks = {name: each for name, each in last_infos.items() if name not in infos}
             infos |= _flagged(_masked(picks, ~ended), ~ended)

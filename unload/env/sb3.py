@@ -10,6 +10,8 @@ Five lines train a policy that sees the mask, to an MSR of 100 % within seconds:
     model.learn(30_000)
 """
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -35,7 +37,7 @@ class VectorEnvAdapter(VecEnv):
         mode = envs.metadata.get("autoreset_mode")
         if mode != AutoresetMode.SAME_STEP:
             raise ValueError(f"envs resets with {mode}; expected {AutoresetMode.SAME_STEP}")
-        self.envs = envs
+        self.envs: Any = envs
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> np.ndarray:

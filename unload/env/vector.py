@@ -139,7 +139,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         items, distances = containers.look_up(self._containers, actions, *self._physics.table.slots)
         if distances.min() == containers.UNKNOWN:
             for env in np.flatnonzero(distances == containers.UNKNOWN):
-                distances[env] = self._lift(env, int(items[env]))
+                distances[env] = self._lift(int(env), int(items[env]))
         return items, distances
 
     def _lift(self, env: int, item: int) -> float:

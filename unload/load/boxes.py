@@ -102,7 +102,7 @@ class Load:
 
 def outside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
     """(n,) bool, which boxes stick out of the container."""
-    return ((low < -tolerance) | (high > task.CONTAINER + tolerance)).any(axis=1)
+    return np.any((low < -tolerance) | (high > task.CONTAINER + tolerance), axis=1)
 
 
 def _check_inside(low: np.ndarray, high: np.ndarray) -> None:

@@ -141,7 +141,9 @@ def view(
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
         items = checks.integer_array("order", order, (None,))[:FIRST_PICKS]
-        groups = {f"pick {number}": [item] for number, item in enumerate(items.tolist(), 1)}
+        groups = {
+            f"pick {number}": np.array([item]) for number, item in enumerate(items.tolist(), 1)
+        }
         of_item, names = _grouped(present, groups, PICK_COLOURS)
         names = {name.replace("unseen", "picked later"): names[name] for name in names}
     elif groups is None:
@@ -299,7 +301,7 @@ def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarr
     moved = (positions - load.positions)[items]
     low, high = (corner + moved for corner in corners(load, items))
     colours = np.array([package_colour(package) for package in load.packages[items]])
-    figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")
+    figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
     order = back_to_front(low, high)
     draw(figure.add_axes((0, 0, 1, 1)), low[order], high[order], colours.reshape(-1, 3)[order])
     return pixels(figure)
@@ -320,7 +322,7 @@ def still(
         legend: name → colour.
         height: of the picture in inches.
     """
-    figure = Figure((WIDTH, height), dpi=100, facecolor="white", layout="none")
+    figure = Figure((WIDTH, height), dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
     order = back_to_front(low, high)
     draw(figure.add_axes((LEGEND, 0, 1 - LEGEND, 1)), low[order], high[order], colours[order])
     handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
@@ -347,7 +349,7 @@ def draw(axes: Axes, low: np.ndarray, high: np.ndarray, colours: np.ndarray) -> 
     shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
     axes.add_collection(
         PolyCollection(
-            polygons,
+            list(polygons),
             facecolors=shades.reshape(-1, 3),
             edgecolors=EDGE * shades.reshape(-1, 3),
             linewidths=0.5,

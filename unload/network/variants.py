@@ -103,7 +103,8 @@ class EquivariantStack(ScoringNetwork):
     def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
         own = observations
         for layer in self.layers:
-            own = torch.relu(linear_with_context(layer, own, maximum_over_items(own, present)))
+            context = maximum_over_items(own, present)
+            own = torch.relu(linear_with_context(layer, own, context))  # type: ignore[arg-type]
         return own
 
 

@@ -10,10 +10,14 @@ from collections.abc import Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from unload import task
+
+if TYPE_CHECKING:
+    import pybullet
 
 
 @contextmanager
@@ -145,8 +149,8 @@ class World:
 
     def add_box(
         self,
-        position: Sequence[float],
-        size: Sequence[float],
+        position: Sequence[float] | np.ndarray,
+        size: Sequence[float] | np.ndarray,
         mass: float,
         orientation: Sequence[float] = UPRIGHT,
         friction: float = FRICTION,

@@ -53,7 +53,9 @@ class FullPhysics(Physics):
             self._world.add_box(position, slim(size), task.MASS)
             for position, size in zip(load.positions, sizes)
         ]
-        self._poses = [(tuple(position), UPRIGHT) for position in load.positions.tolist()]
+        self._poses: list[tuple] = [
+            (tuple(position), UPRIGHT) for position in load.positions.tolist()
+        ]
 
     def _clear(self, bodies: Sequence[int]) -> None:
         """Empty the container, so that Bullet forgets the contacts in it.

@@ -15,7 +15,7 @@ from datetime import datetime
 from hashlib import blake2b, file_digest
 from importlib import resources
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 from uuid import uuid4
 
 import numpy as np
@@ -27,7 +27,7 @@ FIGURES = ROOT / "figures"
 RUNS = ROOT / "runs"  # training runs, not kept in the repository
 
 
-def write_atomically(path: str | Path, write: Callable[[BinaryIO], None]) -> None:
+def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
     """Let ``write`` fill a file that replaces ``path`` only once it is complete on disk.
 
     Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
@@ -69,7 +69,7 @@ def write_text(path: str | Path, text: str) -> None:
     write_atomically(path, lambda file: file.write(text.encode()))
 
 
-def write_json(path: str | Path, value: object, checked: bool = False) -> None:
+def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
     """Write a value as indented JSON in one atomic step.
 
     Args:

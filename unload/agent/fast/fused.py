@@ -22,7 +22,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 import torch
@@ -48,7 +48,7 @@ class Weights(NamedTuple):
     score_bias: np.ndarray
 
 
-def applies(network: torch.nn.Module) -> bool:
+def applies(network: torch.nn.Module) -> TypeGuard[PEQNetwork]:
     """Return whether the fused update applies: a ``PEQNetwork`` (no subclass), float32, CPU."""
     return type(network) is PEQNetwork and all(
         p.device.type == "cpu" and p.dtype == torch.float32 for p in _parameters(network)
@@ -195,7 +195,7 @@ def _check_range(name: str, numbers: np.ndarray, end: int) -> None:
         raise ValueError(f"{name} holds {wrong[0]}; expected 0 to {end - 1}")
 
 
-def _parameters(network: PEQNetwork) -> tuple[torch.nn.Parameter, ...]:
+def _parameters(network: PEQNetwork) -> tuple[torch.Tensor, ...]:
     """Parameters in the order of ``Weights``; ``network.parameters()`` takes ten times as long."""
     extractor, scorer = network.extractor, network.scorer
     return extractor.weight, extractor.bias, scorer.weight, scorer.bias
