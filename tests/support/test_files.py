@@ -7,6 +7,7 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from io import BytesIO
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -112,6 +113,14 @@ def _as_npy(content: bytes) -> bytes:
     return file.getvalue()
 
 
+def _with_a_text(content: bytes) -> bytes:
+    """A file beside the arrays, which NumPy gives as bytes."""
+    file = BytesIO(content)
+    with ZipFile(file, "a") as stored:
+        stored.writestr("readme.txt", "text")
+    return file.getvalue()
+
+
 def _flip_a_byte_of_data(content: bytes) -> bytes:
     """Damage the first array's data, which a zip file's checksum covers."""
     place = content.index(b"NUMPY") + 140
@@ -127,8 +136,9 @@ def _flip_a_byte_of_data(content: bytes) -> bytes:
         lambda content: content[:-1],
         _flip_a_byte_of_data,
         _as_npy,
+        _with_a_text,
     ],
-    ids=["empty", "text", "half", "a byte short", "a wrong byte", "a single array"],
+    ids=["empty", "text", "half", "a byte short", "a wrong byte", "a single array", "more"],
 )
 def test_damaged_arrays_are_refused_by_name(tmp_path, damage):
     path = tmp_path / "arrays.npz"
@@ -195,6 +205,13 @@ def test_json_without_a_digest_is_read_as_it_is(tmp_path):
     files.write_json(tmp_path / "x.json", {"share": 0.25})
     assert (tmp_path / "x.json").read_text() == '{\n  "share": 0.25\n}\n'
     assert files.read_json(tmp_path / "x.json") == {"share": 0.25}
+
+
+def test_the_digest_of_json_is_that_of_its_one_line_form(tmp_path):
+    """Known from the command ``b2sum --length 128``."""
+    files.write_json(tmp_path / "x.json", {"share": 0.25}, checked=True)
+    stored = json.loads((tmp_path / "x.json").read_text())
+    assert stored == {"share": 0.25, "digest": "013c6b44fb43c4be645a5d897a096fce"}
 
 
 def test_digest_is_that_of_the_content(tmp_path):
