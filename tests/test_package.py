@@ -135,7 +135,7 @@ def test_only_the_top_imports_the_top():
 
 
 def test_the_package_has_few_rooms():
-    others = {"__init__.py", "__main__.py", "__pycache__", "data"}
+    others = {"__init__.py", "__main__.py", "__pycache__", "data", "py.typed"}
     assert len({path.name for path in PACKAGE.iterdir()} - others) <= 10
 
 

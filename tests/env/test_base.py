@@ -116,7 +116,8 @@ def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monke
 
 def test_environments_that_are_open_when_the_program_ends_are_silent():
     lines = (
-        "import gymnasium, unload",
+        "import gymnasium, logging, unload",
+        "logging.disable()",  # of what is compiled for the first time
         "single = gymnasium.make('unload/Container-v0', render_mode='rgb_array')",
         "many = gymnasium.make_vec('unload/Container-v0', 2)",
         "single.reset(seed=0), many.reset(seed=0), single.step(0), single.render()",
