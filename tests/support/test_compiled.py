@@ -172,7 +172,7 @@ def test_the_first_compilation_of_a_process_is_logged(load, tmp_path, monkeypatc
     monkeypatch.setattr(unload.support.compiled._Cache, "logged", False)
     load().function(5)
     (record,) = caplog.records
-    assert "made.function.function and what follows is compiled" in record.message
+    assert "compiling made.function.function and others" in record.message
     assert str(tmp_path / "made/__pycache__") in record.message
     caplog.clear()
     monkeypatch.setattr(unload.support.compiled._Cache, "logged", False)

@@ -73,8 +73,8 @@ class _Cache(FunctionCache):
         if found is None and not _Cache.logged:
             _Cache.logged = True
             LOGGER.warning(
-                "%s and what follows is compiled for this processor, in all for about ten seconds; "
-                "later processes find it in %s and the folders beside it",
+                "compiling %s and others for this processor, for about ten seconds in all; "
+                "kept for later in %s and the folders beside it",
                 f"{self._py_func.__module__}.{self._py_func.__name__}",
                 self.cache_path,
             )
