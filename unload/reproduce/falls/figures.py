@@ -14,8 +14,14 @@ from unload.reproduce.paper.grids import PAPER_CELLS
 from unload.reproduce.statistics import PAPER_MSR, end_msr, t_interval
 from unload.reproduce.style import COLOURS, styled
 
+NAMES = {
+    "ranks": "ranks",
+    "shuffled": "places dealt anew",
+    "averaged": "ties averaged",
+    "level": "level loads",
+}
 # Name and colour of each of ``PUPILS``.
-PUPIL_LOOKS = [(name, COLOURS[name]) for name in ("ranks", "shuffled", "averaged", "level")]
+PUPIL_LOOKS = [(name, COLOURS[kind]) for kind, name in NAMES.items()]
 TITLES = {
     "paper_no_mask": "mask off, b = 256",
     "paper_mask": "mask on, b = 256",
@@ -100,7 +106,7 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
     for cell in ("ranks", "shuffled"):
         points = trace[trace["cell"] == cell]
         preference = points["slope_y"] / points["slope_z"].abs()
-        left.plot(preference, points["tilt_y"], ".", color=COLOURS[cell], ms=3, label=cell)
+        left.plot(preference, points["tilt_y"], ".", color=COLOURS[cell], ms=3, label=NAMES[cell])
     left.set(xlabel="preference: slope across / upward", ylabel="tilt of the load", xlim=(-2, 2))
     left.legend(markerscale=3)
     middle.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
@@ -114,7 +120,7 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
             right.plot(PREFERENCES, success, "o-", ms=3, color=colour)
     middle.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
     middle.legend(fontsize=8)
-    right.set(xlabel="preference of the teacher", ylabel="its MSR (%)", ylim=(0, 102))
+    right.set(xlabel="preference of the teacher", ylabel="teacher's MSR (%)", ylim=(0, 102))
     return figure
 
 
@@ -128,11 +134,13 @@ def fall(points: pd.DataFrame) -> Figure:
     figure, panels = plt.subplots(3, 1, figsize=(6.5, 5.6), sharex=True)
     picks = points["picks"] / 1e6
     panels[0].plot(picks, 100 * points["success_rate"], "k", label="MSR while training")
-    panels[0].plot(picks, 100 * points["wrong"], "C1", label="favourite is blocked")
+    panels[0].plot(picks, 100 * points["wrong"], "C1", label="highest score is blocked")
     panels[0].plot(
         picks, 100 * points["wrong_without_place"], "C0", label="the same with x = y = 0"
     )
-    panels[0].plot(picks, 50 * (1 + points["height_of_wrong"]), "C1.", ms=3, label="its height")
+    panels[0].plot(
+        picks, 50 * (1 + points["height_of_wrong"]), "C1.", ms=3, label="its rank in height"
+    )
     panels[0].set(ylabel="%", ylim=(-2, 102))
     for axis, style in (("x", ":"), ("y", "-")):
         preference = points[f"slope_{axis}"] / points["slope_z"].abs()
