@@ -90,7 +90,7 @@ MODULES = {
     "support/checks": "support/test_checks.py",
     "support/files": "support/test_files.py",
     "network/weights": "network/test_weights.py agent/test_greedy.py",
-    "agent/checkpoint": "agent/test_checkpoint.py",
+    "agent/checkpoint": "agent/test_checkpoint.py agent/test_training.py",
     "agent/sweep": "agent/test_sweep.py",
 }
 # Tests that take long, or start processes of their own.

@@ -69,8 +69,8 @@ def test_a_run_of_another_configuration_is_refused(tmp_path, finished):
     else:
         interrupt_run(TrainConfig(**CONTAINER), tmp_path, 3)
     before = {path.name: path.read_bytes() for path in tmp_path.glob("*.*")}
-    other = TrainConfig(**CONTAINER | {"seed": 5, "learning_rate": 0.5})
-    message = r"another configuration: seed \(0, not 5\), learning_rate \(0.001, not 0.5\)"
+    other = TrainConfig(**CONTAINER | {"seed": 5, "batch_size": 8})
+    message = r"another configuration: seed \(0, not 5\), batch_size \(16, not 8\)"
     with pytest.raises(ValueError, match=message):
         train(other, tmp_path, progress=False)
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.*")} == before
@@ -106,13 +106,13 @@ def test_other_loads_than_at_the_start_are_refused(tmp_path):
         train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
 
 
-@pytest.mark.parametrize("stack", [None, lambda rng: stack_load(rng, walls=9)])
-def test_a_finished_run_on_other_loads_is_refused(tmp_path, stack):
+@pytest.mark.parametrize("walls", [12, 11, 9, 8])
+def test_a_finished_run_on_other_loads_is_refused(tmp_path, walls):
     config = TrainConfig(**CONTAINER)
     train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
     train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
     with pytest.raises(ValueError, match="holds a run on other loads; expected the stack"):
-        train(config, tmp_path, progress=False, stack=stack)
+        train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=walls))
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -123,6 +123,21 @@ def test_a_run_may_go_on_with_another_checkpoint_interval(tmp_path, finished):
     else:
         interrupt_run(config, tmp_path, 3)
     train(TrainConfig(**CONTAINER | {"checkpoint_interval": 9.0}), tmp_path, progress=False)
+
+
+def test_a_run_with_settings_that_are_gone_is_read_unless_it_used_them(finished):
+    path, former = finished / "config.json", {
+        "drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0,
+        "height_reward": 0.0, "snapshots": 0,
+    }  # fmt: skip
+    whole, stored = path.read_bytes(), files.read_json(path)
+    files.write_json(path, stored | former, checked=True)
+    RunFolder(finished).result(TrainConfig(**CONTAINER))
+    for name in former:
+        files.write_json(path, stored | former | {name: 0.5}, checked=True)
+        with pytest.raises(ValueError, match=rf"{name} \(0.5, not"):
+            RunFolder(finished).result(TrainConfig(**CONTAINER))
+    path.write_bytes(whole)
 
 
 @pytest.mark.parametrize("content", ["{", "[]", "\xff"])
@@ -171,6 +186,7 @@ def test_a_checkpoint_that_lacks_an_array_is_refused_by_name(tmp_path):
     interrupt_run(config, tmp_path, 20)
     path = tmp_path / "checkpoint.npz"
     arrays = files.read_arrays(path)
+    assert arrays["format"] == 5
     for name in arrays:
         files.write_arrays(path, {each: array for each, array in arrays.items() if each != name})
         with pytest.raises(ValueError, match="checkpoint.npz"):

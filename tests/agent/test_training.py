@@ -38,8 +38,9 @@ def test_the_same_seed_gives_the_same_bytes(tmp_path, config):
 
 
 def test_what_a_run_leaves(tmp_path, config):
-    result = train(config, tmp_path / "run", progress=False)
-    assert {path.name for path in (tmp_path / "run").iterdir()} == LEFT
+    folder = tmp_path / "new" / "run"
+    result = train(config, folder, progress=False)
+    assert {path.name for path in folder.iterdir()} == LEFT
     curve = result.curve
     assert tuple(curve.columns) == CURVE_COLUMNS
     interval = config.log_interval * config.num_envs
@@ -52,9 +53,9 @@ def test_what_a_run_leaves(tmp_path, config):
     assert curve["epsilon"].tolist() == pytest.approx(
         [config.epsilon(picks) for picks in last_step]
     )
-    loaded = load_policy(tmp_path / "run" / "policy.safetensors")
+    loaded = load_policy(folder / "policy.safetensors")
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
-    stored = json.loads((tmp_path / "run" / "config.json").read_text())
+    stored = json.loads((folder / "config.json").read_text())
     assert stored.pop("marks").keys() == {"first_loads", "policy.safetensors", "curve.csv"}
     stored.pop("digest")
     assert TrainConfig(**stored) == config

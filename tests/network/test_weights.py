@@ -1,24 +1,34 @@
 """Files of weights; those of policies and of heap networks have tests beside them, too."""
 
+import json
+
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from unload.network.weights import read_weights, write_weights
 
+SETTINGS = {"sizes": [3, 2], "ends": "open"}
 WEIGHTS = {"a.bias": torch.arange(3.0), "b.weight": torch.full((2, 2), 0.5)}
 
 
 @pytest.fixture
 def path(tmp_path):
-    write_weights(tmp_path / "w.safetensors", "pair", {"sizes": [3, 2]}, WEIGHTS)
+    write_weights(tmp_path / "w.safetensors", "pair", SETTINGS, WEIGHTS)
     return tmp_path / "w.safetensors"
 
 
 def test_they_come_back_as_they_were(path):
     settings, tensors = read_weights(path, "pair", lambda *made: made)
-    assert settings == {"sizes": [3, 2]} and tensors.keys() == WEIGHTS.keys()
+    assert settings == SETTINGS and tensors.keys() == WEIGHTS.keys()
     assert all(torch.equal(tensors[name], WEIGHTS[name]) for name in WEIGHTS)
+
+
+def test_the_digest_stays_so_that_published_files_can_be_read(path):
+    with safe_open(path, "pt") as file:
+        stored = json.loads(file.metadata()["pair"])
+    assert stored == SETTINGS | {"digest": "fdec04c13f517f2b5cae2c5784d6809b"}
 
 
 def test_every_flipped_bit_is_noticed(path, rng):

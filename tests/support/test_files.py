@@ -247,7 +247,7 @@ def hold(folder, then):
 
 
 def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
-    folder = tmp_path / "run"
+    folder = tmp_path / "new" / "run"
     with hold(folder, "sys.stdin.read()") as owner:
         for _ in range(2):  # the lock survives the first refusal
             message = f"{folder} is in use by process {owner.pid} on .+ since 20.*; wait, or take"
@@ -257,7 +257,7 @@ def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
             pass
         owner.communicate("")  # it leaves the block
     with files.locked(folder):
-        pass
+        assert not (folder / "lock").stat().st_mode & 0o111  # a file of text, not a program
 
 
 def test_a_killed_process_holds_no_lock(tmp_path):
