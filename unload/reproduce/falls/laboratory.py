@@ -30,7 +30,7 @@ POINT = [
 ]  # fmt: skip
 COLUMNS = ["cell", "seed", "mean", "end", *JUDGED, *SLOPES, *TILTS]
 OPTIONS = {
-    "--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)},
+    "--cells": {"nargs": "+", "metavar": "CELL", "choices": CELLS, "default": tuple(CELLS)},
     "--seeds": {"type": int, "help": "of each cell at most; those of the plan if not given"},
     **JOBS,
 }
