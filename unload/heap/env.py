@@ -102,7 +102,7 @@ class HeapEnv(EpisodeEnv):
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
     ## Pictures and arrays
-    There is no render mode: ``unload.heap.study.replay`` draws recorded picks. There is no array
+    There is no render mode: ``unload.heap.study.figures`` draws recorded picks. There is no array
     of heaps either, because nearly all of a pick is PyBullet's time;
     ``gymnasium.make_vec(id, n, vectorization_mode="async")`` gives each heap a process.
 
