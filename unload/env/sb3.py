@@ -15,10 +15,16 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from stable_baselines3.common.vec_env import VecEnv
 
 from unload import task
 from unload.env.vector import ContainerVectorEnv
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "unload.env.sb3 needs Stable-Baselines3: pip install 'unload[sb3]'"
+    ) from error
 
 
 class VectorEnvAdapter(VecEnv):
