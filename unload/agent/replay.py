@@ -46,7 +46,7 @@ def shuffle_places(
     """
     keys = rng.random(observations.shape[:2])
     if present is not None:
-        keys = np.where(present, keys, 1 + np.arange(keys.shape[1]))  # the others stay where they are
+        keys = np.where(present, keys, 1 + np.arange(keys.shape[1]))  # others stay
     order = keys.argsort(axis=1)
     shuffled = observations.copy()
     shuffled[..., :2] = observations[np.arange(len(order))[:, np.newaxis], order, :2]
