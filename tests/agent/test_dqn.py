@@ -31,41 +31,27 @@ def without_next(batch: dict) -> dict:
 @pytest.mark.parametrize("network", [peq(), HeightNetwork()], ids=["PEQ", "other"])
 def test_every_action_is_allowed(rng, epsilon, network):
     observations = rng.uniform(-1, 1, (200, 12, 3)).astype(np.float32)
-    masks = rng.integers(2, size=(200, 12), dtype=np.int8)
+    masks = rng.random((200, 12)) < 0.5
     masks[:, 3] |= ~masks.any(axis=1)
-    actions = DQN(network).act(observations, masks, epsilon, rng)
+    actions = DQN(network).choose(observations, masks, epsilon, rng)
     assert actions.shape == (200,) and masks[np.arange(200), actions].all()
 
 
 def test_without_exploration_the_best_allowed_item_is_chosen(rng):
     observations = np.zeros((3, 4, 3), np.float32)
     observations[..., 2] = [-0.9, 0.1, 0.8, 0.2]
-    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]])
-    assert DQN(HeightNetwork()).act(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
-    assert DQN(HeightNetwork(-1.0)).act(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
+    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]], bool)
+    assert DQN(HeightNetwork()).choose(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
+    assert DQN(HeightNetwork(-1.0)).choose(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
 
 
 def test_epsilon_is_the_share_of_random_actions(rng):
     observations = np.zeros((20_000, 4, 3), np.float32)
     observations[:, 2, 2] = 1
-    masks = np.tile([1, 1, 1, 0], (20_000, 1))
-    actions = DQN(HeightNetwork()).act(observations, masks, 0.3, rng)
+    masks = np.tile([True, True, True, False], (20_000, 1))
+    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
     shares = np.bincount(actions, minlength=4) / 20_000
     assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
-
-
-@pytest.mark.parametrize(
-    ("masks", "epsilon", "message"),
-    [
-        (np.zeros((2, 4)), 0.5, "masks is all zero in row 0"),
-        (np.ones((2, 5)), 0.5, "masks has shape"),
-        (np.ones((2, 4)), 1.5, "epsilon is 1.5"),
-        (np.ones((2, 4)), float("nan"), "epsilon is nan"),
-    ],
-)
-def test_bad_calls_of_act_are_refused(rng, masks, epsilon, message):
-    with pytest.raises(ValueError, match=message):
-        DQN(HeightNetwork()).act(np.zeros((2, 4, 3), np.float32), masks, epsilon, rng)
 
 
 # --- learning -----------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """The picks of a training run, and how the latest of them are repeated.
 
-A checkpoint does not hold the replay memory, which is 0.4 GB in the paper's configuration.
+A checkpoint does not hold the replay memory, which is 1.6 GB in the paper's configuration.
 The environments are deterministic, so it holds the state of their generators at the start of the
 oldest episodes that the memory reaches back to, and the actions since: repeating these fills the
 memory again, pick by pick as it was. Where the episodes never start all together, because their

@@ -22,7 +22,6 @@ from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.dqn import DQN
-from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import Greedy
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
@@ -134,20 +133,9 @@ class Training:
             min(config.replay_size, config.picks),
             task.N_VISIBLE,
             next_state=config.gamma > 0,
-            equalized=config.gamma == 0 and self._ranks_of_all(stack),
         )
         self.curve = Curve()
         self.rollout = Rollout(config, self.replay.size, stack)
-
-    def _ranks_of_all(self, stack: Callable | None) -> bool:
-        """Whether each observation holds the ranks of 128 items, which the fused update can read.
-
-        It does until a load is nearly empty, which a load of the paper never is after 500 picks.
-        """
-        config = self.config
-        never_few = stack is None and config.max_picks <= task.MIN_ITEMS - task.N_VISIBLE
-        fused = isinstance(self.agent.learner, FusedLearner)
-        return fused and config.equalize and (never_few or config.env != ENVS[0])
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before.
