@@ -15,7 +15,6 @@ from gymnasium.vector import AutoresetMode
 
 from tests.env.comparing import CONTAINER, HIGHEST, FailingStack, assert_same
 from unload import ContainerEnv, HighestItemEnv
-from unload.env.base import text_of_rng
 from unload.env.vector import ContainerVectorEnv, HighestItemVectorEnv
 from unload.physics.table import LiftTable
 
@@ -290,11 +289,6 @@ def test_what_no_episodes_began_from_is_refused(starts, message):
     with pytest.raises(ValueError, match=message):
         envs.restart(starts)
     assert_same(envs.starts(), before)
-
-
-def test_only_generators_of_the_default_kind_are_kept():
-    with pytest.raises(TypeError, match="the generator is .*MT19937.* expected one of numpy"):
-        text_of_rng(np.random.Generator(np.random.MT19937(0)))
 
 
 def test_results_are_no_views_of_what_the_environments_hold():

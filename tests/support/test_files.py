@@ -1,8 +1,6 @@
-import errno
 import json
 import os
 import re
-import stat
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -276,32 +274,6 @@ def test_a_lock_is_released_after_an_error_and_kept_from_another_block(tmp_path)
         raise KeyError
     with files.locked(tmp_path):
         pass
-
-
-@pytest.mark.parametrize("link", [os.symlink, os.link])
-def test_a_lock_that_is_a_link_is_refused_and_its_target_kept(tmp_path, link):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "notes").write_text("precious")
-    link(tmp_path / "notes", tmp_path / "run" / "lock")
-    with pytest.raises(OSError, match="run/lock"), files.locked(tmp_path / "run"):
-        pytest.fail("the lock is another file")
-    assert (tmp_path / "notes").read_text() == "precious"
-
-
-@pytest.mark.parametrize("refused", [False, True])
-def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
-    synced, fsync = [], os.fsync
-
-    def sync(descriptor: int) -> None:
-        is_folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
-        synced.append("folder" if is_folder else "file")
-        if is_folder and refused:
-            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
-        fsync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", sync)
-    files.write_text(tmp_path / "x", "whole")
-    assert (tmp_path / "x").read_text() == "whole" and synced == ["file", "folder"]
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -28,6 +28,7 @@ from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.variants import NETWORKS
 from unload.physics.table import shared_table
+from unload.support import checks
 
 CURVE_COLUMNS = (
     "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
@@ -269,6 +270,8 @@ def train_changed(
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
+    if lifts is not None:
+        lifts = checks.path("lifts", lifts)
     keep_lifts = partial(shared_table().exchange, lifts) if lifts is not None else lambda: None
     keep_lifts()
     folder = RunFolder(run_dir)

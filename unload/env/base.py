@@ -123,11 +123,11 @@ class PickingEnv(EpisodeEnv):
 
     def __init__(
         self,
-        equalize: bool,
-        ties: str,
-        max_picks: int,
-        position_noise: float,
-        render_mode: str | None,
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = observation.POSITION_NOISE,
+        render_mode: str | None = None,
     ) -> None:
         checked = check_settings(equalize, ties, max_picks, position_noise)
         self.equalize, self.ties, self.max_picks, self.position_noise = checked
@@ -373,13 +373,7 @@ def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.nda
 
 
 def text_of_rng(rng: np.random.Generator) -> str:
-    """Return the state of a generator as JSON, to be kept with other plain arrays.
-
-    Raises:
-        TypeError: its bit generator is not a ``PCG64``, as those of ``default_rng`` are.
-    """
-    if not isinstance(rng.bit_generator, np.random.PCG64):
-        raise TypeError(f"the generator is {rng!r}; expected one of numpy.random.default_rng")
+    """Return the state of a generator of ``default_rng`` as JSON, to be kept with plain arrays."""
     return json.dumps(rng.bit_generator.state)
 
 

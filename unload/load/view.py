@@ -188,12 +188,8 @@ def _grouped(
     named = COLOURS | dict(zip(others, colours))
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
-        items = np.asarray(items)
-        if not items.size:
-            continue
-        if items.dtype.kind not in "iu":
-            raise TypeError(f"groups[{name!r}] has dtype {items.dtype}; expected item numbers")
-        if not (0 <= items.min() and items.max() < count):
+        items = checks.integer_array(f"groups[{name!r}]", items, (None,))
+        if items.size and not (0 <= items.min() and items.max() < count):
             raise ValueError(
                 f"groups[{name!r}] holds {items.min()} to {items.max()}; expected 0 to {count - 1}"
             )
