@@ -125,28 +125,6 @@ def test_a_run_may_go_on_with_another_checkpoint_interval(tmp_path, finished):
     train(TrainConfig(**CONTAINER | {"checkpoint_interval": 9.0}), tmp_path, progress=False)
 
 
-def test_a_run_with_settings_that_are_gone_is_read_unless_it_used_them(finished):
-    path, former = finished / "config.json", {
-        "drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0,
-        "height_reward": 0.0, "snapshots": 0,
-    }  # fmt: skip
-    whole, stored = path.read_bytes(), files.read_json(path)
-    files.write_json(path, stored | former, checked=True)
-    RunFolder(finished).result(TrainConfig(**CONTAINER))
-    for name in former:
-        files.write_json(path, stored | former | {name: 0.5}, checked=True)
-        with pytest.raises(ValueError, match=rf"{name} \(0.5, not"):
-            RunFolder(finished).result(TrainConfig(**CONTAINER))
-    path.write_bytes(whole)
-
-
-@pytest.mark.parametrize("content", ["{", "[]", "\xff"])
-def test_damaged_config_is_refused_by_name(tmp_path, content):
-    (tmp_path / "config.json").write_text(content)
-    with pytest.raises(ValueError, match="config.json"):
-        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-
-
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory) -> Path:
     """The folder of a finished run; tests bring back what they change."""

@@ -83,17 +83,6 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
         assert torch.allclose(mine, theirs, atol=2e-5)
 
 
-@pytest.mark.parametrize("gamma", [0.0, 0.9])
-@pytest.mark.parametrize("fused", [True, False])
-def test_learning_from_some_rows_is_learning_from_a_copy_of_them(rng, gamma, fused):
-    batch, rows = make_batch(rng), rng.integers(150, size=200)
-    agents = [DQN(peq(), gamma=gamma, fused_update=fused) for _ in range(2)]
-    loss = agents[0].update({name: array[rows] for name, array in batch.items()})
-    assert agents[1].update(batch, rows) == loss
-    for one, other in zip(*(weights(agent.network) for agent in agents)):
-        assert torch.equal(one, other)
-
-
 def test_choosing_from_nothing_is_refused(rng):
     """By whoever chooses, the random numbers or the network."""
     observations, allowed = np.zeros((2, 5, 3), np.float32), np.zeros((2, 5), bool)

@@ -3,8 +3,6 @@
 import copy
 import gc
 import pickle
-import subprocess
-import sys
 
 import gymnasium
 import numpy as np
@@ -111,20 +109,6 @@ def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monke
         del env
         assert clients() == before
     gc.enable()
-
-
-def test_environments_that_are_open_when_the_program_ends_are_silent():
-    lines = (
-        "import gymnasium, logging, unload",
-        "logging.disable()",  # of what is compiled for the first time
-        "single = gymnasium.make('unload/Container-v0', render_mode='rgb_array')",
-        "many = gymnasium.make_vec('unload/Container-v0', 2)",
-        "single.reset(seed=0), many.reset(seed=0), single.step(0), single.render()",
-    )
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", "\n".join(lines)], capture_output=True, text=True
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
 def test_spaces_and_metadata():

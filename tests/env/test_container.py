@@ -13,17 +13,6 @@ from unload.load.view import snapshot
 ENV_ID = "unload/Container-v0"
 
 
-def play(env: gymnasium.Env, actions, seed: int = 0) -> list[tuple]:
-    """All that an episode shows, as comparable values."""
-    seen, info = env.reset(seed=seed)
-    record = [(seen.tobytes(), info["action_mask"].tobytes(), info["unloaded"])]
-    for action in actions:
-        seen, reward, terminated, truncated, info = env.step(int(action))
-        flags = (reward, terminated, truncated, info["unloaded"], info["item"], info["distance"])
-        record.append((seen.tobytes(), info["action_mask"].tobytes(), *flags))
-    return record
-
-
 def tall_load() -> Load:
     """Few enough items to be quick, also where each of them is simulated."""
     return build_load(np.zeros((2, 3, 4), dtype=int))
@@ -253,34 +242,6 @@ def test_every_physics_goes_to_the_last_item(small_env, kwargs):
         rewards.append(reward)
     assert rewards == [1, 1, 1] and env.render().shape == (480, 640, 3)
     assert (env.render() != before).any()
-
-
-# --- seeds, loads and states --------------------------------------------------------
-
-
-def test_the_same_seed_gives_the_same_episode_byte_for_byte(make_env, rng):
-    actions = rng.integers(128, size=60)
-    assert play(make_env(), actions, seed=1) == play(make_env(), actions, seed=1)
-
-
-# --- other libraries ----------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_maskable_ppo_learns_and_obeys_the_mask(make_env, monkeypatch):
-    contrib = pytest.importorskip("sb3_contrib")
-    env, obeyed = make_env(), []
-    container = env.unwrapped
-    step = container.step
-
-    def watched(action):
-        obeyed.append(container.action_masks()[int(action)])
-        return step(action)
-
-    monkeypatch.setattr(container, "step", watched)
-    model = contrib.MaskablePPO("MlpPolicy", env, n_steps=500, batch_size=100, seed=0, device="cpu")
-    model.learn(2_000)
-    assert model.num_timesteps == 2_000 and len(obeyed) == 2_000 and all(obeyed)
 
 
 # --- bad input ----------------------------------------------------------------------

@@ -4,7 +4,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from unload import HighestItemEnv, equalize, stack_load
+from unload import HighestItemEnv, stack_load
 from unload.env import observation
 from unload.env.highest_item import GRID
 
@@ -48,37 +48,6 @@ def test_items_are_blurred_and_nearest_first(make_env):
     for seen in (sharp, blurred):
         distances = observation.distance((seen + 1) / 2 * [7.0, 2.5, 2.5])
         assert (np.diff(distances) > -1e-5).all()
-
-
-def test_equalized_observations_are_rewarded_alike(make_env):
-    raw, equalized = make_env(ENV_ID), make_env(ENV_ID, equalize=True)
-    seen, _ = raw.reset(seed=0)
-    ranks, _ = equalized.reset(seed=0)
-    for _ in range(5):
-        assert (ranks == equalize(seen)).all()
-        assert ranks[np.argmax(seen[:, 2]), 2] == 1
-        seen, *_ = raw.step(0)
-        ranks, reward, *_ = equalized.step(int(np.argmax(ranks[:, 2])))
-        assert reward == 1
-
-
-def test_seeds(make_env):
-    env = make_env(ENV_ID)
-
-    def episode(seed: int) -> list:
-        first = env.reset(seed=seed)[0].tobytes()
-        steps = [env.step(row) for row in range(20)]
-        return [first] + [(seen.tobytes(), reward) for seen, reward, *_ in steps]
-
-    assert episode(1) == episode(1) != episode(2)
-
-
-def test_truncation(make_env):
-    env = make_env(ENV_ID, max_picks=3)
-    env.reset(seed=0)
-    assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (False, True)]
-    with pytest.raises(ResetNeeded, match="the episode is finished"):
-        env.unwrapped.step(0)
 
 
 def test_a_random_load_is_no_load_of_this_environment(make_env, rng):

@@ -57,21 +57,6 @@ def test_what_can_be_lifted_is_that_of_the_single_environments():
     side_by_side.close()
 
 
-@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
-@pytest.mark.parametrize(
-    "kwargs",
-    [
-        {},
-        {"equalize": True},
-        {"equalize": True, "ties": "average"},
-        {"equalize": True, "position_noise": 0.0},
-    ],
-    ids=str,
-)
-def test_every_setting_through_several_episodes(env_id, kwargs):
-    play_both(env_id, 3, 60, seed=5, max_picks=25, **kwargs)
-
-
 def test_a_load_may_be_given_and_is_drawn(few_items, rng):
     """The load and the pictures are those of the single environments."""
     array, side_by_side = make_pair(CONTAINER, 2, max_picks=3, render_mode="rgb_array")
@@ -170,20 +155,6 @@ def test_episodes_that_end_at_once(few_items):
     assert ends[:, 0].any() and ends[:, 1].any()
     together = ends.any(axis=1).sum(axis=1)
     assert 3 in together and {1, 2} & set(together.tolist())
-
-
-def test_visible_items_and_masks():
-    envs, side_by_side = make_pair(CONTAINER, 3)
-    envs.reset(seed=0)
-    side_by_side.reset(seed=0)
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        actions = rng.integers(128, size=3)
-        envs.step(actions)
-        side_by_side.step(actions)
-    for number, env in enumerate(side_by_side.envs):
-        assert (envs.unwrapped.visible[number] == env.unwrapped.visible).all()
-        assert (envs.unwrapped.action_masks()[number] == env.unwrapped.action_masks()).all()
 
 
 # --- the table ----------------------------------------------------------------------

@@ -4,7 +4,6 @@ import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from threading import Barrier
 
 import numpy as np
 import pytest
@@ -102,24 +101,6 @@ def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap
     local = LocalPhysics()
     assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
     local.close()
-
-
-def test_threads_that_share_a_table_get_the_right_answers(known, rng):
-    """Each thread has a physics, hence a world, of its own."""
-    shared, together = LiftTable(), Barrier(4)
-    orders = [rng.permutation(len(known)) for _ in range(4)]
-
-    def work(order) -> list[float]:
-        physics = TablePhysics(shared)
-        together.wait()
-        answers = {number: physics.simulate(known[number][0]) for number in order.tolist()}
-        physics.close()
-        return [answers[number] for number in range(len(known))]
-
-    with ThreadPoolExecutor(4) as pool:
-        answers = list(pool.map(work, orders))
-    assert answers == [[distance for _, distance in known]] * 4
-    assert [shared.find(situation) for situation, _ in known] == answers[0]
 
 
 def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):

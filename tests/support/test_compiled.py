@@ -1,7 +1,6 @@
 """Compiled code on disk: used again as long as nothing changes that it was built from."""
 
 import importlib
-import inspect
 import linecache
 import sys
 from pathlib import Path
@@ -11,7 +10,6 @@ import pytest
 from numba.core.caching import IndexDataCacheFile
 
 import unload
-from unload.env.fast import containers
 from unload.support.compiled import fingerprint
 
 PACKAGE = Path(unload.__file__).parent
@@ -195,18 +193,3 @@ def test_every_compiled_function_is_compiled_so():
     here = PACKAGE / "support" / "compiled.py"
     for path in PACKAGE.rglob("*.py"):
         assert path == here or "njit" not in path.read_text(), f"{path} should use compiled"
-
-
-@pytest.mark.parametrize("edited", ["unload.task", "unload.load.boxes", "unload.env.fast.ranking"])
-def test_the_containers_follow_what_they_import(monkeypatch, edited):
-    """Constants of other rooms, and functions of other files."""
-    before, source = fingerprint(containers.__name__), inspect.getsource
-    assert containers.pick._cache._fingerprint == before
-
-    def with_edit(module):
-        return source(module) + (" " if module.__name__ == edited else "")
-
-    monkeypatch.setattr(inspect, "getsource", with_edit)
-    fingerprint.cache_clear()
-    assert fingerprint(containers.__name__) != before
-    fingerprint.cache_clear()

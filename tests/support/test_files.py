@@ -1,6 +1,5 @@
 import json
 import os
-import re
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -27,13 +26,6 @@ def test_arrays_come_back_as_they_were(tmp_path):
         np.testing.assert_array_equal(read[name], array)
 
 
-def test_text_and_json(tmp_path):
-    files.write_text(tmp_path / "t.txt", "µ\n")
-    assert (tmp_path / "t.txt").read_bytes() == "µ\n".encode()
-    files.write_json(tmp_path / "j.json", {"x": [1, None]})
-    assert json.loads((tmp_path / "j.json").read_text()) == {"x": [1, None]}
-
-
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "file"
     files.write_text(path, "old")
@@ -46,29 +38,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         files.write_atomically(path, write)
     assert path.read_text() == "old"
     assert [path] == list(tmp_path.iterdir())
-
-
-def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tmp_path):
-    path = tmp_path / "file"
-    files.write_text(path, "old")
-    script = """if True:
-        import os, sys
-        import files
-
-        def write(file):
-            file.write(b"half of the n")
-            file.flush()
-            os._exit(9)
-
-        files.write_atomically(sys.argv[1], write)
-    """
-    killed = subprocess.run([sys.executable, "-c", script, path], cwd=ALONE)
-    assert killed.returncode == 9
-    (leftover,) = set(tmp_path.iterdir()) - {path}
-    assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", leftover.name)
-    assert "*.partial" in (files.ROOT / ".gitignore").read_text().splitlines()
-    files.write_text(path, "new")
-    assert path.read_text() == "new" and leftover.read_bytes() == b"half of the n"
 
 
 @contextmanager

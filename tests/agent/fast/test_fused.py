@@ -198,20 +198,12 @@ def test_choice_is_that_of_the_network(batch, rng):
     assert allowed[rows, actions].all()
 
 
-@pytest.mark.parametrize("name", ["observations", "rewards"])
+@pytest.mark.parametrize("place", [0, 1, 2, 3, "observations", "rewards"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_input_that_is_not_finite_is_refused(batch, name, value):
-    batch[name].flat[7] = value
-    with pytest.raises(FloatingPointError, match="expected finite"):
-        gradients(network(16), batch)
-
-
-@pytest.mark.parametrize("parameter", range(4))
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
+def test_weights_and_inputs_that_are_not_finite_are_refused(batch, place, value):
     net = network(16)
-    with torch.no_grad():
-        list(net.parameters())[parameter].view(-1)[0] = value
+    arrays = [parameter.detach().numpy() for parameter in net.parameters()]
+    (batch[place] if place in batch else arrays[place]).flat[0] = value
     with pytest.raises(FloatingPointError, match="expected finite"):
         gradients(net, batch)
 
@@ -221,12 +213,9 @@ def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
     [
         ("actions", np.full(BATCH, ITEMS), "actions holds 128; expected 0 to 127"),
         ("actions", np.full(BATCH, -1), "actions holds -1"),
-        ("actions", np.zeros(BATCH), "actions has shape .* dtype float64"),
         ("actions", np.zeros(BATCH, np.int32), "actions has shape .* dtype int32"),
-        ("rewards", np.zeros(BATCH, np.float16), "targets has shape .* dtype float16"),
         ("rewards", np.zeros(BATCH), "targets has shape .* dtype float64"),
         ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
-        ("rewards", np.zeros(BATCH + 1, np.float32), "targets has shape"),
         ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
         ("observations", np.zeros((BATCH, 0, 3), np.float32), "observations has shape"),
         ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
