@@ -133,6 +133,9 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "MSR=" in shown.out and "loss=" in shown.out and "pick/s" in shown.out
     assert shown.err == ""
+    with open(tmp_path / "log.txt", "w") as log:
+        train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
+    assert "200/200" in (tmp_path / "log.txt").read_text()
     train(TrainConfig(**CONTAINER), tmp_path / "quiet", progress=False)
     assert capsys.readouterr() == ("", "")
 
@@ -258,13 +261,6 @@ def test_a_folder_in_use_is_refused(tmp_path):
     with files.locked(tmp_path), pytest.raises(RuntimeError, match=message):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-
-
-def test_progress_may_go_to_a_file(tmp_path, capsys):
-    with open(tmp_path / "log.txt", "w") as log:
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=log)
-    assert "200/200" in (tmp_path / "log.txt").read_text()
-    assert capsys.readouterr() == ("", "")
 
 
 def test_a_point_holds_the_means_since_the_last_one():

@@ -1,10 +1,9 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from unload import HighestItemEnv, stack_load
+from unload import stack_load
 from unload.env import observation
 from unload.env.highest_item import GRID
 
@@ -53,21 +52,3 @@ def test_items_are_blurred_and_nearest_first(make_env):
 def test_a_random_load_is_no_load_of_this_environment(make_env, rng):
     with pytest.raises(ValueError, match="(?s)options is .*expected none"):
         make_env(ENV_ID).unwrapped.reset(options={"load": stack_load(rng)})
-
-
-def test_calls_out_of_order_are_refused():
-    env = HighestItemEnv()
-    for call in (lambda: env.step(0), env.action_masks, env.render):
-        with pytest.raises(ResetNeeded, match="the episode is not started"):
-            call()
-    env.reset(seed=0)
-    assert env.render() is None
-    env.close()
-    for call in (lambda: env.step(0), env.action_masks, env.render, env.reset):
-        with pytest.raises(ClosedEnvironmentError):
-            call()
-
-
-def test_there_is_nothing_to_draw():
-    with pytest.raises(ValueError, match="render_mode is 'rgb_array'; expected one of None"):
-        HighestItemEnv(render_mode="rgb_array")

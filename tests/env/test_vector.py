@@ -1,6 +1,5 @@
 """The array environments, against Gymnasium's loop over single ones."""
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -9,7 +8,7 @@ from hypothesis import strategies as st
 
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_pair
-from unload.env.vector import ContainerVectorEnv, HighestItemVectorEnv
+from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import LiftTable
 
 
@@ -69,18 +68,6 @@ def test_a_load_may_be_given_and_is_drawn(few_items, rng):
     assert array.unwrapped._containers.left.min() > 700
     array.close()
     side_by_side.close()
-
-
-def test_without_a_render_mode_there_is_no_picture():
-    for env_id in (CONTAINER, HIGHEST):
-        envs = gymnasium.make_vec(env_id, 2)
-        with pytest.raises(ResetNeeded):
-            envs.render()
-        envs.reset(seed=0)
-        assert envs.render() is None
-        envs.close()
-    with pytest.raises(ValueError, match="render_mode is 'rgb_array'; expected one of None"):
-        HighestItemVectorEnv(2, render_mode="rgb_array")
 
 
 def test_loads_of_several_sizes_and_kinds():
@@ -192,19 +179,3 @@ def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch, boxes):
     envs.reset(seed=0)
     assert envs.step(np.array([0, 0]))[4]["unloaded"].tolist() == [1, 1]
     envs.close()
-
-
-# --- bad input ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("kwargs", "error", "message"),
-    [
-        ({"physics": "local"}, ValueError, "physics is 'local'; expected one of 'table'"),
-        ({"stack": 3}, TypeError, "stack is 3"),
-        ({"render_mode": "human"}, ValueError, "render_mode is 'human'"),
-    ],
-)
-def test_bad_settings_are_refused(kwargs, error, message):
-    with pytest.raises(error, match=message):
-        ContainerVectorEnv(**kwargs)
