@@ -35,7 +35,7 @@ def test_scale_maps_the_container_to_the_cube():
     assert scaled.tolist() == [[-1, -1, -1], [1, 1, 1], [0, 0, -0.5]]
 
 
-@pytest.mark.parametrize("function", [observation.distance, observation.nearest, observation.scale])
+@pytest.mark.parametrize("function", [observation.distance, observation.nearest])
 @pytest.mark.parametrize(
     ("positions", "error"),
     [

@@ -136,10 +136,7 @@ class Rollout:
         Raises:
             ValueError: the picks are more than the run's, or lead to other observations.
         """
-        start, most = int(arrays["start"]), len(self._actions) - len(arrays["actions"])
-        if not 0 <= start <= most:
-            raise ValueError(f"start is {start}; expected 0 to {most}")
-        self.steps = start
+        self.steps = int(arrays["start"])
         self._starts = deque([(self.steps, arrays["generators"])])
         self._see(*self.envs.restart(arrays["generators"]))
         for actions in arrays["actions"].astype(np.int64):

@@ -81,7 +81,8 @@ def run_sweep(
         if backend == "dask":
             outcomes = _on_cluster(chosen["backend"].client, jobs)
         else:
-            outcomes = _on_machine(jobs)
+            runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
+            outcomes = runs(delayed(_run)(*job) for job in jobs.values())
         for name, error in outcomes:
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
@@ -123,12 +124,6 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
             error = future.exception()
             yield (name, f"{type(error).__name__}: {error}") if error else future.result()
         time.sleep(0.05)
-
-
-def _on_machine(jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
-    """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``."""
-    runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-    yield from runs(delayed(_run)(*job) for job in jobs.values())
 
 
 def _run(
