@@ -1,5 +1,7 @@
 """The environments as Stable-Baselines3 takes them."""
 
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
@@ -85,3 +87,10 @@ def test_maskable_ppo_learns_on_64_containers():
 
     assert evaluate(policy, 20, max_picks=50)["success_rate"].mean() > 0.98
     envs.close()
+
+
+def test_without_stable_baselines_the_error_names_the_extra(monkeypatch):
+    monkeypatch.delitem(sys.modules, "unload.env.sb3")
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'unload\[sb3\]'"):
+        import unload.env.sb3  # noqa: F401

@@ -4,7 +4,6 @@ import json
 from itertools import combinations, permutations
 
 import numpy as np
-import plotly.graph_objects as go
 import pytest
 from IPython.core.formatters import DisplayFormatter
 from matplotlib.image import imread
@@ -15,9 +14,7 @@ from unload.load.view import (
     EYE,
     PLOTLY_MIMETYPE,
     back_to_front,
-    buttons,
     css,
-    slider,
     snapshot,
     still,
 )
@@ -200,18 +197,6 @@ def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
     assert 100 < boxes_drawn[0] < boxes_drawn[1]
     assert (snapshot(load, both, moved.positions) == snapshot(moved, both, moved.positions)).all()
     assert (snapshot(load, both, moved.positions) != picture).any()
-
-
-def test_plotly_takes_both_and_they_name_the_frames():
-    layout = go.Layout(
-        sliders=[slider({"0": "no pick", "1": "one pick"})], updatemenus=[buttons(300)]
-    )
-    steps = layout.sliders[0].steps
-    assert [step.label for step in steps] == ["no pick", "one pick"]
-    assert [list(step.args[0]) for step in steps] == [["0"], ["1"]]
-    play, pause = layout.updatemenus[0].buttons
-    assert play.args[0] is None and list(pause.args[0]) == [None]
-    assert play.args[1]["frame"]["duration"] == 300 and play.args[1]["fromcurrent"]
 
 
 # Machado et al. (2009): linear RGB as seen without the long, the middle, the short cones.

@@ -17,10 +17,10 @@ def shuffle_places(
     """
     keys = rng.random(observations.shape[:2])
     if present is not None:
-        keys = np.where(present, keys, 1.0)  # rows without an item stay behind the others
-    order = keys.argsort(axis=1, kind="stable")[..., np.newaxis]
+        keys = np.where(present, keys, 1 + np.arange(keys.shape[1]))  # others stay
+    order = keys.argsort(axis=1)
     shuffled = observations.copy()
-    shuffled[..., :2] = np.take_along_axis(observations[..., :2], order, axis=1)
+    shuffled[..., :2] = observations[np.arange(len(order))[:, np.newaxis], order, :2]
     return shuffled
 
 

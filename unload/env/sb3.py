@@ -11,10 +11,16 @@ Five lines train a policy that sees the mask, to an MSR of 100 % within seconds:
 """
 
 import numpy as np
-from stable_baselines3.common.vec_env import VecEnv
 
 from unload import task
 from unload.env.vector import ContainerVectorEnv
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "unload.env.sb3 needs Stable-Baselines3: pip install 'unload[sb3]'"
+    ) from error
 
 
 class ContainerVecEnv(VecEnv):

@@ -39,6 +39,9 @@ def test_every_figure_draws_its_data(heap, outcome):
     assert titles == ["before the pick", "after it: 2 unloaded, 1 fallen"]
     names = [text.get_text() for text in pick.legends[0].get_texts()]
     assert names == list(figures.MEANINGS)
+    one = [heap, outcome.heap], np.array([0]), [outcome]
+    titles = [panel.get_title() for panel in figures.episodes({"lowest": one}).axes]
+    assert titles == ["lowest, pick 1: 0 unloaded, 0 fallen"] * 3
 
 
 def test_missing_data_names_the_command_that_makes_it(tmp_path):

@@ -1,5 +1,6 @@
 """Figures of heaps: what a pick does, and the policies compared."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -138,6 +139,27 @@ def one_pick(before: Heap, box: int, outcome: Outcome) -> Figure:
     kept[kept == 1] = 0
     count, falls = int(outcome.unloaded.sum()), int(outcome.fallen.sum())
     draw_heap(right, outcome.heap, colours_of(kept), f"after it: {count} unloaded, {falls} fallen")
+    add_legend(figure)
+    return figure
+
+
+@styled
+def episodes(played: Mapping[str, tuple[Sequence[Heap], np.ndarray, Sequence[Outcome]]]) -> Figure:
+    """Episodes line by line, before the first, the middle and the last pick.
+
+    Args:
+        played: name → heaps before the picks, boxes dragged (t,) and outcomes of the t picks;
+            the heaps are coloured by what the next pick will do.
+    """
+    figure, grid = plt.subplots(len(played), 3, figsize=(9, 2.7 * len(played)), squeeze=False)
+    for line, (name, (heaps, boxes, outcomes)) in zip(grid, played.items()):
+        unloaded = np.cumsum([0, *(one.unloaded.sum() for one in outcomes)])
+        falls = np.cumsum([0, *(one.fallen.sum() for one in outcomes)])
+        for axes, pick in zip(line, (0, len(outcomes) // 2, len(outcomes) - 1)):
+            colours = colours_of(meanings(outcomes[pick], int(boxes[pick])))
+            title = f"{name}, pick {pick + 1}: {unloaded[pick]} unloaded, {falls[pick]} fallen"
+            draw_heap(axes, heaps[pick], colours, title)
+            axes.title.set_fontsize(8)
     add_legend(figure)
     return figure
 
