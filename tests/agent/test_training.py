@@ -62,14 +62,6 @@ def test_what_a_run_leaves(tmp_path, config):
     assert TrainConfig(**stored) == config
 
 
-def test_a_finished_run_is_not_repeated(tmp_path):
-    config = TrainConfig(**CONTAINER)
-    first = train(config, tmp_path, progress=False)
-    with at_step(1, crash):
-        again = train(config, tmp_path, progress=False)
-    pd.testing.assert_frame_equal(first.curve, again.curve)
-
-
 def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
     """Row 5 again and again: it changes only when it is unloaded."""
     config = TrainConfig(**CONTAINER | {"num_envs": 1, "picks": 11, "log_interval": 11})
@@ -165,22 +157,6 @@ def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
     with at_step(49, crash), pytest.raises(Breakdown):  # after nine points
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert 1 <= len(written) < 9
-
-
-def test_own_loads_are_trained_on_and_gone_on_with(tmp_path):
-    seen = []
-
-    def stack(rng):
-        seen.append(stack_load(rng, walls=10))
-        return seen[-1]
-
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path / "straight", progress=False, stack=stack)
-    assert len(seen) >= 4
-    with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "broken", progress=False, stack=stack)
-    train(config, tmp_path / "broken", progress=False, stack=stack)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):

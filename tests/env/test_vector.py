@@ -70,13 +70,6 @@ def test_a_load_may_be_given_and_is_drawn(few_items, rng):
     side_by_side.close()
 
 
-def test_loads_of_several_sizes_and_kinds():
-    def stack(rng):
-        return unload.stack_load(rng, walls=int(rng.integers(3, 16)))
-
-    play_both(CONTAINER, 4, 45, max_picks=15, stack=stack)
-
-
 def test_fewer_boxes_may_have_more_contacts():
     """60 boxes apart, and 40 bars, 20 of them across the others."""
     count, places = 20, (np.arange(20) + 0.5) / 20

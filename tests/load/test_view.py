@@ -103,23 +103,14 @@ def test_pointing_at_a_box_names_it_and_its_edges(small_load):
     assert "%{fullData.name}" in trace.hovertemplate and trace.name == "failed"
 
 
-def test_a_full_load_is_a_small_file_and_needs_no_network(full_load):
-    bundle = view(full_load)._repr_mimebundle_()
+def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_network(full_load):
+    bundle, _ = DisplayFormatter().format(view(full_load, height=300))
+    assert set(bundle) == {"image/png", "text/plain", PLOTLY_MIMETYPE}
     assert sum(len(json.dumps(content)) for content in bundle.values()) < 1_000_000
-    assert "http" not in json.dumps(bundle[PLOTLY_MIMETYPE])
-
-
-def test_a_picture_stands_beside_what_plotly_draws(small_load):
-    bundle = view(small_load, height=300)._repr_mimebundle_()
-    assert bundle[PLOTLY_MIMETYPE]["data"]
+    assert "http" not in json.dumps(bundle[PLOTLY_MIMETYPE]) and bundle[PLOTLY_MIMETYPE]["data"]
     picture = base64.b64decode(bundle["image/png"])
     assert picture.startswith(b"\x89PNG")
     assert int.from_bytes(picture[20:24]) == 300  # pixels high
-
-
-def test_ipython_displays_both_and_nothing_that_needs_a_network(small_load):
-    formats, _ = DisplayFormatter().format(view(small_load))
-    assert set(formats) == {"image/png", "text/plain", PLOTLY_MIMETYPE}
 
 
 @pytest.mark.parametrize(

@@ -168,14 +168,11 @@ def test_every_damaged_byte_of_checked_json_is_refused_by_name_or_harmless(tmp_p
     assert harmless < len(whole) / 3
 
 
-def test_json_without_a_digest_is_read_as_it_is(tmp_path):
+def test_json_has_a_digest_where_it_is_wanted(tmp_path):
+    """That of its one-line form, known from the command ``b2sum --length 128``."""
     files.write_json(tmp_path / "x.json", {"share": 0.25})
     assert (tmp_path / "x.json").read_text() == '{\n  "share": 0.25\n}\n'
     assert files.read_json(tmp_path / "x.json") == {"share": 0.25}
-
-
-def test_the_digest_of_json_is_that_of_its_one_line_form(tmp_path):
-    """Known from the command ``b2sum --length 128``."""
     files.write_json(tmp_path / "x.json", {"share": 0.25}, checked=True)
     stored = json.loads((tmp_path / "x.json").read_text())
     assert stored == {"share": 0.25, "digest": "013c6b44fb43c4be645a5d897a096fce"}

@@ -25,11 +25,6 @@ def test_written_and_read(tmp_path):
     assert len(stored["revision"].rstrip("+")) == 12 or stored["revision"] == "unknown"
 
 
-def test_missing(tmp_path):
-    with pytest.raises(FileNotFoundError):
-        provenance.read_provenance(tmp_path, "x")
-
-
 def test_records_are_joined():
     first = provenance.run_record(10)
     second = first | {"wall_time_s": 20.5, "peak_memory_mib": 10**6, "revision": "another"}
