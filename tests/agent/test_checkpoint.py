@@ -20,7 +20,6 @@ from tests.agent.runs import (
     interrupt_run,
 )
 from unload import TrainConfig, stack_load, train
-from unload.agent import checkpoint
 from unload.agent.checkpoint import RunFolder
 from unload.support import files
 
@@ -223,16 +222,22 @@ def test_a_run_of_a_former_setting_at_its_default_is_as_one_of_today(tmp_path):
     interrupt_run(config, tmp_path, 20)
     path = tmp_path / "checkpoint.npz"
     stored = files.read_arrays(path)
-    old = json.loads(str(stored["config"])) | checkpoint.FORMER
+    former = {
+        "drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0,
+        "height_reward": 0.0, "snapshots": 0,
+    }  # fmt: skip
+    old = json.loads(str(stored["config"])) | former
+    del old["shuffle_places"]  # came later
     files.write_arrays(path, stored | {"config": np.array(json.dumps(old))})
     train(config, tmp_path / "straight", progress=False)
     train(config, tmp_path, progress=False)
     assert_same(tmp_path / "straight", tmp_path)
 
-    content = files.read_json(tmp_path / "config.json") | checkpoint.FORMER
+    content = files.read_json(tmp_path / "config.json") | former
     content["marks"]["config.json"] = "a digest of its own, as there was once"
     files.write_json(tmp_path / "config.json", content)
     train(config, tmp_path, progress=False)
-    files.write_json(tmp_path / "config.json", content | {"literal": True})
-    with pytest.raises(ValueError, match=r"another configuration: literal \(True, not False\)"):
-        train(config, tmp_path, progress=False)
+    for name in former:
+        files.write_json(tmp_path / "config.json", content | {name: 0.5})
+        with pytest.raises(ValueError, match=rf"another configuration: {name} \(0.5, not"):
+            train(config, tmp_path, progress=False)

@@ -40,6 +40,17 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     assert [path] == list(tmp_path.iterdir())
 
 
+def test_of_two_that_write_one_file_the_last_to_finish_wins(tmp_path):
+    path = tmp_path / "file"
+
+    def write(file):
+        files.write_text(path, "the other's")
+        file.write(b"whole")
+
+    files.write_atomically(path, write)
+    assert path.read_text() == "whole" and [path] == list(tmp_path.iterdir())
+
+
 @contextmanager
 def full_disk(room=1000):
     """Limit files to ``room`` bytes: writing beyond is an OSError, as on a full disk."""
