@@ -41,12 +41,12 @@ def test_samples_are_whole_picks(rng, next_state):
 
 
 def test_the_oldest_picks_are_overwritten(rng):
-    replay = ReplayBuffer(10, 4)
+    replay = ReplayBuffer(11, 4)
     for first in range(0, 24, 6):
         replay.add(**picks(first, 6))
-    assert len(replay) == 10 and replay.total == 24
+    assert len(replay) == 11 and replay.total == 24
     kept = sample(replay, 300, rng)["observations"][:, 0, 0]
-    assert set(kept.tolist()) == set(range(14, 24))
+    assert set(kept.tolist()) == set(range(13, 24))
 
 
 def test_samples_are_uniform_and_seeded(rng):
