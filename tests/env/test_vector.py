@@ -137,6 +137,20 @@ def test_episodes_that_end_at_once(few_items):
     assert 3 in together and {1, 2} & set(together.tolist())
 
 
+def test_visible_items_and_masks():
+    envs, side_by_side = make_pair(CONTAINER, 3)
+    envs.reset(seed=0)
+    side_by_side.reset(seed=0)
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        actions = rng.integers(128, size=3)
+        envs.step(actions)
+        side_by_side.step(actions)
+    for number, env in enumerate(side_by_side.envs):
+        assert (envs.unwrapped.visible[number] == env.unwrapped.visible).all()
+        assert (envs.unwrapped.action_masks()[number] == env.unwrapped.action_masks()).all()
+
+
 # --- the table ----------------------------------------------------------------------
 
 
