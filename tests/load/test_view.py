@@ -119,6 +119,7 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
         ({"load": "walls"}, TypeError, "load is 'walls'; expected an unload.Load"),
         ({"present": np.ones(3, dtype=bool)}, ValueError, r"present has shape \(3,\)"),
         ({"present": 1}, ValueError, "present has shape .* dtype int64; expected"),
+        ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to"),
         ({"groups": {"a": [10**6]}}, ValueError, r"groups\['a'\] holds 1000000 to 1000000"),
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
         ({"groups": {}, "order": [0]}, ValueError, "groups and order are given; expected one"),

@@ -146,6 +146,8 @@ def test_a_table_grows_and_forgets_nothing(table):
     # Whoever still reads the first arrays finds in them what they held when they were full.
     assert len(old[0]) == FEWEST_SLOTS and (old[0] != 0).sum() == FEWEST_SLOTS // 2 + 1
     assert table.find(situation(2000)) is None
+    table.add(situation(7), 0.5)  # it is known
+    assert len(table) == 2000 and table.find(situation(7)) == 0.007
 
 
 def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng):
