@@ -72,9 +72,9 @@ MODULES = {
     "physics/situation": "physics/test_situation.py env/fast/test_containers.py",
     "physics/table": "physics/test_table.py",
     "env/base": "env/test_base.py env/test_container.py env/test_vector.py",
-    "env/container": "env/test_container.py env/test_base.py",
+    "env/container": "env/test_container.py env/test_base.py env/test_vector.py",
     "env/equalization": "env/test_equalization.py",
-    "env/highest_item": "env/test_highest_item.py env/test_base.py",
+    "env/highest_item": "env/test_highest_item.py env/test_base.py env/test_vector.py",
     "env/observation": "env/test_observation.py env/test_base.py env/test_container.py",
     "env/vector": "env/test_vector.py env/test_base.py",
     "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
@@ -94,7 +94,7 @@ MODULES = {
     "agent/sweep": "agent/test_sweep.py",
 }
 # Tests that take long, or start processes of their own.
-SLOW = "full or program_ends or processes or 64_containers or agent_learns"
+SLOW = "full or processes or 64_containers or agent_learns"
 NO_CACHE = shutil.ignore_patterns("__pycache__")  # the first run compiles, as mutants do
 WALL_LIMIT = 900  # s, of a run that waits for ever
 OTHER_CODE = 99  # exit status of a process that did not import the package from its copy

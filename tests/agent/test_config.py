@@ -36,22 +36,17 @@ def test_epsilon_falls_linearly_and_stays():
         ("ties", "coin", ValueError),
         ("picks", 0, ValueError),
         ("picks", 100, ValueError),  # no multiple of 64
-        ("picks", 6.4e3, TypeError),
         ("seed", -1, ValueError),
-        ("seed", None, TypeError),
         ("num_envs", 0, ValueError),
         ("learning_rate", -1e-3, ValueError),
-        ("learning_rate", "fast", TypeError),
         ("batch_size", 0, ValueError),
         ("replay_size", 63, ValueError),  # less than a step of all environments
         ("epsilon_init", 1.1, ValueError),
         ("epsilon_final", -0.1, ValueError),
         ("epsilon_fraction", 2, ValueError),
         ("gamma", float("nan"), ValueError),
-        ("gamma", True, TypeError),
         ("beta", float("inf"), ValueError),
         ("position_noise", -1e-3, ValueError),
-        ("position_noise", "none", TypeError),
         ("network", "mlp", ValueError),
         ("n_features", 0, ValueError),
         ("equalize", "no", TypeError),
@@ -67,16 +62,12 @@ def test_bad_values_are_refused_by_name(field, value, error):
         TrainConfig(**{field: value})
 
 
-def test_numpy_numbers_make_the_same_configuration():
-    config = TrainConfig(picks=np.int64(6400), learning_rate=np.float32(0.5))
-    assert json.dumps(asdict(config)) == json.dumps(
-        asdict(TrainConfig(picks=6400, learning_rate=0.5))
-    )
-
-
-def test_numpy_flags_and_strings_make_the_same_configuration():
+def test_numpy_values_make_the_same_configuration():
     """``numpy.bool_`` was once accepted, and failed at the end of training."""
-    config = TrainConfig(mask=np.bool_(True), equalize=np.False_, ties=np.str_("average"))
-    same = TrainConfig(mask=True, equalize=False, ties="average")
+    config = TrainConfig(
+        picks=np.int64(6400), learning_rate=np.float32(0.5), mask=np.bool_(True),
+        equalize=np.False_, ties=np.str_("average"),
+    )  # fmt: skip
+    same = TrainConfig(picks=6400, learning_rate=0.5, mask=True, equalize=False, ties="average")
     assert json.dumps(asdict(config)) == json.dumps(asdict(same))
     assert type(config.mask) is bool and type(config.ties) is str

@@ -11,7 +11,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 from tests.env.comparing import CONTAINER
 from unload import evaluate
-from unload.env.sb3 import ContainerVecEnv, VectorEnvAdapter
+from unload.env.sb3 import ContainerVecEnv
 from unload.load.substacks import stack_load
 
 
@@ -71,13 +71,6 @@ def test_what_single_environments_only_can_do_is_refused(adapter):
         adapter.env_method("liftable")
     with pytest.raises(NotImplementedError, match="make new ones"):
         adapter.set_attr("max_picks", 5)
-
-
-def test_another_way_of_resetting_is_refused():
-    envs = gymnasium.make_vec("CartPole-v1", 2, vectorization_mode="sync")
-    with pytest.raises(ValueError, match="envs resets with .*expected AutoresetMode.SAME_STEP"):
-        VectorEnvAdapter(envs)
-    envs.close()
 
 
 def test_maskable_ppo_learns_on_64_containers():

@@ -34,8 +34,7 @@ def run_sweep(
 
     A run that fails is reported and does not stop the others. Each run uses one thread, shows its
     own progress in ``log.txt`` in its folder, and leaves ``record.json`` there: the entries of
-    ``unload.support.provenance.run_record``, ``process``, and ``resumed``, true if they describe
-    only the last part of a run that had been stopped.
+    ``unload.support.provenance.run_record``, and ``process``.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -82,7 +81,8 @@ def run_sweep(
         if backend == "dask":
             outcomes = _on_cluster(chosen["backend"].client, jobs)
         else:
-            outcomes = _on_machine(jobs)
+            runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
+            outcomes = runs(delayed(_run)(*job) for job in jobs.values())
         for name, error in outcomes:
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
@@ -126,12 +126,6 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
         time.sleep(0.05)
 
 
-def _on_machine(jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
-    """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``."""
-    runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-    yield from runs(delayed(_run)(*job) for job in jobs.values())
-
-
 def _run(
     name: str, config: TrainConfig, folder: Path, change: Callable[[Training], None]
 ) -> tuple[str, str]:
@@ -139,14 +133,12 @@ def _run(
     start = time.monotonic()
     try:
         run = RunFolder(folder)
-        resumed = run.checkpoint.exists() or run.finished
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if run.finished else folder / "log.txt"
         with open(log_path, "a") as log, one_thread():
             train_changed(config, folder, change, progress=log)
         if not (folder / "record.json").exists():
-            record = {"resumed": resumed, "process": os.getpid()}
-            record |= provenance.run_record(time.monotonic() - start)
+            record = provenance.run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)
         return name, ""
     except Exception as error:  # whatever it was, the other runs go on
