@@ -1,5 +1,8 @@
+import errno
 import json
 import os
+import re
+import stat
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -49,6 +52,29 @@ def test_of_two_that_write_one_file_the_last_to_finish_wins(tmp_path):
 
     files.write_atomically(path, write)
     assert path.read_text() == "whole" and [path] == list(tmp_path.iterdir())
+
+
+def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tmp_path):
+    path = tmp_path / "file"
+    files.write_text(path, "old")
+    script = """if True:
+        import os, sys
+        import files
+
+        def write(file):
+            file.write(b"half of the n")
+            file.flush()
+            os._exit(9)
+
+        files.write_atomically(sys.argv[1], write)
+    """
+    killed = subprocess.run([sys.executable, "-c", script, path], cwd=ALONE)
+    assert killed.returncode == 9
+    (leftover,) = set(tmp_path.iterdir()) - {path}
+    assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", leftover.name)
+    assert "*.partial" in (files.ROOT / ".gitignore").read_text().splitlines()
+    files.write_text(path, "new")
+    assert path.read_text() == "new" and leftover.read_bytes() == b"half of the n"
 
 
 @contextmanager
@@ -251,6 +277,32 @@ def test_a_lock_is_released_after_an_error_and_kept_from_another_block(tmp_path)
         raise KeyError
     with files.locked(tmp_path):
         pass
+
+
+@pytest.mark.parametrize("link", [os.symlink, os.link])
+def test_a_lock_that_is_a_link_is_refused_and_its_target_kept(tmp_path, link):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "notes").write_text("precious")
+    link(tmp_path / "notes", tmp_path / "run" / "lock")
+    with pytest.raises(OSError, match="run/lock"), files.locked(tmp_path / "run"):
+        pytest.fail("the lock is another file")
+    assert (tmp_path / "notes").read_text() == "precious"
+
+
+@pytest.mark.parametrize("refused", [False, True])
+def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
+    synced, fsync = [], os.fsync
+
+    def sync(descriptor: int) -> None:
+        is_folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
+        synced.append("folder" if is_folder else "file")
+        if is_folder and refused:
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    files.write_text(tmp_path / "x", "whole")
+    assert (tmp_path / "x").read_text() == "whole" and synced == ["file", "folder"]
 
 
 def test_a_missing_file_is_named(tmp_path):

@@ -4,12 +4,13 @@ Errors name the file: a damaged one is a ValueError whatever the decoder raises,
 cannot be written an OSError.
 """
 
+import errno
 import fcntl
 import json
 import os
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from hashlib import blake2b, file_digest
 from importlib import resources
@@ -45,11 +46,22 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, path)
+        _sync_folder(path.parent)
     except OSError as error:
         reason = f"cannot write this file: {error.strerror or error}"
         raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
+
+
+def _sync_folder(folder: Path) -> None:
+    """Let the new name of a file outlast a power cut, where the file system can do that."""
+    with suppress(OSError):  # some refuse it with EINVAL; the file itself is on disk
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -159,12 +171,15 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock; not if
             ``wait``.
-        OSError: the folder's file system has no locks, or its disk is full.
+        OSError: ``folder/lock`` is a link to a file elsewhere, which would be overwritten; the
+            folder's file system has no locks, or its disk is full.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     # Not buffered, because closing a buffered file tries again to write what failed.
-    with open(folder / "lock", "a+b", buffering=0) as file:
+    with open(folder / "lock", "a+b", buffering=0, opener=_open_no_link) as file:
+        if os.fstat(file.fileno()).st_nlink > 1:
+            raise OSError(errno.EMLINK, "has several names; expected a file of its own", file.name)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
         except BlockingIOError as error:
@@ -177,3 +192,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
         yield
+
+
+def _open_no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NOFOLLOW, 0o666)
