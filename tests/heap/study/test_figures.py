@@ -2,7 +2,6 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 
 from unload.heap.study import figures
@@ -29,11 +28,6 @@ def test_every_figure_draws_its_data(heap, outcome):
     texts = {text.get_text() for text in curves.texts}
     assert texts == {*figures.RULES, *(f"λ = {weight:g}" for weight in learned["falls_weight"])}
     assert {text.get_text() for text in curves.get_legend().get_texts()} == set(figures.LINES)
-    expected = pd.DataFrame({"boxes": [1.5, 0.5], "falls": [0.25, 2.0]})
-    found = pd.DataFrame({"boxes": [2, 1], "falls": [0, 3]})
-    boxes, falls = figures.predictions(expected, found).axes
-    assert boxes.collections[0].get_offsets().tolist() == [[1.5, 2], [0.5, 1]]
-    assert falls.collections[0].get_offsets().tolist() == [[0.25, 0], [2.0, 3]]
     pick = figures.one_pick(heap, 0, outcome)
     titles = [panel.get_title() for panel in pick.axes]
     assert titles == ["before the pick", "after it: 2 unloaded, 1 fallen"]

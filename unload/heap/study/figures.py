@@ -4,7 +4,6 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -230,20 +229,4 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
     axes.set_xlim(left=0)
     axes.legend(loc="lower right", fontsize=8)
     mark_reduced(figure, Path(folder) / NAME, "table")
-    return figure
-
-
-@styled
-def predictions(expected: pd.DataFrame, found: pd.DataFrame) -> Figure:
-    """What a network expects of each box of a heap, and what dragging it has brought.
-
-    Args:
-        expected: one row per box, with ``boxes`` and ``falls``.
-        found: the same for the picks that were made.
-    """
-    figure, grid = plt.subplots(1, 2, figsize=(7, 3.2))
-    for axes, measure in zip(grid, ("boxes", "falls")):
-        axes.scatter(expected[measure], found[measure], s=22, alpha=0.7, color="C0", lw=0)
-        axes.axline((0, 0), slope=1, color="0.7", lw=1, zorder=0)
-        axes.set(xlabel=f"{measure}, expected", ylabel=f"{measure}, after the pick")
     return figure
