@@ -9,7 +9,7 @@ from unload.heap.study.table import SHOWN_WEIGHT, read_heap_table
 from unload.load.view import COLOURS
 
 
-def test_every_figure_draws_its_data(heap, outcome):
+def test_every_figure_draws_its_data():
     """From data/ where it is read: dots at the values of the table, and all their names."""
     table = read_heap_table()
     shown = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
@@ -28,11 +28,6 @@ def test_every_figure_draws_its_data(heap, outcome):
     texts = {text.get_text() for text in curves.texts}
     assert texts == {*figures.RULES, *(f"λ = {weight:g}" for weight in learned["falls_weight"])}
     assert {text.get_text() for text in curves.get_legend().get_texts()} == set(figures.LINES)
-    pick = figures.one_pick(heap, 0, outcome)
-    titles = [panel.get_title() for panel in pick.axes]
-    assert titles == ["before the pick", "after it: 2 unloaded, 1 fallen"]
-    names = [text.get_text() for text in pick.legends[0].get_texts()]
-    assert names == list(figures.MEANINGS)
 
 
 def test_missing_data_names_the_command_that_makes_it(tmp_path):
@@ -65,6 +60,8 @@ def test_an_expected_fate_is_the_share_of_its_colour(heap, outcome):
     stays, comes, falls, dragged = figures.colours_of(np.arange(4))
     assert left == {tint(c) for c in (dragged, falls, (stays + comes) / 2, stays)}
     assert right == {tint(c) for c in (dragged, falls, comes, stays)}
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == list(figures.MEANINGS)
 
 
 def test_nearer_boxes_are_painted_later(heap):

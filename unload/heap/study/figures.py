@@ -122,26 +122,6 @@ def add_legend(figure: Figure) -> None:
 
 
 @styled
-def one_pick(before: Heap, box: int, outcome: Outcome) -> Figure:
-    """A heap before a pick, coloured by what the pick will do, and after it.
-
-    Args:
-        before: the heap.
-        box: that is dragged.
-        outcome: of the pick.
-    """
-    numbers = meanings(outcome, box)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
-    draw_heap(left, before, colours_of(numbers), "before the pick")
-    kept = numbers[outcome.left]
-    kept[kept == 1] = 0
-    count, falls = int(outcome.unloaded.sum()), int(outcome.fallen.sum())
-    draw_heap(right, outcome.heap, colours_of(kept), f"after it: {count} unloaded, {falls} fallen")
-    add_legend(figure)
-    return figure
-
-
-@styled
 def expected_fates(
     before: Heap, box: int, visible: np.ndarray, chances: np.ndarray, outcome: Outcome
 ) -> Figure:
