@@ -5,7 +5,6 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -124,26 +123,6 @@ def add_legend(figure: Figure) -> None:
 
 
 @styled
-def one_pick(before: Heap, box: int, outcome: Outcome) -> Figure:
-    """A heap before a pick, coloured by what the pick will do, and after it.
-
-    Args:
-        before: the heap.
-        box: that is dragged.
-        outcome: of the pick.
-    """
-    numbers = meanings(outcome, box)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
-    draw_heap(left, before, colours_of(numbers), "before the pick")
-    kept = numbers[outcome.left]
-    kept[kept == 1] = 0
-    count, falls = int(outcome.unloaded.sum()), int(outcome.fallen.sum())
-    draw_heap(right, outcome.heap, colours_of(kept), f"after it: {count} unloaded, {falls} fallen")
-    add_legend(figure)
-    return figure
-
-
-@styled
 def episodes(played: Mapping[str, tuple[Sequence[Heap], np.ndarray, Sequence[Outcome]]]) -> Figure:
     """Episodes line by line, before the first, the middle and the last pick.
 
@@ -252,20 +231,4 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
     axes.set_xlim(left=0)
     axes.legend(loc="lower right", fontsize=8)
     mark_reduced(figure, Path(folder) / NAME, "table")
-    return figure
-
-
-@styled
-def predictions(expected: pd.DataFrame, found: pd.DataFrame) -> Figure:
-    """What a network expects of each box of a heap, and what dragging it has brought.
-
-    Args:
-        expected: one row per box, with ``boxes`` and ``falls``.
-        found: the same for the picks that were made.
-    """
-    figure, grid = plt.subplots(1, 2, figsize=(7, 3.2))
-    for axes, measure in zip(grid, ("boxes", "falls")):
-        axes.scatter(expected[measure], found[measure], s=22, alpha=0.7, color="C0", lw=0)
-        axes.axline((0, 0), slope=1, color="0.7", lw=1, zorder=0)
-        axes.set(xlabel=f"{measure}, expected", ylabel=f"{measure}, after the pick")
     return figure
