@@ -55,7 +55,7 @@ from cosmic_ray.plugins import get_operator
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE, SEED = 40, 0  # mutants per module, and of their choice
-COPIED = ("unload", "tests", "data", "pyproject.toml", ".gitignore")
+COPIED = ("unload", "tests", "data", "pyproject.toml", "README.md", ".gitignore")
 # Tests of the array environment that are quick as plain Python.
 FEW_PICKS = " ".join(
     f"env/test_vector.py::test_{name}"
@@ -67,8 +67,16 @@ FEW_PICKS = " ".join(
 )  # fmt: skip
 # The modules, and the tests in tests/ that have to notice their mutants.
 MODULES = {
+    "__init__": "test_installed.py::test_names_are_where_type_checkers_find_them",
+    "task": "load/test_substacks.py physics/test_base.py env/test_container.py",
     "load/boxes": "load/test_boxes.py",
+    "load/packing_list": "load/test_packing_list.py",
     "load/substacks": "load/test_substacks.py",
+    "load/view": "load/test_view.py",
+    "physics/base": "physics/test_base.py",
+    "physics/bullet": "physics/test_bullet.py physics/test_full.py",
+    "physics/full": "physics/test_full.py",
+    "physics/local": "physics/test_local.py physics/test_base.py",
     "physics/situation": "physics/test_situation.py env/fast/test_containers.py",
     "physics/table": "physics/test_table.py",
     "env/base": "env/test_base.py env/test_container.py env/test_vector.py",
@@ -76,25 +84,35 @@ MODULES = {
     "env/equalization": "env/test_equalization.py",
     "env/highest_item": "env/test_highest_item.py env/test_base.py",
     "env/observation": "env/test_observation.py env/test_base.py env/test_container.py",
+    "env/sb3": "env/test_sb3.py",
     "env/vector": "env/test_vector.py env/test_base.py",
     "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
     "env/fast/ranking": "env/fast/test_ranking.py",
     "network/peq": "network/test_peq.py",
     "network/variants": "network/test_variants.py",
-    "agent/learner": "agent/test_learner.py agent/test_dqn.py agent/test_greedy.py",
+    "network/weights": "network/test_weights.py agent/test_greedy.py",
+    "agent/checkpoint": "agent/test_checkpoint.py agent/test_training.py",
+    "agent/config": "agent/test_config.py",
     "agent/dqn": "agent/test_dqn.py",
+    "agent/evaluation": "agent/test_evaluation.py",
+    "agent/greedy": "agent/test_greedy.py",
+    "agent/learner": "agent/test_learner.py agent/test_dqn.py agent/test_greedy.py",
+    "agent/order": "agent/test_order.py",
+    "agent/policies": "agent/test_policies.py",
     "agent/replay": "agent/test_replay.py",
+    "agent/rollout": "agent/test_rollout.py agent/test_checkpoint.py agent/test_training.py",
+    "agent/sweep": "agent/test_sweep.py",
+    "agent/training": "agent/test_training.py agent/test_checkpoint.py",
     "agent/fast/fused": "agent/fast/test_fused.py",
     "agent/fast/kernel": "agent/fast/test_fused.py",
     "agent/fast/learner": "agent/fast/test_learner.py agent/test_learner.py agent/test_dqn.py",
     "support/checks": "support/test_checks.py",
+    "support/compiled": "support/test_compiled.py",
     "support/files": "support/test_files.py",
-    "network/weights": "network/test_weights.py agent/test_greedy.py",
-    "agent/checkpoint": "agent/test_checkpoint.py agent/test_training.py",
-    "agent/sweep": "agent/test_sweep.py",
+    "support/provenance": "support/test_provenance.py",
 }
 # Tests that take long, or start processes of their own.
-SLOW = "full or program_ends or processes or 64_containers or agent_learns"
+SLOW = "[full or program_ends or processes_that or two_processes or 64_containers or agent_learns"
 NO_CACHE = shutil.ignore_patterns("__pycache__")  # the first run compiles, as mutants do
 WALL_LIMIT = 900  # s, of a run that waits for ever
 OTHER_CODE = 99  # exit status of a process that did not import the package from its copy

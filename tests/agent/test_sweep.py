@@ -1,12 +1,13 @@
 """Many runs side by side: what is kept, what is reported, and who does the work."""
 
 import os
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from unload.agent import sweep
-from unload.agent.training import train
+from unload.agent.training import train, unchanged
 from unload.reproduce.paper.grids import tuning_config
 from unload.support import files
 
@@ -42,6 +43,14 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     before = [path.stat().st_mtime_ns for path in written]
     sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
     assert [path.stat().st_mtime_ns for path in written] == before
+
+
+def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path):
+    config = replace(configs["set/run_0"], log_interval=2)
+    with pytest.raises(KeyboardInterrupt, match="stopped after 192 picks"):
+        sweep._run("run", config, tmp_path / "run", unchanged, sweep=0)
+    sweep.run_sweep({"run": config}, tmp_path, n_jobs=1, progress=False)
+    assert files.read_json(tmp_path / "run" / "record.json")["resumed"]
 
 
 def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):

@@ -1,6 +1,7 @@
 """Many training runs side by side, on the cores of one machine or of a cluster."""
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -35,7 +36,8 @@ def run_sweep(
     A run that fails is reported and does not stop the others. Each run uses one thread, shows its
     own progress in ``log.txt`` in its folder, and leaves ``record.json`` there: the entries of
     ``unload.support.provenance.run_record``, ``process``, and ``resumed``, true if they describe
-    only the last part of a run that had been stopped.
+    only the last part of a run that had been stopped. If this process is killed, the runs of
+    ``"loky"`` stop with a checkpoint at the next point of their curves.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -129,21 +131,34 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
 def _on_machine(jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
     """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``."""
     runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-    yield from runs(delayed(_run)(*job) for job in jobs.values())
+    yield from runs(delayed(_run)(*job, os.getpid()) for job in jobs.values())
 
 
 def _run(
-    name: str, config: TrainConfig, folder: Path, change: Callable[[Training], None]
+    name: str,
+    config: TrainConfig,
+    folder: Path,
+    change: Callable[[Training], None],
+    sweep: int | None = None,
 ) -> tuple[str, str]:
-    """Train one configuration; its name, and the error's text if it failed."""
+    """Train one configuration; its name, and the error's text if it failed.
+
+    Once the process ``sweep``, which has begun the run on this machine, is gone, nobody waits for
+    the run, and the next sweep needs its folder: it stops as after Ctrl-C.
+    """
     start = time.monotonic()
+
+    def stop_if_alone(point: dict[str, float]) -> None:
+        if sweep not in (None, os.getpid(), os.getppid()):
+            signal.raise_signal(signal.SIGINT)
+
     try:
         run = RunFolder(folder)
         resumed = run.checkpoint.exists() or run.finished
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if run.finished else folder / "log.txt"
         with open(log_path, "a") as log, one_thread():
-            train_changed(config, folder, change, progress=log)
+            train_changed(config, folder, change, log, callback=stop_if_alone)
         if not (folder / "record.json").exists():
             record = {"resumed": resumed, "process": os.getpid()}
             record |= provenance.run_record(time.monotonic() - start)
