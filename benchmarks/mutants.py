@@ -2,6 +2,7 @@
 
     make mutants                                       a sample of each module's mutants
     python benchmarks/mutants.py agent/dqn --sample 0  all mutants of one module
+    python benchmarks/mutants.py --sample 12 --keep    for data/benchmarks
 
 Cosmic Ray makes the mutants. mutmut 3 leaves decorated functions alone, and so would miss all
 compiled ones. Each mutant's module is changed in a copy of the tree, where a forked process
@@ -16,7 +17,8 @@ function fast only, and operators that numbers of the other kind do not have, su
 place of ``*``, because each call of such a mutant fails, which would only raise the score.
 
 The scores are printed at the end, and all outcomes kept in ``build/mutants.csv``. Most survivors
-are equivalent to the code as it is: no result depends on the change beyond rounding.
+are equivalent to the code as it is: no result depends on the change beyond rounding. Why one
+survives is written by hand into ``survivors.csv`` in ``data/benchmarks``, which keeps it.
 """
 
 import argparse
@@ -54,6 +56,7 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 
 ROOT = Path(__file__).resolve().parent.parent
+KEPT = ROOT / "data" / "benchmarks"
 SAMPLE, SEED = 40, 0  # mutants per module, and of their choice
 COPIED = ("unload", "tests", "data", "pyproject.toml", "README.md", ".gitignore")
 # Tests of the array environment that are quick as plain Python.
@@ -65,18 +68,21 @@ FEW_PICKS = " ".join(
         "fewer_boxes_may_have_more_contacts",
     )
 )  # fmt: skip
+# That lifts are those of the table that ships, and that training is that of the data.
+SHIPPED = "physics/test_table.py::test_shipped_table_fits_this_physics"
+TRAINING = "reproduce/test_fingerprint.py::test_data_is_of_todays_training"
 # The modules, and the tests in tests/ that have to notice their mutants.
 MODULES = {
-    "__init__": "test_installed.py::test_names_are_where_type_checkers_find_them",
-    "task": "load/test_substacks.py physics/test_base.py env/test_container.py",
+    "__init__": "test_installed.py",
+    "task": f"load/test_substacks.py physics/test_base.py env/test_observation.py {TRAINING}",
     "load/boxes": "load/test_boxes.py",
     "load/packing_list": "load/test_packing_list.py",
     "load/substacks": "load/test_substacks.py",
     "load/view": "load/test_view.py",
     "physics/base": "physics/test_base.py",
-    "physics/bullet": "physics/test_bullet.py physics/test_full.py",
+    "physics/bullet": f"physics/test_bullet.py {SHIPPED}",
     "physics/full": "physics/test_full.py",
-    "physics/local": "physics/test_local.py physics/test_base.py",
+    "physics/local": f"physics/test_local.py physics/test_base.py {SHIPPED}",
     "physics/situation": "physics/test_situation.py env/fast/test_containers.py",
     "physics/table": "physics/test_table.py",
     "env/base": "env/test_base.py env/test_container.py env/test_vector.py",
@@ -88,7 +94,7 @@ MODULES = {
     "env/vector": "env/test_vector.py env/test_base.py",
     "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
     "env/fast/ranking": "env/fast/test_ranking.py",
-    "network/peq": "network/test_peq.py",
+    "network/peq": "network/test_peq.py network/test_variants.py",
     "network/variants": "network/test_variants.py",
     "network/weights": "network/test_weights.py agent/test_greedy.py",
     "agent/checkpoint": "agent/test_checkpoint.py agent/test_training.py",
@@ -381,6 +387,30 @@ def scores(table: pd.DataFrame) -> str:
     )
 
 
+def keep(table: pd.DataFrame, folder: Path = KEPT) -> None:
+    """Write ``mutants.csv``, a row a module, and ``survivors.csv``, a row a surviving mutant.
+
+    Modules that are not in ``table`` keep their rows, and survivors that are known already the
+    reason in ``why``.
+    """
+    killed = table["outcome"] != "survived"
+    modules = table.assign(killed=killed).groupby("module", as_index=False)
+    survivors = table.loc[~killed, ["module", "before", "after"]].drop_duplicates()
+    parts = {
+        "mutants": modules.agg(
+            of=("of", "first"), mutants=("killed", "size"), killed=("killed", "sum")
+        ),
+        "survivors": survivors.assign(why=""),
+    }
+    for name, new in parts.items():
+        path = folder / f"{name}.csv"
+        old = pd.read_csv(path) if path.exists() else new[:0]
+        if name == "survivors":
+            new = new.drop(columns="why").merge(old, "left", ["module", "before", "after"])
+        others = old[~old["module"].isin(table["module"])]
+        pd.concat([others, new]).sort_values("module", kind="stable").to_csv(path, index=False)
+
+
 def main() -> None:
     """Measure, print survivors and scores; keep all in build/mutants.csv."""
     parser = argparse.ArgumentParser(description="Mutation testing.")
@@ -388,6 +418,7 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per module, 0 for all")
     parser.add_argument("--seed", type=int, default=SEED, help="of the sample")
     parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
+    parser.add_argument("--keep", action="store_true", help="the results in data/benchmarks, too")
     arguments = parser.parse_args()
     for name in arguments.modules:
         if name not in MODULES:
@@ -397,6 +428,8 @@ def main() -> None:
     table = measure(names, arguments.sample, arguments.seed, arguments.jobs)
     (ROOT / "build").mkdir(exist_ok=True)
     table.to_csv(ROOT / "build" / "mutants.csv", index=False)
+    if arguments.keep:
+        keep(table)
     print(scores(table))
     print(f"{(time.monotonic() - start) / 60:.0f} minutes")
 

@@ -32,6 +32,7 @@ def test_ties_go_to_the_smaller_index():
     positions[:, 1] = [0.1, 2.0, 0.5, 1.0, 1.5, 0.3]  # y does not count
     positions[4, 0] = 6.0
     assert observation.nearest(positions, 4).tolist() == [4, 0, 1, 2]
+    assert observation.nearest(np.zeros((500, 3))).tolist() == list(range(128))
 
 
 def test_scale_maps_the_container_to_the_cube():
@@ -67,7 +68,7 @@ def test_all_items_are_observed_if_there_are_fewer(rng):
 
 def test_rows_that_hold_an_item(rng):
     seen = rng.uniform(-1, 1, (2, 3, 6, 3)).astype(np.float32)
-    seen[0, 1, 4:] = observation.PADDING
+    seen[0, 1, 4:] = -1
     seen[1, 2, :, :2] = -1  # in the corner in two of three columns
     expected = np.ones((2, 3, 6), bool)
     expected[0, 1, 4:] = False
