@@ -7,9 +7,9 @@
 Cosmic Ray makes the mutants. mutmut 3 leaves decorated functions alone, and so would miss all
 compiled ones. Each mutant's module is changed in a copy of the tree, where a forked process
 then runs the tests that belong to it; to fork saves importing PyTorch a thousand times. Modules
-with compiled functions run as plain Python, so that nothing is compiled; ``kernel``, whose
-instructions Python does not have, is compiled anew for each mutant, and so that it refuses places
-outside of its arrays.
+with compiled functions run as plain Python, so that nothing is compiled; those in ``agent/fast``,
+whose kernel has instructions that Python does not have, are compiled anew for each mutant, and so
+that they refuse places outside of their arrays.
 
 Left out are changes without an effect on behaviour: in annotations, in errors that are raised
 (the condition for it counts) and of ``is`` for ``==``. So are decorators, most of which make a
@@ -211,8 +211,9 @@ def run_tests(tree: Path, module: str) -> int:
     sys.path.insert(0, str(tree))
     sys.dont_write_bytecode = False
     source = (tree / "unload" / f"{module}.py").read_text()
-    numba.config.DISABLE_JIT = "@compiled" in source and "@intrinsic" not in source
-    numba.config.BOUNDSCHECK = "@intrinsic" in source or None  # as Python does by itself
+    has_kernel = module.startswith("agent/fast/")  # and so instructions that Python does not have
+    numba.config.DISABLE_JIT = "\n@compiled" in source and not has_kernel
+    numba.config.BOUNDSCHECK = has_kernel or None  # as Python does by itself
     torch.set_num_threads(1)
     tests = [f"tests/{name}" for name in MODULES[module].split()]
     options = ["-x", "-p", "no:cacheprovider", "-k", f"not ({SLOW})", "-m", "not slow"]

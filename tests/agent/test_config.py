@@ -29,6 +29,15 @@ def test_epsilon_falls_linearly_and_stays():
     assert TrainConfig(picks=64, epsilon_fraction=0).epsilon(0) == 0
 
 
+def test_values_at_the_edge_are_taken():
+    for fields in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64}):
+        TrainConfig(**fields)
+
+
+def test_the_seeds_stay_so_that_runs_can_be_repeated():
+    assert TrainConfig(seed=3).seeds() == (1645421708, 4294262074, 3363538554)
+
+
 @pytest.mark.parametrize(
     ("field", "value", "error"),
     [

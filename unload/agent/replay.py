@@ -13,7 +13,7 @@ CHECKS = {"f": checks.finite_array, "i": checks.integer_array, "b": checks.flag_
 def _fitting(name: str, values: object, shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
     """Return ``values`` converted to ``dtype``; raise unless they fit."""
     if isinstance(values, np.ndarray) and (values.dtype, values.shape) == (dtype, shape):
-        if dtype.kind != "f" or np.isfinite(values).all():
+        if np.isfinite(values).all():
             return values  # nothing to convert
     values = CHECKS[dtype.kind](name, values, shape)
     with np.errstate(over="ignore"):  # what is too large for ``dtype`` is refused as infinite
