@@ -73,7 +73,7 @@ SHIPPED = "physics/test_table.py::test_shipped_table_fits_this_physics"
 TRAINING = "reproduce/test_fingerprint.py::test_data_is_of_todays_training"
 # The modules, and the tests in tests/ that have to notice their mutants.
 MODULES = {
-    "__init__": "test_installed.py",
+    "__init__": "test_installed.py::test_an_import_takes_few_modules agent/test_policies.py",
     "task": f"load/test_substacks.py physics/test_base.py env/test_observation.py {TRAINING}",
     "load/boxes": "load/test_boxes.py",
     "load/packing_list": "load/test_packing_list.py",
@@ -324,13 +324,12 @@ def _kill(process: int) -> None:
         os.killpg(process, signal.SIGKILL)
 
 
-def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame:
-    """Run the mutants of some modules: one row each, with its outcome.
+def measure(names: list[str], sample: int, seed: int, jobs: int) -> Iterator[pd.DataFrame]:
+    """Run the mutants of some modules: a table a module, with a row and an outcome each.
 
     Raises:
         RuntimeError: a module's tests fail without any change.
     """
-    rows = []
     with (
         tempfile.TemporaryDirectory() as folder,
         contextlib.closing(Workers(Path(folder), jobs)) as workers,
@@ -345,9 +344,8 @@ def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame
             for mutant in chosen:
                 ends += [_row(*end) for end in workers.start(name, mutant.code, limit, mutant)]
             ends += [_row(*end) for end in workers.rest()]
-            rows += [row | {"of": count} for row in ends]
             print(f"{name}: {len(chosen)} of {count} mutants tested", flush=True)
-    return pd.DataFrame(rows).sort_values(["module", "line", "operator"], ignore_index=True)
+            yield pd.DataFrame(ends).assign(of=count).sort_values(["line", "operator"])
 
 
 def _seconds_unchanged(workers: Workers, name: str) -> float:
@@ -426,9 +424,12 @@ def main() -> None:
             parser.error(f"modules has {name!r}; expected some of {', '.join(MODULES)}")
     start = time.monotonic()
     names = arguments.modules or list(MODULES)
-    table = measure(names, arguments.sample, arguments.seed, arguments.jobs)
     (ROOT / "build").mkdir(exist_ok=True)
-    table.to_csv(ROOT / "build" / "mutants.csv", index=False)
+    parts = []
+    for part in measure(names, arguments.sample, arguments.seed, arguments.jobs):
+        parts.append(part)
+        table = pd.concat(parts, ignore_index=True)
+        table.to_csv(ROOT / "build" / "mutants.csv", index=False)
     if arguments.keep:
         keep(table)
     print(scores(table))

@@ -80,6 +80,7 @@ def test_bad_sizes_are_refused(size, items, name):
         ({"observations": np.full((2, 5, 3), np.nan, np.float32)}, "observations holds nan"),
         ({"next_observations": np.full((2, 5, 3), -np.inf, np.float32)}, "next_.* holds -inf"),
         ({"actions": np.array([0, 5])}, "actions holds 0 to 5; expected 0 to 4"),
+        ({"actions": np.array([-1, 0])}, "actions holds -1 to 0; expected 0 to 4"),
         ({"next_masks": np.zeros((2, 5), bool)}, "next_masks is all zero in row 0"),
         ({"next_masks": np.full((2, 5), 2)}, "next_masks holds 2"),
         ({"masks": np.ones(2)}, "batch has .*expected"),

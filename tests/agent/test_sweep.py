@@ -38,6 +38,7 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
         )
         record = files.read_json(folder / "record.json")
         assert not record["resumed"]
+        assert '"digest"' in (folder / "record.json").read_text()
         assert record["peak_memory_mib"] > 50 and 0 <= record["wall_time_s"] < 60
         assert "256/256" in (folder / "log.txt").read_text()
     written = sorted(tmp_path.glob("many/set/*/*"))
