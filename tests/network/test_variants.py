@@ -161,7 +161,7 @@ def test_every_weight_has_a_gradient(kind, items, padded):
         assert value.grad.isfinite().all() and value.grad.any(), name
 
 
-@pytest.mark.parametrize("shape", [(4, 3), (2, 4, 2), (2, 0, 3), (2, 4, 3, 1)])
+@pytest.mark.parametrize("shape", [(4, 3), (2, 4, 2), (2, 4, 4), (2, 0, 3), (2, 4, 3, 1)])
 def test_other_shapes_are_refused(kind, shape):
     with pytest.raises(ValueError, match=r"observations has shape .*expected \(batch, items, 3\)"):
         make(kind)(torch.zeros(shape))
