@@ -68,13 +68,12 @@ FEW_PICKS = " ".join(
         "fewer_boxes_may_have_more_contacts",
     )
 )  # fmt: skip
-# That lifts are those of the table that ships, and that training is that of the data.
+# That lifts are those of the table that ships.
 SHIPPED = "physics/test_table.py::test_shipped_table_fits_this_physics"
-TRAINING = "reproduce/test_fingerprint.py::test_data_is_of_todays_training"
 # The modules, and the tests in tests/ that have to notice their mutants.
 MODULES = {
     "__init__": "test_installed.py::test_an_import_takes_few_modules agent/test_policies.py",
-    "task": f"load/test_substacks.py physics/test_base.py env/test_observation.py {TRAINING}",
+    "task": "load/test_substacks.py env/test_observation.py reproduce/paper/test_numbers.py",
     "load/boxes": "load/test_boxes.py",
     "load/packing_list": "load/test_packing_list.py",
     "load/substacks": "load/test_substacks.py",
@@ -172,7 +171,10 @@ def mutants(
         found = [found[i] for i in sorted(rng.choice(count, sample, replace=False))]
     chosen = []
     for _, operator, mutation in found:
-        code = mutate_code(source, get_operator(mutation.operator_name)(), mutation.occurrence)
+        try:
+            code = mutate_code(source, get_operator(mutation.operator_name)(), mutation.occurrence)
+        except AttributeError:  # Cosmic Ray's, of an exception whose name has a dot
+            continue
         pairs = enumerate(zip(lines, code.splitlines()), 1)
         line, (before, after) = next((n, pair) for n, pair in pairs if pair[0] != pair[1])
         chosen.append(Mutant(module, line, before.strip(), after.strip(), operator, code))
