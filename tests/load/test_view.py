@@ -200,6 +200,9 @@ def test_boxes_in_a_circle_are_all_drawn():
 def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
     load, moved = boxes((0.8, 0.2), (0.8, 0.6)), boxes((1.6, 0.2), (1.6, 0.6))
     both, one, none = (np.arange(2) < count for count in (2, 1, 0))
+    empty = snapshot(load, none, load.positions).mean(axis=2) / 255
+    shares = [(abs(empty - grey) < 0.006).mean() for grey in (0.87, 0.91, 0.94)]
+    assert shares == pytest.approx([0.23, 0.19, 0.08], abs=0.01), "the container's sides"
     picture = snapshot(load, both, load.positions)
     assert picture.shape == (480, 640, 3) and picture.dtype == np.uint8
     boxes_drawn = [(snapshot(load, some, load.positions) != snapshot(load, none, load.positions))

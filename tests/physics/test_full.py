@@ -86,6 +86,13 @@ def test_the_container_has_a_floor_and_three_walls(make, boxes):
         assert pybullet.rayTest(start, (9, *start[1:]), physicsClientId=client)[0][0] == -1
 
 
+def test_a_removed_box_comes_to_lie_far_below(make, boxes):
+    physics = make("full", boxes((1.2, 0.2)))
+    physics.remove(0)
+    physics.settle(1.0)
+    assert physics._world.pose(physics._bodies[0])[0][2] == pytest.approx(-100 + 0.2, abs=0.01)
+
+
 # --- reset --------------------------------------------------------------------------
 
 
