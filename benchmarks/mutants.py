@@ -2,7 +2,7 @@
 
     make mutants                                       a sample of each module's mutants
     python benchmarks/mutants.py agent/dqn --sample 0  all mutants of one module
-    python benchmarks/mutants.py --sample 12 --keep    for data/benchmarks
+    python benchmarks/mutants.py --sample 12 --seed 33 --keep    for data/benchmarks
 
 Cosmic Ray makes the mutants. mutmut 3 leaves decorated functions alone, and so would miss all
 compiled ones. Each mutant's module is changed in a copy of the tree, where a forked process
