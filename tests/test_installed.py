@@ -2,7 +2,6 @@
 
 import ast
 import os
-import re
 import subprocess
 import sys
 import tomllib
@@ -13,8 +12,6 @@ import pytest
 import unload
 from unload.support import files
 
-README = (files.ROOT / "README.md").read_text()
-(EXAMPLE,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 USE_ALL = """
 import numpy as np
 import unload
@@ -67,11 +64,8 @@ def installed(tmp_path) -> Path:
 
 @pytest.mark.slow
 def test_a_wheel_is_whole(installed):
-    code = f"FOLDER = {str(installed)!r}{USE_ALL}{EXAMPLE}"
-    promised = re.findall(r"print\(.*\) +# (.*)", EXAMPLE)
-    lines = run(code, installed).splitlines()
-    printed = [line for line in lines if line and "pick/s" not in line]  # no progress bar
-    assert printed == [unload.__version__, "True", *promised]
+    code = f"FOLDER = {str(installed)!r}{USE_ALL}"
+    assert run(code, installed).splitlines() == [unload.__version__, "True"]
     shipped = {path.relative_to(files.SHIPPED) for path in files.SHIPPED.rglob("*.*")}
     assert shipped == {
         path.relative_to(installed / "unload/data")

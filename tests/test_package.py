@@ -13,7 +13,7 @@ README = (ROOT / "README.md").read_text()
 
 # The files and folders of unload/ that may import a library; "" stands for all.
 LIBRARIES = {
-    "PIL": ("load/view.py", "heap/study/", "reproduce/paper/animation.py"),
+    "PIL": ("load/view.py", "reproduce/paper/animation.py"),
     "anywidget": ("play/canvas.py",),
     "gymnasium": ("__init__.py", "env/", "agent/", "heap/", "reproduce/"),
     "ipywidgets": ("play/",),
@@ -23,7 +23,7 @@ LIBRARIES = {
     "numba": ("support/compiled.py", "agent/fast/kernel.py"),
     "numpy": ("",),
     "pandas": ("load/packing_list.py", "agent/", "heap/study/", "reproduce/"),
-    "plotly": ("load/view.py", "play/replay.py", "heap/study/replay.py"),
+    "plotly": ("load/view.py", "play/replay.py"),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("network/weights.py",),
     "scipy": ("heap/", "reproduce/"),

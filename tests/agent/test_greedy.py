@@ -65,26 +65,19 @@ def test_rows_without_an_item_have_no_part_in_the_choice(observations, name, rng
     assert (with_padding != few).any() and (full != few).any()
 
 
-@pytest.mark.parametrize("name", NETWORKS)
-def test_weights_that_are_not_finite_choose_nothing(observations, name):
-    """They once picked row 0 without a word."""
-    network = NETWORKS[name](4, torch.Generator().manual_seed(0))
+@pytest.mark.parametrize(
+    ("name", "value"), [*((name, torch.nan) for name in NETWORKS), ("peq", torch.inf)]
+)
+def test_a_weight_that_is_not_finite_chooses_nothing(observations, name, value):
+    """It once picked row 0 without a word, or passed over the items that it spoiled."""
     allowed = np.ones(observations.shape[:2], bool)
-    torch.nn.init.constant_(network.scorer.weight, torch.nan)
-    for choose in (greedy_actions, highest_values):
-        with pytest.raises(FloatingPointError, match="row 0 has no allowed action of a finite"):
-            choose(network, observations, allowed)
-
-
-@pytest.mark.parametrize("value", [torch.nan, torch.inf])
-@pytest.mark.parametrize("layer", ["extractor", "scorer"])
-def test_one_weight_that_is_not_finite_is_enough(observations, value, layer):
-    """The compiled choice once took row 0, or passed over the items that it spoiled."""
-    network = peq()
-    with torch.no_grad():
-        getattr(network, layer).weight[0, 0] = value
-    with pytest.raises(FloatingPointError, match="has no allowed action of a finite value"):
-        greedy_actions(network, observations, np.ones(observations.shape[:2], bool))
+    for layer in ("scorer", "extractor") if name == "peq" else ("scorer",):
+        network = NETWORKS[name](4, torch.Generator().manual_seed(0))
+        with torch.no_grad():
+            getattr(network, layer).weight[0, 0] = value
+        for choose in (greedy_actions, highest_values):
+            with pytest.raises(FloatingPointError, match="has no allowed action of a finite"):
+                choose(network, observations, allowed)
 
 
 def of_network(name: object) -> dict[str, str]:

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-import unload
 from unload.agent.replay import ReplayBuffer, shuffle_places
 
 
@@ -23,47 +22,51 @@ def picks(first: int, count: int, items: int = 4, next_state: bool = False) -> d
     return batch
 
 
+def sample(replay: ReplayBuffer, count: int, rng: np.random.Generator) -> dict:
+    rows = replay.sample_rows(count, rng)
+    return {name: array[rows] for name, array in replay.arrays.items()}
+
+
 @pytest.mark.parametrize("next_state", [False, True])
 def test_samples_are_whole_picks(rng, next_state):
     replay = ReplayBuffer(100, 4, next_state)
     replay.add(**picks(0, 40, next_state=next_state))
-    sample = replay.sample(500, rng)
-    numbers = sample["observations"][:, 0, 0].astype(int)
+    samples = sample(replay, 500, rng)
+    numbers = samples["observations"][:, 0, 0].astype(int)
     assert set(numbers.tolist()) == set(range(40))
-    assert sample.keys() == replay.arrays.keys()
     everything = picks(0, 40, next_state=next_state)
-    for name, values in sample.items():
-        assert len(values) == 500
+    assert samples.keys() == everything.keys()
+    for name, values in samples.items():
         np.testing.assert_array_equal(values, everything[name][numbers])
 
 
 def test_the_oldest_picks_are_overwritten(rng):
-    replay = ReplayBuffer(10, 4)
+    replay = ReplayBuffer(11, 4)
     for first in range(0, 24, 6):
         replay.add(**picks(first, 6))
-    assert len(replay) == 10 and replay.total == 24
-    kept = replay.sample(300, rng)["observations"][:, 0, 0]
-    assert set(kept.tolist()) == set(range(14, 24))
+    assert len(replay) == 11 and replay.total == 24
+    kept = sample(replay, 300, rng)["observations"][:, 0, 0]
+    assert set(kept.tolist()) == set(range(13, 24))
 
 
 def test_samples_are_uniform_and_seeded(rng):
     replay = ReplayBuffer(8, 4)
     replay.add(**picks(0, 8))
-    counts = np.bincount(replay.sample(40_000, rng)["observations"][:, 0, 0].astype(int))
+    counts = np.bincount(replay.sample_rows(40_000, rng))
     assert counts / 40_000 == pytest.approx(np.full(8, 1 / 8), abs=0.01)
-    first, same = (replay.sample(50, np.random.default_rng(1))["rewards"] for _ in range(2))
+    first, same = (replay.sample_rows(50, np.random.default_rng(1)) for _ in range(2))
     assert (first == same).all()
 
 
 def test_sampling_refuses(rng):
     replay = ReplayBuffer(10, 4)
     with pytest.raises(ValueError, match="the replay buffer is empty"):
-        replay.sample(1, rng)
+        replay.sample_rows(1, rng)
     replay.add(**picks(0, 2))
     with pytest.raises(ValueError, match="batch_size is 0"):
-        replay.sample(0, rng)
+        replay.sample_rows(0, rng)
     with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
-        replay.sample(1, None)
+        replay.sample_rows(1, None)
 
 
 @pytest.mark.parametrize(("size", "items", "name"), [(0, 4, "size"), (4, 0, "items")])
@@ -75,70 +78,18 @@ def test_bad_sizes_are_refused(size, items, name):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"rewards": np.array([1e39, 1.0])}, "rewards holds inf"),
-        ({"rewards": np.array([np.inf, 1.0], np.float32)}, "rewards holds inf"),
-        ({"observations": np.full((2, 5, 3), np.nan, np.float32)}, "observations holds nan"),
-        ({"next_observations": np.full((2, 5, 3), -np.inf, np.float32)}, "next_.* holds -inf"),
-        ({"actions": np.array([0, 5])}, "actions holds 0 to 5; expected 0 to 4"),
-        ({"actions": np.array([-1, 0])}, "actions holds -1 to 0; expected 0 to 4"),
-        ({"next_masks": np.zeros((2, 5), bool)}, "next_masks is all zero in row 0"),
-        ({"next_masks": np.full((2, 5), 2)}, "next_masks holds 2"),
         ({"masks": np.ones(2)}, "batch has .*expected"),
-        ({"actions": np.zeros(3, int)}, r"actions has shape \(3,\); expected \(2,\)"),
-        ({"actions": np.zeros(2)}, "actions has dtype float64; expected integers"),
-        ({"observations": np.zeros((2, 4, 3))}, r"observations has shape \(2, 4, 3\)"),
-        ({"rewards": 1.0}, r"rewards has shape \(\)"),
+        ({"actions": np.zeros(3, int)}, r"observations has shape .*expected \(3, 4, 3\)"),
+        ({"observations": np.zeros((2, 5, 3))}, r"observations has shape \(2, 5, 3\)"),
+        ({"rewards": 1.0}, r"rewards has shape \(\); expected \(2,\)"),
     ],
 )
-def test_what_would_spoil_learning_is_refused_where_it_enters(rng, change, message):
-    replay = ReplayBuffer(10, 5, next_state=True)
-    batch = {
-        "observations": rng.uniform(-1, 1, (2, 5, 3)),
-        "actions": np.array([0, 4]),
-        "rewards": np.array([1.0, -1.0]),
-        "next_observations": rng.uniform(-1, 1, (2, 5, 3)),
-        "next_masks": np.ones((2, 5), bool),
-        "terminations": np.array([False, False]),
-    }
-    with pytest.raises((TypeError, ValueError), match=message):
-        replay.add(**batch | change)
-    assert len(replay) == 0
-    replay.add(**batch)
-    assert len(replay) == 2
-
-
-def equalized_picks(rng, count: int) -> dict:
-    """Picks of equalized observations of 128 items."""
-    return {
-        "observations": unload.equalize(rng.random((count, 128, 3))),
-        "actions": rng.integers(128, size=count),
-        "rewards": rng.choice([-1.0, 1.0], count),
-    }
-
-
-def test_bytes_hold_the_same_picks_as_floats(rng):
-    batch = equalized_picks(rng, 30)
-    samples = []
-    for equalized in (True, False):
-        replay = ReplayBuffer(20, 128, equalized=equalized)
-        replay.add(**{name: values[:15] for name, values in batch.items()})
-        replay.add(**{name: values[15:] for name, values in batch.items()})
-        samples.append(replay.sample(50, np.random.default_rng(1)))
-        assert replay.arrays["observations"].itemsize == (1 if equalized else 4)
-    for name, values in samples[0].items():
-        assert values.dtype == samples[1][name].dtype
-        np.testing.assert_array_equal(values, samples[1][name])
-
-
-def test_bytes_hold_equalized_observations_only(rng):
-    replay, batch = ReplayBuffer(20, 128, equalized=True), equalized_picks(rng, 3)
-    batch["observations"][2, 127, 2] = 0.3
-    with pytest.raises(ValueError, match="observations holds 0.3"):
-        replay.add(**batch)
-    assert len(replay) == 0
-    for items, next_state in ((64, False), (129, False), (128, True)):
-        with pytest.raises(ValueError, match="^equalized is True with items="):
-            ReplayBuffer(20, items, next_state, equalized=True)
+def test_a_batch_that_does_not_fit_is_refused(change, message):
+    replay = ReplayBuffer(2, 4)
+    replay.add(**picks(0, 2))
+    with pytest.raises(ValueError, match=message):
+        replay.add(**picks(5, 2) | change)
+    assert replay.total == 2 and replay.arrays["observations"].max() == 1
 
 
 def test_places_are_shuffled_among_the_items_of_each_observation():

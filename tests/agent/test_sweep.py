@@ -3,12 +3,16 @@
 import os
 import time
 from dataclasses import replace
+from functools import partial
 
 import pandas as pd
 import pytest
 
+from tests.agent.runs import CONTAINER, assert_same
 from unload.agent import sweep
+from unload.agent.config import TrainConfig
 from unload.agent.training import train, unchanged
+from unload.load.substacks import stack_load
 from unload.reproduce.paper.grids import tuning_config
 from unload.support import files
 
@@ -37,7 +41,6 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
             tmp_path / "alone" / name / "curve.csv"
         )
         record = files.read_json(folder / "record.json")
-        assert not record["resumed"]
         assert '"digest"' in (folder / "record.json").read_text()
         assert record["peak_memory_mib"] > 50 and 0 <= record["wall_time_s"] < 60
         assert "256/256" in (folder / "log.txt").read_text()
@@ -50,9 +53,19 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
 def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path):
     config = replace(configs["set/run_0"], log_interval=2)
     with pytest.raises(KeyboardInterrupt, match="stopped after 192 picks"):
-        sweep._run("run", config, tmp_path / "run", unchanged, sweep=0)
+        sweep._run("run", config, tmp_path / "run", unchanged, {}, sweep=0)
     sweep.run_sweep({"run": config}, tmp_path, n_jobs=1, progress=False)
-    assert files.read_json(tmp_path / "run" / "record.json")["resumed"]
+    assert (tmp_path / "run" / "policy.safetensors").exists()
+
+
+def test_own_loads_are_trained_on_with_one_file_of_lifts(tmp_path):
+    config, own = TrainConfig(**CONTAINER), {"stack": partial(stack_load, walls=10)}
+    report = sweep.run_sweep(
+        {"run": config}, tmp_path, 1, progress=False, lifts=tmp_path / "lifts.npz", **own
+    )
+    assert report["error"].tolist() == [""] and (tmp_path / "lifts.npz").exists()
+    train(config, tmp_path / "alone", progress=False, **own)
+    assert_same(tmp_path / "run", tmp_path / "alone")
 
 
 def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):
@@ -105,11 +118,6 @@ def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
     assert len(used) == 2
 
 
-def test_dask_without_a_client_is_refused(configs, tmp_path):
-    with pytest.raises(ValueError, match="first create a Dask Client"):
-        sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
-
-
 def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(sweep, "WORKER_WAIT", 0.2)
@@ -122,37 +130,24 @@ def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path,
 
 
 @pytest.mark.parametrize(
-    ("configs", "error", "message"),
-    [
-        ([1], TypeError, r"configs is \[1\]; expected a dict"),
-        ({"a": 1}, TypeError, r"configs\['a'\] is 1; expected an unload.TrainConfig"),
-        *(
-            ({name: tuning_config(8, 1e-3, 0)}, ValueError, "configs has the name .*relative path")
-            for name in ("", ".", "/a", "../a", "a/", "a//b")
-        ),
-    ],
-)
-def test_bad_configurations_are_refused(configs, error, message, tmp_path):
-    with pytest.raises(error, match=message):
-        sweep.run_sweep(configs, tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
-def test_unknown_backend_is_refused(configs, tmp_path):
-    with pytest.raises(ValueError, match="backend is 'spark'; expected one of 'loky', 'dask'"):
-        sweep.run_sweep(configs, tmp_path, backend="spark")
-
-
-@pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"configs": [1]}, r"configs is \[1\]; expected a dict"),
+        ({"configs": {"a": 1}}, r"configs\['a'\] is 1; expected an unload.TrainConfig"),
+        *(
+            ({"configs": {name: tuning_config(8, 1e-3, 0)}}, "configs has the name .*relative path")
+            for name in ("", ".", "/a", "../a", "a/", "a//b")
+        ),
         ({"folder": None}, "folder is None; expected a path"),
         ({"changes": 3}, "changes is 3; expected a dict"),
-        ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
         ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
+        ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
+        ({"backend": "spark"}, "backend is 'spark'; expected one of 'loky', 'dask'"),
+        ({"backend": "dask"}, "first create a Dask Client"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_runs(configs, tmp_path, arguments, message):
+    usual = {"configs": configs, "folder": tmp_path, "progress": False}
     with pytest.raises((TypeError, ValueError), match=message):
-        sweep.run_sweep(configs, **{"folder": tmp_path, "progress": False} | arguments)
+        sweep.run_sweep(**usual | arguments)
     assert not list(tmp_path.iterdir())

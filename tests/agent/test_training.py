@@ -28,6 +28,7 @@ from unload.network.variants import NETWORKS
 from unload.physics.table import LiftTable, shared_table
 from unload.support import files
 
+HIGHEST = TrainConfig(**RUNS["highest item"])
 LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
 
 
@@ -59,14 +60,6 @@ def test_what_a_run_leaves(tmp_path, config):
     assert stored.pop("marks").keys() == {"first_loads", "policy.safetensors", "curve.csv"}
     stored.pop("digest")
     assert TrainConfig(**stored) == config
-
-
-def test_a_finished_run_is_not_repeated(tmp_path):
-    config = TrainConfig(**CONTAINER)
-    first = train(config, tmp_path, progress=False)
-    with at_step(1, crash):
-        again = train(config, tmp_path, progress=False)
-    pd.testing.assert_frame_equal(first.curve, again.curve)
 
 
 def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
@@ -132,6 +125,9 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "MSR=" in shown.out and "loss=" in shown.out and "pick/s" in shown.out
     assert shown.err == ""
+    with open(tmp_path / "log.txt", "w") as log:
+        train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
+    assert "200/200" in (tmp_path / "log.txt").read_text()
     train(TrainConfig(**CONTAINER), tmp_path / "quiet", progress=False)
     assert capsys.readouterr() == ("", "")
 
@@ -173,33 +169,6 @@ def test_the_target_network_follows_once_an_interval(tmp_path, monkeypatch, gamm
     assert copied == picks
 
 
-def test_what_cannot_be_called_is_refused(tmp_path):
-    with pytest.raises(TypeError, match="callback is 3; expected a function of a dict"):
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, callback=3)
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_configuration_is_needed(tmp_path):
-    with pytest.raises(TypeError, match="config is {}; expected an unload.TrainConfig"):
-        train({}, tmp_path)
-
-
-def test_own_loads_are_trained_on_and_gone_on_with(tmp_path):
-    seen = []
-
-    def stack(rng):
-        seen.append(stack_load(rng, walls=10))
-        return seen[-1]
-
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path / "straight", progress=False, stack=stack)
-    assert len(seen) >= 4
-    with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "broken", progress=False, stack=stack)
-    train(config, tmp_path / "broken", progress=False, stack=stack)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-
-
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     """The second run asks PyBullet nothing, and gives the same."""
     config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
@@ -227,13 +196,6 @@ def test_lifts_are_kept_when_a_run_is_stopped_and_refused_before_it_begins(tmp_p
     assert not (tmp_path / "other").exists()
 
 
-@pytest.mark.parametrize("given", [{"stack": stack_load}, {"lifts": "lifts.npz"}])
-def test_what_an_environment_without_loads_does_not_need_is_refused(tmp_path, given):
-    config = TrainConfig(**RUNS["highest item"])
-    with pytest.raises(ValueError, match="(stack|lifts) is given; expected None for env="):
-        train(config, tmp_path, progress=False, **given)
-
-
 def test_without_updates_the_weights_stay(tmp_path):
     config = TrainConfig(**CONTAINER | {"gradient_steps": 0})
     with begun(config, tmp_path) as run:
@@ -257,23 +219,27 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
         assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
 
 
-@pytest.mark.parametrize("stack", [3, lambda rng: "load"], ids=["no", "wrong"])
-def test_what_makes_no_loads_is_refused(tmp_path, stack):
-    with pytest.raises(TypeError, match="(stack|load) is .*; expected"):
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, stack=stack)
-
-
 @pytest.mark.parametrize(
-    ("run_dir", "error", "message"),
+    ("given", "error", "message"),
     [
-        ("", ValueError, "run_dir is ''; expected a folder of the run's own"),
-        (None, TypeError, "run_dir is None; expected a path"),
-        ("/dev/null/run", OSError, "/dev/null"),
+        ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
+        ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
+        ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
+        ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),
+        ({"stack": 3}, TypeError, "stack is 3; expected"),
+        ({"stack": lambda rng: "load"}, TypeError, "load is 'load'; expected"),
+        ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
+        ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
+        ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
+        ({"run_dir": None}, TypeError, "run_dir is None; expected a path"),
+        ({"run_dir": "/dev/null/run"}, OSError, "/dev/null"),
     ],
 )
-def test_run_dirs_that_will_not_do_are_refused(run_dir, error, message):
+def test_bad_arguments_are_refused(tmp_path, given, error, message):
+    usual = {"config": TrainConfig(**CONTAINER), "run_dir": tmp_path / "run", "progress": False}
     with pytest.raises(error, match=message):
-        train(TrainConfig(**CONTAINER), run_dir, progress=False)
+        train(**usual | given)
+    assert not list(tmp_path.glob("*/*.*"))
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
@@ -281,15 +247,6 @@ def test_a_folder_in_use_is_refused(tmp_path):
     with files.locked(tmp_path), pytest.raises(RuntimeError, match=message):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-
-
-def test_progress_may_go_to_a_file(tmp_path, capsys):
-    with open(tmp_path / "log.txt", "w") as log:
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=log)
-    assert "200/200" in (tmp_path / "log.txt").read_text()
-    assert capsys.readouterr() == ("", "")
-    with pytest.raises(TypeError, match="progress is 3; expected True, False or a text file"):
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=3)
 
 
 def test_a_point_holds_the_means_since_the_last_one():

@@ -1,7 +1,7 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from tests.env.comparing import FailingStack, assert_same, state_of
@@ -11,17 +11,6 @@ from unload.load.substacks import build_load
 from unload.load.view import snapshot
 
 ENV_ID = "unload/Container-v0"
-
-
-def play(env: gymnasium.Env, actions, seed: int = 0) -> list[tuple]:
-    """All that an episode shows, as comparable values."""
-    seen, info = env.reset(seed=seed)
-    record = [(seen.tobytes(), info["action_mask"].tobytes(), info["unloaded"])]
-    for action in actions:
-        seen, reward, terminated, truncated, info = env.step(int(action))
-        flags = (reward, terminated, truncated, info["unloaded"], info["item"], info["distance"])
-        record.append((seen.tobytes(), info["action_mask"].tobytes(), *flags))
-    return record
 
 
 def tall_load() -> Load:
@@ -92,6 +81,7 @@ def test_a_failure_changes_nothing_but_the_mask(make_env):
     assert (after == seen).all() and env.unwrapped.physics.present.all()
     expected = np.ones(128)
     expected[row] = 0
+    assert info["item_mask"].all()
     assert info["action_mask"].dtype == np.int8 and (info["action_mask"] == expected).all()
     masks = env.unwrapped.action_masks()
     assert masks.dtype == bool and (masks == expected).all()
@@ -219,16 +209,6 @@ def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing(small_env):
     assert_same(state_of(env), state | {"_picks": 1})
 
 
-def test_a_failed_item_is_masked_in_the_action_mask_only(small_env):
-    env = small_env(20)
-    seen, _ = env.reset(seed=0)
-    row = int(seen[:20, 2].argmin())
-    _, reward, _, _, info = env.step(row)
-    held = np.arange(128) < 20
-    assert reward == -1 and (info["item_mask"] == held).all()
-    assert (info["action_mask"] == held & (np.arange(128) != row)).all()
-
-
 def test_the_last_item_may_go_with_the_last_pick(small_env):
     env = small_env(2, max_picks=2)
     env.reset(seed=0)
@@ -255,34 +235,6 @@ def test_every_physics_goes_to_the_last_item(small_env, kwargs):
     assert (env.render() != before).any()
 
 
-# --- seeds, loads and states --------------------------------------------------------
-
-
-def test_the_same_seed_gives_the_same_episode_byte_for_byte(make_env, rng):
-    actions = rng.integers(128, size=60)
-    assert play(make_env(), actions, seed=1) == play(make_env(), actions, seed=1)
-
-
-# --- other libraries ----------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_maskable_ppo_learns_and_obeys_the_mask(make_env, monkeypatch):
-    contrib = pytest.importorskip("sb3_contrib")
-    env, obeyed = make_env(), []
-    container = env.unwrapped
-    step = container.step
-
-    def watched(action):
-        obeyed.append(container.action_masks()[int(action)])
-        return step(action)
-
-    monkeypatch.setattr(container, "step", watched)
-    model = contrib.MaskablePPO("MlpPolicy", env, n_steps=500, batch_size=100, seed=0, device="cpu")
-    model.learn(2_000)
-    assert model.num_timesteps == 2_000 and len(obeyed) == 2_000 and all(obeyed)
-
-
 # --- bad input ----------------------------------------------------------------------
 
 
@@ -303,43 +255,12 @@ def test_bad_actions_change_nothing(action, error):
     untouched.close()
 
 
-@pytest.mark.parametrize("call", ["step", "render", "action_masks", "liftable"])
-def test_nothing_works_before_reset_or_after_close(call):
-    env = ContainerEnv(physics="table", render_mode="rgb_array")
-    arguments = (0,) if call == "step" else ()
-    with pytest.raises(ResetNeeded, match="the episode is not started; call reset first"):
-        getattr(env, call)(*arguments)
-    env.reset(seed=0)
-    env.close()
-    env.close()
-    with pytest.raises(ClosedEnvironmentError, match="the environment is closed"):
-        getattr(env, call)(*arguments)
-    with pytest.raises(ClosedEnvironmentError):
-        env.reset()
-
-
-@pytest.mark.parametrize(
-    ("kwargs", "error", "message"),
-    [
-        ({"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
-        ({"physics": "full", "after_pick": "x"}, ValueError, "after_pick is 'x'; expected one of"),
-        ({"physics": "table", "after_pick": "keep"}, ValueError, "expected 'restore'"),
-        ({"render_mode": "human"}, ValueError, "render_mode is 'human'; .*None, 'rgb_array'"),
-        ({"stack": "walls"}, TypeError, "stack is 'walls'; expected a function"),
-    ],
-)
-def test_bad_settings_are_refused(kwargs, error, message):
-    with pytest.raises(error, match=message):
-        ContainerEnv(**kwargs)
-
-
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
         ({"lode": None}, ValueError, "options is {'lode': None}; expected load"),
         ({"load": None}, TypeError, "load is None; expected an unload.Load"),
         (["load"], TypeError, r"options is \['load'\]; expected a dict"),
-        ("load", TypeError, "options is 'load'; expected a dict"),
     ],
 )
 def test_bad_options_leave_the_episode_as_it_was(options, error, message):
@@ -370,9 +291,3 @@ def test_a_reset_whose_stack_fails_needs_another_one(number):
         env.step(0)
     assert_same(env.reset(seed=0), other.reset(seed=0))
     assert_same(env.step(3), other.step(3))
-
-
-def test_without_a_render_mode_there_is_no_picture(make_env):
-    env = make_env()
-    env.reset(seed=0)
-    assert env.unwrapped.render() is None

@@ -1,10 +1,9 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from unload import HighestItemEnv, equalize, stack_load
+from unload import stack_load
 from unload.env import observation
 from unload.env.highest_item import GRID
 
@@ -50,55 +49,6 @@ def test_items_are_blurred_and_nearest_first(make_env):
         assert (np.diff(distances) > -1e-5).all()
 
 
-def test_equalized_observations_are_rewarded_alike(make_env):
-    raw, equalized = make_env(ENV_ID), make_env(ENV_ID, equalize=True)
-    seen, _ = raw.reset(seed=0)
-    ranks, _ = equalized.reset(seed=0)
-    for _ in range(5):
-        assert (ranks == equalize(seen)).all()
-        assert ranks[np.argmax(seen[:, 2]), 2] == 1
-        seen, *_ = raw.step(0)
-        ranks, reward, *_ = equalized.step(int(np.argmax(ranks[:, 2])))
-        assert reward == 1
-
-
-def test_seeds(make_env):
-    env = make_env(ENV_ID)
-
-    def episode(seed: int) -> list:
-        first = env.reset(seed=seed)[0].tobytes()
-        steps = [env.step(row) for row in range(20)]
-        return [first] + [(seen.tobytes(), reward) for seen, reward, *_ in steps]
-
-    assert episode(1) == episode(1) != episode(2)
-
-
-def test_truncation(make_env):
-    env = make_env(ENV_ID, max_picks=3)
-    env.reset(seed=0)
-    assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (False, True)]
-    with pytest.raises(ResetNeeded, match="the episode is finished"):
-        env.unwrapped.step(0)
-
-
 def test_a_random_load_is_no_load_of_this_environment(make_env, rng):
     with pytest.raises(ValueError, match="(?s)options is .*expected none"):
         make_env(ENV_ID).unwrapped.reset(options={"load": stack_load(rng)})
-
-
-def test_calls_out_of_order_are_refused():
-    env = HighestItemEnv()
-    for call in (lambda: env.step(0), env.action_masks, env.render):
-        with pytest.raises(ResetNeeded, match="the episode is not started"):
-            call()
-    env.reset(seed=0)
-    assert env.render() is None
-    env.close()
-    for call in (lambda: env.step(0), env.action_masks, env.render, env.reset):
-        with pytest.raises(ClosedEnvironmentError):
-            call()
-
-
-def test_there_is_nothing_to_draw():
-    with pytest.raises(ValueError, match="render_mode is 'rgb_array'; expected one of None"):
-        HighestItemEnv(render_mode="rgb_array")

@@ -5,12 +5,6 @@ from unload import task
 from unload.env import observation
 
 
-def test_distance_ignores_y_and_counts_z_double():
-    view = task.VIEWPOINT
-    steps = np.array([(0, 0, 0), (-3, 0, 0), (0, 1, 0), (0, 0, -2), (-3, 1.25, -2)])
-    assert observation.distance(view + steps) == pytest.approx([0, 3, 0, 4, 5])
-
-
 def test_distance_is_the_papers_formula(rng):
     points = rng.uniform(0, task.CONTAINER, (50, 3))
     weights = np.diag([1.0, 0.0, 4.0])
@@ -41,7 +35,7 @@ def test_scale_maps_the_container_to_the_cube():
     assert scaled.tolist() == [[-1, -1, -1], [1, 1, 1], [0, 0, -0.5]]
 
 
-@pytest.mark.parametrize("function", [observation.distance, observation.nearest, observation.scale])
+@pytest.mark.parametrize("function", [observation.distance, observation.nearest])
 @pytest.mark.parametrize(
     ("positions", "error"),
     [

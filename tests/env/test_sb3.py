@@ -1,5 +1,7 @@
 """The environments as Stable-Baselines3 takes them."""
 
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from stable_baselines3.common.vec_env import VecMonitor
 
 from tests.env.comparing import CONTAINER
 from unload import evaluate
-from unload.env.sb3 import ContainerVecEnv, VectorEnvAdapter
+from unload.env.sb3 import ContainerVecEnv
 from unload.load.substacks import stack_load
 
 
@@ -72,13 +74,6 @@ def test_what_single_environments_only_can_do_is_refused(adapter):
         adapter.set_attr("max_picks", 5)
 
 
-def test_another_way_of_resetting_is_refused():
-    envs = gymnasium.make_vec("CartPole-v1", 2, vectorization_mode="sync")
-    with pytest.raises(ValueError, match="envs resets with .*expected AutoresetMode.SAME_STEP"):
-        VectorEnvAdapter(envs)
-    envs.close()
-
-
 def test_maskable_ppo_learns_on_64_containers():
     envs = VecMonitor(ContainerVecEnv(num_envs=64, max_picks=50))
     model = MaskablePPO(
@@ -93,3 +88,10 @@ def test_maskable_ppo_learns_on_64_containers():
 
     assert evaluate(policy, 20, max_picks=50)["success_rate"].mean() > 0.98
     envs.close()
+
+
+def test_without_stable_baselines_the_error_names_the_extra(monkeypatch):
+    monkeypatch.delitem(sys.modules, "unload.env.sb3")
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
+    with pytest.raises(ModuleNotFoundError, match=r"pip install 'unload\[sb3\]'"):
+        import unload.env.sb3  # noqa: F401

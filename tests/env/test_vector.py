@@ -1,6 +1,5 @@
 """The array environments, against Gymnasium's loop over single ones."""
 
-import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
@@ -9,7 +8,7 @@ from hypothesis import strategies as st
 
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_pair
-from unload.env.vector import ContainerVectorEnv, HighestItemVectorEnv
+from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import FREE_LIFT, LiftTable
 
 
@@ -57,21 +56,6 @@ def test_what_can_be_lifted_is_that_of_the_single_environments():
     side_by_side.close()
 
 
-@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
-@pytest.mark.parametrize(
-    "kwargs",
-    [
-        {},
-        {"equalize": True},
-        {"equalize": True, "ties": "average"},
-        {"equalize": True, "position_noise": 0.0},
-    ],
-    ids=str,
-)
-def test_every_setting_through_several_episodes(env_id, kwargs):
-    play_both(env_id, 3, 60, seed=5, max_picks=25, **kwargs)
-
-
 def test_a_load_may_be_given_and_is_drawn(few_items, rng):
     """The load and the pictures are those of the single environments."""
     array, side_by_side = make_pair(CONTAINER, 2, max_picks=3, render_mode="rgb_array")
@@ -93,25 +77,6 @@ def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
     monkeypatch.setattr(unload.task, "LIFT_THRESHOLD", FREE_LIFT)
     assert_same(envs.liftable(), liftable)
     envs.close()
-
-
-def test_without_a_render_mode_there_is_no_picture():
-    for env_id in (CONTAINER, HIGHEST):
-        envs = gymnasium.make_vec(env_id, 2)
-        with pytest.raises(ResetNeeded):
-            envs.render()
-        envs.reset(seed=0)
-        assert envs.render() is None
-        envs.close()
-    with pytest.raises(ValueError, match="render_mode is 'rgb_array'; expected one of None"):
-        HighestItemVectorEnv(2, render_mode="rgb_array")
-
-
-def test_loads_of_several_sizes_and_kinds():
-    def stack(rng):
-        return unload.stack_load(rng, walls=int(rng.integers(3, 16)))
-
-    play_both(CONTAINER, 4, 45, max_picks=15, stack=stack)
 
 
 def test_fewer_boxes_may_have_more_contacts():
@@ -230,19 +195,3 @@ def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch, boxes):
     envs.reset(seed=0)
     assert envs.step(np.array([0, 0]))[4]["unloaded"].tolist() == [1, 1]
     envs.close()
-
-
-# --- bad input ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("kwargs", "error", "message"),
-    [
-        ({"physics": "local"}, ValueError, "physics is 'local'; expected one of 'table'"),
-        ({"stack": 3}, TypeError, "stack is 3"),
-        ({"render_mode": "human"}, ValueError, "render_mode is 'human'"),
-    ],
-)
-def test_bad_settings_are_refused(kwargs, error, message):
-    with pytest.raises(error, match=message):
-        ContainerVectorEnv(**kwargs)

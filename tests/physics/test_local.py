@@ -2,7 +2,6 @@
 
 import pytest
 
-from tests.physics.kinds import ONE_BOX
 from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
 
@@ -41,10 +40,3 @@ def test_a_world_that_is_emptied_of_old_sizes_gives_the_same(situations, monkeyp
     assert fresh._world.shapes > 10
     physics.close()
     fresh.close()
-
-
-def test_pybullet_is_started_at_the_first_lift(make, boxes):
-    physics = make("local", boxes((1.2, 0.2)))
-    assert physics._world is None
-    assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
-    assert physics._world is not None

@@ -30,17 +30,6 @@ def test_a_box_that_bridges_two_rests_on_both(boxes):
     assert (situation.boxes[:, 3:] == 400_000).all() and situation.boxes.dtype == np.int32
 
 
-def test_boxes_that_touch_at_an_edge_only_do_not_rest_on_each_other(boxes):
-    assert surroundings(boxes((1.0, 0.2), (1.4, 0.6))).on_top(0) == []
-
-
-def test_boxes_of_other_walls_do_not_count():
-    positions = np.array([[1.0, 1.0, 0.2], [1.4, 1.0, 0.6], [1.4, 1.0, 0.2]])
-    labels = np.zeros(3, dtype=int)
-    situation = surroundings(Load(positions, np.full((3, 3), 0.4), labels, labels)).situation(0)
-    assert situation.on_top == 0 and len(situation.boxes) == 1
-
-
 def test_floor_and_side_walls(boxes):
     load = boxes((0.2, 0.2), (0.2, 0.6), (1.25, 0.2), (2.3, 0.2))
     around = surroundings(load)

@@ -4,7 +4,6 @@ import json
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from threading import Barrier
 
 import numpy as np
 import pytest
@@ -104,24 +103,6 @@ def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap
     local.close()
 
 
-def test_threads_that_share_a_table_get_the_right_answers(known, rng):
-    """Each thread has a physics, hence a world, of its own."""
-    shared, together = LiftTable(), Barrier(4)
-    orders = [rng.permutation(len(known)) for _ in range(4)]
-
-    def work(order) -> list[float]:
-        physics = TablePhysics(shared)
-        together.wait()
-        answers = {number: physics.simulate(known[number][0]) for number in order.tolist()}
-        physics.close()
-        return [answers[number] for number in range(len(known))]
-
-    with ThreadPoolExecutor(4) as pool:
-        answers = list(pool.map(work, orders))
-    assert answers == [[distance for _, distance in known]] * 4
-    assert [shared.find(situation) for situation, _ in known] == answers[0]
-
-
 def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):
     monkeypatch.setattr("unload.physics.table.LIFTS_FILE", tmp_path / "missing.npz")
     shared_table.cache_clear()
@@ -165,6 +146,8 @@ def test_a_table_grows_and_forgets_nothing(table):
     # Whoever still reads the first arrays finds in them what they held when they were full.
     assert len(old[0]) == FEWEST_SLOTS and (old[0] != 0).sum() == FEWEST_SLOTS // 2 + 1
     assert table.find(situation(2000)) is None
+    table.add(situation(7), 0.5)  # it is known
+    assert len(table) == 2000 and table.find(situation(7)) == 0.007
 
 
 def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng):
@@ -207,13 +190,6 @@ def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(mon
 
     monkeypatch.setattr(unload.physics.table, "slot_of", then_filled)
     assert table.find(situation(0)) is None
-
-
-@pytest.mark.parametrize("distance", [-0.001, float("nan"), float("inf"), 2148.0])
-def test_bad_distances_are_refused(table, distance):
-    with pytest.raises(ValueError, match="distance is"):
-        table.add(situation(99), distance)
-    assert len(table) == 50 and table.find(situation(99)) is None
 
 
 # --- files --------------------------------------------------------------------------
@@ -266,8 +242,6 @@ def test_an_exchange_that_is_refused_changes_nothing(table, tmp_path):
     before = (tmp_path / "lifts.npz").read_bytes()
     with pytest.raises(ValueError, match="lifts.npz is of another physics"):
         table.exchange(tmp_path / "lifts.npz")
-    with pytest.raises(TypeError, match="path is 3; expected the path of a lift table"):
-        table.exchange(3)
     assert len(table) == 50 and (tmp_path / "lifts.npz").read_bytes() == before
 
 
@@ -280,18 +254,14 @@ def test_a_damaged_file_is_refused(tmp_path):
 
 
 def settings_of(**changes) -> np.ndarray:
-    """The settings in JSON; a change to None leaves one out."""
-    settings = {name: value for name, value in (SETTINGS | changes).items() if value is not None}
-    return np.array(json.dumps(settings))
+    return np.array(json.dumps(SETTINGS | changes))
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"digests": None}, r"holds \['micrometres', 'settings'\]; expected a lift table"),
-        ({"extra": np.zeros(3)}, "expected a lift table"),
         ({"settings": settings_of(friction=0.7)}, "is of another physics, .*0.7.*; expected"),
-        ({"settings": settings_of(gap=None)}, "is of another physics"),
         ({"settings": np.zeros(2)}, "is of another physics"),
     ],
 )

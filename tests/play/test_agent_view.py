@@ -27,6 +27,8 @@ def test_draw_0_is_the_noise_that_the_agent_is_stuck_with(stuck):
     assert "<b>cannot</b> be lifted" in stuck.message.value
     stuck.draw.value = 3
     assert "<b>can</b> be lifted" in stuck.message.value
+    stuck.draw.value, stuck.agent.value = 0, "the recommended agent"
+    assert "<b>can</b> be lifted" in stuck.message.value
 
 
 def test_without_noise_or_ties_it_is_not_stuck(stuck):
@@ -54,11 +56,6 @@ def test_epsilon_changes_the_chance(stuck):
     assert chance() == 0
     stuck.epsilon.value = 1
     assert 0.1 < chance() < 0.6
-
-
-def test_another_agent_can_look(stuck):
-    stuck.agent.value = "the recommended agent"
-    assert "<b>can</b> be lifted" in stuck.message.value
 
 
 def test_a_view_stands_beside_the_widget(stuck):

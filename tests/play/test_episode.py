@@ -7,9 +7,7 @@ from unload.play.episode import Episode, Pick, explain
 
 @pytest.fixture
 def episode(full_load):
-    made = Episode(full_load, seed=3)
-    yield made
-    made.close()
+    return Episode(full_load, seed=3)
 
 
 def test_picks_are_those_of_the_environment(full_load, make_env):

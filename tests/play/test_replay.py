@@ -3,7 +3,7 @@ import pytest
 
 from unload.play.episode import Episode
 from unload.play.players import Run
-from unload.play.replay import STOPS, replay
+from unload.play.replay import PAUSE, STOPS, replay
 
 
 def hidden(frame) -> list[int]:
@@ -41,6 +41,9 @@ def test_slider_and_frames_have_the_same_stops(full_load):
     steps = figure.layout.sliders[0].steps
     assert [step.args[0][0] for step in steps] == [frame.name for frame in figure.frames]
     assert steps[-1].label == f"50 picks, {run.unloaded()} unloaded"
+    play, pause = figure.layout.updatemenus[0].buttons
+    assert play.args[0] is None and list(pause.args[0]) == [None]
+    assert play.args[1]["frame"]["duration"] == PAUSE and play.args[1]["fromcurrent"]
 
 
 def test_bad_input_is_refused(boxes):

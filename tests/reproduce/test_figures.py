@@ -65,10 +65,9 @@ FIGURES = FROM_DATA | {
     ),
     "fig03_substacks": loads.fig03_substacks,
     "fig07_network": diagrams.fig07_network,
-    "packages": loads.packages,
     "rows": lambda: loads.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
     "side_views": lambda: loads.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
-    "wall_views": lambda: loads.wall_views(LOAD, [10, 11]),
+    "wall_view": lambda: loads.wall_view(LOAD, 11, {"visible": VISIBLE}),
     "visibility": lambda: observation.visibility(LOAD.positions, VISIBLE),
     "distance_curves": lambda: lifts.distance_curves(
         {"force (N)": {"one box": (LINE, LINE, LINE)}}, {"force (N)": 20}
@@ -156,12 +155,6 @@ def test_picks_and_values_are_drawn_by_their_meaning():
     failed, unloaded = axes.collections
     assert failed.get_offsets().tolist() == [[0, 7], [1, 7]]
     assert unloaded.get_offsets().tolist() == [[2, 9]]
-
-
-def test_every_package_has_its_number_and_size():
-    texts = [text.get_text() for text in loads.packages().axes[0].texts]
-    assert [text for text in texts if text.isdigit()] == [str(number) for number in range(13)]
-    assert sum("×" in text for text in texts) == 13
 
 
 def test_the_colour_of_the_chosen_box_says_whether_it_was_lifted():

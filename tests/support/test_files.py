@@ -29,13 +29,6 @@ def test_arrays_come_back_as_they_were(tmp_path):
         np.testing.assert_array_equal(read[name], array)
 
 
-def test_text_and_json(tmp_path):
-    files.write_text(tmp_path / "t.txt", "µ\n")
-    assert (tmp_path / "t.txt").read_bytes() == "µ\n".encode()
-    files.write_json(tmp_path / "j.json", {"x": [1, None]})
-    assert json.loads((tmp_path / "j.json").read_text()) == {"x": [1, None]}
-
-
 def test_a_failed_write_leaves_the_old_file(tmp_path):
     path = tmp_path / "file"
     files.write_text(path, "old")
@@ -48,6 +41,17 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         files.write_atomically(path, write)
     assert path.read_text() == "old"
     assert [path] == list(tmp_path.iterdir())
+
+
+def test_of_two_that_write_one_file_the_last_to_finish_wins(tmp_path):
+    path = tmp_path / "file"
+
+    def write(file):
+        files.write_text(path, "the other's")
+        file.write(b"whole")
+
+    files.write_atomically(path, write)
+    assert path.read_text() == "whole" and [path] == list(tmp_path.iterdir())
 
 
 def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tmp_path):
@@ -201,14 +205,11 @@ def test_every_damaged_byte_of_checked_json_is_refused_by_name_or_harmless(tmp_p
     assert harmless < len(whole) / 3
 
 
-def test_json_without_a_digest_is_read_as_it_is(tmp_path):
+def test_json_has_a_digest_where_it_is_wanted(tmp_path):
+    """That of its one-line form, known from the command ``b2sum --length 128``."""
     files.write_json(tmp_path / "x.json", {"share": 0.25})
     assert (tmp_path / "x.json").read_text() == '{\n  "share": 0.25\n}\n'
     assert files.read_json(tmp_path / "x.json") == {"share": 0.25}
-
-
-def test_the_digest_of_json_is_that_of_its_one_line_form(tmp_path):
-    """Known from the command ``b2sum --length 128``."""
     files.write_json(tmp_path / "x.json", {"share": 0.25}, checked=True)
     stored = json.loads((tmp_path / "x.json").read_text())
     assert stored == {"share": 0.25, "digest": "013c6b44fb43c4be645a5d897a096fce"}

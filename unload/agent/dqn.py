@@ -9,8 +9,7 @@ from unload.agent.fast import fused
 from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import check_network
 from unload.agent.learner import PlainLearner
-from unload.agent.policies import any_allowed, check_batch
-from unload.agent.replay import check_next_masks
+from unload.agent.policies import any_allowed
 from unload.support import checks
 
 
@@ -64,32 +63,6 @@ class DQN:
             self.learner = PlainLearner(network, learning_rate, beta)
         self.update_target()
 
-    def act(
-        self,
-        observations: np.ndarray,
-        masks: np.ndarray,
-        epsilon: float,
-        rng: np.random.Generator,
-    ) -> np.ndarray:
-        """Choose actions ε-greedily.
-
-        Args:
-            observations: (batch, items, 3) float32.
-            masks: (batch, items), bool or 0 and 1, where an item may be picked.
-            epsilon: probability of a random allowed action.
-            rng: draws who explores, and what.
-
-        Returns:
-            (batch,) int64.
-
-        Raises:
-            TypeError, ValueError: see ``unload.agent.policies.check_batch``; ``epsilon`` is no
-                number in [0, 1], or ``rng`` no generator.
-        """
-        observations, allowed = check_batch(observations, masks)
-        epsilon = checks.real("epsilon", epsilon, 0, 1)
-        return self.choose(observations, allowed, epsilon, checks.generator("rng", rng))
-
     def choose(
         self,
         observations: np.ndarray,
@@ -97,7 +70,20 @@ class DQN:
         epsilon: float,
         rng: np.random.Generator,
     ) -> np.ndarray:
-        """``act`` without its checks, on float observations and bool masks of an environment."""
+        """Choose actions ε-greedily.
+
+        Args:
+            observations: (batch, items, 3) float.
+            allowed: (batch, items) bool, where an item may be picked.
+            epsilon: probability of a random allowed action.
+            rng: draws who explores, and what.
+
+        Returns:
+            (batch,) int64.
+
+        Raises:
+            ValueError, FloatingPointError: a row allows no action, or none of a finite value.
+        """
         explore = rng.random(len(observations)) < epsilon
         exploit = ~explore
         actions = np.empty(len(observations), np.int64)
@@ -111,7 +97,7 @@ class DQN:
         """Take one step of Adam.
 
         Args:
-            batch: arrays as ``ReplayBuffer.sample`` returns them, or all that it holds.
+            batch: arrays as those of a ``ReplayBuffer``.
             rows: (batch,) int64, which rows of the arrays to learn from; all if None.
 
         Returns:
@@ -149,7 +135,12 @@ class DQN:
     @torch.no_grad()
     def _targets(self, batch: dict[str, np.ndarray]) -> np.ndarray:
         """r + γ max over the allowed actions of the target network, (batch,) float32."""
-        check_next_masks(batch["next_masks"], batch["terminations"])
+        hopeless = ~batch["next_masks"].any(axis=1) & ~batch["terminations"]
+        if hopeless.any():
+            raise ValueError(
+                f"next_masks is all zero in row {int(np.argmax(hopeless))}, which is not terminal; "
+                "expected at least one allowed action"
+            )
         following = torch.from_numpy(batch["next_observations"])
         values = torch.func.functional_call(self.network, self.target, (following,))
         best = values.masked_fill(torch.from_numpy(~batch["next_masks"]), -torch.inf).amax(dim=1)

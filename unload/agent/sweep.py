@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import pandas as pd
 import torch
 from joblib import Parallel, delayed, parallel_config
@@ -17,6 +18,7 @@ from tqdm import tqdm
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train_changed, unchanged
+from unload.load.boxes import Load
 from unload.support import checks, files, provenance
 
 BACKENDS = ("loky", "dask")
@@ -30,14 +32,16 @@ def run_sweep(
     backend: str = "loky",
     progress: bool = True,
     changes: Mapping[str, Callable[[Training], None]] | None = None,
+    stack: Callable[[np.random.Generator], Load] | None = None,
+    lifts: str | Path | None = None,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
     A run that fails is reported and does not stop the others. Each run uses one thread, shows its
     own progress in ``log.txt`` in its folder, and leaves ``record.json`` there: the entries of
-    ``unload.support.provenance.run_record``, ``process``, and ``resumed``, true if they describe
-    only the last part of a run that had been stopped. If this process is killed, the runs of
-    ``"loky"`` stop with a checkpoint at the next point of their curves.
+    ``unload.support.provenance.run_record`` (of its last part, if it had been stopped), and
+    ``process``. If this process is killed, the runs of ``"loky"`` stop with a checkpoint at the
+    next point of their curves.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -50,6 +54,7 @@ def run_sweep(
         progress: show a progress bar over the runs.
         changes: what is changed in some of the runs, by name, see ``training.train_changed``;
             functions that can be pickled.
+        stack, lifts: of all runs, see ``train``; runs side by side share the file of lifts.
 
     Returns:
         One row per run, in the order given, its name as index: ``error`` (what went wrong,
@@ -77,14 +82,16 @@ def run_sweep(
         checks.one_of("changes", name, configs)
     folders = {name: folder / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
-    jobs = {name: (name, configs[name], folders[name], changes[name]) for name in configs}
+    loads = {"stack": stack, "lifts": lifts}
+    jobs = {name: (name, configs[name], folders[name], changes[name], loads) for name in configs}
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
     with bar, parallel_config(backend=backend, n_jobs=n_jobs) as chosen:
         if backend == "dask":
             outcomes = _on_cluster(chosen["backend"].client, jobs)
         else:
-            outcomes = _on_machine(jobs)
+            runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
+            outcomes = runs(delayed(_run)(*job, os.getpid()) for job in jobs.values())
         for name, error in outcomes:
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
@@ -128,17 +135,12 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
         time.sleep(0.05)
 
 
-def _on_machine(jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
-    """Name and error of each run, as they end; ``jobs`` as in ``_on_cluster``."""
-    runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-    yield from runs(delayed(_run)(*job, os.getpid()) for job in jobs.values())
-
-
 def _run(
     name: str,
     config: TrainConfig,
     folder: Path,
     change: Callable[[Training], None],
+    loads: dict,
     sweep: int | None = None,
 ) -> tuple[str, str]:
     """Train one configuration; its name, and the error's text if it failed.
@@ -154,14 +156,12 @@ def _run(
 
     try:
         run = RunFolder(folder)
-        resumed = run.checkpoint.exists() or run.finished
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if run.finished else folder / "log.txt"
         with open(log_path, "a") as log, one_thread():
-            train_changed(config, folder, change, log, callback=stop_if_alone)
+            train_changed(config, folder, change, log, callback=stop_if_alone, **loads)
         if not (folder / "record.json").exists():
-            record = {"resumed": resumed, "process": os.getpid()}
-            record |= provenance.run_record(time.monotonic() - start)
+            record = provenance.run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)
         return name, ""
     except Exception as error:  # whatever it was, the other runs go on

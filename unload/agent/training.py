@@ -22,13 +22,13 @@ from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.dqn import DQN
-from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import Greedy
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.variants import NETWORKS
 from unload.physics.table import shared_table
+from unload.support import checks
 
 CURVE_COLUMNS = (
     "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
@@ -134,20 +134,9 @@ class Training:
             min(config.replay_size, config.picks),
             task.N_VISIBLE,
             next_state=config.gamma > 0,
-            equalized=config.gamma == 0 and self._ranks_of_all(stack),
         )
         self.curve = Curve()
         self.rollout = Rollout(config, self.replay.size, stack)
-
-    def _ranks_of_all(self, stack: Callable | None) -> bool:
-        """Whether each observation holds the ranks of 128 items, which the fused update can read.
-
-        It does until a load is nearly empty, which a load of the paper never is after 500 picks.
-        """
-        config = self.config
-        never_few = stack is None and config.max_picks <= task.MIN_ITEMS - task.N_VISIBLE
-        fused = isinstance(self.agent.learner, FusedLearner)
-        return fused and config.equalize and (never_few or config.env != ENVS[0])
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before.
@@ -281,6 +270,8 @@ def train_changed(
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
+    if lifts is not None:
+        lifts = checks.path("lifts", lifts)
     keep_lifts = partial(shared_table().exchange, lifts) if lifts is not None else lambda: None
     keep_lifts()
     folder = RunFolder(run_dir)

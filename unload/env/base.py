@@ -123,11 +123,11 @@ class PickingEnv(EpisodeEnv):
 
     def __init__(
         self,
-        equalize: bool,
-        ties: str,
-        max_picks: int,
-        position_noise: float,
-        render_mode: str | None,
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = observation.POSITION_NOISE,
+        render_mode: str | None = None,
     ) -> None:
         checked = check_settings(equalize, ties, max_picks, position_noise)
         self.equalize, self.ties, self.max_picks, self.position_noise = checked
@@ -299,7 +299,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         self._check_open()
         if np.shape(starts) != (self.num_envs,):
             raise ValueError(f"starts has shape {np.shape(starts)}; expected ({self.num_envs},)")
-        return self._restart([rng_of_text("starts", text) for text in starts])
+        return self._restart([_generator(start) for start in starts])
 
     def _restart(self, rngs: list[np.random.Generator], **options):
         """Begin an episode in every environment; return ``reset``'s observations and infos."""
@@ -311,7 +311,7 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         """Begin an episode in each of these environments."""
         with AllOrReset(self):
             for env, rng in zip(envs, rngs):
-                self._starts[env] = text_of_rng(rng)
+                self._starts[env] = json.dumps(rng.bit_generator.state)
             self._picks[envs] = 0
             self._fill(envs, rngs, **options)
 
@@ -372,30 +372,15 @@ def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.nda
     return infos
 
 
-def text_of_rng(rng: np.random.Generator) -> str:
-    """Return the state of a generator as JSON, to be kept with other plain arrays.
+def _generator(start: object) -> np.random.Generator:
+    """A generator that goes on from one of ``starts``.
 
     Raises:
-        TypeError: its bit generator is not a ``PCG64``, as those of ``default_rng`` are.
-    """
-    if not isinstance(rng.bit_generator, np.random.PCG64):
-        raise TypeError(f"the generator is {rng!r}; expected one of numpy.random.default_rng")
-    return json.dumps(rng.bit_generator.state)
-
-
-def rng_of_text(name: str, text: object) -> np.random.Generator:
-    """Return a generator that goes on from what ``text_of_rng`` returned.
-
-    Args:
-        name: what the error calls it.
-        text: str, or an array that holds one.
-
-    Raises:
-        ValueError: ``text`` is something else.
+        ValueError: ``start`` is something else.
     """
     rng = np.random.default_rng()
     try:
-        rng.bit_generator.state = json.loads(str(text))
+        rng.bit_generator.state = json.loads(str(start))
     except (KeyError, OverflowError, RecursionError, TypeError, ValueError) as error:
-        raise ValueError(f"{name} is {text!r}; expected a generator's state") from error
+        raise ValueError(f"starts is {start!r}; expected a generator's state") from error
     return rng

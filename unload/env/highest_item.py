@@ -5,7 +5,6 @@ import numpy as np
 from unload import task
 from unload.env import observation
 from unload.env.base import AllOrReset, PickingEnv, check_options
-from unload.env.observation import POSITION_NOISE
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 
 HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
@@ -54,16 +53,6 @@ class HighestItemEnv(PickingEnv):
     """
 
     metadata = {"render_modes": []}
-
-    def __init__(
-        self,
-        equalize: bool = False,
-        ties: str = "noise",
-        max_picks: int = task.MAX_PICKS,
-        position_noise: float = POSITION_NOISE,
-        render_mode: None = None,
-    ) -> None:
-        super().__init__(equalize, ties, max_picks, position_noise, render_mode)
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Draw the first items. There are no options."""

@@ -61,10 +61,6 @@ def scale(positions: np.ndarray) -> np.ndarray:
     Returns:
         (n, 3) float32, [-1, 1] from one side of the container to the other.
     """
-    return _scale(checks.finite_array("positions", positions, (None, 3)))
-
-
-def _scale(positions: np.ndarray) -> np.ndarray:
     return (2 / task.CONTAINER * positions - 1).astype(np.float32)
 
 
@@ -77,11 +73,8 @@ def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.nda
 
 
 def scaled(positions: np.ndarray) -> np.ndarray:
-    """``scale`` of (n, 3) float64 positions in m, within [-1, 1]; not checked again.
-
-    An item that is outside the container is seen at its edge.
-    """
-    return np.clip(_scale(positions), -1, 1)
+    """``scale`` within [-1, 1]: an item that is outside the container is seen at its edge."""
+    return np.clip(scale(positions), -1, 1)
 
 
 def holds_item(observations: np.ndarray) -> np.ndarray:

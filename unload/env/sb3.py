@@ -10,35 +10,31 @@ Five lines train a policy that sees the mask, to an MSR of 100 % within seconds:
     model.learn(30_000)
 """
 
-from typing import Any
-
-import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
-from stable_baselines3.common.vec_env import VecEnv
 
 from unload import task
 from unload.env.vector import ContainerVectorEnv
 
+try:
+    from stable_baselines3.common.vec_env import VecEnv
+except ModuleNotFoundError as error:
+    raise ModuleNotFoundError(
+        "unload.env.sb3 needs Stable-Baselines3: pip install 'unload[sb3]'"
+    ) from error
 
-class VectorEnvAdapter(VecEnv):
-    """A Gymnasium ``VectorEnv`` that resets in the same step, as Stable-Baselines3's ``VecEnv``.
 
-    Stable-Baselines3 takes environments of its own kind only.
+class ContainerVecEnv(VecEnv):
+    """``ContainerVectorEnv`` for Stable-Baselines3, which takes environments of its own kind only.
 
     Args:
-        envs: the environments.
-
-    Raises:
-        ValueError: they reset in another way.
+        num_envs: number of containers.
+        **settings: of ``ContainerVectorEnv``.
     """
 
-    def __init__(self, envs: gymnasium.vector.VectorEnv) -> None:
-        mode = envs.metadata.get("autoreset_mode")
-        if mode != AutoresetMode.SAME_STEP:
-            raise ValueError(f"envs resets with {mode}; expected {AutoresetMode.SAME_STEP}")
-        self.envs: Any = envs
-        super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
+    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
+        self.envs = ContainerVectorEnv(num_envs, **settings)
+        spaces = self.envs.single_observation_space, self.envs.single_action_space
+        super().__init__(num_envs, *spaces)
 
     def reset(self) -> np.ndarray:
         """Start all episodes, with what ``seed`` and ``set_options`` were given before."""
@@ -84,15 +80,3 @@ class VectorEnvAdapter(VecEnv):
 
     def set_attr(self, attr_name: str, value, indices=None) -> None:
         raise NotImplementedError("the environments are one; make new ones instead")
-
-
-class ContainerVecEnv(VectorEnvAdapter):
-    """``ContainerVectorEnv`` for Stable-Baselines3.
-
-    Args:
-        num_envs: number of containers.
-        **settings: of ``ContainerVectorEnv``.
-    """
-
-    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
-        super().__init__(ContainerVectorEnv(num_envs, **settings))

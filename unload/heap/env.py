@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from unload import task
-from unload.env.base import AllOrReset, EpisodeEnv, rng_of_text, text_of_rng
+from unload.env.base import AllOrReset, EpisodeEnv
 from unload.heap import generate
 from unload.heap.boxes import Heap, check_heap
 from unload.heap.observation import (
@@ -28,7 +28,6 @@ from unload.support import checks
 MAX_PICKS = 15  # they unload some 25 to 40 of 100 boxes, the front of the heap
 OBSERVATIONS = {"truth": true_boxes, "camera": camera_boxes}
 LARGEST = 20.0  # of the observation: twice what a box 10 m away would show
-STATE = ("positions", "orientations", "sizes", "packages", "failed", "counts", "rng")
 
 
 class HeapEnv(EpisodeEnv):
@@ -102,7 +101,7 @@ class HeapEnv(EpisodeEnv):
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
     ## Pictures and arrays
-    There is no render mode: ``unload.heap.study.replay`` draws recorded picks. There is no array
+    There is no render mode: ``unload.heap.study.figures`` draws recorded picks. There is no array
     of heaps either, because nearly all of a pick is PyBullet's time;
     ``gymnasium.make_vec(id, n, vectorization_mode="async")`` gives each heap a process.
 
@@ -121,7 +120,7 @@ class HeapEnv(EpisodeEnv):
         visible: (96,) int64, the box in each row of the observation, -1 in rows without.
 
     Raises:
-        TypeError, ValueError: an argument, an action or a state is not as described.
+        TypeError, ValueError: an argument or an action is not as described.
         FileNotFoundError: the stored heaps are missing.
         gymnasium.error.ResetNeeded: ``step`` before ``reset``, or after an episode's end.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
@@ -174,7 +173,9 @@ class HeapEnv(EpisodeEnv):
         if heap is None:
             heap = self.heaps[self.np_random.integers(len(self.heaps))]
         with AllOrReset(self):
-            self._start(heap, np.zeros(len(heap), bool), 0)
+            self.heap, self._failed, self._picks = heap, np.zeros(len(heap), bool), 0
+            self._state = "running"
+            self._look()
         return self._observation.copy(), self._info()
 
     def step(self, action: int):
@@ -185,23 +186,24 @@ class HeapEnv(EpisodeEnv):
         box = int(self.visible[row])
         fates = np.zeros(ROWS, np.int8)
         pick = {
-            "unloaded": 0, "falls": 0, "box": box, "moved": 0.0, "came": False, "fates": fates
+            "unloaded": np.int64(0), "falls": np.int64(0), "box": np.int64(box),
+            "moved": np.float64(0), "came": np.False_, "fates": fates,
         }  # fmt: skip
         with AllOrReset(self):
             self._picks += 1
             if box >= 0:
                 outcome = self._rake.pick(self.heap, box)
                 pick |= {
-                    "unloaded": int(outcome.unloaded.sum()),
-                    "falls": int(outcome.fallen.sum()),
-                    "moved": outcome.moved,
-                    "came": outcome.came,
+                    "unloaded": outcome.unloaded.sum(),
+                    "falls": outcome.fallen.sum(),
+                    "moved": np.float64(outcome.moved),
+                    "came": np.bool_(outcome.came),
                 }
                 seen = self.visible >= 0
                 numbers = self.visible[seen]
                 fates[seen] = UNLOADED * outcome.unloaded[numbers] + FELL * outcome.fallen[numbers]
                 self._take(outcome, box)
-        reward = pick["unloaded"] - self.falls_weight * pick["falls"]
+        reward = float(pick["unloaded"] - self.falls_weight * pick["falls"])
         terminated, truncated = len(self.heap) == 0, self._picks >= self.max_picks
         if terminated or truncated:
             self._state = "finished"
@@ -215,51 +217,11 @@ class HeapEnv(EpisodeEnv):
         untried[allowed] = ~self._failed[self.visible[allowed]]
         return untried if untried.any() else allowed
 
-    def get_state(self) -> dict[str, np.ndarray]:
-        """The episode as plain arrays, from which ``set_state`` goes on to the bit.
-
-        Raises:
-            ResetNeeded: no episode has begun.
-        """
-        self._check_started()
-        return {
-            **{name: getattr(self.heap, name).copy() for name in STATE[:4]},
-            "failed": self._failed.copy(),
-            "counts": np.array([self._picks]),
-            "rng": np.array(text_of_rng(self.np_random)),
-        }
-
-    def set_state(self, state: dict[str, np.ndarray]) -> None:
-        """Go on from what ``get_state`` returned.
-
-        Raises:
-            TypeError, ValueError: an entry is not as ``get_state`` returns it.
-        """
-        self._check_open()
-        checks.entries("state", state, STATE)
-        heap = Heap(*(state[name] for name in STATE[:4]))
-        if len(heap):
-            check_heap("state", heap)
-        failed = checks.flag_array("state['failed']", state["failed"], (len(heap),))
-        counts = checks.integer_array("state['counts']", state["counts"], (1,))
-        picks = checks.integer("state['counts'][0]", int(counts[0]), 0, self.max_picks)
-        rng = rng_of_text("state['rng']", state["rng"])
-        with AllOrReset(self):
-            self._np_random = rng
-            self._start(heap, failed, picks)
-            if picks == self.max_picks or not len(heap):
-                self._state = "finished"
-
     def close(self) -> None:
         """Disconnect both clients; may be called again."""
         self._rake.close()
         self._camera.close()
         self._state = "closed"
-
-    def _start(self, heap: Heap, failed: np.ndarray, picks: int) -> None:
-        self.heap, self._failed, self._picks = heap, failed, picks
-        self._state = "running"
-        self._look()
 
     def _take(self, outcome: Outcome, box: int) -> None:
         if outcome.unloaded.any():
@@ -282,7 +244,7 @@ class HeapEnv(EpisodeEnv):
         return {
             "action_mask": self.action_masks().astype(np.int8),
             "item_mask": (self.visible >= 0).astype(np.int8),
-            "left": len(self.heap),
+            "left": np.int64(len(self.heap)),
         }
 
 

@@ -188,12 +188,8 @@ def _grouped(
     named = COLOURS | dict(zip(others, colours))
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
-        items = np.asarray(items)
-        if not items.size:
-            continue
-        if items.dtype.kind not in "iu":
-            raise TypeError(f"groups[{name!r}] has dtype {items.dtype}; expected item numbers")
-        if not (0 <= items.min() and items.max() < count):
+        items = checks.integer_array(f"groups[{name!r}]", items, (None,))
+        if items.size and not (0 <= items.min() and items.max() < count):
             raise ValueError(
                 f"groups[{name!r}] holds {items.min()} to {items.max()}; expected 0 to {count - 1}"
             )
@@ -407,54 +403,3 @@ def _separated(low: np.ndarray, high: np.ndarray, axis: int) -> np.ndarray:
 def _wider(values: np.ndarray, margin: float = 0.04) -> tuple[float, float]:
     room = margin * np.ptp(values)
     return values.min() - room, values.max() + room
-
-
-def slider(labels: Mapping[str, str]) -> dict:
-    """A slider over the frames of a plotly figure, as plotly describes it.
-
-    Args:
-        labels: name of each frame → what the slider says there.
-    """
-    steps = [
-        {"label": label, "method": "animate", "args": [[frame], _timing(0)]}
-        for frame, label in labels.items()
-    ]
-    return {
-        "steps": steps,
-        "x": 0.12,
-        "len": 0.86,
-        "y": 0.02,
-        "yanchor": "bottom",
-        "ticklen": 0,
-        "font": {"color": "rgba(0,0,0,0)"},  # of the labels below the slider: too many to read
-        "currentvalue": {"font": {"color": "black"}},
-    }
-
-
-def buttons(pause: int) -> dict:
-    """Play and pause, left of the slider.
-
-    Args:
-        pause: ms that each frame is shown.
-    """
-    return {
-        "type": "buttons",
-        "direction": "left",
-        "x": 0.0,
-        "xanchor": "left",
-        "y": 0.04,
-        "yanchor": "bottom",
-        "buttons": [
-            {"label": "▶", "method": "animate", "args": [None, _timing(pause, from_here=True)]},
-            {"label": "❚❚", "method": "animate", "args": [[None], _timing(0)]},
-        ],
-    }
-
-
-def _timing(pause: int, from_here: bool = False) -> dict:
-    return {
-        "mode": "immediate",
-        "fromcurrent": from_here,
-        "frame": {"duration": pause, "redraw": True},
-        "transition": {"duration": 0},
-    }

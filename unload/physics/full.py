@@ -1,7 +1,5 @@
 """Lifts in a simulation of every box of the container."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from unload import task
@@ -57,16 +55,6 @@ class FullPhysics(Physics):
             (tuple(position), UPRIGHT) for position in load.positions.tolist()
         ]
 
-    def _clear(self, bodies: Sequence[int]) -> None:
-        """Empty the container, so that Bullet forgets the contacts in it.
-
-        A box that is only moved keeps its old contacts: it may be flung by up to a metre, or
-        held though nothing touches it any more.
-        """
-        for body in bodies:
-            self._park(body)
-        self._world.step(TIME_STEP)
-
     def _park(self, body: int) -> None:
         """Move a body to a place of its own in the depot."""
         row, column = divmod(body, 100)
@@ -97,7 +85,11 @@ class FullPhysics(Physics):
 
     def _restore(self) -> None:
         present = np.flatnonzero(self.present)
-        self._clear([self._bodies[index] for index in present])
+        # The container is emptied first, so that Bullet forgets the contacts in it. A box that is
+        # only moved keeps its old ones: it may be flung by up to a metre, or held by nothing.
+        for index in present:
+            self._park(self._bodies[index])
+        self._world.step(TIME_STEP)
         for index in present:
             self._world.place(self._bodies[index], *self._poses[index])
 

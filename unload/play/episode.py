@@ -159,10 +159,6 @@ class Episode:
         """Number of items unloaded by the first ``count`` picks; by all of them if None."""
         return sum(pick.success for pick in self.picks[:count])
 
-    def close(self) -> None:
-        """Free the simulator; may be called again."""
-        self._env.close()
-
 
 def explain(pick: Pick) -> str:
     """Say in a sentence how a pick ended, and why."""

@@ -1,9 +1,11 @@
 """An episode as a plotly figure with a play button and a slider, which needs no kernel."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import plotly.graph_objects as go
 
-from unload.load.view import COLOURS, View, buttons, layout, mesh, slider, view
+from unload.load.view import COLOURS, View, layout, mesh, view
 from unload.play.episode import Episode
 
 STOPS = 24  # of the slider, at most
@@ -51,8 +53,49 @@ def replay(episode: Episode, height: int = 520) -> View:
     still = view(load, middle.present, middle.groups(), height)
     figure = View(traces, layout(height), frames, picture=still.picture)
     labels = {str(stop): f"{stop} picks, {episode.unloaded(stop)} unloaded" for stop in stops}
-    figure.update_layout(sliders=[slider(labels)], updatemenus=[buttons(PAUSE)])
+    figure.update_layout(_controls(labels))
     return figure
+
+
+def _controls(labels: Mapping[str, str]) -> dict:
+    """A slider over the frames of a plotly figure, and play and pause left of it.
+
+    Args:
+        labels: name of each frame → what the slider says there.
+    """
+    at_once, slowly = (
+        {
+            "mode": "immediate",
+            "fromcurrent": True,
+            "frame": {"duration": pause, "redraw": True},
+            "transition": {"duration": 0},
+        }
+        for pause in (0, PAUSE)
+    )
+
+    def animate(label: str, frames: list | None, timing: dict) -> dict:
+        return {"label": label, "method": "animate", "args": [frames, timing]}
+
+    slider = {
+        "steps": [animate(label, [name], at_once) for name, label in labels.items()],
+        "x": 0.12,
+        "len": 0.86,
+        "y": 0.02,
+        "yanchor": "bottom",
+        "ticklen": 0,
+        "font": {"color": "rgba(0,0,0,0)"},  # of the labels below the slider: too many to read
+        "currentvalue": {"font": {"color": "black"}},
+    }
+    buttons = {
+        "type": "buttons",
+        "direction": "left",
+        "x": 0,
+        "xanchor": "left",
+        "y": 0.04,
+        "yanchor": "bottom",
+        "buttons": [animate("▶", None, slowly), animate("❚❚", [None], at_once)],
+    }
+    return {"sliders": [slider], "updatemenus": [buttons]}
 
 
 def _last_failure(episode: Episode, count: int) -> go.Mesh3d:

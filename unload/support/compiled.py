@@ -30,7 +30,7 @@ def compiled(function: Callable | None = None, **options) -> Callable:
 
     The first function of a process that is not in the cache is logged, because a fresh
     installation compiles for ten seconds. Where no folder can be written, compiled code is kept
-    in memory, with one warning.
+    in memory, with a warning.
 
     Args:
         function: of a module, to be compiled at its first call. What it uses is defined in that
@@ -43,17 +43,12 @@ def compiled(function: Callable | None = None, **options) -> Callable:
     try:
         dispatcher._cache = _Cache(function)
     except RuntimeError:  # numba's, of all folders that it tries
-        _warn_of_no_folder()
+        warnings.warn(  # shown once, because it comes from here each time
+            "compiled code cannot be kept, and every process compiles for ten seconds; set "
+            "NUMBA_CACHE_DIR to a folder that can be written",
+            stacklevel=1,
+        )
     return dispatcher
-
-
-@cache
-def _warn_of_no_folder() -> None:
-    warnings.warn(
-        "compiled code cannot be kept, and every process compiles for ten seconds; set "
-        "NUMBA_CACHE_DIR to a folder that can be written",
-        stacklevel=4,
-    )
 
 
 class _Cache(FunctionCache):

@@ -12,9 +12,6 @@ from torch.nn.functional import smooth_l1_loss
 
 from unload.agent.dqn import DQN
 from unload.agent.fast import fused
-from unload.agent.fast.kernel import decode, encode, level
-from unload.env.equalization import equalize
-from unload.env.fast.ranking import LEVELS
 from unload.network.peq import PEQNetwork
 
 BATCH, ITEMS = 300, 128
@@ -203,20 +200,12 @@ def test_choice_is_that_of_the_network(batch, rng):
     assert allowed[rows, actions].all()
 
 
-@pytest.mark.parametrize("name", ["observations", "rewards"])
+@pytest.mark.parametrize("place", [0, 1, 2, 3, "observations", "rewards"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_input_that_is_not_finite_is_refused(batch, name, value):
-    batch[name].flat[7] = value
-    with pytest.raises(FloatingPointError, match="expected finite"):
-        gradients(network(16), batch)
-
-
-@pytest.mark.parametrize("parameter", range(4))
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
+def test_weights_and_inputs_that_are_not_finite_are_refused(batch, place, value):
     net = network(16)
-    with torch.no_grad():
-        list(net.parameters())[parameter].view(-1)[0] = value
+    arrays = [parameter.detach().numpy() for parameter in net.parameters()]
+    (batch[place] if place in batch else arrays[place]).flat[0] = value
     with pytest.raises(FloatingPointError, match="expected finite"):
         gradients(net, batch)
 
@@ -226,12 +215,9 @@ def test_weights_that_are_not_finite_are_refused(batch, parameter, value):
     [
         ("actions", np.full(BATCH, ITEMS), "actions holds 128; expected 0 to 127"),
         ("actions", np.full(BATCH, -1), "actions holds -1"),
-        ("actions", np.zeros(BATCH), "actions has shape .* dtype float64"),
         ("actions", np.zeros(BATCH, np.int32), "actions has shape .* dtype int32"),
-        ("rewards", np.zeros(BATCH, np.float16), "targets has shape .* dtype float16"),
         ("rewards", np.zeros(BATCH), "targets has shape .* dtype float64"),
         ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
-        ("rewards", np.zeros(BATCH + 1, np.float32), "targets has shape"),
         ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
         ("observations", np.zeros((BATCH, 0, 3), np.float32), "observations has shape"),
         ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
@@ -292,39 +278,3 @@ def test_any_update_is_that_of_double_precision(shape, n_features, scale, levels
         "rewards": rng.uniform(-1, 1, size).astype(np.float32),
     }
     check(net, batch, beta, tolerance=1e-4)
-
-
-@pytest.mark.parametrize("ties", ["noise", "average"])
-def test_bytes_give_the_same_bits_as_floats(batch, ties, rng):
-    coarse = np.round(batch["observations"] * 8) / 8
-    batch["observations"] = equalize(coarse, ties)
-    weights, rows = fused.weights_of(network(70)), rng.integers(BATCH, size=200)
-    totals = []
-    for seen in (batch["observations"], encode(batch["observations"])):
-        arguments = seen, batch["actions"], batch["rewards"], 1.0, rows
-        totals.append(fused.start_gradients(weights, *arguments)())
-    assert totals[0].tobytes() == totals[1].tobytes()
-
-
-@pytest.mark.parametrize("ties", ["noise", "average"])
-def test_equalized_observations_come_back_to_the_bit(rng, ties):
-    seen = equalize(rng.integers(-20, 20, (50, 128, 3)) / 20, ties)
-    codes = encode(seen)
-    assert codes.dtype == np.uint8 and codes.nbytes == seen.nbytes // 4
-    back = decode(codes)
-    assert back.dtype == np.float32 and back.tobytes() == seen.tobytes()
-
-
-def test_each_byte_means_the_same_everywhere():
-    codes = np.arange(255, dtype=np.uint8)
-    levels = np.array([level(np.float32(code)) for code in codes], np.float32)
-    assert levels.tobytes() == decode(codes).tobytes() == LEVELS[128, :255].tobytes()
-    assert (encode(levels) == codes).all()
-
-
-@pytest.mark.parametrize("value", [0.5, 1.5, -3.0, 1e30, np.nan, np.inf, np.float32(1) / 126])
-def test_other_numbers_are_refused(value):
-    seen = decode(np.full((2, 128, 3), 7, np.uint8))
-    seen[1, 5, 2] = value
-    with pytest.raises(ValueError, match="^observations holds .*expected equalized coordinates"):
-        encode(seen)

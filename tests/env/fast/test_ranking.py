@@ -40,16 +40,6 @@ def test_replaced_items_leave_the_ranks_of_a_stable_sort(items, rng):
         assert (values == wanted).all() and (ranks == ranks_of(wanted)).all()
 
 
-@pytest.mark.parametrize("ties", ["noise", "average"])
-def test_features_are_those_of_equalize(items, ties):
-    observation = np.empty((128, 3), np.float32)
-    ranks = ranks_of(items).astype(np.int32)
-    features(items, ranks, True, ties == "average", TOLERANCE, observation)
-    assert observation.tobytes() == equalize(items.T, ties).tobytes()
-    features(items, ranks, False, ties == "average", TOLERANCE, observation)
-    assert (observation == items.T).all()
-
-
 @pytest.mark.parametrize("tolerance", [0.25, 0.2499, 0.0])
 def test_values_as_far_apart_as_the_tolerance_are_a_tie(tolerance):
     values = np.tile(np.arange(128, dtype=np.float32) // 2 / 4, (3, 1))  # 0, 0, 0.25, 0.25, 0.5, …

@@ -2,7 +2,6 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 
 from unload.heap.study import figures
@@ -10,7 +9,7 @@ from unload.heap.study.table import SHOWN_WEIGHT, read_heap_table
 from unload.load.view import COLOURS
 
 
-def test_every_figure_draws_its_data(heap, outcome):
+def test_every_figure_draws_its_data():
     """From data/ where it is read: dots at the values of the table, and all their names."""
     table = read_heap_table()
     shown = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
@@ -29,16 +28,6 @@ def test_every_figure_draws_its_data(heap, outcome):
     texts = {text.get_text() for text in curves.texts}
     assert texts == {*figures.RULES, *(f"λ = {weight:g}" for weight in learned["falls_weight"])}
     assert {text.get_text() for text in curves.get_legend().get_texts()} == set(figures.LINES)
-    expected = pd.DataFrame({"boxes": [1.5, 0.5], "falls": [0.25, 2.0]})
-    found = pd.DataFrame({"boxes": [2, 1], "falls": [0, 3]})
-    boxes, falls = figures.predictions(expected, found).axes
-    assert boxes.collections[0].get_offsets().tolist() == [[1.5, 2], [0.5, 1]]
-    assert falls.collections[0].get_offsets().tolist() == [[0.25, 0], [2.0, 3]]
-    pick = figures.one_pick(heap, 0, outcome)
-    titles = [panel.get_title() for panel in pick.axes]
-    assert titles == ["before the pick", "after it: 2 unloaded, 1 fallen"]
-    names = [text.get_text() for text in pick.legends[0].get_texts()]
-    assert names == list(figures.MEANINGS)
 
 
 def test_missing_data_names_the_command_that_makes_it(tmp_path):
@@ -71,6 +60,14 @@ def test_an_expected_fate_is_the_share_of_its_colour(heap, outcome):
     stays, comes, falls, dragged = figures.colours_of(np.arange(4))
     assert left == {tint(c) for c in (dragged, falls, (stays + comes) / 2, stays)}
     assert right == {tint(c) for c in (dragged, falls, comes, stays)}
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert names == list(figures.MEANINGS)
+
+
+def test_episodes_are_drawn_before_their_first_middle_and_last_pick(heap, outcome):
+    one = [heap, outcome.heap], np.array([0]), [outcome]
+    titles = [panel.get_title() for panel in figures.episodes({"lowest": one}).axes]
+    assert titles == ["lowest, pick 1: 0 unloaded, 0 fallen"] * 3
 
 
 def test_nearer_boxes_are_painted_later(heap):

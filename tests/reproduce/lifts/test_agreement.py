@@ -66,59 +66,38 @@ def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(agreement, "STAGES", (30,))
     monkeypatch.setattr(agreement, "WANTED", (1, 1, 1, 0))
     folders = {"folder": tmp_path / "data", "runs_dir": tmp_path / "runs", "progress": False}
-    frame = agreement.agreement_data(3, 3, 5, 0, **folders)
+    frame = agreement.agreement_data(3, 3, 5, **folders)
     assert (frame["asked_full"] == "drawn").all() and frame["full"].notna().all()
-    assert (frame["after_pick"] == "restore").all() and not frame[["lived", "drift"]].any(axis=None)
     assert not len(agreement.disagreements(frame, "local", "full"))
     assert frame["full"].max() == pytest.approx(frame["local"].max(), abs=0.01)
     provenance = read_provenance(tmp_path / "data", agreement.NAME)
     assert provenance["reduced"] and provenance["settings"]["lifts"] == 3
     written = (tmp_path / "data" / "lift_agreement.csv").read_bytes()
     monkeypatch.setattr(full, "FullPhysics", None)
-    agreement.agreement_data(3, 3, 5, 0, **folders)
+    agreement.agreement_data(3, 3, 5, **folders)
     assert (tmp_path / "data" / "lift_agreement.csv").read_bytes() == written
     with pytest.raises(TypeError):  # an answer to another question is not taken
-        agreement.agreement_data(3, 3, 6, 0, **folders)
-
-
-def test_rows_of_a_drifting_world_are_asked_of_local_without_what_was_unloaded(asker):
-    states, _ = agreement.collect_lifts(1, 3, asker)
-    state, lived = states[2], agreement.LIVED
-    asker.enter(state)
-    below = {item: asker.local.surroundings.on_top(item) for item in state.visible.tolist()}
-    covered = next(item for item, above in below.items() if len(above) == 1)
-    above = below[covered][0]
-    others = [item for item in below if item not in (covered, above)][: lived - 1]
-    picks = [(item, 0.0, 0.0) for item in others] + [(above, 0.46, 0.001), (covered, 0.45, 0.002)]
-    (row,) = agreement.drifted_rows(state, "keep", picks, asker)
-    assert (row["item"], row["on_top"], row["lived"]) == (covered, 0, lived)
-    assert (row["full"], row["drift"], row["after_pick"]) == (0.45, 0.002, "keep")
-    assert row["local"] > 0.4
-    asker.enter(state)
-    assert asker.lift(covered)["on_top"] == 1
+        agreement.agreement_data(3, 3, 6, **folders)
 
 
 def test_bounds_count_each_kind_of_lift():
-    columns = ["situation", "on_top", "asked_full", "after_pick", "lived", "local", "full"]
+    columns = ["situation", "on_top", "asked_full", "local", "full"]
     rows = [
-        (0, 0, "drawn", "restore", 0, 0.4, 0.4),
-        (0, 0, "drawn", "restore", 0, 0.4, 0.1),
-        (1, 4, "buried", "restore", 0, 0.0, 0.0),
-        (2, 1, "", "", 0, 0.1, np.nan),
-        (3, 1, "drifted", "keep", 11, 0.4, 0.1),
-        (3, 1, "drifted", "keep", 12, 0.4, 0.4),
+        (0, 0, "drawn", 0.4, 0.4),
+        (0, 0, "drawn", 0.4, 0.1),
+        (1, 4, "buried", 0.0, 0.0),
+        (2, 1, "", 0.1, np.nan),
     ]
     frame = pd.DataFrame(rows, columns=columns).assign(seed=0, picks=100)
     frame["table"] = frame["local"]
     bounds = agreement.error_bounds(frame)
     counted = bounds[["lifts", "states", "situations", "differ"]].T.to_dict("list")
     assert counted == {
-        "table, local": [4, 3, 4, 0],
+        "table, local": [3, 1, 3, 0],
         "table, local: three or more on top": [1, 1, 1, 0],
         "local, full: drawn": [2, 1, 1, 1],
         "local, full: three or more on top": [1, 1, 1, 0],
-        "local, full: all of fresh worlds": [3, 1, 2, 1],
-        "local, full: after drift, keep": [2, 2, 1, 1],
+        "local, full: all": [3, 1, 2, 1],
     }
     for _, row in bounds.iterrows():
         assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))

@@ -1,9 +1,8 @@
-"""Lifts in fresh worlds of ``full``, and picks in worlds that drift."""
+"""Lifts in fresh worlds of ``full``."""
 
 import numpy as np
 import pytest
 
-from unload import task
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Surroundings
@@ -51,29 +50,3 @@ def test_a_fresh_world_lifts_the_item_it_was_asked_about(monkeypatch, state):
     local.close()
     another, _ = full.fresh_job(state, item, full.WALLS)
     assert another != question
-
-
-@pytest.mark.parametrize("after_pick", ["keep", "restore_failure"])
-def test_a_drifting_world_lives_through_picks(monkeypatch, state, after_pick):
-    monkeypatch.setattr(full, "NEAR_WALLS", 1)
-    monkeypatch.setattr(full, "LIVED", 3)
-    monkeypatch.setattr(full, "ASKED", 3)
-    question, compute = full.drifting_job(state, after_pick, 1)
-    assert question["picks"] == 6 and question["after_pick"] == after_pick
-    items, distances, drifts = map(np.array, zip(*compute()))
-    assert len(set(items)) == 6 and set(items) <= set(state.visible)
-    assert len(set(state.load.walls[items])) == 1
-    assert drifts[0] == 0
-    before = drifts[1:] != drifts[:-1]  # whether the pick between them has moved boxes
-    lifted = distances[:-1] >= task.LIFT_THRESHOLD
-    assert lifted.any() and before[lifted].all()
-    assert before.all() if after_pick == "keep" else not before[~lifted].any()
-    _, compute = full.drifting_job(state, after_pick, 1)
-    assert [item for item, _, _ in compute()] == items.tolist()
-
-
-def test_drifting_worlds_end_when_all_has_been_tried(state):
-    rng = np.random.default_rng(0)
-    visible, load = np.arange(2), state.load
-    picks = full.drifting_picks(load, np.arange(len(load)) + 7, visible, "keep", rng)
-    assert sorted(item for item, _, _ in picks) == [7, 8]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from unload.load.substacks import front_walls, package_colour, stack_load
+from unload.load.substacks import front_walls, stack_load
 from unload.load.view import COLOURS
-from unload.reproduce.paper.loads import fig02_containers, side_views, wall_views
+from unload.reproduce.paper.loads import fig02_containers, side_views, wall_view
 
 
 @pytest.fixture
@@ -46,28 +46,19 @@ def test_side_views_show_each_group_in_its_colour_to_scale(load):
     assert [text.get_text() for text in figure.legends[0].texts] == list(groups)
 
 
-def test_wall_views_show_the_boxes_of_each_wall_to_scale(load):
-    walls = np.unique(load.walls)[::-1]
-    visible, present = np.flatnonzero(load.walls == walls[0])[:4], np.ones(len(load), dtype=bool)
+def test_a_wall_view_shows_the_boxes_of_the_wall_to_scale(load):
+    wall = load.walls.max()
+    visible, present = np.flatnonzero(load.walls == wall)[:4], np.ones(len(load), dtype=bool)
     present[visible[0]] = False
-    figure = wall_views(load, walls, {"visible": visible}, present)
-    for axes, wall in zip(figure.axes, walls, strict=True):
-        assert axes.get_aspect() == 1
-        items = np.flatnonzero(present & (load.walls == wall))
-        for item, box in zip(items, axes.patches, strict=True):
-            meaning = "visible" if item in visible else "unseen"
-            assert box.get_facecolor()[:3] == pytest.approx(COLOURS[meaning])
-            assert (box.get_width(), box.get_height()) == pytest.approx(load.sizes[item, 1:])
-            assert box.get_center() == pytest.approx(load.positions[item, 1:])
+    figure = wall_view(load, wall, {"visible": visible}, present)
+    (axes,) = figure.axes
+    assert axes.get_aspect() == 1
+    for item, box in zip(np.flatnonzero(present & (load.walls == wall)), axes.patches, strict=True):
+        meaning = "visible" if item in visible else "unseen"
+        assert box.get_facecolor()[:3] == pytest.approx(COLOURS[meaning])
+        assert (box.get_width(), box.get_height()) == pytest.approx(load.sizes[item, 1:])
+        assert box.get_center() == pytest.approx(load.positions[item, 1:])
     assert [text.get_text() for text in figure.legends[0].texts] == ["unseen", "visible"]
-
-
-def test_walls_without_groups_show_packages(load):
-    figure = wall_views(load, [load.walls[0]])
-    packages = load.packages[load.walls == load.walls[0]]
-    for package, box in zip(packages, figure.axes[0].patches, strict=True):
-        assert box.get_facecolor()[:3] == pytest.approx(package_colour(package))
-    assert not figure.legends
 
 
 LOAD = stack_load(np.random.default_rng(0))
@@ -77,7 +68,7 @@ LOAD = stack_load(np.random.default_rng(0))
     ("draw", "arguments", "message"),
     [
         (side_views, (LOAD.positions, {"": {"seen": np.arange(2)}}), "a group's name is 'seen'"),
-        (wall_views, (LOAD, [11], {"seen": np.arange(2)}), "a group's name is 'seen'"),
+        (wall_view, (LOAD, 11, {"seen": np.arange(2)}), "a group's name is 'seen'"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(draw, arguments, message):

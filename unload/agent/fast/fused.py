@@ -27,7 +27,6 @@ from typing import NamedTuple, TypeGuard
 import numpy as np
 import torch
 
-from unload import task
 from unload.agent.fast.kernel import CHUNK, add_chunks, best_items, sum_chunks
 from unload.network.peq import PEQNetwork
 
@@ -76,7 +75,7 @@ def start_gradients(
 
     Args:
         weights: of the network.
-        observations: (batch, items, 3) float32, or bytes, see ``kernel.encode``.
+        observations: (batch, items, 3) float32.
         actions: (batch,) int64, in 0 … items-1.
         targets: (batch,) float32.
         beta: of the smooth-L1 loss, > 0.
@@ -91,7 +90,7 @@ def start_gradients(
     Raises:
         ValueError: an array's shape or dtype is another, or an action or row is out of range.
     """
-    count, items = _check(observations, ranks=True)
+    count, items = _check(observations)
     if rows is None:
         rows = np.arange(count)
     for name, array, shape, dtype in (
@@ -168,13 +167,8 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
     return actions
 
 
-def _check(observations: np.ndarray, ranks: bool = False) -> tuple[int, int]:
-    """Batch size and number of items of (batch, items, 3) float32 observations.
-
-    With ``ranks``, they may also be bytes, see ``kernel.encode``.
-    """
-    if ranks and observations.dtype == np.uint8 and observations.shape[1:] == (task.N_VISIBLE, 3):
-        return observations.shape[:2]
+def _check(observations: np.ndarray) -> tuple[int, int]:
+    """Batch size and number of items of (batch, items, 3) float32 observations."""
     if (
         observations.ndim != 3
         or 0 in observations.shape

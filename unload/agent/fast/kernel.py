@@ -2,10 +2,6 @@
 
 Features are handled in blocks of ``BLOCK``, whose numbers lie in one flat array; samples in
 chunks of ``CHUNK``, which several threads share.
-
-Equalized observations may be in bytes: a quarter of the memory, and not a bit lost. Among 128
-items, a coordinate (2 r - 127) / 127 is told by twice the item's rank r, which is an integer from
-0 to 254 even where ties share the mean of their ranks.
 """
 
 import numpy as np
@@ -13,8 +9,6 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from unload import task
-from unload.env.fast.ranking import LEVELS
 from unload.support.compiled import compiled
 
 CHUNK = 32  # samples whose gradients are summed in single precision
@@ -35,9 +29,6 @@ GRADIENT = STARTS[34]  # 8 rows: of the extractor's weights and bias, of the sco
 
 FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
 ZERO, ONE = np.float32(0), np.float32(1)
-LAST = np.float32(task.N_VISIBLE - 1)  # greatest rank
-SHARE = ONE / LAST
-COORDINATES = LEVELS[task.N_VISIBLE]  # by twice the rank
 
 
 @intrinsic
@@ -121,8 +112,7 @@ def add_chunks(
 ):
     """Sum the gradients and losses of each chunk into its row of ``partial``.
 
-    Several threads may call this with the same ``counter``, and share the chunks. Observations
-    in bytes are those of ``encode``.
+    Several threads may call this with the same ``counter``, and share the chunks.
     """
     n, items = len(bias), observations.shape[1]
     samples = observations.reshape(len(observations), 3 * items)
@@ -143,7 +133,7 @@ def add_chunks(
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
         coming = rows[following * CHUNK : (following + 1) * CHUNK]
         _look_up(chosen, actions, targets, picked, wanted)
-        largest = ONE if samples.itemsize == 1 else _largest(samples, chosen)
+        largest = _largest(samples, chosen)
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
         sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias[0]  # NaN if not finite
@@ -241,18 +231,9 @@ def _start_chunk(largest, precision, block):
 def _copy(inputs, x):
     """Copy one sample and repeat its last item until ``x`` is full."""
     for i in range(len(inputs)):
-        number = np.float32(inputs[i])
-        x[i] = level(number) if inputs.itemsize == 1 else number
+        x[i] = inputs[i]
     for i in range(len(inputs), len(x)):
         x[i] = x[i - 3]
-
-
-@compiled(forceinline=True)
-def level(twice):
-    """The coordinate (twice - 127) / 127 of twice a rank, as if divided and rounded once."""
-    centred = twice - LAST
-    quotient = centred * SHARE  # to divide takes three times as long as these three steps
-    return fma(fma(-quotient, LAST, centred), SHARE, quotient)
 
 
 @compiled
@@ -505,37 +486,3 @@ def best_items(observations, allowed, weight, bias, score, actions):
                 break
             if scores[i] > best:
                 best, actions[sample] = scores[i], i
-
-
-def encode(observations: np.ndarray) -> np.ndarray:
-    """Twice the ranks, uint8 of the same shape as ``observations``, float32.
-
-    Raises:
-        ValueError: a number is no equalized coordinate of 128 items, as it happens where fewer
-            are left.
-    """
-    codes = np.empty(observations.shape, np.uint8)
-    numbers = np.ascontiguousarray(observations).reshape(-1)
-    if not _encode(numbers, codes.reshape(-1)):
-        wrong = numbers[decode(codes).reshape(-1) != numbers][0]
-        raise ValueError(
-            f"observations holds {wrong}; expected equalized coordinates of {task.N_VISIBLE} items"
-        )
-    return codes
-
-
-def decode(codes: np.ndarray) -> np.ndarray:
-    """The observations that ``encode`` was given."""
-    return COORDINATES[codes]
-
-
-@compiled
-def _encode(numbers, codes):
-    """Fill ``codes``; whether all can be decoded."""
-    exact = True
-    for i in range(len(numbers)):
-        twice = np.rint(numbers[i] * LAST + LAST)
-        code = np.uint8(np.int32(min(max(twice, np.float32(0)), 2 * LAST)))
-        codes[i] = code
-        exact &= level(np.float32(code)) == numbers[i]
-    return exact

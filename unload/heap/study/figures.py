@@ -1,10 +1,10 @@
 """Figures of heaps: what a pick does, and the policies compared."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -123,21 +123,22 @@ def add_legend(figure: Figure) -> None:
 
 
 @styled
-def one_pick(before: Heap, box: int, outcome: Outcome) -> Figure:
-    """A heap before a pick, coloured by what the pick will do, and after it.
+def episodes(played: Mapping[str, tuple[Sequence[Heap], np.ndarray, Sequence[Outcome]]]) -> Figure:
+    """Episodes line by line, before the first, the middle and the last pick.
 
     Args:
-        before: the heap.
-        box: that is dragged.
-        outcome: of the pick.
+        played: name → heaps before the picks, boxes dragged (t,) and outcomes of the t picks;
+            the heaps are coloured by what the next pick will do.
     """
-    numbers = meanings(outcome, box)
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
-    draw_heap(left, before, colours_of(numbers), "before the pick")
-    kept = numbers[outcome.left]
-    kept[kept == 1] = 0
-    count, falls = int(outcome.unloaded.sum()), int(outcome.fallen.sum())
-    draw_heap(right, outcome.heap, colours_of(kept), f"after it: {count} unloaded, {falls} fallen")
+    figure, grid = plt.subplots(len(played), 3, figsize=(9, 2.7 * len(played)), squeeze=False)
+    for line, (name, (heaps, boxes, outcomes)) in zip(grid, played.items()):
+        unloaded = np.cumsum([0, *(one.unloaded.sum() for one in outcomes)])
+        falls = np.cumsum([0, *(one.fallen.sum() for one in outcomes)])
+        for axes, pick in zip(line, (0, len(outcomes) // 2, len(outcomes) - 1)):
+            colours = colours_of(meanings(outcomes[pick], int(boxes[pick])))
+            title = f"{name}, pick {pick + 1}: {unloaded[pick]} unloaded, {falls[pick]} fallen"
+            draw_heap(axes, heaps[pick], colours, title)
+            axes.title.set_fontsize(8)
     add_legend(figure)
     return figure
 
@@ -230,20 +231,4 @@ def throughput_falls(folder: str | Path = files.DATA) -> Figure:
     axes.set_xlim(left=0)
     axes.legend(loc="lower right", fontsize=8)
     mark_reduced(figure, Path(folder) / NAME, "table")
-    return figure
-
-
-@styled
-def predictions(expected: pd.DataFrame, found: pd.DataFrame) -> Figure:
-    """What a network expects of each box of a heap, and what dragging it has brought.
-
-    Args:
-        expected: one row per box, with ``boxes`` and ``falls``.
-        found: the same for the picks that were made.
-    """
-    figure, grid = plt.subplots(1, 2, figsize=(7, 3.2))
-    for axes, measure in zip(grid, ("boxes", "falls")):
-        axes.scatter(expected[measure], found[measure], s=22, alpha=0.7, color="C0", lw=0)
-        axes.axline((0, 0), slope=1, color="0.7", lw=1, zorder=0)
-        axes.set(xlabel=f"{measure}, expected", ylabel=f"{measure}, after the pick")
     return figure

@@ -7,8 +7,8 @@ stages some of the visible items are lifted, each from the same state; most of t
 hard cases, with one or two boxes on top. ``full`` is slow and asked about some lifts only:
 a few of each of many states, drawn without looking at any answer; as many with three or more
 boxes on top, which ``table`` answers without a simulation; and all that are close, for which
-``local`` finds a distance near the threshold. These worlds are fresh. Others drift, and each
-of their picks is a lift that ``table`` and ``local`` are asked about on the exact grid.
+``local`` finds a distance near the threshold. These worlds are fresh; what drift does to the picks
+of a policy, ``unload.reproduce.policies.robustness`` tells.
 """
 
 from collections.abc import Iterator
@@ -25,25 +25,23 @@ from unload.agent import policies
 from unload.load.substacks import WALLS
 from unload.physics.local import LocalPhysics
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
-from unload.reproduce.lifts.full import LIVED, NEAR_WALLS, State, drifting_job, fresh_job
+from unload.reproduce.lifts.full import NEAR_WALLS, State, fresh_job
 from unload.reproduce.results import COMMAND, keep_all, measured, publish, read_table
 from unload.reproduce.statistics import share_interval
 from unload.support import checks, files
 
 NAME = "lift_agreement"
 LIFT_COUNT, FULL_COUNT = 5000, 300  # compared in table and local, and drawn for full
-WORLDS = 12  # that drift, half of them with each ``after_pick``
 FRESH = 1_000_000  # seed of the first container; no other data uses it or the next ones
 STAGES = (0, 100, 200, 300, 400, 500)  # picks after which items are lifted
 WANTED = (2, 4, 4, 2)  # lifts per state with 0, 1, 2, and 3 or more boxes on top
 PER_STATE = 3  # lifts of a state that are drawn for full
 WHOLE = 5  # of every so many states drawn, one is asked about in the whole container
 CLOSE = (0.1, 0.3)  # m, distances in local that count as close to the threshold
-DRIFTING = ("keep", "restore_failure")  # in turn, the ``after_pick`` of worlds that drift
-ASKED_FULL = ("drawn", "buried", "close", "drifted")
+ASKED_FULL = ("drawn", "buried", "close")
 COLUMNS = [
     "policy", "seed", "picks", "item", "on_top", "situation", "known",
-    "asked_full", "walls", "after_pick", "lived", "drift", "table", "local", "full",
+    "asked_full", "walls", "table", "local", "full",
 ]  # fmt: skip
 UNLOADED_BY = {
     "random": policies.random,
@@ -57,7 +55,6 @@ def agreement_data(
     lifts: int = LIFT_COUNT,
     full: int = FULL_COUNT,
     seed: int = FRESH,
-    worlds: int = WORLDS,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
@@ -68,11 +65,10 @@ def agreement_data(
     A run that was stopped goes on with the answers of ``full`` that it has.
 
     Args:
-        lifts: how many at least, in ``table`` and ``local``, of fresh worlds.
+        lifts: how many at least, in ``table`` and ``local``.
         full: how many of these at least are drawn for ``full``, and how many more of those
             with three or more boxes on top; the close ones come on top.
         seed: of the first container.
-        worlds: that drift, see ``full.drifting_picks``.
         folder: of the data.
         runs_dir: where the answers of ``full`` are kept.
         n_jobs: processes for ``full``, as in joblib.
@@ -86,7 +82,6 @@ def agreement_data(
         FileNotFoundError: there is no lift table.
     """
     checks.integer("full", full, 0, checks.integer("lifts", lifts, 1))
-    checks.integer("worlds", worlds, 0)
     runs_dir, rng = Path(runs_dir) / "agreement", np.random.default_rng(seed)
     asker = Asker()
     (states, frame), record = measured(partial(collect_lifts, lifts, seed, asker))
@@ -96,16 +91,6 @@ def agreement_data(
     jobs = [fresh_job(states[state], item, walls) for state, item, walls in zip(*columns)]
     answers = keep_all(runs_dir, jobs, n_jobs, progress)
     frame["full"] = pd.Series([answer.value for answer in answers], asked, "float64")
-    frame["after_pick"] = np.where(frame["asked_full"] != "", "restore", "")
-    frame["lived"], frame["drift"] = 0, 0.0
-
-    drifting = [states[number] for number in rng.integers(len(states), size=worlds)]
-    modes = [DRIFTING[number % len(DRIFTING)] for number in range(worlds)]
-    jobs = [drifting_job(*each, seed + number) for number, each in enumerate(zip(drifting, modes))]
-    lives = keep_all(runs_dir, jobs, n_jobs, progress)
-    for state, mode, life in zip(drifting, modes, lives):
-        rows = drifted_rows(state, mode, life.value, asker)
-        frame = pd.concat([frame, pd.DataFrame(rows)], ignore_index=True)
     asker.close()
     settings = {
         "lifts": len(frame),
@@ -122,8 +107,8 @@ def agreement_data(
         {NAME: frame[COLUMNS]},
         f"{COMMAND} lifts",
         settings,
-        lifts < LIFT_COUNT or full < FULL_COUNT or worlds < WORLDS,
-        [record, *(answer.record for answer in (*answers, *lives))],
+        lifts < LIFT_COUNT or full < FULL_COUNT,
+        [record, *(answer.record for answer in answers)],
         float_format="%.6f",
     )
     return read_agreement(folder)
@@ -139,19 +124,15 @@ def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
         ``table``, ``local`` and ``full`` are how far the box moved in m, NaN where ``full``
         was not asked.
 
-        Of ``full``: ``asked_full`` says why it was asked, "drawn", "buried", "close" or
-        "drifted", and is empty where it was not; ``walls`` is how many item walls it
-        simulated, 0 for none, 5 for the item's own and two on each side (of a drifting world:
-        those around one visible item), 12 for the whole container; ``after_pick`` is
-        "restore" in a fresh world; a drifting one has ``lived`` through so many picks, and
-        ``drift``, in m, is how far half of its boxes, or more, are from where the load has them.
-        What has been unloaded in a drifting world has been taken from ``local``, too.
+        Of ``full``: ``asked_full`` says why it was asked, "drawn", "buried" or "close", and is
+        empty where it was not; ``walls`` is how many item walls it simulated, 0 for none, 5 for
+        the item's own and two on each side, 12 for the whole container.
 
     Raises:
         FileNotFoundError: there is no such file.
     """
     frame = read_table(Path(folder) / f"{NAME}.csv", f"{COMMAND} lifts", COLUMNS)
-    return frame.fillna({"asked_full": "", "after_pick": ""})
+    return frame.fillna({"asked_full": ""})
 
 
 def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
@@ -170,28 +151,21 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
         frame: see ``read_agreement``.
 
     Returns:
-        Indexed by what is compared: ``lifts``; from how many ``states`` of a container, a
-        drifting world being in another one at each pick; ``situations``, how many distinct
-        ones; ``differ``, the lifts decided differently; ``low`` and ``high``, the
-        Clopper–Pearson interval of their share. Between ``table`` and ``local`` each situation
-        counts once, because both give equal situations equal answers.
+        Indexed by what is compared: ``lifts``; from how many ``states`` of a container;
+        ``situations``, how many distinct ones; ``differ``, the lifts decided differently; ``low``
+        and ``high``, the Clopper–Pearson interval of their share. Between ``table`` and ``local``
+        each situation counts once, because both give equal situations equal answers.
     """
     once = frame.drop_duplicates("situation")
-    fresh, why = frame["after_pick"] == "restore", frame["asked_full"]
+    asked, why = frame[frame["asked_full"] != ""], frame["asked_full"]
     groups = {
         "table, local": (once, "table"),
         "table, local: three or more on top": (once[once["on_top"] >= HELD_DOWN], "table"),
         "local, full: drawn": (frame[why == "drawn"], "full"),
-        "local, full: three or more on top": (
-            frame[fresh & (frame["on_top"] >= HELD_DOWN)], "full"
-        ),
+        "local, full: three or more on top": (asked[asked["on_top"] >= HELD_DOWN], "full"),
         "local, full: close": (frame[why == "close"], "full"),
-        "local, full: all of fresh worlds": (frame[fresh], "full"),
-        **{
-            f"local, full: after drift, {mode}": (frame[frame["after_pick"] == mode], "full")
-            for mode in DRIFTING
-        },
-    }  # fmt: skip
+        "local, full: all": (asked, "full"),
+    }
     rows = {}
     for name, (lifts, other) in groups.items():
         if lifts.empty:
@@ -200,7 +174,7 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
         low, high = share_interval(differ, len(lifts))
         rows[name] = {
             "lifts": len(lifts),
-            "states": lifts.groupby(["seed", "picks", "after_pick", "lived"]).ngroups,
+            "states": lifts.groupby(["seed", "picks"]).ngroups,
             "situations": lifts["situation"].nunique(),
             "differ": differ,
             "low": low,
@@ -327,23 +301,3 @@ def choose_for_full(
         why[frame["local"].between(*CLOSE) & (why == "")] = "close"
     walls[np.isin(why, ("buried", "close"))] = NEAR_WALLS
     return why, walls
-
-
-def drifted_rows(state: State, after_pick: str, picks: list, asker: Asker) -> list[dict]:
-    """Rows of the picks in a drifting world, those after the first ``LIVED``.
-
-    Args:
-        state: that the world started from.
-        after_pick: see ``FullPhysics``.
-        picks: what ``drifting_picks`` returned.
-        asker: asked on the exact grid, without the boxes unloaded in the world.
-    """
-    asker.enter(state)
-    named, rows = _name(state) | {"asked_full": "drifted", "after_pick": after_pick}, []
-    for lived, (item, distance, drift) in enumerate(picks):
-        if lived >= LIVED:
-            of_full = {"walls": NEAR_WALLS, "lived": lived, "drift": drift, "full": distance}
-            rows.append(named | asker.lift(item) | of_full)
-        if distance >= task.LIFT_THRESHOLD:
-            asker.remove(item)
-    return rows

@@ -1,8 +1,6 @@
-"""Lifts asked of ``full``, from a state of a container: in a fresh world, or in one that drifts.
+"""Lifts asked of ``full``, from a state of a container, each in a fresh world.
 
-A fresh world holds the state's boxes on the load's exact grid and has seen no other lift. A
-drifting one has lived through picks with ``after_pick="keep"`` or ``"restore_failure"``: its
-boxes have moved a little, as they do in any simulation of everything.
+Such a world holds the state's boxes on the load's exact grid and has seen no other lift.
 """
 
 from collections.abc import Callable
@@ -12,18 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from unload import task
 from unload.load.boxes import Load
 from unload.load.substacks import WALLS
 from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics
-from unload.physics.situation import Surroundings
 
 NEAR_WALLS = 5  # the item's own wall and two on each side
-LIVED, ASKED = 10, 20  # picks that a drifting world lives through before lifts count; and then
-# How often a drifting world is asked for items with 0, 1, 2, and 3 or more boxes on top. Half
-# are free, because only successes let time pass with "restore_failure".
-ODDS = (0.5, 0.2, 0.2, 0.1)
 
 
 class State(NamedTuple):
@@ -82,65 +74,6 @@ def fresh_distance(load: Load, item: int) -> float:
     distance = physics.lift(item)
     physics.close()
     return distance
-
-
-def drifting_job(state: State, after_pick: str, seed: int) -> tuple[dict, Callable[[], list]]:
-    """Question and computation of the picks in one drifting world, for ``results.keep_all``.
-
-    Args:
-        state: of the container. ``NEAR_WALLS`` are simulated, around a visible item.
-        after_pick: ``"keep"`` or ``"restore_failure"``, see ``FullPhysics``.
-        seed: of the walls and of the picks.
-    """
-    rng = np.random.default_rng(seed)
-    left, items = boxes_left(state, state.load.walls[rng.choice(state.visible)], NEAR_WALLS)
-    visible = np.flatnonzero(np.isin(items, state.visible))
-    question = _question(
-        left, visible=visible.tolist(), after_pick=after_pick, seed=seed, odds=ODDS,
-        picks=LIVED + ASKED,
-    )  # fmt: skip
-    return question, partial(drifting_picks, left, items, visible, after_pick, rng)
-
-
-def drifting_picks(
-    load: Load, numbers: np.ndarray, visible: np.ndarray, after_pick: str, rng: np.random.Generator
-) -> list[tuple[int, float, float]]:
-    """Picks in one world of ``full`` that keeps what they make of it.
-
-    Args:
-        load: what the world is filled with.
-        numbers: (n,) int64, what its items are called.
-        visible: the items that may be picked, none of them twice.
-        after_pick: see ``FullPhysics``.
-        rng: draws the items, by ``ODDS``.
-
-    Returns:
-        Of each pick: the item's name; how far it moved, in m; and the drift before it, in m:
-        the median distance of the boxes left from where the load has them.
-    """
-    physics, tried, picks = FullPhysics(after_pick), set(), []
-    physics.reset(load)
-    surroundings = Surroundings(load, physics.present)
-    while len(picks) < LIVED + ASKED and len(tried) < len(visible):
-        open_to_try = [item for item in visible.tolist() if item not in tried]
-        item = _draw(open_to_try, surroundings, rng)
-        moved = np.linalg.norm(physics.positions() - load.positions, axis=1)
-        drift = float(np.median(moved[physics.present]))
-        distance = physics.lift(item)
-        if distance >= task.LIFT_THRESHOLD:
-            physics.remove(item)
-        tried.add(item)
-        picks.append((int(numbers[item]), distance, drift))
-    physics.close()
-    return picks
-
-
-def _draw(items: list[int], surroundings: Surroundings, rng: np.random.Generator) -> int:
-    """One of the items: first how many boxes are on it, by ``ODDS``, then which."""
-    kinds = np.array([min(len(surroundings.on_top(item)), len(ODDS) - 1) for item in items])
-    odds = np.array([chance * (kinds == kind).any() for kind, chance in enumerate(ODDS)])
-    kind = rng.choice(len(ODDS), p=odds / odds.sum())
-    return items[rng.choice(np.flatnonzero(kinds == kind))]
 
 
 def _question(load: Load, **rest) -> dict:

@@ -59,24 +59,6 @@ def fig03_substacks() -> Figure:
 
 
 @styled
-def packages() -> Figure:
-    """The 13 packages side by side, with width and height in cm."""
-    figure, axes = plt.subplots(figsize=(8.6, 1.9))
-    left = 0.0
-    for package, (width, height) in enumerate(PACKAGES * CELL):
-        # Narrow boxes get enough room for their label.
-        room = max(width, 0.36)
-        start = left + (room - width) / 2
-        _draw_box(axes, package, start, 0.0, width, height)
-        label = f"{100 * width:.0f} × {100 * height:.0f}"
-        axes.text(left + room / 2, -0.04, label, ha="center", va="top", fontsize=8)
-        left += room + 0.06
-    _bare(axes, (0, left), (-0.14, 0.46))
-    axes.set_title("packages 0–12, width × height in cm", loc="left")
-    return figure
-
-
-@styled
 def rows(combinations: Iterable[Sequence[int]]) -> Figure:
     """Rows of a wall one above the other, two in a line.
 
@@ -238,48 +220,41 @@ def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray],
 
 
 @styled
-def wall_views(
+def wall_view(
     load: Load,
-    walls: Sequence[int],
-    groups: Mapping[str, np.ndarray] | None = None,
+    wall: int,
+    groups: Mapping[str, np.ndarray],
     present: np.ndarray | None = None,
 ) -> Figure:
-    """Walls of a load, each as it is seen from the entrance, to scale.
+    """A wall of a load as it is seen from the entrance, to scale.
 
     Args:
         load: the boxes.
-        walls: numbers of the walls, in the order in which they are drawn.
+        wall: its number.
         groups: meaning → item numbers, as in ``side_views``; items in no group are "unseen".
-            If None, colours mean packages.
         present: (n,) bool, which boxes to draw; all if None.
 
     Raises:
         ValueError: a group's name is not in ``unload.load.COLOURS``.
     """
-    colours = [package_colour(package) for package in load.packages]
-    if groups is not None:
-        groups = {"unseen": np.arange(len(load)), **groups}
-        for meaning, items in groups.items():
-            checks.one_of("a group's name", meaning, COLOURS)
-            for item in items:
-                colours[item] = COLOURS[meaning]
+    groups = {"unseen": np.arange(len(load)), **groups}
+    colours = [COLOURS["unseen"]] * len(load)
+    for meaning, items in groups.items():
+        checks.one_of("a group's name", meaning, COLOURS)
+        for item in items:
+            colours[item] = COLOURS[meaning]
     _, width, height = task.CONTAINER
-    figure, panels = plt.subplots(
-        1, len(walls), figsize=(1 + 2.3 * max(len(walls), 1.6), 3.6), sharey=True, squeeze=False
-    )
-    for axes, wall in zip(panels[0], walls):
-        in_wall = load.walls == wall if present is None else (load.walls == wall) & present
-        for item in np.flatnonzero(in_wall):
-            corner = load.positions[item] - load.sizes[item] / 2
-            axes.add_patch(
-                Rectangle(corner[1:], *load.sizes[item, 1:], fc=colours[item], ec="white", lw=0.8)
-            )
-        axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", aspect="equal")
-        axes.set(title=f"wall {wall}", xticks=[0, 1, 2], yticks=[0, 1, 2])
-        axes.grid(False)
-    panels[0, 0].set_ylabel("z (m)")
-    if groups is not None:
-        _legend(figure, [Patch(fc=COLOURS[meaning]) for meaning in groups], list(groups))
+    figure, axes = plt.subplots(figsize=(4.68, 3.6))
+    in_wall = load.walls == wall if present is None else (load.walls == wall) & present
+    for item in np.flatnonzero(in_wall):
+        corner = load.positions[item] - load.sizes[item] / 2
+        axes.add_patch(
+            Rectangle(corner[1:], *load.sizes[item, 1:], fc=colours[item], ec="white", lw=0.8)
+        )
+    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
+    axes.set(title=f"wall {wall}", xticks=[0, 1, 2], yticks=[0, 1, 2])
+    axes.grid(False)
+    _legend(figure, [Patch(fc=COLOURS[meaning]) for meaning in groups], list(groups))
     return figure
 
 
