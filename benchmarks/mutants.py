@@ -2,13 +2,14 @@
 
     make mutants                                       a sample of each module's mutants
     python benchmarks/mutants.py agent/dqn --sample 0  all mutants of one module
+    python benchmarks/mutants.py --sample 12 --seed 33 --keep    for data/benchmarks
 
 Cosmic Ray makes the mutants. mutmut 3 leaves decorated functions alone, and so would miss all
 compiled ones. Each mutant's module is changed in a copy of the tree, where a forked process
 then runs the tests that belong to it; to fork saves importing PyTorch a thousand times. Modules
-with compiled functions run as plain Python, so that nothing is compiled; ``kernel``, whose
-instructions Python does not have, is compiled anew for each mutant, and so that it refuses places
-outside of its arrays.
+with compiled functions run as plain Python, so that nothing is compiled; those in ``agent/fast``,
+whose kernel has instructions that Python does not have, are compiled anew for each mutant, and so
+that they refuse places outside of their arrays.
 
 Left out are changes without an effect on behaviour: in annotations, in errors that are raised
 (the condition for it counts) and of ``is`` for ``==``. So are decorators, most of which make a
@@ -16,7 +17,8 @@ function fast only, and operators that numbers of the other kind do not have, su
 place of ``*``, because each call of such a mutant fails, which would only raise the score.
 
 The scores are printed at the end, and all outcomes kept in ``build/mutants.csv``. Most survivors
-are equivalent to the code as it is: no result depends on the change beyond rounding.
+are equivalent to the code as it is: no result depends on the change beyond rounding. Why one
+survives is written by hand into ``survivors.csv`` in ``data/benchmarks``, which keeps it.
 """
 
 import argparse
@@ -54,8 +56,9 @@ from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator
 
 ROOT = Path(__file__).resolve().parent.parent
+KEPT = ROOT / "data" / "benchmarks"
 SAMPLE, SEED = 40, 0  # mutants per module, and of their choice
-COPIED = ("unload", "tests", "data", "pyproject.toml", ".gitignore")
+COPIED = ("unload", "tests", "data", "pyproject.toml", "README.md", ".gitignore")
 # Tests of the array environment that are quick as plain Python.
 FEW_PICKS = " ".join(
     f"env/test_vector.py::test_{name}"
@@ -65,10 +68,20 @@ FEW_PICKS = " ".join(
         "fewer_boxes_may_have_more_contacts",
     )
 )  # fmt: skip
+# That lifts are those of the table that ships.
+SHIPPED = "physics/test_table.py::test_shipped_table_fits_this_physics"
 # The modules, and the tests in tests/ that have to notice their mutants.
 MODULES = {
+    "__init__": "test_installed.py::test_an_import_takes_few_modules agent/test_policies.py",
+    "task": "load/test_substacks.py env/test_observation.py reproduce/paper/test_numbers.py",
     "load/boxes": "load/test_boxes.py",
+    "load/packing_list": "load/test_packing_list.py",
     "load/substacks": "load/test_substacks.py",
+    "load/view": "load/test_view.py",
+    "physics/base": "physics/test_base.py",
+    "physics/bullet": f"physics/test_bullet.py {SHIPPED}",
+    "physics/full": "physics/test_full.py",
+    "physics/local": f"physics/test_local.py physics/test_base.py {SHIPPED}",
     "physics/situation": "physics/test_situation.py env/fast/test_containers.py",
     "physics/table": "physics/test_table.py",
     "env/base": "env/test_base.py env/test_container.py env/test_vector.py",
@@ -76,25 +89,35 @@ MODULES = {
     "env/equalization": "env/test_equalization.py",
     "env/highest_item": "env/test_highest_item.py env/test_base.py env/test_vector.py",
     "env/observation": "env/test_observation.py env/test_base.py env/test_container.py",
+    "env/sb3": "env/test_sb3.py",
     "env/vector": "env/test_vector.py env/test_base.py",
     "env/fast/containers": f"env/fast/test_containers.py {FEW_PICKS}",
     "env/fast/ranking": "env/fast/test_ranking.py",
-    "network/peq": "network/test_peq.py",
+    "network/peq": "network/test_peq.py network/test_variants.py",
     "network/variants": "network/test_variants.py",
-    "agent/learner": "agent/test_learner.py agent/test_dqn.py agent/test_greedy.py",
+    "network/weights": "network/test_weights.py agent/test_greedy.py",
+    "agent/checkpoint": "agent/test_checkpoint.py agent/test_training.py",
+    "agent/config": "agent/test_config.py",
     "agent/dqn": "agent/test_dqn.py",
+    "agent/evaluation": "agent/test_evaluation.py",
+    "agent/greedy": "agent/test_greedy.py",
+    "agent/learner": "agent/test_learner.py agent/test_dqn.py agent/test_greedy.py",
+    "agent/order": "agent/test_order.py",
+    "agent/policies": "agent/test_policies.py",
     "agent/replay": "agent/test_replay.py",
+    "agent/rollout": "agent/test_rollout.py agent/test_checkpoint.py agent/test_training.py",
+    "agent/sweep": "agent/test_sweep.py",
+    "agent/training": "agent/test_training.py agent/test_checkpoint.py",
     "agent/fast/fused": "agent/fast/test_fused.py",
     "agent/fast/kernel": "agent/fast/test_fused.py",
     "agent/fast/learner": "agent/fast/test_learner.py agent/test_learner.py agent/test_dqn.py",
     "support/checks": "support/test_checks.py",
+    "support/compiled": "support/test_compiled.py",
     "support/files": "support/test_files.py",
-    "network/weights": "network/test_weights.py agent/test_greedy.py",
-    "agent/checkpoint": "agent/test_checkpoint.py agent/test_training.py",
-    "agent/sweep": "agent/test_sweep.py",
+    "support/provenance": "support/test_provenance.py",
 }
 # Tests that take long, or start processes of their own.
-SLOW = "full or processes or 64_containers or agent_learns"
+SLOW = "[full or program_ends or processes_that or two_processes or 64_containers or agent_learns"
 NO_CACHE = shutil.ignore_patterns("__pycache__")  # the first run compiles, as mutants do
 WALL_LIMIT = 900  # s, of a run that waits for ever
 OTHER_CODE = 99  # exit status of a process that did not import the package from its copy
@@ -148,7 +171,10 @@ def mutants(
         found = [found[i] for i in sorted(rng.choice(count, sample, replace=False))]
     chosen = []
     for _, operator, mutation in found:
-        code = mutate_code(source, get_operator(mutation.operator_name)(), mutation.occurrence)
+        try:
+            code = mutate_code(source, get_operator(mutation.operator_name)(), mutation.occurrence)
+        except AttributeError:  # Cosmic Ray's, of an exception whose name has a dot
+            continue
         pairs = enumerate(zip(lines, code.splitlines()), 1)
         line, (before, after) = next((n, pair) for n, pair in pairs if pair[0] != pair[1])
         chosen.append(Mutant(module, line, before.strip(), after.strip(), operator, code))
@@ -187,8 +213,9 @@ def run_tests(tree: Path, module: str) -> int:
     sys.path.insert(0, str(tree))
     sys.dont_write_bytecode = False
     source = (tree / "unload" / f"{module}.py").read_text()
-    numba.config.DISABLE_JIT = "@compiled" in source and "@intrinsic" not in source
-    numba.config.BOUNDSCHECK = "@intrinsic" in source or None  # as Python does by itself
+    has_kernel = module.startswith("agent/fast/")  # and so instructions that Python does not have
+    numba.config.DISABLE_JIT = "\n@compiled" in source and not has_kernel
+    numba.config.BOUNDSCHECK = has_kernel or None  # as Python does by itself
     torch.set_num_threads(1)
     tests = [f"tests/{name}" for name in MODULES[module].split()]
     options = ["-x", "-p", "no:cacheprovider", "-k", f"not ({SLOW})", "-m", "not slow"]
@@ -299,13 +326,12 @@ def _kill(process: int) -> None:
         os.killpg(process, signal.SIGKILL)
 
 
-def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame:
-    """Run the mutants of some modules: one row each, with its outcome.
+def measure(names: list[str], sample: int, seed: int, jobs: int) -> Iterator[pd.DataFrame]:
+    """Run the mutants of some modules: a table a module, with a row and an outcome each.
 
     Raises:
         RuntimeError: a module's tests fail without any change.
     """
-    rows = []
     with (
         tempfile.TemporaryDirectory() as folder,
         contextlib.closing(Workers(Path(folder), jobs)) as workers,
@@ -320,9 +346,8 @@ def measure(names: list[str], sample: int, seed: int, jobs: int) -> pd.DataFrame
             for mutant in chosen:
                 ends += [_row(*end) for end in workers.start(name, mutant.code, limit, mutant)]
             ends += [_row(*end) for end in workers.rest()]
-            rows += [row | {"of": count} for row in ends]
             print(f"{name}: {len(chosen)} of {count} mutants tested", flush=True)
-    return pd.DataFrame(rows).sort_values(["module", "line", "operator"], ignore_index=True)
+            yield pd.DataFrame(ends).assign(of=count).sort_values(["line", "operator"])
 
 
 def _seconds_unchanged(workers: Workers, name: str) -> float:
@@ -363,6 +388,30 @@ def scores(table: pd.DataFrame) -> str:
     )
 
 
+def keep(table: pd.DataFrame, folder: Path = KEPT) -> None:
+    """Write ``mutants.csv``, a row a module, and ``survivors.csv``, a row a surviving mutant.
+
+    Modules that are not in ``table`` keep their rows, and survivors that are known already the
+    reason in ``why``.
+    """
+    killed = table["outcome"] != "survived"
+    modules = table.assign(killed=killed).groupby("module", as_index=False)
+    survivors = table.loc[~killed, ["module", "before", "after"]].drop_duplicates()
+    parts = {
+        "mutants": modules.agg(
+            of=("of", "first"), mutants=("killed", "size"), killed=("killed", "sum")
+        ),
+        "survivors": survivors.assign(why=""),
+    }
+    for name, new in parts.items():
+        path = folder / f"{name}.csv"
+        old = pd.read_csv(path) if path.exists() else new[:0]
+        if name == "survivors":
+            new = new.drop(columns="why").merge(old, "left", ["module", "before", "after"])
+        others = old[~old["module"].isin(table["module"])]
+        pd.concat([others, new]).sort_values("module", kind="stable").to_csv(path, index=False)
+
+
 def main() -> None:
     """Measure, print survivors and scores; keep all in build/mutants.csv."""
     parser = argparse.ArgumentParser(description="Mutation testing.")
@@ -370,15 +419,21 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=SAMPLE, help="mutants per module, 0 for all")
     parser.add_argument("--seed", type=int, default=SEED, help="of the sample")
     parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
+    parser.add_argument("--keep", action="store_true", help="the results in data/benchmarks, too")
     arguments = parser.parse_args()
     for name in arguments.modules:
         if name not in MODULES:
             parser.error(f"modules has {name!r}; expected some of {', '.join(MODULES)}")
     start = time.monotonic()
     names = arguments.modules or list(MODULES)
-    table = measure(names, arguments.sample, arguments.seed, arguments.jobs)
     (ROOT / "build").mkdir(exist_ok=True)
-    table.to_csv(ROOT / "build" / "mutants.csv", index=False)
+    parts = []
+    for part in measure(names, arguments.sample, arguments.seed, arguments.jobs):
+        parts.append(part)
+        table = pd.concat(parts, ignore_index=True)
+        table.to_csv(ROOT / "build" / "mutants.csv", index=False)
+    if arguments.keep:
+        keep(table)
     print(scores(table))
     print(f"{(time.monotonic() - start) / 60:.0f} minutes")
 

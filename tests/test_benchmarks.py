@@ -59,6 +59,12 @@ def test_kept_results_name_the_machine():
     assert {"revision", "versions", "machine", "wall_time_s"} <= set(provenance)
 
 
+def test_nearly_all_mutants_are_killed_and_the_others_explained():
+    modules, survivors = (pd.read_csv(FOLDER / f"{name}.csv") for name in ("mutants", "survivors"))
+    assert modules["killed"].sum() >= 0.92 * modules["mutants"].sum()
+    assert survivors["why"].notna().all()
+
+
 def test_speeds_are_printed_with_their_units(capsys):
     row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
     show(pd.DataFrame([row]))

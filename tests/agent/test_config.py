@@ -29,6 +29,12 @@ def test_epsilon_falls_linearly_and_stays():
     assert TrainConfig(picks=64, epsilon_fraction=0).epsilon(0) == 0
 
 
+def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
+    for fields in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64}):
+        seeds = TrainConfig(seed=3, **fields).seeds()
+        assert seeds == (1645421708, 4294262074, 3363538554)
+
+
 @pytest.mark.parametrize(
     ("field", "value", "error"),
     [

@@ -44,7 +44,7 @@ def test_highest_takes_the_highest_allowed_row(rng):
 @pytest.mark.parametrize(
     ("observations", "masks", "error", "message"),
     [
-        (np.zeros((2, 2, 3)), [[1, 0], [0, 0]], ValueError, "masks is all zero in row 1"),
+        (np.zeros((2, 2, 3)), [[0, 1], [0, 0]], ValueError, "masks is all zero in row 1"),
         (np.zeros((2, 4, 3)), np.ones((2, 5)), ValueError, r"shape \(2, 5\); expected \(2, 4\)"),
         (np.zeros((2, 4, 2)), np.ones((2, 4)), ValueError, r"observations has shape \(2, 4, 2\)"),
         (np.full((1, 1, 3), np.nan), [[1]], ValueError, "observations holds nan"),

@@ -33,6 +33,14 @@ def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
     assert min(fewest) < 70  # of 128 rows
 
 
+def test_a_checkpoint_reaches_back_as_far_as_the_memory(tmp_path):
+    """Of 25 steps, where episodes of 12 steps begin together."""
+    with begun(TrainConfig(**CONTAINER), tmp_path) as run:
+        for _ in range(49):
+            run.step()
+        assert run.rollout.state()["start"] == 12
+
+
 def test_training_meets_other_loads_than_evaluate_does_with_its_seed(tmp_path):
     with begun(TrainConfig(**CONTAINER), tmp_path) as run:
         met = {observation.tobytes() for observation in run.rollout.observations}

@@ -1,12 +1,18 @@
 """Many runs side by side: what is kept, what is reported, and who does the work."""
 
 import os
+import time
+from dataclasses import replace
+from functools import partial
 
 import pandas as pd
 import pytest
 
+from tests.agent.runs import CONTAINER, assert_same
 from unload.agent import sweep
-from unload.agent.training import train
+from unload.agent.config import TrainConfig
+from unload.agent.training import train, unchanged
+from unload.load.substacks import stack_load
 from unload.reproduce.paper.grids import tuning_config
 from unload.support import files
 
@@ -35,12 +41,31 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
             tmp_path / "alone" / name / "curve.csv"
         )
         record = files.read_json(folder / "record.json")
-        assert record["peak_memory_mib"] > 50
+        assert '"digest"' in (folder / "record.json").read_text()
+        assert record["peak_memory_mib"] > 50 and 0 <= record["wall_time_s"] < 60
         assert "256/256" in (folder / "log.txt").read_text()
     written = sorted(tmp_path.glob("many/set/*/*"))
     before = [path.stat().st_mtime_ns for path in written]
     sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
     assert [path.stat().st_mtime_ns for path in written] == before
+
+
+def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path):
+    config = replace(configs["set/run_0"], log_interval=2)
+    with pytest.raises(KeyboardInterrupt, match="stopped after 192 picks"):
+        sweep._run("run", config, tmp_path / "run", unchanged, {}, sweep=0)
+    sweep.run_sweep({"run": config}, tmp_path, n_jobs=1, progress=False)
+    assert (tmp_path / "run" / "policy.safetensors").exists()
+
+
+def test_own_loads_are_trained_on_with_one_file_of_lifts(tmp_path):
+    config, own = TrainConfig(**CONTAINER), {"stack": partial(stack_load, walls=10)}
+    report = sweep.run_sweep(
+        {"run": config}, tmp_path, 1, progress=False, lifts=tmp_path / "lifts.npz", **own
+    )
+    assert report["error"].tolist() == [""] and (tmp_path / "lifts.npz").exists()
+    train(config, tmp_path / "alone", progress=False, **own)
+    assert_same(tmp_path / "run", tmp_path / "alone")
 
 
 def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):
@@ -99,7 +124,9 @@ def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path,
     message = "^2 runs wait for a worker of the Dask cluster .* has had none for 0.2 s; start one"
     cluster = distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None)
     with cluster, distributed.Client(cluster), pytest.raises(TimeoutError, match=message):
+        start = time.monotonic()
         sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
+    assert time.monotonic() - start > 0.2
 
 
 @pytest.mark.parametrize(

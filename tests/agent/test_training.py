@@ -159,6 +159,16 @@ def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
     assert 1 <= len(written) < 9
 
 
+@pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
+def test_the_target_network_follows_once_an_interval(tmp_path, monkeypatch, gamma, picks):
+    copied = []
+    with begun(TrainConfig(**CONTAINER | {"gamma": gamma}), tmp_path) as run:
+        monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
+        while not run.rollout.finished:
+            run.step()
+    assert copied == picks
+
+
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     """The second run asks PyBullet nothing, and gives the same."""
     config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"

@@ -208,6 +208,7 @@ def test_bad_numbers_of_environments_are_refused(make, num_envs, error):
         (-1, ValueError, "seed is -1"),
         (0.5, TypeError, "seed is 0.5"),
         ([1], ValueError, "seed holds 1 seeds; expected 2"),
+        ([1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
         ([1, "2"], TypeError, "seed is '2'"),
     ],
 )

@@ -61,7 +61,7 @@ def test_all_items_are_observed_if_there_are_fewer(rng):
 
 def test_rows_that_hold_an_item(rng):
     seen = rng.uniform(-1, 1, (2, 3, 6, 3)).astype(np.float32)
-    seen[0, 1, 4:] = observation.PADDING
+    seen[0, 1, 4:] = -1
     seen[1, 2, :, :2] = -1  # in the corner in two of three columns
     expected = np.ones((2, 3, 6), bool)
     expected[0, 1, 4:] = False

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_pair
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.table import LiftTable
+from unload.physics.table import FREE_LIFT, LiftTable
 
 
 def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -> np.ndarray:
@@ -68,6 +68,15 @@ def test_a_load_may_be_given_and_is_drawn(few_items, rng):
     assert array.unwrapped._containers.left.min() > 700
     array.close()
     side_by_side.close()
+
+
+def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
+    envs = ContainerVectorEnv(1)
+    envs.reset(seed=0)
+    liftable = envs.liftable()
+    monkeypatch.setattr(unload.task, "LIFT_THRESHOLD", FREE_LIFT)
+    assert_same(envs.liftable(), liftable)
+    envs.close()
 
 
 def test_fewer_boxes_may_have_more_contacts():

@@ -43,6 +43,7 @@ def test_a_mesh_holds_the_boxes_of_one_colour(full_load):
 
 def test_triangles_are_the_faces_of_their_box(boxes):
     mesh = view(boxes((1.0, 0.2), (2.0, 0.2))).data[0]
+    assert mesh.i.dtype == np.int16, "of 16 vertices"
     points = vertices(mesh)
     triangles = np.column_stack([mesh.i, mesh.j, mesh.k])
     assert set((triangles // 8).min(axis=1)) == {0, 1}
@@ -59,6 +60,8 @@ def test_the_container_has_its_true_proportions(small_load):
     assert drawn / drawn[1] == pytest.approx([2.8, 1, 1])
     ranges = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
     assert ranges == pytest.approx(drawn * 2.5)
+    eye = np.array([scene.camera.eye[axis] for axis in "xyz"])  # from the container's middle
+    assert eye * 2.5 + (3.5, 1.25, 1.25) == pytest.approx(EYE)
 
 
 def test_present_chooses_what_is_drawn(small_load):
@@ -79,9 +82,9 @@ def test_of_two_groups_the_later_one_wins(small_load):
 
 
 def test_a_group_may_be_empty(small_load):
-    figure = view(small_load, groups={"tried": []})
-    assert [trace.name for trace in figure.data] == ["tried", "unseen"]
-    assert items(figure.data[0]) == [] and len(items(figure.data[1])) == len(small_load)
+    figure = view(small_load, groups={"tried": [], "failed": [1]})
+    assert [trace.name for trace in figure.data] == ["tried", "failed", "unseen"]
+    assert [len(items(trace)) for trace in figure.data] == [0, 1, len(small_load) - 1]
 
 
 def test_an_order_shows_its_first_ten_picks(full_load):
@@ -110,7 +113,8 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
     assert "http" not in json.dumps(bundle[PLOTLY_MIMETYPE]) and bundle[PLOTLY_MIMETYPE]["data"]
     picture = base64.b64decode(bundle["image/png"])
     assert picture.startswith(b"\x89PNG")
-    assert int.from_bytes(picture[20:24]) == 300  # pixels high
+    assert int.from_bytes(picture[16:20]) == 800  # pixels wide
+    assert int.from_bytes(picture[20:24]) == 300  # and high
 
 
 @pytest.mark.parametrize(
@@ -182,6 +186,9 @@ def test_boxes_in_a_circle_are_all_drawn():
 def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
     load, moved = boxes((0.8, 0.2), (0.8, 0.6)), boxes((1.6, 0.2), (1.6, 0.6))
     both, one, none = (np.arange(2) < count for count in (2, 1, 0))
+    empty = snapshot(load, none, load.positions).mean(axis=2) / 255
+    shares = [(abs(empty - grey) < 0.006).mean() for grey in (0.87, 0.91, 0.94)]
+    assert shares == pytest.approx([0.23, 0.19, 0.08], abs=0.01), "the container's sides"
     picture = snapshot(load, both, load.positions)
     assert picture.shape == (480, 640, 3) and picture.dtype == np.uint8
     boxes_drawn = [(snapshot(load, some, load.positions) != snapshot(load, none, load.positions))
@@ -202,6 +209,7 @@ BLINDNESS = {
 @pytest.mark.parametrize("kind", BLINDNESS)
 def test_the_colour_blind_tell_all_meanings_apart(kind):
     linear = np.array(list(COLOURS.values())) ** 2.2
+    assert linear.max() <= 1
     seen = (linear @ np.transpose(BLINDNESS[kind])).clip(0, 1) ** (1 / 2.2)
     for (one, a), (other, b) in combinations(zip(COLOURS, seen), 2):
         assert np.linalg.norm(a - b) > 0.1, (one, other)

@@ -28,6 +28,7 @@ def make(kind: type, n_features: int = 16, seed: int = 0) -> torch.nn.Module:
 
 def test_permuting_the_items_permutes_the_values(kind, items, rng):
     network, batch = make(kind, 64), items(4, 128)
+    assert kind().n_features == 64
     order = torch.from_numpy(rng.permutation(128))
     values = network(batch)
     assert values.std(dim=1).min() > 1e-3

@@ -130,6 +130,7 @@ def test_a_scan_gives_the_distance_and_the_body_of_each_pixel(make_world):
     depth, bodies = world.scan((0, -2.15, 0.15), (0, 0, 0.15), 41, 31, angle=40)
     assert depth.shape == bodies.shape == (31, 41)
     assert bodies[15, 20] == box and depth[15, 20] == pytest.approx(2.0, abs=0.01)
+    assert abs((bodies == box).any(axis=0).sum() - (bodies == box).any(axis=1).sum()) <= 1
     assert bodies[0, 0] == -1 and bodies[30, 20] == 0, "the sky, and the floor"
 
 

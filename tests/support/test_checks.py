@@ -1,5 +1,6 @@
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -73,6 +74,13 @@ def test_one_of_takes_what_is_listed():
     checks.one_of("colour", None, ("red", None))
 
 
+def test_paths_and_generators(rng):
+    assert checks.path("x", "a/b") == Path("a/b") and checks.generator("x", rng) is rng
+    for check, wanted in ((checks.path, "path"), (checks.generator, "numpy.random.Generator")):
+        with pytest.raises(TypeError, match=f"x is 3; expected a {wanted}"):
+            check("x", 3)
+
+
 def test_entries_names_what_is_missing():
     checks.entries("state", {"a": 1, "b": 2, "c": 3}, ("a", "b"))
     with pytest.raises(ValueError, match="state has no a, b; expected b, a"):
@@ -94,6 +102,7 @@ def test_finite_array_returns_a_float64_copy():
     ("value", "error", "message"),
     [
         ([[1.0, 2.0]], ValueError, r"a has shape \(1, 2\); expected \(any, 3\)"),
+        ([[1.0, 2.0, 3.0, 4.0]], ValueError, r"a has shape \(1, 4\)"),
         ([1.0, 2.0, 3.0], ValueError, r"a has shape \(3,\)"),
         ([[1, 2, np.nan]], ValueError, r"a holds nan at index \(0, 2\)"),
         ([[1, -np.inf, 0]], ValueError, r"a holds -inf at index \(0, 1\)"),

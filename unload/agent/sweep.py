@@ -1,6 +1,7 @@
 """Many training runs side by side, on the cores of one machine or of a cluster."""
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -8,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import pandas as pd
 import torch
 from joblib import Parallel, delayed, parallel_config
@@ -16,6 +18,7 @@ from tqdm import tqdm
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train_changed, unchanged
+from unload.load.boxes import Load
 from unload.support import checks, files, provenance
 
 BACKENDS = ("loky", "dask")
@@ -29,12 +32,16 @@ def run_sweep(
     backend: str = "loky",
     progress: bool = True,
     changes: Mapping[str, Callable[[Training], None]] | None = None,
+    stack: Callable[[np.random.Generator], Load] | None = None,
+    lifts: str | Path | None = None,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
     A run that fails is reported and does not stop the others. Each run uses one thread, shows its
     own progress in ``log.txt`` in its folder, and leaves ``record.json`` there: the entries of
-    ``unload.support.provenance.run_record``, and ``process``.
+    ``unload.support.provenance.run_record`` (of its last part, if it had been stopped), and
+    ``process``. If this process is killed, the runs of ``"loky"`` stop with a checkpoint at the
+    next point of their curves.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -47,6 +54,7 @@ def run_sweep(
         progress: show a progress bar over the runs.
         changes: what is changed in some of the runs, by name, see ``training.train_changed``;
             functions that can be pickled.
+        stack, lifts: of all runs, see ``train``; runs side by side share the file of lifts.
 
     Returns:
         One row per run, in the order given, its name as index: ``error`` (what went wrong,
@@ -74,7 +82,8 @@ def run_sweep(
         checks.one_of("changes", name, configs)
     folders = {name: folder / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
-    jobs = {name: (name, configs[name], folders[name], changes[name]) for name in configs}
+    loads = {"stack": stack, "lifts": lifts}
+    jobs = {name: (name, configs[name], folders[name], changes[name], loads) for name in configs}
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
     with bar, parallel_config(backend=backend, n_jobs=n_jobs) as chosen:
@@ -82,7 +91,7 @@ def run_sweep(
             outcomes = _on_cluster(chosen["backend"].client, jobs)
         else:
             runs = Parallel(return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-            outcomes = runs(delayed(_run)(*job) for job in jobs.values())
+            outcomes = runs(delayed(_run)(*job, os.getpid()) for job in jobs.values())
         for name, error in outcomes:
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)
@@ -127,16 +136,30 @@ def _on_cluster(client, jobs: Mapping[str, tuple]) -> Iterator[tuple[str, str]]:
 
 
 def _run(
-    name: str, config: TrainConfig, folder: Path, change: Callable[[Training], None]
+    name: str,
+    config: TrainConfig,
+    folder: Path,
+    change: Callable[[Training], None],
+    loads: dict,
+    sweep: int | None = None,
 ) -> tuple[str, str]:
-    """Train one configuration; its name, and the error's text if it failed."""
+    """Train one configuration; its name, and the error's text if it failed.
+
+    Once the process ``sweep``, which has begun the run on this machine, is gone, nobody waits for
+    the run, and the next sweep needs its folder: it stops as after Ctrl-C.
+    """
     start = time.monotonic()
+
+    def stop_if_alone(point: dict[str, float]) -> None:
+        if sweep not in (None, os.getpid(), os.getppid()):
+            signal.raise_signal(signal.SIGINT)
+
     try:
         run = RunFolder(folder)
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if run.finished else folder / "log.txt"
         with open(log_path, "a") as log, one_thread():
-            train_changed(config, folder, change, progress=log)
+            train_changed(config, folder, change, log, callback=stop_if_alone, **loads)
         if not (folder / "record.json").exists():
             record = provenance.run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)

@@ -333,7 +333,8 @@ def _go(
                     shown = time.monotonic()
                 if callback is not None:
                     callback(point)
-            stop_if_interrupted(rollout.picks)
+            if due:  # and therefore saved
+                stop_if_interrupted(rollout.picks)
     keep_lifts()
     folder.finish(run, first_shown)
 

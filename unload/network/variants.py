@@ -29,7 +29,7 @@ class ScoringNetwork(nn.Module):
         ValueError: ``n_features`` is less than 1.
     """
 
-    def __init__(self, n_features: int = 64) -> None:
+    def __init__(self, n_features: int) -> None:
         super().__init__()
         self.n_features = checks.integer("n_features", n_features, 1)
         self.scorer = nn.Linear(n_features, 1)

@@ -191,6 +191,8 @@ def test_choice_is_that_of_the_network(batch, rng):
     values = net(torch.from_numpy(batch["observations"]))
     expected = values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
     actions = fused.best_actions(fused.weights_of(net), batch["observations"], allowed)
+    with pytest.raises(FloatingPointError, match="row 0 has no allowed action"):
+        fused.best_actions(fused.weights_of(net), batch["observations"], np.zeros_like(allowed))
     assert np.mean(actions == expected) > 0.99  # tanh may round two scores to one value
     rows = np.arange(BATCH)
     best = values.detach().numpy()
