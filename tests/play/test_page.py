@@ -314,3 +314,16 @@ def test_presets_end_where_they_say():
         results = dict(zip(cases, pool.map(lambda case: ends(*case), cases)))
     print(results)
     assert not [case for case, result in results.items() if not ENDS[case[0]](*result)], results
+
+
+@pytest.mark.slow
+def test_a_browser_shows_it(tmp_path):
+    """Clicks pick, Train draws, Reset brings the first weights back, the address the settings."""
+    pytest.importorskip("playwright", reason="make browser installs it")
+    from tests.browser.start import BROWSERS, browser
+    from tests.browser.train_page import look_at_page
+
+    if not any(map(shutil.which, BROWSERS)):
+        pytest.skip("Chromium is not installed")
+    with browser() as chromium:
+        assert not list(look_at_page(chromium, tmp_path))
