@@ -2,6 +2,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pybullet
 import pytest
 
 from tests.physics.kinds import ONE_BOX
@@ -139,3 +140,20 @@ def test_importing_is_silent_and_so_is_an_end_with_an_open_world():
     command = [sys.executable, "-c", "\n".join(lines)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_importing_needs_no_stderr():
+    script = (
+        "import os; os.close(2); from unload.physics.bullet import World; print(World().clear())"
+    )
+    done = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stdout) == (0, "None\n")
+
+
+def test_a_world_to_which_nothing_refers_is_disconnected():
+    world = World()
+    client = world._client
+    world.add_box((0, 0, 0), (1, 1, 1), 0)
+    assert pybullet.isConnected(client)
+    del world
+    assert not pybullet.isConnected(client)

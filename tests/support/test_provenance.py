@@ -73,6 +73,7 @@ def copy(tmp_path) -> Path:
 
 
 def test_the_projects_own_commit_is_its_revision(copy):
+    shutil.copy(files.ROOT / "pyproject.toml", copy)
     own = commit(copy)
     (copy / "README.md").write_text("not part of the package")
     (copy / ".gitignore").write_text("__pycache__\n")
@@ -85,3 +86,5 @@ def test_an_enclosing_repositorys_commit_is_not_the_revision(copy):
     """As where the package was copied into the work of others."""
     commit(copy.parent)
     assert revision_of_copy(copy) == "unknown"
+    commit(copy)
+    assert revision_of_copy(copy) == "unknown", "theirs, too, without our pyproject.toml"

@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 @contextmanager
 def _quiet_stderr():
     """Hide what PyBullet's C code prints while it is imported: its build time."""
-    saved = os.dup(2)
+    try:
+        saved = os.dup(2)
+    except OSError:  # stderr is closed: there is nothing to hide
+        yield
+        return
     null = os.open(os.devnull, os.O_WRONLY)
     try:
         os.dup2(null, 2)

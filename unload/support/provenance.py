@@ -5,6 +5,7 @@ import platform
 import resource
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
@@ -116,9 +117,12 @@ def revision() -> str:
         return subprocess.check_output(command, cwd=root, text=True, stderr=subprocess.DEVNULL)
 
     try:
+        project = tomllib.loads((root / "pyproject.toml").read_text())["project"]["name"]
+        if project != "unload":
+            return "unknown"
         commit = output("rev-parse", "--short=12", "HEAD").strip()
         changed = output("status", "--porcelain", "unload")
-    except (OSError, subprocess.CalledProcessError):
+    except (OSError, KeyError, tomllib.TOMLDecodeError, subprocess.CalledProcessError):
         return "unknown"
     return commit + ("+" if changed else "")
 
