@@ -85,6 +85,7 @@ def test_bad_sizes_are_refused(size, items, name):
     ],
 )
 def test_a_batch_that_does_not_fit_is_refused(change, message):
+    ReplayBuffer(1, 1)  # the smallest
     replay = ReplayBuffer(2, 4)
     replay.add(**picks(0, 2))
     with pytest.raises(ValueError, match=message):

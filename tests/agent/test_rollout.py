@@ -11,12 +11,13 @@ def test_the_bootstrap_maximum_obeys_the_mask(tmp_path, mask):
     """A failed item is out of the next state's maximum, whether training masks choices or not."""
     config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
     with begun(config, tmp_path) as run:
-        for _ in range(12):
+        for _ in range(20):
             run.step()
     stored = run.replay.arrays
     failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
     assert len(failed) > 10
     assert not stored["next_masks"][failed, stored["actions"][failed]].any()
+    assert (run.rollout.allowed & (run.rollout.masks == 0)).any() == (not mask)
 
 
 def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):

@@ -169,6 +169,12 @@ def test_the_target_network_follows_once_an_interval(tmp_path, monkeypatch, gamm
     assert copied == picks
 
 
+def test_a_policys_card_says_how_its_training_ended(tmp_path):
+    policy, curve = train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+    assert curve["success_rate"].nunique() > 3
+    assert policy.card["msr"] == {"at the end of its training": curve["success_rate"].iloc[-1]}
+
+
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     """The second run asks PyBullet nothing, and gives the same."""
     config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"

@@ -154,6 +154,7 @@ def test_spaces_and_metadata():
     assert envs.observation_space.shape == (5, 128, 3) and envs.num_envs == 5
     assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
     assert envs.spec.max_episode_steps is None  # but max_picks
+    assert not single.unwrapped.equalize and not envs.unwrapped.equalize
     assert envs.observation_space.contains(envs.reset(seed=0)[0])
     single.close()
 
@@ -210,6 +211,7 @@ def test_bad_numbers_of_environments_are_refused(make, num_envs, error):
         ([1], ValueError, "seed holds 1 seeds; expected 2"),
         ([1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
         ([1, "2"], TypeError, "seed is '2'"),
+        ([1, -1], ValueError, "seed is -1; expected an integer >= 0"),
     ],
 )
 def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):

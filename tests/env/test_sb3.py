@@ -72,6 +72,15 @@ def test_what_single_environments_only_can_do_is_refused(adapter):
             adapter.env_method(name)
     with pytest.raises(NotImplementedError, match="make new ones"):
         adapter.set_attr("max_picks", 5)
+    assert adapter.env_is_wrapped(VecMonitor) == [False, False]
+
+
+def test_an_episode_that_ends_in_both_ways_is_done(few_items):
+    envs = ContainerVecEnv(1, max_picks=2, stack=lambda rng: few_items(rng, 2))
+    envs.reset()
+    dones = [envs.step(np.array([row]))[2][0] for row in (0, 0)]
+    assert dones == [False, True]
+    envs.close()
 
 
 def test_maskable_ppo_learns_on_64_containers():

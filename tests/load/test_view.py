@@ -11,8 +11,12 @@ from matplotlib.image import imread
 from unload import view
 from unload.load.view import (
     COLOURS,
+    CORNERS,
     EYE,
+    FACES,
+    INSIDES,
     PLOTLY_MIMETYPE,
+    TRIANGLES,
     back_to_front,
     css,
     snapshot,
@@ -213,3 +217,13 @@ def test_the_colour_blind_tell_all_meanings_apart(kind):
     seen = (linear @ np.transpose(BLINDNESS[kind])).clip(0, 1) ** (1 / 2.2)
     for (one, a), (other, b) in combinations(zip(COLOURS, seen), 2):
         assert np.linalg.norm(a - b) > 0.1, (one, other)
+
+
+def test_triangles_and_faces_lie_in_the_sides_of_a_box():
+    """Twelve different triangles, and faces whose corners go round."""
+    assert len({frozenset(triangle) for triangle in TRIANGLES.tolist()}) == 12
+    assert (np.sort(np.ptp(CORNERS[TRIANGLES], axis=1), axis=1) == [0, 1, 1]).all()
+    for corners, _ in (*FACES, *INSIDES):
+        ring = CORNERS[list(corners)]
+        assert (np.abs(np.roll(ring, 1, axis=0) - ring).sum(axis=1) == 1).all()
+        assert sorted(np.ptp(ring, axis=0)) == [0, 1, 1]

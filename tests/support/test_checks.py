@@ -12,7 +12,7 @@ from unload.support import checks
 @pytest.mark.parametrize(
     ("check", "value", "arguments"),
     [
-        *((checks.integer, value, (0, 5)) for value in (2, np.int64(2), np.uint8(2))),
+        *((checks.integer, value, (0, 5)) for value in (0, 5, np.int64(2), np.uint8(2))),
         *((checks.integer, value, (1,)) for value in (10**12, np.uint64(2**63 - 1))),
         *((checks.real, value, (0, 1)) for value in (0, 1, 0.25, np.float32(0.25), np.int8(1))),
         (checks.real, np.longdouble(0.25), (0, 1)),
