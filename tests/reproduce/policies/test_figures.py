@@ -48,10 +48,3 @@ def test_bars_are_the_measured_ratios():
 def test_ways_are_compared_with_the_first():
     (axes,) = speed.cost_of_ways(pd.Series({"plain": 80.0, "fast": 20.0})).axes
     assert [text.get_text().strip() for text in axes.texts] == ["80 µs, 1 ×", "20 µs, 4 ×"]
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(1234567.0, "1,230,000"), (0.98765, "0.988"), (12.0, "12")]
-)
-def test_three_digits(value, text):
-    assert speed.three_digits(value) == text
