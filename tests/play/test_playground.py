@@ -93,6 +93,8 @@ def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
     alone, other = (Run("random", load, seed) for seed in (4, 0))
     assert np.array_equal(alone.observation, game.you.observation)
     assert not np.array_equal(alone.observed_positions(), other.observed_positions())
+    rows = [each.visible.tolist().index(each.choose()) for each in (alone, other)]
+    assert rows[0] != rows[1]
     for each in (run, alone, other):
         each.play_to(5)
     assert run.picks == alone.picks != other.picks
