@@ -1,20 +1,10 @@
 """Figures of the policies, and those of the speeds."""
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 
 from unload.reproduce.policies import comparison, figures, robustness, speed
-
-matplotlib.use("Agg")
-
-
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
 
 
 def test_every_condition_has_its_panel():
