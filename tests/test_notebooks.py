@@ -35,7 +35,7 @@ def test_every_chapter_has_solutions():
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
-def test_has_one_parameters_cell_of_upper_case_names(path):
+def test_has_one_parameters_cell_of_upper_case_names_with_the_reduced_ones(path):
     tagged = [
         cell for cell in cells(path, "code") if "parameters" in cell["metadata"].get("tags", [])
     ]
@@ -43,6 +43,7 @@ def test_has_one_parameters_cell_of_upper_case_names(path):
     names = re.findall(r"^(\w+) *=", text(tagged[0]), flags=re.MULTILINE)
     assert names
     assert all(each.isupper() for each in names)
+    assert set(run.reduced_parameters(path)) <= set(names)
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=name)
@@ -84,15 +85,6 @@ def test_a_wrong_answer_stops_every_solution():
 def test_reduced_parameters_belong_to_notebooks():
     tables = tomllib.loads((run.HERE / "reduced.toml").read_text())
     assert set(tables) <= {run.key(path) for path in NOTEBOOKS}
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
-def test_reduced_parameters_exist(path):
-    (tagged,) = [
-        cell for cell in cells(path, "code") if "parameters" in cell["metadata"].get("tags", [])
-    ]
-    names = re.findall(r"^(\w+) *=", text(tagged), flags=re.MULTILINE)
-    assert set(run.reduced_parameters(path)) <= set(names)
 
 
 def test_unknown_parameter_is_refused(tmp_path):

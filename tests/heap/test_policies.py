@@ -70,18 +70,11 @@ def test_outcomes_of_an_episode_are_those_that_were_played(make_heap_env, make_r
         outcomes(episode, make_rake("whole"))
 
 
-def test_the_oracle_picks_the_box_that_brings_most(make_heap_env, cubes):
-    """Of a row of three and a single box, the rear one of the row brings all three."""
-    heap = cubes((4.8, 0.5, 0), (5.21, 0.5, 0), (5.62, 0.5, 0), (5.62, 2.0, 0))
-    env = make_heap_env(heaps=[heap])
-    oracle = Oracle(env, falls_weight=1.0)
-    episode = play(env, oracle, heap, 0)
-    oracle.close()
-    assert int(episode.boxes[0]) == 0 and episode.unloaded[0] == 3
-
-
 def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes, monkeypatch):
-    """A first physics in which all boxes look alike leaves the choice to the second."""
+    """A first physics in which all boxes look alike leaves the choice to the second.
+
+    Of a single box and a row of three, the rear one of the row brings all three.
+    """
     heap = cubes((5.62, 2.0, 0), (4.8, 0.5, 0), (5.21, 0.5, 0), (5.62, 0.5, 0))
     env = make_heap_env(heaps=[heap])
     oracle = Oracle(env, falls_weight=1.0, physics="coarse")

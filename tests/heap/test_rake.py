@@ -43,23 +43,21 @@ def test_a_free_box_comes_alone(cubes, make_rake, physics):
     assert outcome.unloaded.tolist() == [True] and len(outcome.heap) == 0
 
 
-def test_boxes_before_the_dragged_one_are_pushed_over_the_edge(cubes, make_rake):
-    row = cubes((4.5, 1, 0), (4.91, 1, 0), (5.32, 1, 0), (5.32, 2, 0))
-    outcome = make_rake().pick(row, 0)
-    assert outcome.unloaded.tolist() == [True, True, True, False]
-    assert outcome.left.tolist() == [3]
-    assert outcome.heap.positions[0] == pytest.approx(row.positions[3], abs=0.005)
-
-
-def test_a_box_too_far_behind_pushes_none_over_the_edge(cubes, make_rake):
-    row = cubes((4.5, 1, 0), (6, 1, 0), (6.5, 2, 0))
-    assert make_rake().pick(row, 0).unloaded.tolist() == [True, False, False]
-
-
-def test_boxes_that_lie_outside_do_not_push_the_edge_away(cubes, make_rake):
-    """The third reaches to 7.39 m; the second is pushed to 7.28 m, past the edge at 7.2 m."""
-    heap = cubes((6.0, 1, 0), (6.5, 1, 0), (7.19, 2, 0))
-    assert make_rake().pick(heap, 0).unloaded.tolist() == [True, True, False]
+@pytest.mark.parametrize(
+    ("places", "unloaded"),
+    [
+        (((4.5, 1, 0), (4.91, 1, 0), (5.32, 1, 0), (5.32, 2, 0)), [True, True, True, False]),
+        (((4.5, 1, 0), (6, 1, 0), (6.5, 2, 0)), [True, False, False]),  # too far behind
+        # The third reaches to 7.39 m; the second is pushed to 7.28 m, past the edge at 7.2 m.
+        (((6.0, 1, 0), (6.5, 1, 0), (7.19, 2, 0)), [True, True, False]),
+    ],
+)
+def test_boxes_before_the_dragged_one_are_pushed_over_the_edge(cubes, make_rake, places, unloaded):
+    heap = cubes(*places)
+    outcome = make_rake().pick(heap, 0)
+    assert outcome.unloaded.tolist() == unloaded
+    assert outcome.left.tolist() == np.flatnonzero(~outcome.unloaded).tolist()
+    assert outcome.heap.positions[-1] == pytest.approx(heap.positions[-1], abs=0.005)
 
 
 def test_too_heavy_a_row_does_not_come(cubes, make_rake):

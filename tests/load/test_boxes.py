@@ -127,15 +127,6 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
         load_of(np.vstack([low, other_low]), np.vstack([high, other_high]))
 
 
-def corners_of(load):
-    return load.positions - load.sizes / 2, load.positions + load.sizes / 2
-
-
-def test_slabs_are_the_walls(full_load):
-    low, high = corners_of(full_load)
-    assert (slabs(low[:, 0] + 1e-6, high[:, 0]) == full_load.walls).all()
-
-
 def test_slabs_join_what_overlaps_in_a_chain():
     groups = slabs(np.array([0.0, 5.0, 0.5, 1.5]), np.array([1.0, 6.0, 2.0, 3.0]))
     assert groups.tolist() == [0, 1, 0, 0]

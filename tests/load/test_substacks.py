@@ -85,13 +85,6 @@ def test_colours_of_packages_are_their_codes_and_begin_again():
     assert package_colour(13) == package_colour(0) and len(set(PACKAGE_COLOURS)) == 13
 
 
-def test_the_same_seed_gives_the_same_load_byte_for_byte():
-    first, second, other = (stack_load(np.random.default_rng(seed)) for seed in (5, 5, 6))
-    for name in FIELDS:
-        assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
-    assert first.positions.tobytes() != other.positions.tobytes()
-
-
 def test_build_load_places_the_walls_from_the_rear():
     load = build_load(np.zeros((2, 3, 4), dtype=int))
     assert np.unique(load.positions[:, 0]).tolist() == [1.75, 5.25]
@@ -151,35 +144,24 @@ def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
 # --- bad input ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("variants", "error", "message"),
-    [
-        (np.zeros((3, 4), dtype=int), ValueError, r"shape \(3, 4\); expected \(any, any, 4\)"),
-        (np.zeros((0, 3, 4), dtype=int), ValueError, "variants has no walls"),
-        (np.zeros((12, 0, 4), dtype=int), ValueError, "variants has no rows"),
-        (np.zeros((1, 3, 5), dtype=int), ValueError, r"expected \(any, any, 4\)"),
-        (np.zeros((1, 3, 4)), TypeError, "dtype float64; expected integers"),
-        (np.full((1, 3, 4), 3), ValueError, "variants holds 3 to 3; expected 0 to 2"),
-        (np.full((1, 3, 4), -1), ValueError, "variants holds -1 to -1; expected 0 to 2"),
-    ],
-)
-def test_bad_variants_are_refused(variants, error, message):
-    with pytest.raises(error, match=message):
-        build_load(variants)
+BAD_INPUT = {
+    r"shape \(3, 4\); expected \(any, any, 4\)": lambda rng: build_load(np.zeros((3, 4), int)),
+    r"expected \(any, any, 3\)": lambda rng: build_load(np.zeros((1, 3, 4), int), scale=1.2),
+    "variants has no walls": lambda rng: build_load(np.zeros((0, 3, 4), int)),
+    "variants has no rows": lambda rng: build_load(np.zeros((12, 0, 4), int)),
+    "dtype float64; expected integers": lambda rng: build_load(np.zeros((1, 3, 4))),
+    "variants holds 3 to 3; expected 0 to 2": lambda rng: build_load(np.full((1, 3, 4), 3)),
+    "variants holds -1 to -1; expected 0 to 2": lambda rng: build_load(np.full((1, 3, 4), -1)),
+    "inside the container": lambda rng: build_load(np.zeros((1, 4, 4), int)),
+    "rng is 0; expected a numpy.random.Generator": lambda rng: stack_load(0),
+    "walls is 0": lambda rng: stack_load(rng, walls=0),
+    r"scale is 0.1; expected .*\[0.5, 1.5\]": lambda rng: stack_load(rng, scale=0.1),
+    "scale is '1'": lambda rng: stack_load(rng, scale="1"),
+    "count is 2": lambda rng: front_walls(stack_load(rng, walls=1), 2),
+}
 
 
-def test_bad_arguments_of_stack_load_are_refused(rng):
-    with pytest.raises(TypeError, match="rng is 0; expected a numpy.random.Generator"):
-        stack_load(0)
-    with pytest.raises(ValueError, match="walls is 0"):
-        stack_load(rng, walls=0)
-    with pytest.raises(ValueError, match=r"scale is 0.1; expected .*\[0.5, 1.5\]"):
-        stack_load(rng, scale=0.1)
-    with pytest.raises(TypeError, match="scale is '1'"):
-        stack_load(rng, scale="1")
-    with pytest.raises(ValueError, match=r"variants has shape .* expected \(any, any, 3\)"):
-        build_load(np.zeros((1, 3, 4), dtype=int), scale=1.2)
-    with pytest.raises(ValueError, match="inside the container"):
-        build_load(np.zeros((1, 4, 4), dtype=int))
-    with pytest.raises(ValueError, match="count is 2"):
-        front_walls(stack_load(rng, walls=1), 2)
+@pytest.mark.parametrize("message", BAD_INPUT)
+def test_bad_input_is_refused(rng, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        BAD_INPUT[message](rng)

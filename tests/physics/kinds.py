@@ -1,8 +1,13 @@
-"""The three physics, and the appendix's distances."""
+"""The three physics, the appendix's distances, and lifts one after the other."""
 
+from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
 KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
 ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg
+
+
+def lifts(physics: Physics, items) -> list[float]:
+    return [physics.lift(int(item)) for item in items]

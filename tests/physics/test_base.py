@@ -5,15 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES
+from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES, lifts
 from unload.load.boxes import SMALLEST_EDGE, Load
 from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
 from unload.physics.situation import Surroundings
-
-
-def lifts(physics: Physics, items) -> list[float]:
-    return [physics.lift(int(item)) for item in items]
 
 
 @pytest.mark.parametrize("kind", KINDS)

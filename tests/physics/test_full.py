@@ -4,15 +4,10 @@ import numpy as np
 import pybullet
 import pytest
 
+from tests.physics.kinds import lifts
 from unload import task
 from unload.load.substacks import stack_load
-from unload.physics.base import Physics
 from unload.physics.bullet import World
-
-
-def lifts(physics: Physics, items) -> list[float]:
-    return [physics.lift(int(item)) for item in items]
-
 
 # --- effects of a lift --------------------------------------------------------------
 

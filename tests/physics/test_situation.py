@@ -88,18 +88,6 @@ def test_whatever_may_matter_is_in_the_key(boxes, change):
     assert surroundings(load).situation(item).key != alone.key
 
 
-def test_a_neat_load_stands_and_its_highest_centre_is_free(full_load):
-    around = surroundings(full_load)
-    low = full_load.positions[:, 2] - full_load.sizes[:, 2] / 2
-    for item in range(len(full_load)):
-        situation = around.situation(item)
-        supports = situation.boxes[situation.dynamic :]
-        below = supports[:, 2] + supports[:, 5] // 2 <= -(situation.boxes[0, 5] // 2) + 1
-        assert (situation.floor is not None) == (low[item] < CELL / 2)
-        assert situation.floor is not None or below.any()
-    assert around.on_top(int(np.argmax(full_load.positions[:, 2]))) == []
-
-
 def test_on_top_agrees_with_a_plain_definition(small_load):
     low = small_load.positions - small_load.sizes / 2
     high = small_load.positions + small_load.sizes / 2

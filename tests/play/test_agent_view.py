@@ -62,13 +62,6 @@ def test_a_view_stands_beside_the_widget(stuck):
     assert {PLOTLY_MIMETYPE, "image/png"} <= set(stuck._repr_mimebundle_())
 
 
-def test_bad_input_is_refused():
-    with pytest.raises(ValueError, match="agent is 'random'; expected one of"):
-        AgentView(agent="random")
-    with pytest.raises(ValueError, match="picks is -1"):
-        AgentView(picks=-1)
-
-
 @pytest.fixture
 def seen(full_load):
     """Positions of visible items, and which can be lifted, in the order of height."""

@@ -5,10 +5,12 @@ import pytest
 
 from unload import stack_load
 from unload.load.view import PLOTLY_MIMETYPE
+from unload.play.agent_view import AgentView
 from unload.play.canvas import ABSENT
 from unload.play.episode import Episode
 from unload.play.players import Run
 from unload.play.playground import SHOWN, Playground
+from unload.play.replay import replay
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -89,6 +91,10 @@ def test_what_the_browser_sends_is_shown_as_text(game):
 def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
     load, run = stack_load(np.random.default_rng(4)), game.runs["random"]
     alone, other = (Run("random", load, seed) for seed in (4, 0))
+    assert np.array_equal(alone.observation, game.you.observation)
+    assert not np.array_equal(alone.observed_positions(), other.observed_positions())
+    rows = [each.visible.tolist().index(each.choose()) for each in (alone, other)]
+    assert rows[0] != rows[1]
     for each in (run, alone, other):
         each.play_to(5)
     assert run.picks == alone.picks != other.picks
@@ -153,15 +159,24 @@ def test_a_replay_stands_beside_the_widget(game):
     assert labels[-1] == "20 picks, 20 unloaded"
 
 
-@pytest.mark.parametrize(
-    ("kwargs", "error", "message"),
-    [
-        ({"seed": -1}, ValueError, "seed is -1"),
-        ({"player": "me"}, ValueError, "player is 'me'; expected one of 'you', 'random'"),
-        ({"mask": None}, TypeError, "mask is None"),
-        ({"picks": 0}, ValueError, "picks is 0"),
-    ],
-)
-def test_bad_input_is_refused(kwargs, error, message):
-    with pytest.raises(error, match=message):
-        Playground(**kwargs)
+BAD_INPUT = {
+    "agent is 'random'; expected one of": lambda load: AgentView(agent="random"),
+    "picks is -1": lambda load: AgentView(picks=-1),
+    "load is 'load'; expected an unload.Load": lambda load: Episode("load"),
+    "count is 1; expected an integer >= 0 and <= 0": lambda load: Episode(load).back_to(1),
+    "player is 'chess'; expected one of 'random'": lambda load: Run("chess", load),
+    "mask is 1; expected True or False": lambda load: Run("random", load, mask=1),
+    "count is -1": lambda load: Run("random", load).play_to(-1),
+    "seed is -1": lambda load: Playground(seed=-1),
+    "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
+    "mask is None": lambda load: Playground(mask=None),
+    "picks is 0": lambda load: Playground(picks=0),
+    "height is 10": lambda load: replay(Episode(load), height=10),
+}
+
+
+@pytest.mark.parametrize("message", BAD_INPUT)
+def test_bad_input_is_refused(full_load, message):
+    """In all modules of this room; the message names the argument and its value."""
+    with pytest.raises((TypeError, ValueError), match=message):
+        BAD_INPUT[message](full_load)

@@ -1,5 +1,4 @@
 import numpy as np
-import pytest
 
 from unload.play.episode import Episode
 from unload.play.players import Run
@@ -44,8 +43,3 @@ def test_slider_and_frames_have_the_same_stops(full_load):
     play, pause = figure.layout.updatemenus[0].buttons
     assert play.args[0] is None and list(pause.args[0]) == [None]
     assert play.args[1]["frame"]["duration"] == PAUSE and play.args[1]["fromcurrent"]
-
-
-def test_bad_input_is_refused(boxes):
-    with pytest.raises(ValueError, match="height is 10"):
-        replay(Episode(boxes((1.0, 0.2))), height=10)

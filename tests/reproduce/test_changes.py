@@ -1,7 +1,6 @@
 """Changes of a training run."""
 
 import numpy as np
-import pytest
 
 from unload import TrainConfig
 from unload.agent.training import Training
@@ -23,8 +22,3 @@ def test_height_reward_shapes_what_is_learned_and_not_what_is_seen():
     assert plain.curve.sums == shaped.curve.sums
     for run in (plain, shaped):
         run.rollout.close()
-
-
-def test_height_reward_is_a_share():
-    with pytest.raises(ValueError, match="share is 1.5; expected"):
-        height_reward(1.5)

@@ -4,7 +4,6 @@ import json
 import re
 from functools import partial
 
-import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -27,8 +26,6 @@ from unload.reproduce.policies import figures as policies
 from unload.reproduce.policies.speed import speed_ratios
 from unload.reproduce.variants.grids import GRIDS, variants_msr
 from unload.support import files
-
-matplotlib.use("Agg")
 
 LOAD = stack_load(np.random.default_rng(0))
 VISIBLE = nearest(LOAD.positions)
@@ -91,12 +88,6 @@ FIGURES = FROM_DATA | {
         {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}
     ),
 }
-
-
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
 
 
 @pytest.mark.parametrize("name", FIGURES)

@@ -80,8 +80,3 @@ def test_a_shorter_grid_is_published_elsewhere(small, trained):
     grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1, progress=False)
     assert (trained / "some/small_loss.csv").read_bytes() == before
     assert read_provenance(trained / "reduced/some", "small")["reduced"]
-
-
-def test_an_unknown_cell_is_refused(small, tmp_path):
-    with pytest.raises(ValueError, match="cells is 'nonsense'"):
-        grid.train_grid(small, ["nonsense"], folder=tmp_path)

@@ -52,6 +52,7 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
             for value in (1, 0, 1.0, None, "yes", np.array([True]))
         ),
         (checks.jobs, 2.0, (), TypeError, f"an integer >= {-checks.LARGEST}"),
+        (checks.jobs, 0, (), ValueError, "a number of processes, or -1 for one per core"),
         *(
             (checks.one_of, value, (("red", None, 1),), ValueError, "one of 'red', None, 1")
             for value in ("blue", np.array(["red"]), torch.ones(2), ["red"], float("nan"))
@@ -62,11 +63,6 @@ def test_what_does_not_fit_is_refused_by_name_and_value(check, value, arguments,
     with pytest.raises(error) as caught:
         check("n", value, *arguments)
     assert str(caught.value) == f"n is {value!r}; expected {wanted}"
-
-
-def test_zero_is_no_number_of_processes():
-    with pytest.raises(ValueError, match="n is 0; expected a number of processes, or -1"):
-        checks.jobs("n", 0)
 
 
 def test_one_of_takes_what_is_listed():

@@ -14,12 +14,8 @@ from unload.reproduce.falls.cells import CONFIG
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
 
-def observations(rng, count=5):
-    return equalize(rng.random((count, 128, 3)))
-
-
 def test_mirrored_places_keep_their_size_and_heights_are_untouched():
-    seen = observations(np.random.default_rng(0), 200)
+    seen = equalize(np.random.default_rng(0).random((200, 128, 3)))
     found = changes.mirror(seen.copy(), np.random.default_rng(1))
     signs = found[:, :, :2] / seen[:, :, :2]
     assert (found[..., 2] == seen[..., 2]).all()
@@ -37,6 +33,15 @@ def run_of(change, steps=3, config=SMALL):
         run.step()
     run.rollout.close()
     return run, np.concatenate(seen)
+
+
+def note_what_is_asked(run):
+    """The observations of greedy choices, which all become that of the first item."""
+    asked = []
+    run.agent.learner.best_actions = lambda observations, allowed: (
+        asked.append(observations) or np.zeros(len(allowed), np.int64)
+    )
+    return asked
 
 
 def remembered(run):
@@ -63,10 +68,7 @@ def test_the_setting_shuffles_as_the_change_does():
 
 def test_what_is_seen_is_changed_in_choosing_and_learning():
     run = Training(SMALL)
-    asked = []
-    run.agent.learner.best_actions = lambda observations, allowed: (
-        asked.append(observations) or np.zeros(len(allowed), np.int64)
-    )
+    asked = note_what_is_asked(run)
     changes.see(run, changes.without)
     run.step()
     run.agent.choose(run.rollout.observations, run.rollout.allowed, 0.0, run.rng)
@@ -115,10 +117,7 @@ def test_a_teacher_chooses_by_height_and_its_preference():
 
 def test_choices_see_other_signs_than_the_memory_holds():
     run = Training(SMALL)
-    asked = []
-    run.agent.learner.best_actions = lambda observations, allowed: (
-        asked.append(observations) or np.zeros(len(allowed), np.int64)
-    )
+    asked = note_what_is_asked(run)
     changes.untilted(run, axes=(1,))
     seen = run.rollout.observations.copy()
     run.agent.choose(seen, run.rollout.allowed, 0.0, run.rng)
@@ -157,11 +156,9 @@ def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
     run, _ = run_of(partial(changes.tandem, change=lambda run: None, seed=50), steps=4)
     first = Training(SMALL).agent.state()
     assert run.agent.choose.__self__ is not run.agent
-    active = run.agent.choose.__self__.state()
-    assert not np.array_equal(active["network.extractor.weight"], alone.agent.state()[
-        "network.extractor.weight"])  # it has learned  # fmt: skip
-    assert not np.array_equal(run.agent.state()["network.extractor.weight"], first[
-        "network.extractor.weight"])  # fmt: skip
+    active, weight = run.agent.choose.__self__.state(), "network.extractor.weight"
+    assert not np.array_equal(active[weight], alone.agent.state()[weight]), "it has learned"
+    assert not np.array_equal(run.agent.state()[weight], first[weight])
     assert len(run.replay) == 256
 
 

@@ -23,11 +23,6 @@ def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
     assert not (tmp_path / "falls").exists()
 
 
-def test_an_unknown_cell_is_refused():
-    with pytest.raises(ValueError, match="cells is 'nonsense'"):
-        laboratory.laboratory_data(["nonsense"])
-
-
 def test_cells_differ_from_the_first_in_what_they_are_named_for():
     plain = cells.CELLS["ranks"].config
     assert cells.CELLS["ranks_no_mask"].config.mask is False and plain.mask

@@ -122,19 +122,3 @@ def test_committed_lifts_can_be_computed_again(committed, asker):
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
     assert (frame[columns] == first[columns]).all(axis=None)
     assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("lifts", "full", "message"),
-    [(0, 0, "lifts is 0"), (10, 11, "full is 11"), (10, -1, "full is -1")],
-)
-def test_impossible_counts_are_refused(tmp_path, lifts, full, message):
-    with pytest.raises(ValueError, match=message):
-        agreement.agreement_data(lifts, full, folder=tmp_path, runs_dir=tmp_path)
-
-
-def test_unknown_names_are_refused(committed):
-    with pytest.raises(ValueError, match="policy is 'lowest'"):
-        next(agreement.container_states("lowest", 0))
-    with pytest.raises(ValueError, match="other is 'mujoco'"):
-        agreement.disagreements(committed, "local", "mujoco")

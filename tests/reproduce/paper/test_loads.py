@@ -59,18 +59,3 @@ def test_a_wall_view_shows_the_boxes_of_the_wall_to_scale(load):
         assert (box.get_width(), box.get_height()) == pytest.approx(load.sizes[item, 1:])
         assert box.get_center() == pytest.approx(load.positions[item, 1:])
     assert [text.get_text() for text in figure.legends[0].texts] == ["unseen", "visible"]
-
-
-LOAD = stack_load(np.random.default_rng(0))
-
-
-@pytest.mark.parametrize(
-    ("draw", "arguments", "message"),
-    [
-        (side_views, (LOAD.positions, {"": {"seen": np.arange(2)}}), "a group's name is 'seen'"),
-        (wall_view, (LOAD, 11, {"seen": np.arange(2)}), "a group's name is 'seen'"),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused(draw, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        draw(*arguments)

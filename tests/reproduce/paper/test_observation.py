@@ -1,6 +1,5 @@
 """Figs. 4–6: their data, what they show, and what is visible."""
 
-import matplotlib
 import numpy as np
 import pandas as pd
 
@@ -10,8 +9,6 @@ from unload.load.view import COLOURS
 from unload.reproduce.paper import observation
 from unload.support import files
 from unload.support.provenance import read_provenance
-
-matplotlib.use("Agg")
 
 NAMES = ("all_items", "Observation", "Equalized_Observation")
 

@@ -50,15 +50,3 @@ def test_every_rule_has_its_name():
 @pytest.mark.parametrize("name", ["comparison", "robustness"])
 def test_committed_data_is_of_the_committed_policies(name):
     assert read_provenance(files.DATA / "policies", name)["settings"]["policies"] == digests()
-
-
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (lambda folder: find_policy("lowest"), ValueError, "name is 'lowest'"),
-        (lambda folder: comparison_data(0, folder), ValueError, "loads is 0"),
-    ],
-)
-def test_bad_input_is_refused_by_name(tmp_path, call, error, message):
-    with pytest.raises(error, match=message):
-        call(tmp_path)

@@ -1,20 +1,10 @@
 """Figures of the policies, and those of the speeds."""
 
-import matplotlib
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 
 from unload.reproduce.policies import comparison, figures, robustness, speed
-
-matplotlib.use("Agg")
-
-
-@pytest.fixture(autouse=True)
-def close_figures():
-    yield
-    plt.close("all")
 
 
 def test_every_condition_has_its_panel():
@@ -48,10 +38,3 @@ def test_bars_are_the_measured_ratios():
 def test_ways_are_compared_with_the_first():
     (axes,) = speed.cost_of_ways(pd.Series({"plain": 80.0, "fast": 20.0})).axes
     assert [text.get_text().strip() for text in axes.texts] == ["80 µs, 1 ×", "20 µs, 4 ×"]
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(1234567.0, "1,230,000"), (0.98765, "0.988"), (12.0, "12")]
-)
-def test_three_digits(value, text):
-    assert speed.three_digits(value) == text

@@ -73,20 +73,3 @@ def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(robustness, "play", lambda *_: pytest.fail("played again"))
     robustness.robustness_data(2, 2, tmp_path, tmp_path / "runs", progress=False)
     assert (tmp_path / "policies/robustness.csv").read_text() == written
-
-
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (lambda: robustness.robustness_data(0), ValueError, "episodes is 0"),
-        (lambda: robustness.robustness_data(1, 101), ValueError, "picks is 101"),
-        (
-            lambda: robustness.play(policies.random, "keep", 0, 280, piles),
-            ValueError,
-            "expected more than picks=280 items",
-        ),
-    ],
-)
-def test_bad_input_is_refused_by_name(call, error, message):
-    with pytest.raises(error, match=message):
-        call()

@@ -1,4 +1,4 @@
-"""The grids of the outlook: their plans, what they publish, and what is refused."""
+"""The grids of the outlook: their plans, and what they publish."""
 
 from dataclasses import asdict, replace
 
@@ -8,13 +8,7 @@ from unload import TrainConfig, evaluate, load_policy
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.grid import read_measures
 from unload.reproduce.variants import grids
-from unload.reproduce.variants.grids import (
-    GRIDS,
-    judged,
-    read_variants,
-    variants_data,
-    variants_msr,
-)
+from unload.reproduce.variants.grids import GRIDS, judged, read_variants, variants_data
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -89,24 +83,3 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
     provenance = read_provenance(tmp_path, "variants/recommended")
     assert provenance["fingerprint"] == training_fingerprint()
     assert not load_policy(tmp_path / "policies/recommended.safetensors").equalize
-
-
-@pytest.mark.parametrize(
-    ("call", "error", "message"),
-    [
-        (
-            lambda folder: variants_data(["nothing"], folder=folder),
-            ValueError,
-            "grids is 'nothing'",
-        ),
-        (lambda folder: variants_msr("nothing", folder), ValueError, "grid is 'nothing'"),
-        (
-            lambda folder: variants_msr("networks", folder),
-            FileNotFoundError,
-            "networks.csv is missing; python -m unload.reproduce variants makes it",
-        ),
-    ],
-)
-def test_bad_input_is_refused_by_name(tmp_path, call, error, message):
-    with pytest.raises(error, match=message):
-        call(tmp_path)
