@@ -17,7 +17,8 @@ def shuffle_places(
     """
     keys = rng.random(observations.shape[:2])
     if present is not None:
-        keys = np.where(present, keys, 1 + np.arange(keys.shape[1]))  # others stay
+        # Rows without an item stay behind the others, in their order.
+        keys = np.where(present, keys, 1 + np.arange(keys.shape[1]))
     order = keys.argsort(axis=1)
     shuffled = observations.copy()
     shuffled[..., :2] = observations[np.arange(len(order))[:, np.newaxis], order, :2]

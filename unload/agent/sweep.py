@@ -18,7 +18,7 @@ from tqdm import tqdm
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train_changed, unchanged
-from unload.load.boxes import Load
+from unload.load.boxes import Load, check_stack
 from unload.support import checks, files, provenance
 
 BACKENDS = ("loky", "dask")
@@ -80,6 +80,10 @@ def run_sweep(
     checks.entries("changes", changes or {}, ())
     for name in changes or {}:
         checks.one_of("changes", name, configs)
+    if stack is not None:
+        check_stack(stack)
+    if lifts is not None:
+        lifts = checks.path("lifts", lifts)
     folders = {name: folder / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     loads = {"stack": stack, "lifts": lifts}

@@ -64,7 +64,9 @@ def fresh_job(state: State, item: int, walls: int) -> tuple[dict, Callable[[], f
     """
     left, items = boxes_left(state, state.load.walls[item], walls)
     box = int(np.searchsorted(items, item))
-    return _question(left, item=box), partial(fresh_distance, left, box)
+    boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
+    question = {"settings": SETTINGS, "boxes": boxes, "item": box}
+    return question, partial(fresh_distance, left, box)
 
 
 def fresh_distance(load: Load, item: int) -> float:
@@ -74,8 +76,3 @@ def fresh_distance(load: Load, item: int) -> float:
     distance = physics.lift(item)
     physics.close()
     return distance
-
-
-def _question(load: Load, **rest) -> dict:
-    boxes = blake2b(load.positions.tobytes() + load.sizes.tobytes(), digest_size=16).hexdigest()
-    return {"settings": SETTINGS, "boxes": boxes} | rest
