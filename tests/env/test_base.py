@@ -154,7 +154,8 @@ def test_spaces_and_metadata():
     assert envs.observation_space.shape == (5, 128, 3) and envs.num_envs == 5
     assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
     assert envs.spec.max_episode_steps is None  # but max_picks
-    assert not single.unwrapped.equalize and not envs.unwrapped.equalize
+    for env in (single, envs, gymnasium.make(HIGHEST), gymnasium.make_vec(HIGHEST, 2)):
+        assert not env.unwrapped.equalize
     assert envs.observation_space.contains(envs.reset(seed=0)[0])
     single.close()
 

@@ -167,7 +167,7 @@ def test_every_weight_has_a_gradient(kind, items, padded):
     [
         *(
             (torch.zeros(shape), None, ValueError, r"observations has shape .*expected \(batch, ")
-            for shape in [(4, 3), (2, 4, 2), (2, 0, 3)]
+            for shape in [(4, 3), (2, 4, 2), (2, 4, 4), (2, 0, 3)]
         ),
         (np.zeros((1, 4, 3)), None, TypeError, "observations is a ndarray; expected a tensor"),
         (torch.zeros((1, 4, 3), dtype=int), None, TypeError, "dtype torch.int64; expected torch."),
