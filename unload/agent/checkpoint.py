@@ -16,12 +16,6 @@ from unload.agent.rollout import Rollout
 from unload.support import checks, files
 
 FORMAT = 5  # of the checkpoints
-# Settings that there were once, or not yet. A run with these values, or without these settings, is
-# as one of today.
-FORMER = {
-    "drift": "noise", "staggered": False, "literal": False, "failures_kept": 0.0,
-    "height_reward": 0.0, "snapshots": 0, "shuffle_places": False,
-}  # fmt: skip
 # Of a ``Training``: what has a state besides the generator.
 STATEFUL = ("agent", "curve", "rollout")
 
@@ -192,8 +186,7 @@ class RunFolder:
         """Raise ValueError unless a stored configuration is ``config``."""
         wanted = json.loads(json.dumps(asdict(config)))
         # How often it is saved changes nothing in a run.
-        names = [name for name in FORMER | wanted | stored if name != "checkpoint_interval"]
-        stored, wanted = FORMER | stored, FORMER | wanted
+        names = [name for name in wanted | stored if name != "checkpoint_interval"]
         differing = [name for name in names if stored.get(name) != wanted.get(name)]
         if differing:
             details = ", ".join(
