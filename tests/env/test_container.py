@@ -1,3 +1,5 @@
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
@@ -7,6 +9,8 @@ from gymnasium.utils.env_checker import check_env
 from tests.env.comparing import FailingStack, assert_same, state_of
 from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
+from unload.env.vector import ContainerVectorEnv
+from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.substacks import build_load
 from unload.load.view import snapshot
 
@@ -274,10 +278,15 @@ def test_bad_options_leave_the_episode_as_it_was(options, error, message):
     env.close()
 
 
-def test_a_stack_of_something_else_is_refused(make_env):
-    env = make_env(stack=lambda rng: "boxes")
-    with pytest.raises(TypeError, match="load is 'boxes'; expected an unload.Load"):
-        env.reset(seed=0)
+@pytest.mark.parametrize("make", [ContainerEnv, partial(ContainerVectorEnv, 2)])
+def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
+    tower = boxes((1.2, 0.2), (1.2, 0.6 + 2 * CONTACT_TOLERANCE))
+    with pytest.raises(TypeError, match="what stack returned is 'boxes'; expected an unload.Load"):
+        make(stack=lambda rng: "boxes").reset(seed=0)
+    with pytest.raises(ValueError, match="what stack returned has 1 floating boxes: .* 0.4002 m"):
+        make(stack=lambda rng: tower).reset(seed=0)
+    with pytest.raises(ValueError, match="load has 1 floating boxes"):
+        make().reset(options={"load": tower})
 
 
 @pytest.mark.parametrize("number", [1, 2])

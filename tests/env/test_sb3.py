@@ -55,6 +55,9 @@ def test_options_hold_for_the_next_reset(rng):
     envs.set_options({"load": stack_load(rng)})
     assert np.array_equal(*envs.reset())
     assert not np.array_equal(*envs.reset())
+    envs.set_options([{}, {"load": stack_load(rng)}])
+    with pytest.raises(ValueError, match="options is .*; expected the same for all environments"):
+        envs.reset()
     envs.close()
 
 

@@ -218,7 +218,7 @@ BAD_INPUT = {
     "heaps is empty": lambda r: r.env(heaps=[]),
     r"heaps\[0\] holds no box": lambda r: r.env(heaps=[r.pile.only(np.array([], int))]),
     r"heaps\[0\] is 3; expected a Heap": lambda r: r.env(heaps=[3]),
-    "one of 'heap'": lambda r: r.env().reset(options={"load": r.pile}),
+    "; expected heap": lambda r: r.env().reset(options={"load": r.pile}),
     "a column is 'colour'; expected one of 'behind'": lambda r: linear({"colour": 1}),
     "masks is all zero in row 0": lambda r: RULES["highest"](r.seen, 0 * r.masks, r.rng),
     "observations has shape": lambda r: RULES["highest"](r.seen[..., :3], r.masks, r.rng),

@@ -62,17 +62,17 @@ def test_a_load_that_is_written_is_read_again(written, rng):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (["a,0,0,0,1,1,1", "b,0,0.5,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'b'\) overlap"),
-        (["a,0,0,0,1,1,1", "b,0,0,1.001,1,1,1"], r": row 2 \(id 'b'\) float; expected"),
-        (["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"], r": row 2 \(id 'b'\) stick out of the container"),
-        (["a,0,0,0,1,1,1", "b,1,0,-0.1,1,1,1"], r": row 2 \(id 'b'\) stick out"),
-        (["a,0,0,0,1,1,1", "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\) share an id"),
-        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\) hold no number"),
-        (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\) hold no number"),
-        (["a,0,0,0,1,1,inf"], r": row 1 \(id 'a'\) hold no number"),
-        ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r": row 1 \(id 'a'\) are too small"),
-        (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\) are too small"),
-        ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more stick out"),
+        (["a,0,0,0,1,1,1", "b,0,0.5,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'b'\): boxes"),
+        (["a,0,0,0,1,1,1", "b,0,0,1.001,1,1,1"], r": row 2 \(id 'b'\): a box that floats.* 1.001"),
+        (["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"], r"'b'\): a box from \[6.5 0.  0. \] to \[7.5 1.  1"),
+        (["a,0,0,0,1,1,1", "b,1,0,-0.1,1,1,1"], r": row 2 \(id 'b'\): a box from"),
+        (["a,0,0,0,1,1,1", "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
+        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): size_z is 'wide'; expected a length in m"),
+        (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\): size_z is ''; expected a length"),
+        (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): z_min is 'inf'; expected a length"),
+        ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r"'a'\): edges of \[1.    1.    0.001\] m;"),
+        (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\): edges of"),
+        ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: a box from"),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with x, y, z or"),
         (["a,0,0,0,1,1,1,5,5"], "has more cells in a row than names"),
     ],
@@ -83,8 +83,14 @@ def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, messag
 
 
 def test_files_that_are_no_lists_are_refused(written, tmp_path):
-    with pytest.raises(ValueError, match="has 1 rows and the columns id, x; expected"):
-        read_load(written("a,1", columns="id,x"))
+    for columns, message in (
+        ("id,x", "has 1 rows and the columns id, x; expected boxes"),
+        ("ID,x", "has the column 'ID'; expected 'id', and once"),
+        ("x,x", "has the column 'x.1'; expected 'x', and once"),
+        ("x,y_min", "has centres and corners, .*; expected either"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            read_load(written("a,1", columns=columns))
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\xff\xfe")
     (tmp_path / "empty.csv").write_bytes(b"")
     for name in ("picture.csv", "empty.csv"):

@@ -126,6 +126,7 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
         ({"groups": {}, "order": [0]}, ValueError, "groups and order are given; expected one"),
         ({"order": [0.5]}, TypeError, "order has dtype float64"),
+        ({"order": [0, -1]}, ValueError, "order holds -1 to 0; expected 0 to"),
         ({"groups": [1]}, TypeError, r"groups is \[1\]; expected a dict"),
         ({"groups": {"a": [0.5]}}, TypeError, r"groups\['a'\] has dtype float64"),
         ({"height": "tall"}, TypeError, "height is 'tall'; expected an integer"),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from unload import task
-from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, Load
+from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, Load, floating
 
 # Drawn for each box: depth of its wall, width, height, in m.
 CONTINUOUS = ((0.3, 0.9), (0.1, 0.6), (0.08, 0.45))
@@ -32,7 +32,13 @@ def own_load(rng: np.random.Generator, kind: str) -> Load:
         low[:, 1] = np.maximum(low[:, 1] + gaps[0], 0)
         high[:, 1] = np.minimum(high[:, 1] - gaps[1], task.CONTAINER[1])
         high[:, 2] -= rng.uniform(-0.4 * OVERLAP, 0.9 * CONTACT_TOLERANCE, len(low))
-    return Load((low + high) / 2, high - low, np.zeros(len(low), int), np.array(walls))
+    walls = np.array(walls)
+    while True:  # beyond the end of a layer below, boxes of the next one would float
+        load = Load((low + high) / 2, high - low, np.zeros(len(low), int), walls)
+        kept = ~floating(low, load.contacts)
+        if kept.all():
+            return load
+        low, high, walls = low[kept], high[kept], walls[kept]
 
 
 def _cut(rng: np.random.Generator, kind: str, axis: int) -> list[tuple[float, float]]:

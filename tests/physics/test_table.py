@@ -263,6 +263,9 @@ def settings_of(**changes) -> np.ndarray:
         ({"digests": None}, r"holds \['micrometres', 'settings'\]; expected a lift table"),
         ({"settings": settings_of(friction=0.7)}, "is of another physics, .*0.7.*; expected"),
         ({"settings": np.zeros(2)}, "is of another physics"),
+        ({"digests": np.ones(2)}, "arrays that do not fit; expected a lift table"),
+        ({"micrometres": np.ones(2)}, "arrays that do not fit"),
+        ({"micrometres": np.ones(1, np.int32)}, "arrays that do not fit"),
     ],
 )
 def test_other_files_are_refused_by_name(changes, message, tmp_path):

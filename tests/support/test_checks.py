@@ -44,14 +44,14 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
             for value in (True, "1", None, 1j, Fraction(1, 3), Decimal("0.5"), np.array(1))
         ),
         *(
-            (checks.real, value, (0, 1), ValueError, "a finite number in [0, 1]")
+            (checks.real, value, (0, 1), ValueError, "a number in [0, 1]")
             for value in (float("nan"), float("inf"), -0.1, 1.1)
         ),
         *(
             (checks.boolean, value, (), TypeError, "True or False")
             for value in (1, 0, 1.0, None, "yes", np.array([True]))
         ),
-        (checks.jobs, 2.0, (), TypeError, f"an integer >= {-checks.LARGEST}"),
+        (checks.jobs, 2.0, (), TypeError, "a number of processes, or -1 for one per core"),
         (checks.jobs, 0, (), ValueError, "a number of processes, or -1 for one per core"),
         *(
             (checks.one_of, value, (("red", None, 1),), ValueError, "one of 'red', None, 1")

@@ -25,7 +25,7 @@ from gymnasium.vector.utils import batch_space
 from unload import task
 from unload.env import observation
 from unload.env.equalization import TIE_TOLERANCE, TIES, equalize
-from unload.load.boxes import Load, check_load
+from unload.load.boxes import Load, check_stacked
 from unload.support import checks
 
 MOST_ENVS = 2**16  # several GB
@@ -53,14 +53,14 @@ def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Loa
 
     Raises:
         TypeError, ValueError: ``options`` is no dict, has a name that is not in ``known``, or
-            holds something other than a ``Load``.
+            holds something other than a ``Load`` without floating boxes.
     """
     options = {} if options is None else options
     checks.entries("options", options, ())
     for name, value in options.items():
         if name not in known:
             raise ValueError(f"options is {options!r}; expected {', '.join(known) or 'none'}")
-        check_load(value)
+        check_stacked(value)
     return dict(options)
 
 

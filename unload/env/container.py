@@ -8,7 +8,7 @@ from unload import task
 from unload.env import observation
 from unload.env.base import AllOrReset, PickingEnv, check_options
 from unload.env.observation import POSITION_NOISE
-from unload.load.boxes import Load, check_load, check_stack
+from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
 from unload.load.view import snapshot
 from unload.physics.base import Physics
@@ -78,9 +78,9 @@ class ContainerEnv(PickingEnv):
 
     Args:
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
-            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered, and nothing
-            if no box rests on the chosen one, which always moves by 0.463053 m, or three or
-            more: it moves by 0 m).
+            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered). ``"table"``
+            answers without a simulation if nothing rests on the chosen box, which then moves by
+            0.463053 m, and if three boxes or more do: it moves by 0 m.
         after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
@@ -89,7 +89,9 @@ class ContainerEnv(PickingEnv):
             the 1 mm down. It applies where the boxes stay where they were put; ``"full"``
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
-        stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``.
+        stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``. Each
+            box stands on the floor or, within 0.1 mm, on another one: across a wider gap it would
+            not hold down what is below.
         render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
@@ -128,7 +130,7 @@ class ContainerEnv(PickingEnv):
         super().reset(seed=seed)
         with AllOrReset(self):
             load = options["load"] if "load" in options else self.stack(self.np_random)
-            check_load(load)
+            check_stacked(load, "what stack returned")
             self._blur = observation.drift(len(load), self.position_noise, self.np_random)
             self.physics.reset(load)
             self._failed = np.zeros(len(load), dtype=bool)

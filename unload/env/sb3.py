@@ -37,8 +37,15 @@ class ContainerVecEnv(VecEnv):
         super().__init__(num_envs, *spaces)
 
     def reset(self) -> np.ndarray:
-        """Start all episodes, with what ``seed`` and ``set_options`` were given before."""
-        observations, _ = self.envs.reset(seed=self._seeds[0], options=self._options[0] or None)
+        """Start all episodes, with what ``seed`` and ``set_options`` were given before.
+
+        Raises:
+            ValueError: the environments were given different options.
+        """
+        options = self._options[0]
+        if any(other is not options and other != options for other in self._options):
+            raise ValueError(f"options is {self._options}; expected the same for all environments")
+        observations, _ = self.envs.reset(seed=self._seeds[0], options=options or None)
         self._reset_seeds()
         self._reset_options()
         return observations

@@ -11,7 +11,7 @@ from unload.env.fast import containers
 from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
-from unload.load.boxes import Load, check_load, check_stack
+from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
 from unload.load.view import snapshot
 from unload.physics.situation import Surroundings
@@ -96,7 +96,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     ) -> None:
         for env, rng in zip(envs, rngs):
             chosen = self.stack(rng) if load is None else load
-            check_load(chosen)
+            check_stacked(chosen, "what stack returned")
             self._put(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:

@@ -163,8 +163,8 @@ class HeapEnv(EpisodeEnv):
         self._check_open()
         options = {} if options is None else options
         checks.entries("options", options, ())
-        for name in options:
-            checks.one_of("options", name, ("heap",))
+        if set(options) - {"heap"}:
+            raise ValueError(f"options is {options!r}; expected heap")
         heap = options.get("heap")
         if heap is not None:
             check_heap("options['heap']", heap)

@@ -46,15 +46,15 @@ class Load:
     Attributes:
         positions: (n, 3) float64, centre of each box in m, inside the container.
         sizes: (n, 3) float64, edge lengths along x, y and z in m, at least 0.002.
-        packages: (n,) int64, package number (0–12 in the paper's loads).
-        walls: (n,) int64, number of the item wall, 0 at the rear.
+        packages: (n,) int64, package number (0–12 in the paper's loads), for the colours of views.
+        walls: (n,) int64, number of the item wall, 0 at the rear; a label, too.
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         contacts: which boxes touch, computed from positions and sizes.
 
     Raises:
         TypeError: a field's dtype is not numeric.
         ValueError: a field's shape or a value is wrong, a box sticks out of the
-            container, two boxes overlap, or an id is given twice.
+            container, two boxes overlap by more than 1 µm, or an id is given twice.
     """
 
     positions: np.ndarray
@@ -116,10 +116,30 @@ def _check_inside(low: np.ndarray, high: np.ndarray) -> None:
     )
 
 
-def check_load(load: object) -> None:
+def check_load(load: object, name: str = "load") -> None:
     """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
     if not isinstance(load, Load):
-        raise TypeError(f"load is {load!r}; expected an unload.Load")
+        raise TypeError(f"{name} is {load!r}; expected an unload.Load")
+
+
+def check_stacked(load: Load, name: str = "load") -> None:
+    """Raise unless ``load`` is a ``Load`` whose boxes stand on the floor or on each other.
+
+    Where there is a gap between two boxes, the upper one would not hold the lower one down.
+
+    Raises:
+        TypeError: it is no ``Load``.
+        ValueError: a box floats.
+    """
+    check_load(load, name)
+    low = load.positions - load.sizes / 2
+    aloft = np.flatnonzero(floating(low, load.contacts))
+    if aloft.size:
+        raise ValueError(
+            f"{name} has {aloft.size} floating boxes: the lower face of box {aloft[0]} is at "
+            f"{low[aloft[0], 2]:.6g} m; expected it, within {CONTACT_TOLERANCE} m, on the floor or "
+            "on another box"
+        )
 
 
 def check_stack(stack: object) -> None:
@@ -157,8 +177,17 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
     """
     found, *pair = _found(low, high)
     if pair[0] != pair[1]:
-        raise ValueError(f"boxes {min(pair)} and {max(pair)} overlap; expected disjoint boxes")
+        shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
+        raise ValueError(
+            f"boxes {min(pair)} and {max(pair)} overlap by {shared:.2g} m; "
+            f"expected at most {OVERLAP}"
+        )
     return Contacts(*_lists(found, len(low)))
+
+
+def floating(low: np.ndarray, touching: Contacts) -> np.ndarray:
+    """(n,) bool, which boxes stand neither on the floor nor on another box."""
+    return (np.diff(touching.starts[BELOW]) == 0) & (low[:, 2] > CONTACT_TOLERANCE)
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> list[int]:

@@ -1,22 +1,22 @@
 """Packing lists: the boxes of a load in a CSV file."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from unload import task
 from unload.load.boxes import (
-    BELOW,
-    CONTACT_TOLERANCE,
     OVERLAP,
     SMALLEST_EDGE,
     Load,
+    floating,
     outside,
     overlapping,
     slabs,
 )
-from unload.support import files
+from unload.support import checks, files
 
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
 CENTRE, CORNER, SIZES = (
@@ -46,48 +46,88 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
         package, and boxes that share a stretch of depth are of one wall.
 
     Raises:
+        TypeError: ``path`` is none.
         FileNotFoundError: there is no such file.
-        ValueError: the file is no CSV, or a column is missing; or a box has an edge that is no
-            number or too short, has the id of another one, sticks out of the container, overlaps
-            another one, or floats: it stands neither on the floor nor, within 0.1 mm, on a box.
-            The message names the first rows, counted from 1 without the line of names, and the
-            ids.
+        ValueError: the file is no CSV; a column is missing, given twice or spelled otherwise; there
+            are both centres and corners; or a box has an edge that is no number or too short, has
+            the id of another one, is not inside the container, overlaps another one, or floats: it
+            stands neither on the floor nor, within 0.1 mm, on a box. The message names the first
+            rows, counted from 1 without the line of names, and the ids.
     """
+    path = checks.path("path", path)
     try:
-        table = pd.read_csv(path, dtype={"id": str}, skipinitialspace=True, keep_default_na=False)
+        table = pd.read_csv(path, dtype=str, skipinitialspace=True, keep_default_na=False)
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} is not a readable CSV file: {error}") from error
     if not isinstance(table.index, pd.RangeIndex):  # pandas takes what is too much for an index
         raise ValueError(f"{path} has more cells in a row than names; expected as many")
-    place = CENTRE if set(CENTRE) <= set(table.columns) else CORNER
-    missing = [name for name in (*place, *SIZES) if name not in table.columns]
-    if missing or table.empty:
+    place = _place_columns(path, table)
+    ids = table["id"] if "id" in table.columns else pd.Series(range(1, len(table) + 1))
+    ids = ids.astype(str).to_numpy()
+
+    def refuse(items: Iterable[int], problem: Callable[[int], str]) -> None:
+        items = list(items)
+        if items:
+            named = ", ".join(f"row {item + 1} (id {str(ids[item])!r})" for item in items[:5])
+            more = f" and {len(items) - 5} more" if len(items) > 5 else ""
+            raise ValueError(f"{path}: {named}{more}: {problem(items[0])}")
+
+    def no_number(item: int) -> str:
+        column = cells.columns[np.isfinite(numbers[item]).argmin()]
+        return f"{column} is {cells.at[item, column]!r}; expected a length in m"
+
+    cells = table[[*place, *SIZES]]
+    numbers = cells.apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
+    where, sizes = numbers[:, :3], numbers[:, 3:]
+    positions = where if place is CENTRE else where + sizes / 2
+    low, high = positions - sizes / 2, positions + sizes / 2
+    refuse(
+        np.flatnonzero(pd.Series(ids).duplicated(keep=False)),
+        lambda _: "the same id; expected one for each box",
+    )
+    refuse(np.flatnonzero(~np.isfinite(numbers).all(axis=1)), no_number)
+    refuse(
+        np.flatnonzero(sizes.min(axis=1) < SMALLEST_EDGE),
+        lambda item: f"edges of {sizes[item]} m; expected {SMALLEST_EDGE} m or more",
+    )
+    refuse(
+        np.flatnonzero(outside(low, high)),
+        lambda item: (
+            f"a box from {low[item]} to {high[item]} m; expected it inside the container, "
+            f"[0 0 0] to {task.CONTAINER}"
+        ),
+    )
+    refuse(overlapping(low, high), lambda _: "boxes that overlap; expected disjoint ones")
+    packages = np.unique(np.rint(sizes / OVERLAP), axis=0, return_inverse=True)[1].reshape(-1)
+    load = Load(positions, sizes, packages, slabs(low[:, 0] + OVERLAP, high[:, 0]), ids)
+    refuse(
+        np.flatnonzero(floating(low, load.contacts)),
+        lambda item: (
+            f"a box that floats at a height of {low[item, 2]} m; expected it on the floor "
+            "or on another box"
+        ),
+    )
+    return load
+
+
+def _place_columns(path: Path, table: pd.DataFrame) -> tuple[str, ...]:
+    """``CENTRE`` or ``CORNER``, of which a packing list has the columns.
+
+    Raises:
+        ValueError: a column is missing, given twice or spelled otherwise, or it has both.
+    """
+    known = {"id", *CENTRE, *CORNER, *SIZES}
+    for column in table.columns:
+        name = column.strip().lower().partition(".")[0]  # pandas calls a second one "x.1"
+        if name in known and column not in known:
+            raise ValueError(f"{path} has the column {column!r}; expected {name!r}, and once")
+    corners, centres = (set(names) & set(table.columns) for names in (CORNER, CENTRE))
+    if corners and centres:
+        raise ValueError(f"{path} has centres and corners, {centres | corners}; expected either")
+    place = CENTRE if centres else CORNER
+    if table.empty or not {*place, *SIZES} <= set(table.columns):
         raise ValueError(
             f"{path} has {len(table)} rows and the columns {', '.join(table.columns)}; expected "
             f"boxes with x, y, z or x_min, y_min, z_min, and with {', '.join(SIZES)}"
         )
-    ids = table["id"] if "id" in table.columns else pd.Series(range(1, len(table) + 1))
-    ids = ids.astype(str).to_numpy()
-
-    def refuse(items: Iterable[int], problem: str) -> None:
-        named = [f"row {item + 1} (id {str(ids[item])!r})" for item in items]
-        if named:
-            more = f" and {len(named) - 5} more" if len(named) > 5 else ""
-            raise ValueError(f"{path}: {', '.join(named[:5])}{more} {problem}")
-
-    numbers = table[[*place, *SIZES]].apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
-    where, sizes = numbers[:, :3], numbers[:, 3:]
-    refuse(np.flatnonzero(pd.Series(ids).duplicated(keep=False)), "share an id; expected one each")
-    refuse(np.flatnonzero(~np.isfinite(numbers).all(axis=1)), "hold no number; expected lengths")
-    short = sizes.min(axis=1) < SMALLEST_EDGE
-    refuse(np.flatnonzero(short), f"are too small; expected edges of {SMALLEST_EDGE} m or more")
-    positions = where if place is CENTRE else where + sizes / 2
-    low, high = positions - sizes / 2, positions + sizes / 2
-    refuse(np.flatnonzero(outside(low, high)), "stick out of the container of 7 × 2.5 × 2.5 m")
-    refuse(overlapping(low, high), "overlap; expected disjoint boxes")
-    packages = np.unique(np.rint(sizes / OVERLAP), axis=0, return_inverse=True)[1].reshape(-1)
-    load = Load(positions, sizes, packages, slabs(low[:, 0] + OVERLAP, high[:, 0]), ids)
-    supports = np.diff(load.contacts.starts[BELOW])
-    floating = (supports == 0) & (low[:, 2] > CONTACT_TOLERANCE)
-    refuse(np.flatnonzero(floating), "float; expected boxes on the floor or on others")
-    return load
+    return place

@@ -122,12 +122,15 @@ def view(
         order: (k,) item numbers in the order in which they are picked, such as the column
             ``item`` of ``unload.picking_order``: the first ten have colours from dark to light.
 
+    Returns:
+        A plotly figure, which a notebook shows; elsewhere its method ``show`` does.
+
     Raises:
         TypeError: ``load`` is not a ``Load``, ``groups`` no dict, or a group does not hold
             integers.
         ValueError: ``present`` has another shape, more than four groups have names that are
-            not in ``COLOURS``, a group holds a number that is no item, or both ``groups`` and
-            ``order`` are given.
+            not in ``COLOURS``, a group or ``order`` holds a number that is no item, or both
+            ``groups`` and ``order`` are given.
     """
     check_load(load)
     present = np.ones(len(load), dtype=bool) if present is None else np.asarray(present)
@@ -140,7 +143,7 @@ def view(
     if order is not None:
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
-        items = checks.integer_array("order", order, (None,))[:FIRST_PICKS]
+        items = _items("order", order, len(load))[:FIRST_PICKS]
         groups = {
             f"pick {number}": np.array([item]) for number, item in enumerate(items.tolist(), 1)
         }
@@ -188,17 +191,20 @@ def _grouped(
     named = COLOURS | dict(zip(others, colours))
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
-        items = checks.integer_array(f"groups[{name!r}]", items, (None,))
-        if items.size and not (0 <= items.min() and items.max() < count):
-            raise ValueError(
-                f"groups[{name!r}] holds {items.min()} to {items.max()}; expected 0 to {count - 1}"
-            )
-        of_item[items] = number
+        of_item[_items(f"groups[{name!r}]", items, count)] = number
     if (present & (of_item < 0)).any():
         if "unseen" not in names:
             names.append("unseen")
         of_item[of_item < 0] = names.index("unseen")
     return of_item, {name: named[name] for name in names}
+
+
+def _items(name: str, items: object, count: int) -> np.ndarray:
+    """Return ``items`` as an int64 array; raise unless it holds numbers of the ``count`` items."""
+    items = checks.integer_array(name, items, (None,))
+    if items.size and not (0 <= items.min() and items.max() < count):
+        raise ValueError(f"{name} holds {items.min()} to {items.max()}; expected 0 to {count - 1}")
+    return items
 
 
 def corners(load: Load, items: np.ndarray, seam: float = SEAM) -> tuple[np.ndarray, np.ndarray]:

@@ -125,6 +125,10 @@ class LiftTable:
         arrays = files.read_arrays(path)
         if set(arrays) != {"digests", "micrometres", "settings"}:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
+        digests, micrometres = arrays["digests"], arrays["micrometres"]
+        kinds = digests.dtype, micrometres.dtype, micrometres.shape
+        if kinds != (np.uint64, np.int32, (digests.size,)):
+            raise ValueError(f"{path} holds arrays that do not fit; expected a lift table")
         settings = str(arrays["settings"])
         if settings != json.dumps(SETTINGS):
             raise ValueError(
@@ -132,7 +136,7 @@ class LiftTable:
                 "Remove it to fill a new one"
             )
         table = cls()
-        table._hold(arrays["digests"], arrays["micrometres"])
+        table._hold(digests, micrometres)
         return table
 
     def exchange(self, path: str | Path) -> None:

@@ -43,10 +43,12 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
 
 def jobs(name: str, value: object) -> int:
     """Return a number of processes as int, as joblib counts them; -1 stands for one per core."""
-    count = integer(name, value, -LARGEST)
-    if count == 0:
-        raise ValueError(f"{name} is 0; expected a number of processes, or -1 for one per core")
-    return count
+    wanted = "expected a number of processes, or -1 for one per core"
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{name} is {value!r}; {wanted}")
+    if value == 0:
+        raise ValueError(f"{name} is {value!r}; {wanted}")
+    return int(value)
 
 
 def path(name: str, value: object) -> Path:
@@ -62,11 +64,12 @@ def real(name: str, value: object, low: float, high: float = np.inf) -> float:
     Numbers are those of Python and NumPy; a ``Fraction`` or ``Decimal`` is a TypeError.
     """
     numbers = (int, float, np.integer, np.floating)
+    wanted = f"expected a number {f'>= {low}' if high == np.inf else f'in [{low}, {high}]'}"
     if isinstance(value, bool) or not isinstance(value, numbers):
-        raise TypeError(f"{name} is {value!r}; expected a number in [{low}, {high}]")
+        raise TypeError(f"{name} is {value!r}; {wanted}")
     number = float(value)
     if not np.isfinite(number) or not low <= number <= high:
-        raise ValueError(f"{name} is {value!r}; expected a finite number in [{low}, {high}]")
+        raise ValueError(f"{name} is {value!r}; {wanted}")
     return number
 
 
