@@ -2,8 +2,8 @@
 
 import re
 
-from unload.reproduce.falls.published import read_published
-from unload.reproduce.paper.grids import paper_runs
+from unload.reproduce.falls.long import read_published
+from unload.reproduce.paper.training import paper_runs
 from unload.reproduce.statistics import cell_table, end_msr, falls, windows
 from unload.support import files
 

@@ -7,7 +7,7 @@ from unload import PEQNetwork, TrainConfig
 from unload.network.variants import NETWORKS
 from unload.reproduce import fingerprint
 from unload.reproduce.fingerprint import short_runs, training_fingerprint
-from unload.reproduce.variants.grids import GRIDS
+from unload.reproduce.variants import GRIDS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.

@@ -6,7 +6,7 @@ today.
 """
 
 from collections.abc import Callable, Iterable
-from functools import cache
+from functools import cache, partial
 from hashlib import blake2b
 from tempfile import TemporaryDirectory
 
@@ -51,7 +51,7 @@ def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], Non
     return [
         (TrainConfig(**paper), unchanged),
         (TrainConfig(**small, equalize=False, mask=True, epsilon_final=0.05), unchanged),
-        (TrainConfig(**small, ties="average", gradient_steps=2), height_reward(0.5)),
+        (TrainConfig(**small, ties="average", gradient_steps=2), partial(height_reward, share=0.5)),
         (TrainConfig(**small, env="unload/HighestItem-v0"), unchanged),
     ]
 

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from unload import task
-from unload.reproduce.falls.cells import PREFERENCES, PUPILS
-from unload.reproduce.paper.grids import PAPER_CELLS
+from unload.reproduce.falls.laboratory import PREFERENCES, PUPILS
+from unload.reproduce.paper.training import PAPER_CELLS
 from unload.reproduce.statistics import PAPER_MSR, end_msr, t_interval
 from unload.reproduce.style import COLOURS, styled
 

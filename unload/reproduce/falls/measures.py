@@ -10,7 +10,7 @@ from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
 from unload.network.peq import PEQNetwork
-from unload.reproduce.falls.changes import left, without
+from unload.reproduce.changes import left, without
 
 Seen = Callable[[np.ndarray], np.ndarray]
 HEIGHT_BINS = 12
@@ -33,14 +33,6 @@ def slopes(network: PEQNetwork, observations: np.ndarray) -> np.ndarray:
     upper = torch.from_numpy(observations[heights > np.median(heights)]).requires_grad_()
     (gradient,) = torch.autograd.grad(scores(network, upper).sum(), upper)
     return gradient.numpy().mean(axis=0)
-
-
-def spreads(network: PEQNetwork, observations: np.ndarray) -> tuple[float, float]:
-    """Standard deviation within an observation of the score's height part and of the rest."""
-    with torch.no_grad():
-        whole = scores(network, torch.from_numpy(observations)).numpy()
-        height = scores(network, torch.from_numpy(without(observations))).numpy()
-    return float(height.std(axis=1).mean()), float((whole - height).std(axis=1).mean())
 
 
 def tilt(observations: np.ndarray, liftable: np.ndarray) -> np.ndarray:

@@ -12,9 +12,14 @@ from matplotlib.ticker import EngFormatter
 
 from unload import task
 from unload.load.view import COLOURS as BOX_COLOURS
-from unload.reproduce.paper.grids import PAPER, TUNING
-from unload.reproduce.paper.training import default_curves, episode_means
-from unload.reproduce.paper.tuning import REACHED, greedy_msr, read_curves, running_mean
+from unload.reproduce.paper.training import PAPER, default_curves, episode_means
+from unload.reproduce.paper.tuning import (
+    REACHED,
+    TUNING,
+    greedy_msr,
+    read_curves,
+    running_mean,
+)
 from unload.reproduce.style import COLOURS, mark_reduced, styled
 from unload.support import files
 

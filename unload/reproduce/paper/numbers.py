@@ -21,8 +21,8 @@ from unload.env.equalization import equalize
 from unload.load import substacks
 from unload.network.peq import PEQNetwork
 from unload.physics import bullet
-from unload.reproduce.paper.grids import RUN_COUNT, STEPS
 from unload.reproduce.paper.observation import BINS, read_points
+from unload.reproduce.paper.tuning import RUN_COUNT, STEPS
 from unload.support import checks, files
 
 CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
