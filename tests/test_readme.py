@@ -4,7 +4,7 @@ import re
 
 from unload.reproduce.falls.long import read_published
 from unload.reproduce.paper.training import paper_runs
-from unload.reproduce.statistics import cell_table, end_msr, falls, windows
+from unload.reproduce.statistics import cell_table, end_msr, fell
 from unload.support import files
 
 README = (files.ROOT / "README.md").read_text()
@@ -52,7 +52,7 @@ def test_the_result_is_that_of_the_data():
     fallen = [
         100 * end_msr(run)
         for cell, _, run in paper_runs()
-        if cell in masked.index and falls(windows(run)["success_rate"])
+        if cell in masked.index and fell(run)
     ]
     sentence = f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, "
     assert sentence + f"and end at {low:.0f}–{max(fallen):.0f} %" in text

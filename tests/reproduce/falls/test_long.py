@@ -3,7 +3,9 @@ from dataclasses import replace
 import pytest
 
 from unload.reproduce.falls import long
+from unload.reproduce.grid import read_policies
 from unload.reproduce.paper.training import PAPER
+from unload.support import files
 from unload.support.provenance import read_provenance
 
 
@@ -34,13 +36,12 @@ def test_long_runs_have_seeds_that_no_plan_had_before():
 def judged(tmp_path, monkeypatch):
     """One published policy and one network without training, in one container each."""
     monkeypatch.setattr(long, "UNTRAINED", 1)
+    name = "paper_mask/seed_0"
+    policy = read_policies(files.DATA / "falls/paper.safetensors")[name]
     monkeypatch.setattr(
-        long, "_names", lambda grid, folder: ["paper_mask/seed_0"] if grid is PAPER else []
+        long, "read_policies", lambda path: {name: policy} if path.stem == "paper" else {}
     )
     monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
-    files = long.files.DATA / "falls"
-    (tmp_path / "falls").mkdir()
-    (tmp_path / "falls/paper.safetensors").symlink_to(files / "paper.safetensors")
     monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
     long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
     return long.read_published(tmp_path)

@@ -84,18 +84,20 @@ def test_bounds_count_each_kind_of_lift():
         (0, 0, "drawn", 0.4, 0.4),
         (0, 0, "drawn", 0.4, 0.1),
         (1, 4, "buried", 0.0, 0.0),
-        (2, 1, "", 0.1, np.nan),
+        (2, 1, "close", 0.1, 0.3),
+        (3, 1, "", 0.0, np.nan),
     ]
     frame = pd.DataFrame(rows, columns=columns).assign(seed=0, picks=100)
     frame["table"] = frame["local"]
     bounds = agreement.error_bounds(frame)
     counted = bounds[["lifts", "states", "situations", "differ"]].T.to_dict("list")
     assert counted == {
-        "table, local": [3, 1, 3, 0],
+        "table, local": [4, 1, 4, 0],
         "table, local: three or more on top": [1, 1, 1, 0],
         "local, full: drawn": [2, 1, 1, 1],
         "local, full: three or more on top": [1, 1, 1, 0],
-        "local, full: all": [3, 1, 2, 1],
+        "local, full: close": [1, 1, 1, 1],
+        "local, full: all": [4, 1, 3, 2],
     }
     for _, row in bounds.iterrows():
         assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))

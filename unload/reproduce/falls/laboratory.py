@@ -249,17 +249,11 @@ def laboratory_data(
     if traces:
         tables["trace"] = pd.concat(traces)[["cell", "seed", *POINT]].astype({"picks": int})
     reduced = seeds is not None or set(cells) < set(CELLS)
-    publish(
-        Path(folder) / ("reduced/falls" if reduced else "falls"),
-        "laboratory",
-        tables,
-        f"{COMMAND} laboratory",
-        {"config": asdict(CONFIG), "runs": len(rows)},
-        reduced,
-        [result.record for result in results],
-        fingerprint,
-        "%.4g",
-    )
+    place = Path(folder) / ("reduced/falls" if reduced else "falls")
+    command = f"{COMMAND} laboratory"
+    settings = {"config": asdict(CONFIG), "runs": len(rows)}
+    records = [result.record for result in results]
+    publish(place, "laboratory", tables, command, settings, reduced, records, fingerprint, "%.4g")
 
 
 def read_laboratory(folder: str | Path = files.DATA) -> pd.DataFrame:

@@ -23,7 +23,7 @@ from unload.reproduce import changes
 from unload.reproduce.falls import measures
 from unload.reproduce.falls.laboratory import JUDGED, POINT, SLOPES, point, train_in_laboratory
 from unload.reproduce.fingerprint import training_fingerprint
-from unload.reproduce.grid import Cell, Grid, read_policies, train_grid
+from unload.reproduce.grid import Cell, Grid, cell_of, read_policies, train_grid
 from unload.reproduce.paper.training import PAPER
 from unload.reproduce.results import COMMAND, JOBS, keep_all, publish, read_table
 from unload.support import files
@@ -82,20 +82,14 @@ def trace_data(
         for seed in TRACED_SEEDS
     ]
     results = keep_all(Path(runs_dir) / "falls/trace", jobs, n_jobs)
-    tables = [
+    traces = [
         pd.DataFrame(result.value).assign(seed=seed) for seed, result in zip(TRACED_SEEDS, results)
     ]
-    publish(
-        Path(folder) / "falls",
-        "long_trace",
-        {"long_trace": pd.concat(tables)[["seed", *POINT]].astype({"picks": int})},
-        f"{COMMAND} falls",
-        {"seeds": list(TRACED_SEEDS), "picks": picks},
-        False,
-        [result.record for result in results],
-        fingerprint,
-        "%.4g",
-    )
+    tables = {"long_trace": pd.concat(traces)[["seed", *POINT]].astype({"picks": int})}
+    settings = {"seeds": list(TRACED_SEEDS), "picks": picks}
+    records = [result.record for result in results]
+    place, command = Path(folder) / "falls", f"{COMMAND} falls"
+    publish(place, "long_trace", tables, command, settings, False, records, fingerprint, "%.4g")
 
 
 def _trace(config: TrainConfig) -> list[dict[str, float]]:
@@ -125,40 +119,27 @@ def published_data(
         n_jobs: processes, as in joblib.
     """
     fingerprint = training_fingerprint()
-    names = [(grid, name) for grid in (PAPER, LONG) for name in _names(grid, folder)]
-    names += [(None, f"untrained/seed_{seed}") for seed in range(UNTRAINED)]
+    judged = {
+        name: (replace(grid.cells[cell_of(name)].config, mask=True), policy.network)
+        for grid in (PAPER, LONG)
+        for name, policy in read_policies(Path(folder) / f"{grid.name}.safetensors").items()
+    }
+    for seed in range(UNTRAINED):
+        network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
+        judged[f"untrained/seed_{seed}"] = PAPER.cells["paper_mask"].config, network
     jobs = [
-        (
-            {"name": name, "fingerprint": fingerprint, **LOADS},
-            partial(_judge, grid, name, Path(folder)),
-        )
-        for grid, name in names
+        ({"name": name, "fingerprint": fingerprint, **LOADS}, partial(_judge, name, *each))
+        for name, each in judged.items()
     ]
     results = keep_all(Path(runs_dir) / "published", jobs, n_jobs)
-    publish(
-        Path(folder) / "falls",
-        "published",
-        {"published": pd.DataFrame([result.value for result in results])[COLUMNS]},
-        f"{COMMAND} falls",
-        LOADS,
-        False,
-        [result.record for result in results],
-        fingerprint,
-    )
+    tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
+    records = [result.record for result in results]
+    place, command = Path(folder) / "falls", f"{COMMAND} falls"
+    publish(place, "published", tables, command, LOADS, False, records, fingerprint)
 
 
-def _names(grid: Grid, folder: str | Path) -> list[str]:
-    return list(read_policies(Path(folder) / f"{grid.name}.safetensors"))
-
-
-def _judge(grid: Grid | None, name: str, folder: Path) -> dict:
+def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     cell, _, seed = name.partition("/seed_")
-    if grid is None:
-        generator = torch.Generator().manual_seed(int(seed))
-        config, network = PAPER.cells["paper_mask"].config, PEQNetwork(generator=generator)
-    else:
-        policy = read_policies(folder / f"{grid.name}.safetensors")[name]
-        config, network = replace(grid.cells[cell].config, mask=True), policy.network
     row: dict[str, object] = {"cell": cell, "seed": int(seed)}
     for column, blank in zip(JUDGED, measures.BLANKED.values()):
         row[column] = measures.judged(network, config, blank, loads=LOADS)

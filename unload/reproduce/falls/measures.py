@@ -14,6 +14,7 @@ from unload.reproduce.changes import left, without
 
 Seen = Callable[[np.ndarray], np.ndarray]
 HEIGHT_BINS = 12
+NEAR = 2.4  # m from the entrance, what the surface is of
 BLANKED = {"as_is": (), "x": (0,), "y": (1,), "place": (0, 1)}  # coordinates set to 0 in choosing
 LOADS = {"episodes": 16, "seed": 1000}  # of fresh containers, 500 picks each
 
@@ -95,17 +96,13 @@ def judged(
     return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
 
 
-def surface(
-    policy: Policy, picks: int = 300, containers: int = 8, seed: int = 0, depth: float = 2.4
-) -> tuple[np.ndarray, np.ndarray]:
-    """What a policy leaves of the loads, seen from the entrance.
+def surface(policy: Policy, picks: int = 300, containers: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """What a policy leaves of the loads, within 2.4 m of the entrance and seen from there.
 
     Args:
         policy: see ``unload.policies``; it plays with the mask on.
         picks: in each container.
         containers: how many.
-        seed: of the first load.
-        depth: of the part at the entrance that is looked at, in m.
 
     Returns:
         Places across the containers, (100,) in m, and the mean height of the highest box there,
@@ -114,8 +111,8 @@ def surface(
     places = (np.arange(100) + 0.5) / 100 * task.CONTAINER[1]
     heights = np.zeros((containers, len(places)))
     for container in range(containers):
-        load = left(policy, picks, seed + container)
-        near = load.positions[:, 0] > task.CONTAINER[0] - depth
+        load = left(policy, picks, seed=container)
+        near = load.positions[:, 0] > task.CONTAINER[0] - NEAR
         for centre, size in zip(load.positions[near], load.sizes[near]):
             above = np.abs(places - centre[1]) < size[1] / 2
             top = np.maximum(heights[container], centre[2] + size[2] / 2)

@@ -104,16 +104,9 @@ def agreement_data(
         "stages (picks)": STAGES,
         "lift table": table_digest(),
     }
-    publish(
-        folder,
-        NAME,
-        {NAME: frame[COLUMNS]},
-        f"{COMMAND} lifts",
-        settings,
-        False,
-        [record, *(answer.record for answer in answers)],
-        float_format="%.6f",
-    )
+    tables, command = {NAME: frame[COLUMNS]}, f"{COMMAND} lifts"
+    records = [record, *(answer.record for answer in answers)]
+    publish(folder, NAME, tables, command, settings, False, records, float_format="%.6f")
 
 
 def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
@@ -167,8 +160,6 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
     }
     rows = {}
     for name, (lifts, other) in groups.items():
-        if lifts.empty:
-            continue
         differ = len(disagreements(lifts, "local", other))
         low, high = share_interval(differ, len(lifts))
         rows[name] = {

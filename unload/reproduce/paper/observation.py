@@ -41,16 +41,9 @@ def observation_data(folder: str | Path = files.DATA) -> None:
         name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
         for name, positions in points.items()
     }
-    publish(
-        Path(folder) / FOLDER,
-        "observation",
-        tables,
-        f"{COMMAND} observation",
-        {"seed": SEED},
-        False,
-        [record],
-        float_format="%.6f",
-    )
+    place, command = Path(folder) / FOLDER, f"{COMMAND} observation"
+    settings = {"seed": SEED}
+    publish(place, "observation", tables, command, settings, False, [record], float_format="%.6f")
 
 
 def _positions() -> dict[str, np.ndarray]:

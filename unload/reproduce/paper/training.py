@@ -97,13 +97,12 @@ def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
         wall_time: of each point of its curve, s since the epoch.
         folder: of the data.
     """
-    curve = default_curves(folder)[DEFAULT_SEEDS[0]]
+    curve = default_curves(folder)[DEFAULT_SEEDS[0]].reset_index(drop=True)
     for name, values in (
         ("loss_function_agent", curve["loss"]),
         ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
     ):
-        columns = {"Wall time": wall_time, "Step": curve["picks"], "Value": values}
-        table = pd.DataFrame({each: np.asarray(column) for each, column in columns.items()})
+        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
         write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
 
 

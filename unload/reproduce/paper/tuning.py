@@ -115,23 +115,16 @@ def export_tuning(folder: str | Path) -> None:
     value per step and no header; the loss before the first update is ``nan``, which the plots
     leave out.
     """
-    for path, values in exported(folder).items():
-        files.write_text(
-            path, values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g")
-        )
-
-
-def exported(folder: str | Path) -> dict[Path, pd.Series]:
-    """Return the values that the paper's plots read of the published search, by their files."""
-    values = {}
     for fe, kind, batch_size, rate, run in SHOWN:
         cell = tuning_cell(batch_size, rate, fe == "with")
         curves = read_grid(TUNING, folder, [cell])
         name = f"{kind}_curve_bz_{batch_size}_lr_{rate:g}_agent_{run}.csv"
         column = {"hitrate": "success_rate", "loss": "loss"}[kind]
-        path = Path(folder) / f"dummy_sim_{fe}_hist_equal" / name
-        values[path] = curves.loc[curves["seed"] == run, column]
-    return values
+        values = curves.loc[curves["seed"] == run, column]
+        files.write_text(
+            Path(folder) / f"dummy_sim_{fe}_hist_equal" / name,
+            values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g"),
+        )
 
 
 def read_curves(
@@ -247,28 +240,24 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
     """
     below = np.flatnonzero(running_mean(success_rate) < SOLVED)
     solved_at = below[-1] + 1 if below.size else 0
-    return {
-        "final_msr": success_rate[-FINAL:].mean(),
-        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
-        **_loss_summary(loss),
-    }
-
-
-def _loss_summary(loss: np.ndarray) -> dict[str, float]:
     known = np.isfinite(loss)
     smooth = running_mean(loss)[known]
     lowest = np.minimum.accumulate(smooth)
     peak = np.argmax(smooth - lowest)
-    ends = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
-    return dict(zip(LOSSES, ends))
+    losses = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
+    return {
+        "final_msr": success_rate[-FINAL:].mean(),
+        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
+        **dict(zip(LOSSES, losses)),
+    }
 
 
 def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
     """One row per configuration of the published search: means over its runs of ``run_summary``.
 
     Columns: ``equalize``, ``batch_size``, ``learning_rate``, ``runs``; ``final_msr`` and its
-    standard deviation, lowest and highest value; ``solved``, the number of runs that end at
-    99 % or above, and ``solved_at`` of these; and the four losses.
+    standard deviation; ``solved``, the number of runs that end at 99 % or above, and ``solved_at``
+    of these; and the four losses.
     """
     rows = []
     for (cell, _), curve in read_grid(TUNING, folder).groupby(["cell", "seed"]):
@@ -285,8 +274,6 @@ def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
             runs=("final_msr", "size"),
             final_msr=("final_msr", "mean"),
             final_msr_std=("final_msr", "std"),
-            final_msr_min=("final_msr", "min"),
-            final_msr_max=("final_msr", "max"),
             solved=("solved_at", "count"),
             solved_at=("solved_at", "mean"),
             **{name: (name, "mean") for name in LOSSES},

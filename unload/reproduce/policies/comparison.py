@@ -121,15 +121,11 @@ def comparison_data(folder: str | Path = files.DATA, n_jobs: int = -1) -> None:
         for condition in CONDITIONS
         for name, mask in PLAYERS
     )
-    publish(
-        Path(folder) / "policies",
-        "comparison",
-        {"comparison": pd.concat([result.value for result in results])},
-        f"{COMMAND} policies",
-        {"policies": digests(), "loads": LOADS, "seed": SEED},
-        False,
-        [result.record for result in results],
-    )
+    tables = {"comparison": pd.concat([result.value for result in results])}
+    settings = {"policies": digests(), "loads": LOADS, "seed": SEED}
+    records = [result.record for result in results]
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    publish(place, "comparison", tables, command, settings, False, records)
 
 
 def compare(name: str, policy: Policy, mask: bool, condition: str) -> pd.DataFrame:

@@ -62,16 +62,12 @@ def robustness_data(
         jobs.append((question, partial(play, found[name], after_pick, seeds[episode], PICKS)))
     answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
     rows = [one | answer.value for one, answer in zip(containers, answers)]
+    tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
     settings = {"policies": weights, "episodes": EPISODES, "picks": PICKS, "seed": SEED}
-    publish(
-        Path(folder) / "policies",
-        "robustness",
-        {"robustness": pd.DataFrame(rows)[COLUMNS]},
-        f"{COMMAND} policies",
-        settings | {"front walls": FRONT_WALLS},
-        False,
-        [answer.record for answer in answers],
-    )
+    settings["front walls"] = FRONT_WALLS
+    records = [answer.record for answer in answers]
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    publish(place, "robustness", tables, command, settings, False, records)
 
 
 def front_load(rng: np.random.Generator) -> Load:
