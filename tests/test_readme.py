@@ -50,9 +50,7 @@ def test_the_result_is_that_of_the_data():
     masked = table.loc[["paper_mask", "paper_b2048_mask"]]
     low, high = 100 * masked["lowest"].min(), 100 * masked["highest"]
     fallen = [
-        100 * end_msr(run)
-        for cell, _, run in paper_runs()
-        if cell in masked.index and fell(run)
+        100 * end_msr(run) for cell, _, run in paper_runs() if cell in masked.index and fell(run)
     ]
     sentence = f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, "
     assert sentence + f"and end at {low:.0f}–{max(fallen):.0f} %" in text

@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
-import torch
 
 from unload import task
 from unload.agent.evaluation import Policy
@@ -190,11 +189,7 @@ def perfect_start(run: Training, change: Callable[[Training], None] = unchanged)
     while not teacher.rollout.finished:
         teacher.step()
     teacher.rollout.close()
-    with torch.no_grad():
-        for mine, learned in zip(
-            run.agent.network.parameters(), teacher.agent.network.parameters()
-        ):
-            mine.copy_(learned)
+    run.agent.network.load_state_dict(teacher.agent.network.state_dict())
     change(run)
 
 

@@ -60,7 +60,7 @@ def test_a_box_is_free_once_all_on_it_is_unloaded(monkeypatch):
 
 
 def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(robustness, "PLAYED", {"keep": ("highest",), "restore": ("highest",)})
+    monkeypatch.setattr(robustness, "PLAYED", (("highest", "keep"), ("highest", "restore")))
     monkeypatch.setattr(robustness, "EPISODES", 2)
     monkeypatch.setattr(robustness, "PICKS", 2)
     small = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 1))

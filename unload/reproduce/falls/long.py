@@ -11,17 +11,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import torch
 
-from unload import task
 from unload.agent.config import TrainConfig
-from unload.env.vector import ContainerVectorEnv
 from unload.network.peq import PEQNetwork
 from unload.reproduce import changes
 from unload.reproduce.falls import measures
-from unload.reproduce.falls.laboratory import JUDGED, POINT, SLOPES, point, train_in_laboratory
+from unload.reproduce.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.grid import Cell, Grid, cell_of, read_policies, train_grid
 from unload.reproduce.paper.training import PAPER
@@ -51,7 +48,7 @@ LONG = Grid(
 )
 LOADS = {"episodes": 100, "seed": 1000}  # that policies are judged in, 500 picks each
 UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
-COLUMNS = ["cell", "seed", *JUDGED, *SLOPES]
+COLUMNS = ["cell", "seed", *JUDGED]
 OPTIONS = {"--cells": {"nargs": "+", "choices": LONG.cells}, **JOBS}
 
 
@@ -111,7 +108,7 @@ def published_data(
     """Judge each published policy in fresh containers: ``falls/published.csv``.
 
     A row per policy: its cell and seed; its MSR as it is and with x, y or both set to 0, with the
-    mask on; its slopes in full containers. The cell ``untrained`` holds networks as they are drawn.
+    mask on. The cell ``untrained`` holds networks as they are drawn.
 
     Args:
         folder: of the data.
@@ -143,10 +140,7 @@ def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     row: dict[str, object] = {"cell": cell, "seed": int(seed)}
     for column, blank in zip(JUDGED, measures.BLANKED.values()):
         row[column] = measures.judged(network, config, blank, loads=LOADS)
-    envs = ContainerVectorEnv(task.NUM_ENVS, equalize=config.equalize, ties=config.ties)
-    observations, _ = envs.reset(seed=LOADS["seed"])
-    envs.close()
-    return row | dict(zip(SLOPES, map(float, measures.slopes(network, np.array(observations)))))
+    return row
 
 
 def read_published(folder: str | Path = files.DATA) -> pd.DataFrame:

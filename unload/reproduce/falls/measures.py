@@ -19,20 +19,16 @@ BLANKED = {"as_is": (), "x": (0,), "y": (1,), "place": (0, 1)}  # coordinates se
 LOADS = {"episodes": 16, "seed": 1000}  # of fresh containers, 500 picks each
 
 
-def scores(network: PEQNetwork, observations: torch.Tensor) -> torch.Tensor:
-    """What decides among the items of an observation: tanh's argument without the pooled part.
-
-    The pooled features move all items of an observation alike.
-    """
-    features = torch.relu(network.extractor(observations))
-    return features @ network.scorer.weight[0, : network.n_features]
-
-
 def slopes(network: PEQNetwork, observations: np.ndarray) -> np.ndarray:
-    """Mean slope of the score along x, y and z over the upper half of the items, (3,)."""
+    """Mean slope of the score along x, y and z over the upper half of the items, (3,).
+
+    The score is what decides among the items of an observation: tanh's argument without the pooled
+    part, which moves all of them alike.
+    """
     heights = observations[..., 2]
     upper = torch.from_numpy(observations[heights > np.median(heights)]).requires_grad_()
-    (gradient,) = torch.autograd.grad(scores(network, upper).sum(), upper)
+    score = torch.relu(network.extractor(upper)) @ network.scorer.weight[0, : network.n_features]
+    (gradient,) = torch.autograd.grad(score.sum(), upper)
     return gradient.numpy().mean(axis=0)
 
 

@@ -74,14 +74,10 @@ def _filling_policies(rng: np.random.Generator) -> list[Callable]:
             for favourite in (policies.highest, policies.nearest)
             for share in (0.0, 0.1, 0.3, 0.6)
         ),
-        *(policies.mixed(_farthest(rng.normal(size=3)), 0.2) for _ in range(12)),
+        *(policies.mixed(partial(_farthest, direction=rng.normal(size=3)), 0.2) for _ in range(12)),
     ]
 
 
-def _farthest(direction: np.ndarray) -> Callable:
-    """A policy that picks the item farthest in a direction, (3,) in scaled positions."""
-
-    def policy(observations, masks, rng):
-        return np.where(masks, observations @ direction, -np.inf).argmax(axis=1)
-
-    return policy
+def _farthest(observations, masks, rng, direction: np.ndarray) -> np.ndarray:
+    """The policy that picks the item farthest in a direction, (3,) in scaled positions."""
+    return np.where(masks, observations @ direction, -np.inf).argmax(axis=1)

@@ -141,9 +141,7 @@ def while_training(folder: str | Path = files.DATA) -> pd.DataFrame:
     rows = {}
     for seed, curve in default_curves(folder).items():
         msr = curve["success_rate"]
-        rows[seed] = {
-            "msr_start": msr.iloc[0], "msr_end": end_msr(curve), "msr_best": msr.max()
-        }  # fmt: skip
+        rows[seed] = {"msr_start": msr.iloc[0], "msr_end": end_msr(curve), "msr_best": msr.max()}
     return pd.DataFrame(rows).T.rename_axis("seed")
 
 
@@ -237,7 +235,6 @@ def favourites(
         (containers, unloaded / 25 + 1) bool.
     """
     checks.integer("containers", containers, 1)
-    checks.integer("unloaded", unloaded, 1)
     env = ContainerEnv(physics="table", max_picks=MOST_PICKS)
     rng = np.random.default_rng(seed)
     found = []

@@ -9,6 +9,7 @@ and a box on which nothing lies may be jammed between its neighbours.
 
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ EPISODES, PICKS = 10, 100  # of each policy; only the front walls of a load are 
 SEED = 2000  # of the loads; no other data uses it
 COLUMNS = ["policy", "after_pick", "episode", "success_rate", "free", "jammed"]
 # Who plays how; of the others, every decision with boxes restored would be the table's.
-PLAYED = {"keep": (*SIMPLE, *LEARNED), "restore": ("recommended",)}
+PLAYED = (*((name, "keep") for name in (*SIMPLE, *LEARNED)), ("recommended", "restore"))
 
 
 def robustness_data(
@@ -45,21 +46,14 @@ def robustness_data(
         runs_dir: where finished episodes are kept.
         n_jobs: processes, as in joblib.
     """
-    found = {name: find_policy(name) for names in PLAYED.values() for name in names}
     weights = digests()
     seeds = np.random.SeedSequence(SEED).generate_state(EPISODES).tolist()
-    containers = [
-        {"policy": name, "after_pick": after_pick, "episode": episode}
-        for after_pick, names in PLAYED.items()
-        for name in names
-        for episode in range(EPISODES)
-    ]
-    jobs = []
-    for container in containers:
-        name, after_pick, episode = container.values()
-        size = {"seed": seeds[episode], "picks": PICKS, "walls": FRONT_WALLS}
-        question = container | size | {"weights": weights.get(name), "settings": SETTINGS}
-        jobs.append((question, partial(play, found[name], after_pick, seeds[episode], PICKS)))
+    containers, jobs = [], []
+    for (name, after_pick), (episode, seed) in product(PLAYED, enumerate(seeds)):
+        containers.append({"policy": name, "after_pick": after_pick, "episode": episode})
+        size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS}
+        question = containers[-1] | size | {"weights": weights.get(name), "settings": SETTINGS}
+        jobs.append((question, partial(play, find_policy(name), after_pick, seed, PICKS)))
     answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
     rows = [one | answer.value for one, answer in zip(containers, answers)]
     tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
@@ -70,17 +64,12 @@ def robustness_data(
     publish(place, "robustness", tables, command, settings, False, records)
 
 
-def front_load(rng: np.random.Generator) -> Load:
-    """The front walls of a random load."""
-    return front_walls(stack_load(rng))
-
-
 def play(
     policy: Policy,
     after_pick: str,
     seed: int,
     picks: int,
-    stack: Callable[[np.random.Generator], Load] = front_load,
+    stack: Callable[[np.random.Generator], Load] = lambda rng: front_walls(stack_load(rng)),
 ) -> dict[str, float]:
     """Let a policy unload one container, with the mask.
 
@@ -89,7 +78,7 @@ def play(
         after_pick: ``"keep"`` or ``"restore"``, see ``FullPhysics``.
         seed: of the load and of the policy's random numbers.
         picks: how many, fewer than the load has items.
-        stack: makes the load, see ``ContainerEnv``.
+        stack: makes the load, see ``ContainerEnv``; the front walls of one of the paper's loads.
 
     Returns:
         ``success_rate``; ``free`` and ``jammed``, the shares of picks at items on which nothing
