@@ -186,10 +186,9 @@ def write_curves(place: Path, curves: Mapping[str, pd.DataFrame]) -> None:
 
 def write_measures(place: Path, rows: Mapping[str, dict[str, float]]) -> None:
     """Write ``<place>.csv``: what is measured, by the names of the runs."""
-    runs = [name.rpartition("/seed_") for name in rows]
     table = pd.DataFrame(list(rows.values()))
-    table.insert(0, "cell", [cell for cell, _, _ in runs])
-    table.insert(1, "seed", [int(seed) for _, _, seed in runs])
+    table.insert(0, "cell", [cell_of(name) for name in rows])
+    table.insert(1, "seed", [int(name.rpartition("/seed_")[2]) for name in rows])
     write_table(place.with_name(f"{place.name}.csv"), table)
 
 

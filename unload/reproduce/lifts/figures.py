@@ -63,13 +63,17 @@ def lift_sequences(
     )
     meanings = {}
     for line, (label, (sizes, poses)) in zip(grid, lifts.items()):
-        limits = _limits(sizes[:2], poses[:, :2])
+        reach = np.hypot(*sizes[:2].T)[:, None] / 2  # of the moving boxes, however they turn
+        low = (poses[:, :2, :2] - reach).min((0, 1))
+        high = (poses[:, :2, :2] + reach).max((0, 1))
         moved = np.hypot(*(poses[-1] - poses[0])[0, :2]) >= task.LIFT_THRESHOLD
         chosen = "liftable" if moved else "blocked"
         meanings[f"chosen box, {chosen}"] = COLOURS[chosen]
         for axes, time, pose in zip(line, times, poses):
             _draw_boxes(axes, sizes, pose, COLOURS[chosen])
-            axes.set(xlim=limits[0], ylim=limits[1], aspect="equal", xticks=[], yticks=[])
+            axes.set(
+                xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xticks=[], yticks=[]
+            )
             axes.set_title(f"{time:.2f} s", fontsize=8)
             for spine in axes.spines.values():
                 spine.set(visible=True, color="#cccccc")
@@ -78,13 +82,6 @@ def lift_sequences(
     handles = [Patch(fc=colour, label=meaning) for meaning, colour in meanings.items()]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=9)
     return figure
-
-
-def _limits(sizes: np.ndarray, poses: np.ndarray) -> tuple[tuple, tuple]:
-    """Limits of both axes that show all moving boxes at all times, and some room."""
-    reach = np.hypot(*sizes.T)[:, None] / 2
-    low, high = (poses[..., :2] - reach).min((0, 1)), (poses[..., :2] + reach).max((0, 1))
-    return (low[0], high[0]), (low[1], high[1])
 
 
 def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, chosen) -> None:
