@@ -36,7 +36,6 @@ LIBRARIES = {
 COVERED_BY = {
     "__main__.py": "agent/test_order.py",
     "agent/fast/kernel.py": "agent/fast/test_fused.py",  # its loops
-    "reproduce/falls/cells.py": "reproduce/falls/test_laboratory.py",
     "reproduce/falls/figures.py": "reproduce/test_figures.py",
     "reproduce/lifts/figures.py": "reproduce/test_figures.py",
     "reproduce/paper/figures.py": "reproduce/test_figures.py",

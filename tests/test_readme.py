@@ -2,9 +2,9 @@
 
 import re
 
-from unload.reproduce.falls.published import read_published
-from unload.reproduce.paper.grids import paper_runs
-from unload.reproduce.statistics import cell_table, end_msr, falls, windows
+from unload.reproduce.falls.long import read_published
+from unload.reproduce.paper.training import paper_runs
+from unload.reproduce.statistics import cell_table, end_msr, fell
 from unload.support import files
 
 README = (files.ROOT / "README.md").read_text()
@@ -50,9 +50,7 @@ def test_the_result_is_that_of_the_data():
     masked = table.loc[["paper_mask", "paper_b2048_mask"]]
     low, high = 100 * masked["lowest"].min(), 100 * masked["highest"]
     fallen = [
-        100 * end_msr(run)
-        for cell, _, run in paper_runs()
-        if cell in masked.index and falls(windows(run)["success_rate"])
+        100 * end_msr(run) for cell, _, run in paper_runs() if cell in masked.index and fell(run)
     ]
     sentence = f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, "
     assert sentence + f"and end at {low:.0f}–{max(fallen):.0f} %" in text

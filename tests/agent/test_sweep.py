@@ -13,7 +13,7 @@ from unload.agent import sweep
 from unload.agent.config import TrainConfig
 from unload.agent.training import train, unchanged
 from unload.load.substacks import stack_load
-from unload.reproduce.paper.grids import tuning_config
+from unload.reproduce.paper.tuning import tuning_config
 from unload.support import files
 
 

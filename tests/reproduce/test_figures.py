@@ -20,11 +20,11 @@ from unload.reproduce.grid import read_grid
 from unload.reproduce.lifts import figures as lifts
 from unload.reproduce.lifts.agreement import read_agreement
 from unload.reproduce.paper import diagrams, figures, loads, observation
-from unload.reproduce.paper.grids import PAPER
+from unload.reproduce.paper.training import PAPER
 from unload.reproduce.paper.tuning import read_curves, running_mean
 from unload.reproduce.policies import figures as policies
 from unload.reproduce.policies.speed import speed_ratios
-from unload.reproduce.variants.grids import GRIDS, variants_msr
+from unload.reproduce.variants import GRIDS, variants_msr
 from unload.support import files
 
 LOAD = stack_load(np.random.default_rng(0))

@@ -7,7 +7,7 @@ from unload import PEQNetwork, TrainConfig
 from unload.network.variants import NETWORKS
 from unload.reproduce import fingerprint
 from unload.reproduce.fingerprint import short_runs, training_fingerprint
-from unload.reproduce.variants.grids import GRIDS
+from unload.reproduce.variants import GRIDS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
@@ -75,6 +75,8 @@ def test_only_what_changes_training_changes_the_fingerprint(changed):
 
 
 def test_each_network_has_its_fingerprint(monkeypatch):
+    with pytest.raises(ValueError, match="network is 'mlp'; expected one of 'peq'"):
+        training_fingerprint(["mlp"])
     monkeypatch.setattr(fingerprint, "_curves", lambda network: f"curves of {network}")
     single = {name: training_fingerprint([name]) for name in NETWORKS}
     assert len(set(single.values())) == len(NETWORKS)
@@ -82,8 +84,6 @@ def test_each_network_has_its_fingerprint(monkeypatch):
     assert both == training_fingerprint(["peq", "stack"])
     assert both not in single.values()
     assert single["peq"] == training_fingerprint()
-    with pytest.raises(ValueError, match="networks is 'mlp'; expected one of 'peq'"):
-        training_fingerprint(["mlp"])
 
 
 @pytest.mark.parametrize("network", NETWORKS)

@@ -5,7 +5,7 @@ import pytest
 
 from unload.agent.config import TrainConfig
 from unload.reproduce import grid
-from unload.reproduce.falls.changes import shuffled
+from unload.reproduce.changes import shuffled
 from unload.support.provenance import read_provenance
 
 CONFIG = TrainConfig(
@@ -26,7 +26,7 @@ def small():
 @pytest.fixture
 def trained(small, tmp_path, monkeypatch):
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
-    grid.train_grid(small, None, None, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
+    grid.train_grid(small, None, None, tmp_path, tmp_path / "runs", n_jobs=1)
     return tmp_path
 
 
@@ -71,12 +71,12 @@ def test_published_runs_are_not_replaced_by_fewer(small, trained):
     with pytest.raises(
         ValueError, match="holds 2 finished runs; expected at least as many as the 4"
     ):
-        grid.train_grid(small, ["plain"], None, trained, trained / "other", 1, progress=False)
+        grid.train_grid(small, ["plain"], None, trained, trained / "other", 1)
     assert (trained / "some/small_loss.csv").read_bytes() == before
 
 
 def test_a_shorter_grid_is_published_elsewhere(small, trained):
     before = (trained / "some/small_loss.csv").read_bytes()
-    grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1, progress=False)
+    grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1)
     assert (trained / "some/small_loss.csv").read_bytes() == before
     assert read_provenance(trained / "reduced/some", "small")["reduced"]

@@ -6,16 +6,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from unload import policies, stack_load
+from unload import stack_load
 from unload.reproduce import __main__ as command
-from unload.reproduce.changes import height_reward
 from unload.reproduce.falls.laboratory import laboratory_data
 from unload.reproduce.grid import train_grid
-from unload.reproduce.lifts import agreement
-from unload.reproduce.paper.grids import PAPER, tuning_config
 from unload.reproduce.paper.loads import side_views, wall_view
-from unload.reproduce.policies import comparison, robustness
-from unload.reproduce.variants.grids import variants_data, variants_msr
+from unload.reproduce.paper.training import PAPER
+from unload.reproduce.paper.tuning import tuning_config
+from unload.reproduce.policies import comparison
+from unload.reproduce.variants import variants_data, variants_msr
 from unload.support import files
 
 
@@ -83,24 +82,12 @@ def test_no_committed_file_is_too_large():
 
 LOAD = stack_load(np.random.default_rng(0), walls=1)
 BAD_INPUT = {
-    "lifts is 0": lambda folder: agreement.agreement_data(0, 0, folder=folder),
-    "full is 11": lambda folder: agreement.agreement_data(10, 11, folder=folder),
-    "full is -1": lambda folder: agreement.agreement_data(10, -1, folder=folder),
-    "policy is 'lowest'": lambda _: next(agreement.container_states("lowest", 0)),
-    "other is 'mujoco'": lambda _: agreement.disagreements([], "local", "mujoco"),
     "cells is 'nonsense'": lambda folder: laboratory_data(["nonsense"], folder=folder),
     "cells is 'nothing'": lambda folder: train_grid(PAPER, ["nothing"], folder=folder),
     "steps is 0": lambda _: tuning_config(8, 1e-3, steps=0),
     "a group's name is 'seen'": lambda _: side_views(LOAD.positions, {"": {"seen": [0, 1]}}),
     "a group's name is 'taken'": lambda _: wall_view(LOAD, 0, {"taken": [0, 1]}),
-    "name is 'lowest'": lambda _: comparison.find_policy("lowest"),
-    "loads is 0": lambda folder: comparison.comparison_data(0, folder),
-    "episodes is 0": lambda folder: robustness.robustness_data(0, folder=folder),
-    "picks is 101": lambda folder: robustness.robustness_data(1, 101, folder),
-    "expected more than picks=280 items": lambda _: robustness.play(
-        policies.random, "keep", 0, 280, lambda rng: LOAD
-    ),
-    "share is 1.5": lambda _: height_reward(1.5),
+    "n_jobs is 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
     "grids is 'nothing'": lambda folder: variants_data(["nothing"], folder=folder),
     "grid is 'nothing'": lambda folder: variants_msr("nothing", folder),
 }

@@ -28,16 +28,18 @@ def test_the_end_is_the_last_tenth():
 @pytest.mark.parametrize(
     ("msr", "found"),
     [
-        ([0.3, 0.9, 0.5], []),  # never high
-        ([0.3, 0.96, 0.81], []),  # never low again
-        ([0.3, 0.95, 0.9, 0.8, 0.3], [(1, 3)]),
-        ([0.96, 0.5, 0.6, 0.97, 0.7], [(0, 1), (3, 4)]),
-        ([0.96, 0.5, 0.4, 0.9, 0.4], [(0, 1)]),
-        ([0.96, 0.98, 0.5], [(1, 2)]),
+        ([0.3, 0.9, 0.5], False),  # never high
+        ([0.3, 0.96, 0.81], False),  # never low again
+        ([0.3, 0.94, 0.95, 0.8, 0.3], True),
+        ([0.3, 0.95, 0.9, 0.81, 0.8], True),
+        ([0.3, 0.8, 0.95, 0.96, 0.98], False),  # low before
     ],
 )
 def test_a_fall_leads_from_high_to_low(msr, found):
-    assert statistics.falls(msr) == found
+    """Each value is the mean of a window."""
+    picks = statistics.WINDOW_PICKS * np.arange(1, len(msr) + 1)
+    run = pd.DataFrame({"picks": picks, "success_rate": msr, "loss": 0.1})
+    assert statistics.fell(run) is found
 
 
 @pytest.mark.parametrize(
@@ -139,17 +141,6 @@ def test_a_bootstrap_interval_holds_the_mean_about_as_often_as_it_says():
     assert statistics.bootstrap_interval([0.25]) == (0.25, 0.25)
 
 
-def test_groups_keep_their_order_and_their_means():
-    table = pd.DataFrame(
-        {"cell": ["b", "b", "a", "a"], "mask": [True] * 4, "msr": [0.0, 1.0, 0.5, 0.5]}
-    )
-    rows = statistics.with_intervals(table, ["cell", "mask"], ["msr"])
-    assert rows["cell"].tolist() == ["b", "a"]
-    assert rows["runs"].tolist() == [2, 2]
-    assert rows["msr"].tolist() == [0.5, 0.5]
-    assert rows[["msr_low", "msr_high"]].to_numpy().tolist() == [[0.0, 1.0], [0.5, 0.5]]
-
-
 def test_share_intervals_are_those_of_the_binomial_distribution():
     """At the ends of the interval, what was seen or more extreme has a probability of 2.5 %."""
     interval = statistics.share_interval
@@ -169,7 +160,6 @@ def test_share_intervals_are_those_of_the_binomial_distribution():
         (statistics.welch_interval, ([1, 2], [np.nan, 1]), "second"),
         (statistics.share_interval, (3, 2), "count is 3"),
         (statistics.share_interval, (0, 0), "total is 0"),
-        (statistics.with_intervals, (pd.DataFrame({"cell": [1]}), ["cell"], ["msr"]), "msr"),
     ],
 )
 def test_bad_values_are_refused_by_name(function, arguments, message):

@@ -2,6 +2,7 @@
 
 Read ``grid`` first (an experiment of training runs), then ``results`` (what is kept, published and
 read), ``statistics`` (how a run ends, and how sure a mean is) and ``style`` (the look of figures).
-``fingerprint`` says whether the code still trains as it did, ``changes`` what experiments change in
-a run, ``exercise`` whether a reader's answer is right. ``__main__`` is the command line.
+``changes`` holds what experiments change in a run, ``fingerprint`` says whether the code still
+trains as it did, ``exercise`` whether a reader's answer is right. ``variants`` is an experiment in
+one file, the others are rooms. ``__main__`` is the command line.
 """

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 
-from unload.reproduce.falls import laboratory, published
+from unload.reproduce import variants
+from unload.reproduce.falls import laboratory, long
 from unload.reproduce.lifts import agreement, table
 from unload.reproduce.paper import observation, training, tuning
-from unload.reproduce.policies import cards, comparison, robustness
+from unload.reproduce.policies import comparison, robustness
 from unload.reproduce.results import COMMAND, JOBS
-from unload.reproduce.variants import grids as variants
 
 
 def lifts(n_jobs: int) -> None:
@@ -21,7 +21,7 @@ def lifts(n_jobs: int) -> None:
 
 def policies(n_jobs: int) -> None:
     """Measure policies, and compare them by the lift table, and with every box simulated."""
-    cards.write_cards()
+    comparison.write_cards()
     comparison.comparison_data(n_jobs=n_jobs)
     robustness.robustness_data(n_jobs=n_jobs)
 
@@ -42,7 +42,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
-    "falls": ("why runs fall: the long runs", published.falls_data, published.OPTIONS),
+    "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
 }  # fmt: skip
 if find_spec("unload.heap"):  # a room that may be taken out
     PARTS["heap"] = "heaps, of which a rake picks several boxes at once", heap, JOBS

@@ -80,7 +80,6 @@ def train_grid(
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
-    progress: bool = True,
 ) -> Path:
     """Train the runs of a grid that are not finished, and publish all that are.
 
@@ -91,7 +90,6 @@ def train_grid(
         folder: of the data; a reduced grid goes to its folder ``reduced``.
         runs_dir: where the runs are kept, apart from those of code that trained otherwise.
         n_jobs: processes, see ``run_sweep``.
-        progress: show a progress bar.
 
     Returns:
         The folder that holds the folders of the runs, by their names.
@@ -109,7 +107,7 @@ def train_grid(
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
     kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
-    report = run_sweep(wanted, kept, n_jobs, progress=progress, changes=changes)
+    report = run_sweep(wanted, kept, n_jobs, changes=changes)
     publish_grid(grid, configs, kept, Path(folder), picks is not None, fingerprint)
     failed = report[report["error"] != ""]
     if len(failed):
@@ -152,10 +150,12 @@ def publish_grid(
     else:
         rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
         write_measures(place, rows)
-    settings = {name: asdict(config) for name, config in _first_of_each(configs).items()}
+    first = {
+        name: asdict(configs[f"{name}/seed_{cell.seeds[0]}"]) for name, cell in grid.cells.items()
+    }
     record = joined(files.read_json(records[name]) for name in done)
     record |= {"fingerprint": fingerprint, "planned": len(configs)}
-    write_provenance(place.parent, place.name, grid.command, settings, reduced, record)
+    write_provenance(place.parent, place.name, grid.command, first, reduced, record)
 
 
 def cell_of(run: str) -> str:
@@ -186,19 +186,10 @@ def write_curves(place: Path, curves: Mapping[str, pd.DataFrame]) -> None:
 
 def write_measures(place: Path, rows: Mapping[str, dict[str, float]]) -> None:
     """Write ``<place>.csv``: what is measured, by the names of the runs."""
-    runs = [name.rpartition("/seed_") for name in rows]
     table = pd.DataFrame(list(rows.values()))
-    table.insert(0, "cell", [cell for cell, _, _ in runs])
-    table.insert(1, "seed", [int(seed) for _, _, seed in runs])
+    table.insert(0, "cell", [cell_of(name) for name in rows])
+    table.insert(1, "seed", [int(name.rpartition("/seed_")[2]) for name in rows])
     write_table(place.with_name(f"{place.name}.csv"), table)
-
-
-def _first_of_each(configs: Mapping[str, TrainConfig]) -> dict[str, TrainConfig]:
-    """The configuration of each cell, with its first seed."""
-    first: dict[str, TrainConfig] = {}
-    for name, config in configs.items():
-        first.setdefault(cell_of(name), config)
-    return first
 
 
 def read_grid(

@@ -16,7 +16,7 @@ PAPER_MSR = 0.6  # at the end of its Fig. 12
 LIKE_THE_PAPER = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
 LEVEL = 0.95  # of the intervals
 RESAMPLES = 10_000
-COUNTED = ("steady", "slower", "noisier", "fig11", "fig12", "both")  # runs of a cell
+COUNTED = ("fell", "steady", "slower", "noisier", "fig11", "fig12", "both")  # runs of a cell
 
 
 def windows(curve: pd.DataFrame) -> pd.DataFrame:
@@ -35,23 +35,10 @@ def end_msr(curve: pd.DataFrame) -> float:
     return float(curve.loc[curve["picks"] > (1 - END) * last, "success_rate"].mean())
 
 
-def falls(msr: Sequence[float]) -> list[tuple[int, int]]:
-    """Return the falls of the MSR to 80 % or less after 95 % or more.
-
-    Args:
-        msr: of the windows.
-
-    Returns:
-        Of each fall, the last window that is high and the first one that is low.
-    """
-    found, high = [], None
-    for window, value in enumerate(msr):
-        if high is not None and value <= LOW:
-            found.append((high, window))
-            high = None
-        if value >= HIGH:
-            high = window
-    return found
+def fell(curve: pd.DataFrame) -> bool:
+    """Whether a window's MSR is 80 % or less after an earlier one's was 95 % or more."""
+    msr = windows(curve)["success_rate"]
+    return bool(((msr >= HIGH).cummax() & (msr <= LOW)).any())
 
 
 def resembles_fig12(curve: pd.DataFrame) -> bool:
@@ -102,14 +89,12 @@ def after_loss_peak(curve: pd.DataFrame) -> tuple[bool, bool]:
 
 
 def run_measures(curve: pd.DataFrame) -> dict:
-    """Return the measures of one run: its end, its falls, and its likeness to the paper's."""
-    msr = windows(curve)["success_rate"]
+    """Return the measures of one run: end, falls, and likeness to the paper's."""
     fig11, fig12 = resembles_fig11(curve), resembles_fig12(curve)
     slower, noisier = after_loss_peak(curve)
     return {
         "end": end_msr(curve),
-        "highest": msr.max(),
-        "falls": len(falls(msr)),
+        "fell": fell(curve),
         "steady": steady(curve),
         "slower": slower,
         "noisier": noisier,
@@ -132,16 +117,16 @@ def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
         ``fig12`` and ``both``, the runs like the paper's.
     """
     measured = pd.DataFrame([{"cell": cell, **run_measures(curve)} for cell, _, curve in runs])
-    rows = []
-    for cell, group in measured.groupby("cell", sort=False):
-        ends = group["end"].to_numpy()
-        rows.append(
-            {"cell": cell, "runs": len(ends), "mean": ends.mean()}
-            | dict(zip(("low", "high"), t_interval(ends)))
-            | {"lowest": ends.min(), "highest": ends.max(), "fell": int((group["falls"] > 0).sum())}
-            | {name: int(group[name].sum()) for name in COUNTED}
-        )
-    return pd.DataFrame(rows)
+    groups = measured.groupby("cell", sort=False)
+    ends = groups["end"].agg(
+        runs="size",
+        mean="mean",
+        low=lambda values: t_interval(values)[0],
+        high=lambda values: t_interval(values)[1],
+        lowest="min",
+        highest="max",
+    )
+    return ends.join(groups[list(COUNTED)].sum()).reset_index()
 
 
 def t_interval(values: Sequence[float]) -> tuple[float, float]:
@@ -202,29 +187,3 @@ def share_interval(count: int, total: int) -> tuple[float, float]:
     count = checks.integer("count", count, 0, checks.integer("total", total, 1))
     interval = stats.binomtest(count, total).proportion_ci(LEVEL, method="exact")
     return float(interval.low), float(interval.high)
-
-
-def with_intervals(table: pd.DataFrame, by: Sequence[str], measures: Sequence[str]) -> pd.DataFrame:
-    """Mean and 95 % bootstrap interval of each measure over the rows of a group.
-
-    Args:
-        table: one row per seed or container.
-        by: columns that make a group; the groups keep their order.
-        measures: columns of numbers.
-
-    Returns:
-        One row per group: the columns ``by``, ``runs``, and for each measure its mean under
-        its own name and the interval's ends as ``<measure>_low`` and ``<measure>_high``.
-
-    Raises:
-        TypeError, ValueError: a column is missing, or a measure is not finite.
-    """
-    checks.entries("table", dict(table), (*by, *measures))
-    rows = []
-    for key, group in table.groupby(list(by), sort=False):
-        row = dict(zip(by, key)) | {"runs": len(group)}
-        for name in measures:
-            low, high = bootstrap_interval(group[name].to_numpy())
-            row |= {name: group[name].mean(), f"{name}_low": low, f"{name}_high": high}
-        rows.append(row)
-    return pd.DataFrame(rows)

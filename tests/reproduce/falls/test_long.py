@@ -1,17 +1,22 @@
-import pandas as pd
+from dataclasses import replace
+
+import pytest
 
 from unload.reproduce.falls import long
+from unload.reproduce.grid import read_policies
+from unload.reproduce.paper.training import PAPER
+from unload.support import files
 from unload.support.provenance import read_provenance
 
 
-def test_a_shorter_trace_is_written_beside_the_published_one(tmp_path, monkeypatch):
+def test_runs_are_traced(tmp_path, monkeypatch):
     monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
-    long.trace_data(64_000, tmp_path, tmp_path / "runs", 1, progress=False)
-    folder = tmp_path / "reduced" / "falls"
-    table = pd.read_csv(folder / "long_trace.csv")
+    monkeypatch.setattr(long, "CONFIG", replace(long.CONFIG, picks=64_000))
+    long.trace_data(tmp_path, tmp_path / "runs", 1)
+    table = long.read_long_trace(tmp_path)
     assert list(table["seed"]) == [20, 20, 21, 21]
     assert list(table["picks"]) == [31_936, 63_936] * 2
-    assert read_provenance(folder, "long_trace")["reduced"]
+    assert read_provenance(tmp_path / "falls", "long_trace")["settings"]["picks"] == 64_000
 
 
 def test_the_published_trace_is_of_the_published_runs():
@@ -25,3 +30,33 @@ def test_the_published_trace_is_of_the_published_runs():
 
 def test_long_runs_have_seeds_that_no_plan_had_before():
     assert all(min(cell.seeds) >= 20 for cell in long.LONG.cells.values())
+
+
+@pytest.fixture
+def judged(tmp_path, monkeypatch):
+    """One published policy and one network without training, in one container each."""
+    monkeypatch.setattr(long, "UNTRAINED", 1)
+    name = "paper_mask/seed_0"
+    policy = read_policies(files.DATA / "falls/paper.safetensors")[name]
+    monkeypatch.setattr(
+        long, "read_policies", lambda path: {name: policy} if path.stem == "paper" else {}
+    )
+    monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
+    monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
+    long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
+    return long.read_published(tmp_path)
+
+
+def test_policies_and_networks_are_judged_alike(judged):
+    assert list(judged["cell"]) == ["paper_mask", "untrained"]
+    policy, network = judged.itertuples()
+    assert policy.judged_place == 1 > policy.judged_as_is
+    assert network.judged_as_is < 0.9
+
+
+def test_the_published_table_holds_every_policy():
+    table = long.read_published()
+    planned = {cell: len(each.seeds) for cell, each in PAPER.cells.items()}
+    counts = table.groupby("cell").size()
+    assert {cell: counts[cell] for cell in planned} == planned
+    assert counts["untrained"] == long.UNTRAINED

@@ -7,7 +7,7 @@ import torch
 from unload import policies
 from unload.network.peq import PEQNetwork
 from unload.reproduce.falls import measures
-from unload.reproduce.falls.cells import CONFIG
+from unload.reproduce.falls.laboratory import CONFIG
 
 
 @pytest.fixture
@@ -29,11 +29,6 @@ def observations():
 
 def test_slopes_are_those_of_the_score(network, observations):
     assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
-
-
-def test_spreads_part_height_from_place(network, observations):
-    height, place = measures.spreads(network, observations)
-    assert height == pytest.approx(2 * place, rel=0.05)
 
 
 def test_tilt_is_the_effect_of_place_at_equal_height(observations):

@@ -9,16 +9,11 @@ import pytest
 
 from unload import policies
 from unload.load.substacks import front_walls, stack_load
-from unload.reproduce.lifts import agreement, full
+from unload.physics.local import LocalPhysics
+from unload.physics.situation import Surroundings
+from unload.reproduce.lifts import agreement
 from unload.reproduce.statistics import share_interval
 from unload.support.provenance import read_provenance
-
-
-@pytest.fixture
-def asker():
-    asker = agreement.Asker()
-    yield asker
-    asker.close()
 
 
 @pytest.fixture(scope="module")
@@ -26,8 +21,8 @@ def committed():
     return agreement.read_agreement()
 
 
-def test_lifts_are_asked_about_in_the_state_they_name(asker):
-    states, frame = agreement.collect_lifts(100, 3, asker)
+def test_lifts_are_asked_about_in_the_state_they_name():
+    states, frame = agreement.collect_lifts(100, 3)
     for state, rows in frame.groupby("state"):
         named = states[state]
         assert (rows["picks"] == named.picks).all() and (rows["seed"] == named.seed).all()
@@ -54,8 +49,6 @@ def test_choice_for_full():
     assert ((walls == 0) == (why == "")).all()
     assert (walls[why == "drawn"] == 12).sum() == 2 * agreement.PER_STATE
     assert (walls[np.isin(why, ("buried", "close"))] == 5).all()
-    why, walls = agreement.choose_for_full(frame, 0, np.random.default_rng(0))
-    assert (why == "").all() and not walls.any()
 
 
 def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
@@ -65,19 +58,24 @@ def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(agreement, "UNLOADED_BY", {"highest": policies.highest})
     monkeypatch.setattr(agreement, "STAGES", (30,))
     monkeypatch.setattr(agreement, "WANTED", (1, 1, 1, 0))
-    folders = {"folder": tmp_path / "data", "runs_dir": tmp_path / "runs", "progress": False}
-    frame = agreement.agreement_data(3, 3, 5, **folders)
+    monkeypatch.setattr(agreement, "LIFT_COUNT", 3)
+    monkeypatch.setattr(agreement, "FULL_COUNT", 3)
+    monkeypatch.setattr(agreement, "FIRST_SEED", 5)
+    folders = tmp_path / "data", tmp_path / "runs"
+    agreement.agreement_data(*folders)
+    frame = agreement.read_agreement(folders[0])
     assert (frame["asked_full"] == "drawn").all() and frame["full"].notna().all()
     assert not len(agreement.disagreements(frame, "local", "full"))
     assert frame["full"].max() == pytest.approx(frame["local"].max(), abs=0.01)
     provenance = read_provenance(tmp_path / "data", agreement.NAME)
-    assert provenance["reduced"] and provenance["settings"]["lifts"] == 3
+    assert provenance["settings"]["lifts"] == 3
     written = (tmp_path / "data" / "lift_agreement.csv").read_bytes()
-    monkeypatch.setattr(full, "FullPhysics", None)
-    agreement.agreement_data(3, 3, 5, **folders)
+    monkeypatch.setattr(agreement, "FullPhysics", None)
+    agreement.agreement_data(*folders)
     assert (tmp_path / "data" / "lift_agreement.csv").read_bytes() == written
+    monkeypatch.setattr(agreement, "FIRST_SEED", 6)
     with pytest.raises(TypeError):  # an answer to another question is not taken
-        agreement.agreement_data(3, 3, 6, **folders)
+        agreement.agreement_data(*folders)
 
 
 def test_bounds_count_each_kind_of_lift():
@@ -86,18 +84,20 @@ def test_bounds_count_each_kind_of_lift():
         (0, 0, "drawn", 0.4, 0.4),
         (0, 0, "drawn", 0.4, 0.1),
         (1, 4, "buried", 0.0, 0.0),
-        (2, 1, "", 0.1, np.nan),
+        (2, 1, "close", 0.1, 0.3),
+        (3, 1, "", 0.0, np.nan),
     ]
     frame = pd.DataFrame(rows, columns=columns).assign(seed=0, picks=100)
     frame["table"] = frame["local"]
     bounds = agreement.error_bounds(frame)
     counted = bounds[["lifts", "states", "situations", "differ"]].T.to_dict("list")
     assert counted == {
-        "table, local": [3, 1, 3, 0],
+        "table, local": [4, 1, 4, 0],
         "table, local: three or more on top": [1, 1, 1, 0],
         "local, full: drawn": [2, 1, 1, 1],
         "local, full: three or more on top": [1, 1, 1, 0],
-        "local, full: all": [3, 1, 2, 1],
+        "local, full: close": [1, 1, 1, 1],
+        "local, full: all": [4, 1, 3, 2],
     }
     for _, row in bounds.iterrows():
         assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))
@@ -116,9 +116,51 @@ def test_committed_lifts(committed):
     assert settings["lift table"] == agreement.table_digest(), "another table ships: compare again"
 
 
-def test_committed_lifts_can_be_computed_again(committed, asker):
-    _, frame = agreement.collect_lifts(100, agreement.FRESH, asker)
+def test_committed_lifts_can_be_computed_again(committed):
+    _, frame = agreement.collect_lifts(100, agreement.FIRST_SEED)
     first = committed[: len(frame)]
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
     assert (frame[columns] == first[columns]).all(axis=None)
     assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def state():
+    """A container of three walls from which a third of the free boxes has been taken."""
+    load, rng = stack_load(np.random.default_rng(4), 3), np.random.default_rng(0)
+    present = np.ones(len(load), bool)
+    surroundings = Surroundings(load, present)
+    free = [item for item in range(len(load)) if not surroundings.on_top(item)]
+    present[rng.choice(free, len(free) // 3, replace=False)] = False
+    visible = rng.choice(np.flatnonzero(present), 30, replace=False)
+    return agreement.State("random", 4, 0, load, present, visible)
+
+
+def test_boxes_left_are_those_of_the_walls_around(monkeypatch, state):
+    monkeypatch.setattr(agreement, "NEAR_WALLS", 1)
+    left, items = agreement.boxes_left(state, 1, 1)
+    assert set(left.walls) == {1}
+    assert (items == np.flatnonzero(state.present & (state.load.walls == 1))).all()
+    assert (left.positions == state.load.positions[items]).all()
+    monkeypatch.setattr(agreement, "NEAR_WALLS", 3)
+    assert set(agreement.boxes_left(state, 0, 3)[0].walls) == {0, 1}
+    left, items = agreement.boxes_left(state, 0, agreement.WALLS)
+    assert (items == np.flatnonzero(state.present)).all()
+
+
+def test_a_fresh_world_lifts_the_item_it_was_asked_about(monkeypatch, state):
+    """With fewer walls around, the item has another number; its distance is that of ``local``."""
+    monkeypatch.setattr(agreement, "NEAR_WALLS", 1)
+    local = LocalPhysics()
+    local.reset(state.load)
+    for item in np.flatnonzero(~state.present):
+        local.remove(item)
+    blocked = {item: bool(local.surroundings.on_top(item)) for item in state.visible.tolist()}
+    for wanted in (True, False):
+        item = next(item for item, is_so in blocked.items() if is_so == wanted)
+        question, compute = agreement.fresh_job(state, item, 1)
+        assert set(question) == {"settings", "boxes", "item"}
+        assert compute() == pytest.approx(local.lift(item), abs=0.01)
+    local.close()
+    another, _ = agreement.fresh_job(state, item, agreement.WALLS)
+    assert another != question

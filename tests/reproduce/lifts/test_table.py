@@ -10,16 +10,17 @@ from unload.support.provenance import read_provenance
 
 def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(task, "NUM_ENVS", 1)
+    monkeypatch.setattr(lifts, "EPISODES", 1)
     monkeypatch.setattr(lifts, "_filling_policies", lambda rng: [policies.random, policies.highest])
     for name in "ab":
-        lifts.lift_data(1, 0, tmp_path / name, tmp_path / name / "runs", progress=False)
+        lifts.lift_data(tmp_path / name, tmp_path / name / "runs")
     assert (tmp_path / "a/lifts.npz").read_bytes() == (tmp_path / "b/lifts.npz").read_bytes()
     count = len(LiftTable.load(tmp_path / "a/lifts.npz"))
     assert count > 50
     provenance = read_provenance(tmp_path / "a", "lifts")
     assert provenance["settings"]["lifts"] == count
     # What is kept is not computed again.
-    lifts.lift_data(1, 0, tmp_path / "c", tmp_path / "a/runs", progress=False)
+    lifts.lift_data(tmp_path / "c", tmp_path / "a/runs")
     again = read_provenance(tmp_path / "c", "lifts")
     assert again["wall_time_s"] == provenance["wall_time_s"]
 

@@ -24,11 +24,6 @@ def test_pictures_are_cropped_and_in_order(images):
     assert [axes.texts[0].get_text() for axes in figure.axes[:3]] == ["7", "8", "9"]
 
 
-def test_white_pictures_are_left_whole():
-    (axes,) = fig02_containers(np.full((1, 4, 5, 3), 255, np.uint8), columns=1).axes
-    assert axes.images[0].get_array().shape == (4, 5, 3)
-
-
 @pytest.fixture
 def load():
     return front_walls(stack_load(np.random.default_rng(0)), 2)

@@ -13,8 +13,9 @@ from unload.support.provenance import read_provenance
 NAMES = ("all_items", "Observation", "Equalized_Observation")
 
 
-def test_observation_data(tmp_path):
-    observation.observation_data(seed=3, folder=tmp_path)
+def test_observation_data(tmp_path, monkeypatch):
+    monkeypatch.setattr(observation, "SEED", 3)
+    observation.observation_data(tmp_path)
     tables = {name: pd.read_csv(tmp_path / f"obs_hist_equal/{name}.csv") for name in NAMES}
     assert {tuple(table.columns) for table in tables.values()} == {("x", "y")}
     assert 800 <= len(tables["all_items"]) <= 1000
@@ -27,7 +28,7 @@ def test_observation_data(tmp_path):
 
 
 def test_committed_data_is_written_again_byte_for_byte(tmp_path):
-    observation.observation_data(folder=tmp_path)
+    observation.observation_data(tmp_path)
     for name in NAMES:
         again, committed = (
             (folder / f"obs_hist_equal/{name}.csv").read_bytes()

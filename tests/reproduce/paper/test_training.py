@@ -10,7 +10,7 @@ from unload import TrainConfig, evaluate, load_policy, policies
 from unload.reproduce import grid
 from unload.reproduce.grid import Cell, Grid, read_policies
 from unload.reproduce.paper import training
-from unload.reproduce.paper.grids import PAPER
+from unload.reproduce.paper.training import PAPER
 from unload.support import files
 
 
@@ -27,7 +27,7 @@ def small(monkeypatch):
 
 def test_a_full_grid_leaves_what_the_papers_plots_and_others_read(small, tmp_path):
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
-    training.training_data(None, None, **folders, n_jobs=1, progress=False)
+    training.training_data(None, None, **folders, n_jobs=1)
     curve = training.default_curves(tmp_path)[0]
     for name in ("loss_function_agent", "total_rew_function_agent"):
         table = pd.read_csv(tmp_path / f"{name}.csv")
@@ -43,10 +43,17 @@ def test_a_full_grid_leaves_what_the_papers_plots_and_others_read(small, tmp_pat
 
 
 def test_a_reduced_grid_leaves_published_data_alone(small, tmp_path):
-    training.training_data(None, 6400, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
+    training.training_data(None, 6400, tmp_path, tmp_path / "runs", n_jobs=1)
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"reduced", "runs"}
     assert len(training.default_curves(tmp_path / "reduced")) == 4
+
+
+def test_all_runs_of_the_papers_cells_are_published():
+    runs = training.paper_runs()
+    planned = [(name, seed) for name, cell in training.PAPER_CELLS.items() for seed in cell.seeds]
+    assert [(cell, seed) for cell, seed, _ in runs] == planned and len(runs) == 36
+    assert {curve["picks"].iloc[-1] for _, _, curve in runs} == {20_000_000}
 
 
 def test_committed_runs_are_what_the_published_grid_exports(tmp_path, monkeypatch):

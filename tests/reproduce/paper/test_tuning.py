@@ -8,7 +8,7 @@ from unload.env.vector import HighestItemVectorEnv
 from unload.reproduce import grid
 from unload.reproduce.grid import read_grid
 from unload.reproduce.paper import tuning
-from unload.reproduce.paper.grids import tuning_grid
+from unload.reproduce.paper.tuning import tuning_grid
 from unload.support import files
 
 
@@ -23,7 +23,7 @@ def small(monkeypatch):
 
 
 def test_a_search_is_published_in_a_table_per_batch_size(small, tmp_path):
-    tuning.tuning_data(None, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
+    tuning.tuning_data(tmp_path, tmp_path / "runs", n_jobs=1)
     names = {path.name for path in (tmp_path / "tuning").iterdir()}
     tables = {f"with_fe_b{b}_{name}.csv" for b in (8, 16) for name in ("loss", "success_rate")}
     assert names == tables | {"tuning.provenance.json"}
@@ -43,16 +43,34 @@ def test_a_search_is_published_in_a_table_per_batch_size(small, tmp_path):
     assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
 
 
-def test_a_shorter_search_leaves_published_data_alone(small, tmp_path):
-    tuning.tuning_data(5 * 64, tmp_path, tmp_path / "runs", n_jobs=1, progress=False)
-    assert {path.name for path in tmp_path.iterdir()} == {"reduced", "runs"}
+def test_the_search_is_the_papers():
+    configs = list(tuning.TUNING.configs().values())
+    assert len(configs) == 3 * 4 * 10 * 2
+    assert {config.learning_rate for config in configs} == {1e-1, 1e-2, 1e-3}
+    assert {config.seed for config in configs} == set(range(10))
+    assert {config.picks for config in configs} == {3000 * 64}
+    assert {config.env for config in configs} == {"unload/HighestItem-v0"}
+    sizes = [config.batch_size for config in configs]
+    assert set(sizes) == {64, 256, 1024, 2048}
+    assert sizes == sorted(sizes, reverse=True), "slow runs come first"
 
 
-def test_committed_files_of_the_papers_plots_hold_what_the_tables_hold():
-    values = tuning.exported(files.DATA)
-    assert set(values) == set(files.DATA.glob("dummy_sim_*/*.csv")) and len(values) == 8
-    for path, column in values.items():
-        assert np.array_equal(np.loadtxt(path), column, equal_nan=True)
+@pytest.mark.parametrize("equalize", [True, False])
+def test_cells_of_the_search_are_named_by_their_settings(equalize):
+    config = tuning.TUNING.cells[tuning.tuning_cell(1024, 0.1, equalize)].config
+    assert (config.batch_size, config.learning_rate, config.equalize) == (1024, 0.1, equalize)
+
+
+def test_committed_files_of_the_papers_plots_are_those_of_the_tables(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        tuning, "read_grid", lambda grid, folder, cells: read_grid(grid, files.DATA, cells)
+    )
+    tuning.export_tuning(tmp_path)
+    written = {path.relative_to(tmp_path) for path in tmp_path.glob("*/*.csv")}
+    assert written == {path.relative_to(files.DATA) for path in files.DATA.glob("dummy_sim_*/*")}
+    assert len(written) == 8
+    for path in written:
+        assert (tmp_path / path).read_bytes() == (files.DATA / path).read_bytes()
 
 
 def test_committed_search_has_all_runs():

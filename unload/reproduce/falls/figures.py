@@ -1,16 +1,15 @@
 """The figures of why runs fall."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from unload import task
-from unload.reproduce.falls.cells import PREFERENCES, PUPILS
-from unload.reproduce.paper.grids import PAPER_CELLS
+from unload.reproduce.falls.laboratory import PREFERENCES, PUPILS
+from unload.reproduce.paper.training import PAPER_CELLS
 from unload.reproduce.statistics import PAPER_MSR, end_msr, t_interval
 from unload.reproduce.style import COLOURS, styled
 
@@ -56,12 +55,6 @@ def four_cells(curves: pd.DataFrame) -> Figure:
     return figure
 
 
-def draw_msr(axes: Axes, picks: Sequence[float], msr: Sequence[float], **style) -> None:
-    """Draw an MSR against picks."""
-    axes.plot(np.asarray(picks) / 1e6, 100 * np.asarray(msr), **style)
-    axes.set(xlabel="million picks", ylabel="MSR while training (%)", ylim=(0, 102))
-
-
 @styled
 def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
     """Learning curves of the laboratory, side by side in one panel.
@@ -71,7 +64,9 @@ def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
     """
     figure, axes = plt.subplots()
     for (name, curve), (_, colour) in zip(curves.items(), PUPIL_LOOKS):
-        draw_msr(axes, curve["picks"], curve["success_rate"], label=name, color=colour, lw=1)
+        msr = 100 * curve["success_rate"]
+        axes.plot(curve["picks"] / 1e6, msr, label=name, color=colour, lw=1)
+    axes.set(xlabel="million picks", ylabel="MSR while training (%)", ylim=(0, 102))
     axes.legend()
     return figure
 

@@ -10,37 +10,26 @@ from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
 from unload.network.peq import PEQNetwork
-from unload.reproduce.falls.changes import left, without
+from unload.reproduce.changes import left, without
 
 Seen = Callable[[np.ndarray], np.ndarray]
 HEIGHT_BINS = 12
+NEAR = 2.4  # m from the entrance, what the surface is of
 BLANKED = {"as_is": (), "x": (0,), "y": (1,), "place": (0, 1)}  # coordinates set to 0 in choosing
 LOADS = {"episodes": 16, "seed": 1000}  # of fresh containers, 500 picks each
 
 
-def scores(network: PEQNetwork, observations: torch.Tensor) -> torch.Tensor:
-    """What decides among the items of an observation: tanh's argument without the pooled part.
-
-    The pooled features move all items of an observation alike.
-    """
-    features = torch.relu(network.extractor(observations))
-    return features @ network.scorer.weight[0, : network.n_features]
-
-
 def slopes(network: PEQNetwork, observations: np.ndarray) -> np.ndarray:
-    """Mean slope of the score along x, y and z over the upper half of the items, (3,)."""
+    """Mean slope of the score along x, y and z over the upper half of the items, (3,).
+
+    The score is what decides among the items of an observation: tanh's argument without the pooled
+    part, which moves all of them alike.
+    """
     heights = observations[..., 2]
     upper = torch.from_numpy(observations[heights > np.median(heights)]).requires_grad_()
-    (gradient,) = torch.autograd.grad(scores(network, upper).sum(), upper)
+    score = torch.relu(network.extractor(upper)) @ network.scorer.weight[0, : network.n_features]
+    (gradient,) = torch.autograd.grad(score.sum(), upper)
     return gradient.numpy().mean(axis=0)
-
-
-def spreads(network: PEQNetwork, observations: np.ndarray) -> tuple[float, float]:
-    """Standard deviation within an observation of the score's height part and of the rest."""
-    with torch.no_grad():
-        whole = scores(network, torch.from_numpy(observations)).numpy()
-        height = scores(network, torch.from_numpy(without(observations))).numpy()
-    return float(height.std(axis=1).mean()), float((whole - height).std(axis=1).mean())
 
 
 def tilt(observations: np.ndarray, liftable: np.ndarray) -> np.ndarray:
@@ -103,17 +92,13 @@ def judged(
     return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
 
 
-def surface(
-    policy: Policy, picks: int = 300, containers: int = 8, seed: int = 0, depth: float = 2.4
-) -> tuple[np.ndarray, np.ndarray]:
-    """What a policy leaves of the loads, seen from the entrance.
+def surface(policy: Policy, picks: int = 300, containers: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """What a policy leaves of the loads, within 2.4 m of the entrance and seen from there.
 
     Args:
         policy: see ``unload.policies``; it plays with the mask on.
         picks: in each container.
         containers: how many.
-        seed: of the first load.
-        depth: of the part at the entrance that is looked at, in m.
 
     Returns:
         Places across the containers, (100,) in m, and the mean height of the highest box there,
@@ -122,8 +107,8 @@ def surface(
     places = (np.arange(100) + 0.5) / 100 * task.CONTAINER[1]
     heights = np.zeros((containers, len(places)))
     for container in range(containers):
-        load = left(policy, picks, seed + container)
-        near = load.positions[:, 0] > task.CONTAINER[0] - depth
+        load = left(policy, picks, seed=container)
+        near = load.positions[:, 0] > task.CONTAINER[0] - NEAR
         for centre, size in zip(load.positions[near], load.sizes[near]):
             above = np.abs(places - centre[1]) < size[1] / 2
             top = np.maximum(heights[container], centre[2] + size[2] / 2)

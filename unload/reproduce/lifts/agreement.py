@@ -11,10 +11,11 @@ boxes on top, which ``table`` answers without a simulation; and all that are clo
 of a policy, ``unload.reproduce.policies.robustness`` tells.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
+from typing import NamedTuple
 
 import gymnasium
 import numpy as np
@@ -22,17 +23,22 @@ import pandas as pd
 
 from unload import task
 from unload.agent import policies
+from unload.load.boxes import Load
 from unload.load.substacks import WALLS
+from unload.physics.bullet import SETTINGS
+from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
+from unload.physics.situation import Surroundings
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
-from unload.reproduce.lifts.full import NEAR_WALLS, State, fresh_job
 from unload.reproduce.results import COMMAND, keep_all, measured, publish, read_table
 from unload.reproduce.statistics import share_interval
-from unload.support import checks, files
+from unload.support import files
 
 NAME = "lift_agreement"
-LIFT_COUNT, FULL_COUNT = 5000, 300  # compared in table and local, and drawn for full
-FRESH = 1_000_000  # seed of the first container; no other data uses it or the next ones
+NEAR_WALLS = 5  # the item's own wall and two on each side
+LIFT_COUNT = 5000  # at least, compared in table and local
+FULL_COUNT = 300  # of these, drawn for full at least, and as many with three or more boxes on top
+FIRST_SEED = 1_000_000  # of the containers; no other data uses it or the next ones
 STAGES = (0, 100, 200, 300, 400, 500)  # picks after which items are lifted
 WANTED = (2, 4, 4, 2)  # lifts per state with 0, 1, 2, and 3 or more boxes on top
 PER_STATE = 3  # lifts of a state that are drawn for full
@@ -40,7 +46,7 @@ WHOLE = 5  # of every so many states drawn, one is asked about in the whole cont
 CLOSE = (0.1, 0.3)  # m, distances in local that count as close to the threshold
 ASKED_FULL = ("drawn", "buried", "close")
 COLUMNS = [
-    "policy", "seed", "picks", "item", "on_top", "situation", "known",
+    "policy", "seed", "picks", "item", "on_top", "situation",
     "asked_full", "walls", "table", "local", "full",
 ]  # fmt: skip
 UNLOADED_BY = {
@@ -51,67 +57,56 @@ UNLOADED_BY = {
 }
 
 
+class State(NamedTuple):
+    """A container on its way to be unloaded.
+
+    Attributes:
+        policy, seed, picks: how it got there, see ``container_states``.
+        load: what it was filled with.
+        present: (n,) bool, the items that are left.
+        visible: (128,) int64, the items that can be picked.
+    """
+
+    policy: str
+    seed: int
+    picks: int
+    load: Load
+    present: np.ndarray
+    visible: np.ndarray
+
+
 def agreement_data(
-    lifts: int = LIFT_COUNT,
-    full: int = FULL_COUNT,
-    seed: int = FRESH,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = 1,
-    progress: bool = True,
-) -> pd.DataFrame:
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = 1
+) -> None:
     """Compare lifts; write ``folder/lift_agreement.csv`` and its provenance.
 
     A run that was stopped goes on with the answers of ``full`` that it has.
 
     Args:
-        lifts: how many at least, in ``table`` and ``local``.
-        full: how many of these at least are drawn for ``full``, and how many more of those
-            with three or more boxes on top; the close ones come on top.
-        seed: of the first container.
         folder: of the data.
         runs_dir: where the answers of ``full`` are kept.
         n_jobs: processes for ``full``, as in joblib.
-        progress: show a progress bar.
-
-    Returns:
-        See ``read_agreement``.
-
-    Raises:
-        TypeError, ValueError: a number is not as described.
-        FileNotFoundError: there is no lift table.
     """
-    checks.integer("full", full, 0, checks.integer("lifts", lifts, 1))
-    runs_dir, rng = Path(runs_dir) / "agreement", np.random.default_rng(seed)
-    asker = Asker()
-    (states, frame), record = measured(partial(collect_lifts, lifts, seed, asker))
-    frame["asked_full"], frame["walls"] = choose_for_full(frame, full, rng)
+    (states, frame), record = measured(partial(collect_lifts, LIFT_COUNT, FIRST_SEED))
+    rng = np.random.default_rng(FIRST_SEED)
+    frame["asked_full"], frame["walls"] = choose_for_full(frame, FULL_COUNT, rng)
     asked = frame.index[frame["asked_full"] != ""]
     columns = (frame.loc[asked, name] for name in ("state", "item", "walls"))
     jobs = [fresh_job(states[state], item, walls) for state, item, walls in zip(*columns)]
-    answers = keep_all(runs_dir, jobs, n_jobs, progress)
+    answers = keep_all(Path(runs_dir) / "agreement", jobs, n_jobs)
     frame["full"] = pd.Series([answer.value for answer in answers], asked, "float64")
-    asker.close()
     settings = {
         "lifts": len(frame),
         "situations": int(frame["situation"].nunique()),
         **{f"in full, {why}": int((frame["asked_full"] == why).sum()) for why in ASKED_FULL},
-        "first seed": seed,
+        "first seed": FIRST_SEED,
         "policies": list(UNLOADED_BY),
         "stages (picks)": STAGES,
         "lift table": table_digest(),
     }
-    publish(
-        folder,
-        NAME,
-        {NAME: frame[COLUMNS]},
-        f"{COMMAND} lifts",
-        settings,
-        lifts < LIFT_COUNT or full < FULL_COUNT,
-        [record, *(answer.record for answer in answers)],
-        float_format="%.6f",
-    )
-    return read_agreement(folder)
+    tables, command = {NAME: frame[COLUMNS]}, f"{COMMAND} lifts"
+    records = [record, *(answer.record for answer in answers)]
+    publish(folder, NAME, tables, command, settings, False, records, float_format="%.6f")
 
 
 def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
@@ -120,9 +115,8 @@ def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
     Returns:
         ``policy``, ``seed`` and ``picks`` name the state of the container; ``item`` is the
         box lifted, ``on_top`` the number of boxes on it; lifts with equal ``situation``
-        are the same to ``local``; ``known`` says whether ``table`` had its answer before;
-        ``table``, ``local`` and ``full`` are how far the box moved in m, NaN where ``full``
-        was not asked.
+        are the same to ``local``; ``table``, ``local`` and ``full`` are how far the box moved
+        in m, NaN where ``full`` was not asked.
 
         Of ``full``: ``asked_full`` says why it was asked, "drawn", "buried" or "close", and is
         empty where it was not; ``walls`` is how many item walls it simulated, 0 for none, 5 for
@@ -137,8 +131,6 @@ def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
 
 def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
     """The lifts that succeed in one physics and not in the other; both must be known."""
-    checks.one_of("one", one, ("table", "local", "full"))
-    checks.one_of("other", other, ("table", "local", "full"))
     known = frame[frame[one].notna() & frame[other].notna()]
     lifted = known[[one, other]] >= task.LIFT_THRESHOLD
     return known[lifted[one] != lifted[other]]
@@ -168,8 +160,6 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
     }
     rows = {}
     for name, (lifts, other) in groups.items():
-        if lifts.empty:
-            continue
         differ = len(disagreements(lifts, "local", other))
         low, high = share_interval(differ, len(lifts))
         rows[name] = {
@@ -190,7 +180,6 @@ def table_digest() -> str:
 
 def container_states(policy: str, seed: int) -> Iterator[State]:
     """The states of one container at each of ``STAGES``, unloaded with ``table``."""
-    checks.one_of("policy", policy, UNLOADED_BY)
     env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
     rng = np.random.default_rng([seed, 1])  # not what draws the load
     observation, info = env.reset(seed=seed)
@@ -204,49 +193,8 @@ def container_states(policy: str, seed: int) -> Iterator[State]:
     env.close()
 
 
-class Asker:
-    """The same lifts asked of ``table``, with the lifts that ship, and of ``local``."""
-
-    def __init__(self) -> None:
-        self.table, self.local = TablePhysics(shared_table()), LocalPhysics()
-        self._numbers: dict[bytes, int] = {}  # of situations
-
-    def enter(self, state: State) -> None:
-        """Bring both to a state."""
-        for physics in (self.table, self.local):
-            physics.reset(state.load)
-        for item in np.flatnonzero(~state.present):
-            self.remove(item)
-
-    def remove(self, item: int) -> None:
-        """Take an item out of both."""
-        self.table.remove(item)
-        self.local.remove(item)
-
-    def on_top(self, item: int) -> int:
-        """Number of boxes on an item."""
-        return len(self.local.surroundings.on_top(item))
-
-    def lift(self, item: int) -> dict:
-        """Row of a lift: its item, its situation and both answers."""
-        situation = self.local.surroundings.situation(item)
-        before = len(self.table.table)
-        distances = {"table": self.table.lift(item), "local": self.local.lift(item)}
-        return {
-            "item": item,
-            "on_top": situation.on_top,
-            "situation": self._numbers.setdefault(situation.key, len(self._numbers)),
-            "known": len(self.table.table) == before,
-        } | distances
-
-    def close(self) -> None:
-        """Free both."""
-        self.table.close()
-        self.local.close()
-
-
-def collect_lifts(lifts: int, seed: int, asker: Asker) -> tuple[list[State], pd.DataFrame]:
-    """At least so many lifts, asked of ``table`` and ``local``.
+def collect_lifts(lifts: int, seed: int) -> tuple[list[State], pd.DataFrame]:
+    """At least so many lifts, asked of ``table``, with the lifts that ship, and of ``local``.
 
     Containers take turns in ``UNLOADED_BY``, with the seeds ``seed``, ``seed + 1``, …
 
@@ -254,25 +202,38 @@ def collect_lifts(lifts: int, seed: int, asker: Asker) -> tuple[list[State], pd.
         The states, and the columns of ``read_agreement`` without those of ``full`` but
         with ``state``, an index into the states.
     """
+    both = {"table": TablePhysics(shared_table()), "local": LocalPhysics()}
     states, rows, names = [], [], list(UNLOADED_BY)
+    numbers: dict[bytes, int] = {}  # of situations
     rng = np.random.default_rng([seed, 2])
     while len(rows) < lifts:
         container = len(states) // len(STAGES)
         for state in container_states(names[container % len(names)], seed + container):
-            asker.enter(state)
-            named = {"state": len(states), **_name(state)}
-            rows += [named | asker.lift(item) for item in choose_items(state, asker, rng)]
+            for physics in both.values():
+                physics.reset(state.load)
+                for item in np.flatnonzero(~state.present):
+                    physics.remove(item)
+            named = {"state": len(states), "policy": state.policy, "seed": state.seed}
+            surroundings = both["local"].surroundings
+            for item in choose_items(state, surroundings, rng):
+                situation = surroundings.situation(item)
+                row = {
+                    "picks": state.picks,
+                    "item": item,
+                    "on_top": situation.on_top,
+                    "situation": numbers.setdefault(situation.key, len(numbers)),
+                }
+                rows.append(named | row | {name: way.lift(item) for name, way in both.items()})
             states.append(state)
+    for physics in both.values():
+        physics.close()
     return states, pd.DataFrame(rows)
 
 
-def _name(state: State) -> dict:
-    return {"policy": state.policy, "seed": state.seed, "picks": state.picks}
-
-
-def choose_items(state: State, asker: Asker, rng: np.random.Generator) -> list[int]:
+def choose_items(state: State, surroundings: Surroundings, rng: np.random.Generator) -> list[int]:
     """Some visible items, as many of each kind as ``WANTED`` says or as there are."""
-    kinds = np.array([min(asker.on_top(item), len(WANTED) - 1) for item in state.visible])
+    on_top = [len(surroundings.on_top(item)) for item in state.visible]
+    kinds = np.minimum(on_top, len(WANTED) - 1)
     chosen = []
     for kind, wanted in enumerate(WANTED):
         items = state.visible[kinds == kind]
@@ -297,7 +258,48 @@ def choose_for_full(
         why[rows], walls[rows] = "drawn", NEAR_WALLS if turn % WHOLE else WALLS
     buried = np.flatnonzero((frame["on_top"] >= HELD_DOWN) & (why == ""))
     why[rng.choice(buried, min(count, len(buried)), replace=False)] = "buried"
-    if count:
-        why[frame["local"].between(*CLOSE) & (why == "")] = "close"
+    why[frame["local"].between(*CLOSE) & (why == "")] = "close"
     walls[np.isin(why, ("buried", "close"))] = NEAR_WALLS
     return why, walls
+
+
+def boxes_left(state: State, wall: int, walls: int) -> tuple[Load, np.ndarray]:
+    """The boxes that are left in a state, in some item walls, and their numbers in its load.
+
+    Args:
+        state: of the container.
+        wall: in the middle.
+        walls: how many, ``NEAR_WALLS`` (fewer where the load ends) or ``WALLS`` for all.
+    """
+    load = state.load
+    near = (abs(load.walls - wall) <= NEAR_WALLS // 2) | (walls == WALLS)
+    items = np.flatnonzero(state.present & near)
+    fields = load.positions, load.sizes, load.packages, load.walls
+    return Load(*(field[items] for field in fields)), items
+
+
+def fresh_job(state: State, item: int, walls: int) -> tuple[dict, Callable[[], float]]:
+    """Question and computation of one lift in a fresh world, for ``results.keep_all``.
+
+    In a world that has seen other lifts, the answer depends on them (by a millimetre or so),
+    and so on the order in which the items are lifted.
+
+    Args:
+        state: of the container.
+        item: to lift.
+        walls: how many are simulated, the item's own in the middle.
+    """
+    left, items = boxes_left(state, state.load.walls[item], walls)
+    box = int(np.searchsorted(items, item))
+    boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
+    question = {"settings": SETTINGS, "boxes": boxes, "item": box}
+    return question, partial(fresh_distance, left, box)
+
+
+def fresh_distance(load: Load, item: int) -> float:
+    """How far ``full`` moves an item of a load that has seen no other lift, in m."""
+    physics = FullPhysics()
+    physics.reset(load)
+    distance = physics.lift(item)
+    physics.close()
+    return distance

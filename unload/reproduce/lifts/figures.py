@@ -46,32 +46,34 @@ def distance_curves(
 def lift_sequences(
     lifts: Mapping[str, tuple[np.ndarray, np.ndarray]],
     times: Sequence[float],
-    dynamic: int = 2,
 ) -> Figure:
     """One line of pictures for each lift.
 
     The chosen box is "liftable" or "blocked": it has moved by 0.2 m in the last picture, or not.
 
     Args:
-        lifts: label → (sizes, poses) of a situation's boxes, the chosen one first and
-            those on top next. ``sizes`` is (boxes, 2) float, width and height in m;
-            ``poses`` (times, boxes, 3) float, y and z of the centre in m and the angle
-            of rotation about the x axis in rad.
+        lifts: label → (sizes, poses) of a situation's boxes, the chosen one first and the
+            one on it next; all others cannot move. ``sizes`` is (boxes, 2) float, width and
+            height in m; ``poses`` (times, boxes, 3) float, y and z of the centre in m and the
+            angle of rotation about the x axis in rad.
         times: when the poses were taken, s.
-        dynamic: how many of the boxes can move.
     """
     figure, grid = plt.subplots(
         len(lifts), len(times), figsize=(10, 2.05 * len(lifts) + 0.3), squeeze=False
     )
     meanings = {}
     for line, (label, (sizes, poses)) in zip(grid, lifts.items()):
-        limits = _limits(sizes[:dynamic], poses[:, :dynamic])
+        reach = np.hypot(*sizes[:2].T)[:, None] / 2  # of the moving boxes, however they turn
+        low = (poses[:, :2, :2] - reach).min((0, 1))
+        high = (poses[:, :2, :2] + reach).max((0, 1))
         moved = np.hypot(*(poses[-1] - poses[0])[0, :2]) >= task.LIFT_THRESHOLD
         chosen = "liftable" if moved else "blocked"
         meanings[f"chosen box, {chosen}"] = COLOURS[chosen]
         for axes, time, pose in zip(line, times, poses):
-            _draw_boxes(axes, sizes, pose, dynamic, COLOURS[chosen])
-            axes.set(xlim=limits[0], ylim=limits[1], aspect="equal", xticks=[], yticks=[])
+            _draw_boxes(axes, sizes, pose, COLOURS[chosen])
+            axes.set(
+                xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xticks=[], yticks=[]
+            )
             axes.set_title(f"{time:.2f} s", fontsize=8)
             for spine in axes.spines.values():
                 spine.set(visible=True, color="#cccccc")
@@ -82,19 +84,11 @@ def lift_sequences(
     return figure
 
 
-def _limits(sizes: np.ndarray, poses: np.ndarray) -> tuple[tuple, tuple]:
-    """Limits of both axes that show all moving boxes at all times, and some room."""
-    reach = np.hypot(*sizes.T)[:, None] / 2
-    low, high = (poses[..., :2] - reach).min((0, 1)), (poses[..., :2] + reach).max((0, 1))
-    return (low[0], high[0]), (low[1], high[1])
-
-
-def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, dynamic: int, chosen) -> None:
+def _draw_boxes(axes: Axes, sizes: np.ndarray, pose: np.ndarray, chosen) -> None:
     corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
     for box, (size, (y, z, angle)) in enumerate(zip(sizes, pose)):
         turn = np.array([(np.cos(angle), np.sin(angle)), (-np.sin(angle), np.cos(angle))])
-        other = COLOURS["on top of it" if box < dynamic else "cannot move"]
-        colour = other if box else chosen
+        colour = (chosen, COLOURS["on top of it"], COLOURS["cannot move"])[min(box, 2)]
         axes.add_patch(Polygon(corners * size @ turn + (y, z), fc=colour, ec="white", lw=0.8))
 
 
@@ -119,13 +113,7 @@ def agreement_scatter(frame: pd.DataFrame) -> Figure:
         ):
             of = known[np.minimum(known["on_top"], 3) == count]
             axes.scatter(of["local"], of[physics], s=14, alpha=0.6, color=colour, label=label)
-        axes.set(
-            xlim=(low, high),
-            ylim=(low, high),
-            xlabel="distance moved in local (m)",
-            ylabel=f"distance moved in {physics} (m)",
-            title=f"{len(known):,} lifts",
-            aspect="equal",
-        )
+        axes.set(xlim=(low, high), ylim=(low, high), title=f"{len(known):,} lifts", aspect="equal")
+        axes.set(xlabel="distance moved in local (m)", ylabel=f"distance moved in {physics} (m)")
     panels[0].legend(title="on top of the box", loc="upper left")
     return figure

@@ -22,51 +22,41 @@ from unload.agent import policies
 from unload.physics.bullet import SETTINGS
 from unload.physics.table import LiftTable
 from unload.reproduce.results import COMMAND, kept, publish
-from unload.support import checks, files
+from unload.support import files
 
-EPISODES = 12
-RANDOM_SHARE = 40  # episodes of random picks per episode of each other policy
+EPISODES, SEED = 12, 0  # of 64 containers, for each policy
+RANDOM_SHARE = 40  # times as many episodes of random picks
 
 
-def lift_data(
-    episodes: int = EPISODES,
-    seed: int = 0,
-    folder: str | Path = files.SHIPPED,
-    runs_dir: str | Path = files.RUNS,
-    progress: bool = True,
-) -> None:
+def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = files.RUNS) -> None:
     """Write ``lifts.npz``, see ``unload.physics.table.LiftTable``.
 
     Args:
-        episodes: of 64 containers for each of the 20 policies, and ``RANDOM_SHARE`` times as
-            many of random picks.
-        seed: of the episodes.
         folder: of the table.
         runs_dir: where the table is kept, not to be computed again.
-        progress: show a progress bar.
     """
     settings = {
-        "episodes of 64 containers per taste": checks.integer("episodes", episodes, 1),
-        "of random picks": RANDOM_SHARE * episodes,
-        "seed": checks.integer("seed", seed, 0),
+        "episodes of 64 containers per taste": EPISODES,
+        "of random picks": RANDOM_SHARE * EPISODES,
+        "seed": SEED,
     }
     runs_dir = Path(runs_dir) / "lifts"
-    path = runs_dir / f"{episodes}_episodes_seed_{seed}.npz"
+    path = runs_dir / f"{EPISODES}_episodes_seed_{SEED}.npz"
     question = settings | {"physics": SETTINGS}
-    _, record = kept(runs_dir, question, partial(_fill, path, episodes, seed, progress))
+    _, record = kept(runs_dir, question, partial(_fill, path))
     table = LiftTable.load(path)
     table.save(Path(folder) / "lifts.npz")
     settings["lifts"] = len(table)
-    publish(folder, "lifts", {}, f"{COMMAND} lifts", settings, episodes < EPISODES, [record])
+    publish(folder, "lifts", {}, f"{COMMAND} lifts", settings, False, [record])
 
 
-def _fill(path: Path, episodes: int, seed: int, progress: bool) -> None:
+def _fill(path: Path) -> None:
     """Fill an empty table by playing, and save it."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS).unwrapped
     envs.table = LiftTable()
-    jobs = list(product(range(episodes), _filling_policies(rng)))
-    for _, policy in tqdm(jobs, unit="episode", disable=not progress, ncols=100, file=sys.stdout):
+    jobs = list(product(range(EPISODES), _filling_policies(rng)))
+    for _, policy in tqdm(jobs, unit="episode", ncols=100, file=sys.stdout):
         observations, infos = envs.reset(seed=int(rng.integers(2**31)))
         for _ in range(task.MAX_PICKS):
             actions = policy(observations, infos["action_mask"], rng)
@@ -84,14 +74,10 @@ def _filling_policies(rng: np.random.Generator) -> list[Callable]:
             for favourite in (policies.highest, policies.nearest)
             for share in (0.0, 0.1, 0.3, 0.6)
         ),
-        *(policies.mixed(_farthest(rng.normal(size=3)), 0.2) for _ in range(12)),
+        *(policies.mixed(partial(_farthest, direction=rng.normal(size=3)), 0.2) for _ in range(12)),
     ]
 
 
-def _farthest(direction: np.ndarray) -> Callable:
-    """A policy that picks the item farthest in a direction, (3,) in scaled positions."""
-
-    def policy(observations, masks, rng):
-        return np.where(masks, observations @ direction, -np.inf).argmax(axis=1)
-
-    return policy
+def _farthest(observations, masks, rng, direction: np.ndarray) -> np.ndarray:
+    """The policy that picks the item farthest in a direction, (3,) in scaled positions."""
+    return np.where(masks, observations @ direction, -np.inf).argmax(axis=1)

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from unload import task
-from unload.reproduce.paper.grids import BATCH_SIZES, paper_runs
 from unload.reproduce.paper.numbers import CHANCE_ERROR, Row, table
-from unload.reproduce.paper.training import in_fresh_containers
+from unload.reproduce.paper.training import in_fresh_containers, paper_runs
 from unload.reproduce.paper.tuning import (
+    BATCH_SIZES,
     greedy_reached,
     read_curves,
     running_mean,

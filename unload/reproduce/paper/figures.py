@@ -12,8 +12,7 @@ from matplotlib.ticker import EngFormatter
 
 from unload import task
 from unload.load.view import COLOURS as BOX_COLOURS
-from unload.reproduce.paper.grids import PAPER, TUNING
-from unload.reproduce.paper.training import default_curves, episode_means
+from unload.reproduce.paper.training import PAPER, default_curves, episode_means
 from unload.reproduce.paper.tuning import REACHED, greedy_msr, read_curves, running_mean
 from unload.reproduce.style import COLOURS, mark_reduced, styled
 from unload.support import files
@@ -41,7 +40,7 @@ def fig08_learning_rate(folder: str | Path = files.DATA) -> Figure:
         )
         for power, shown in ((1, 6), (2, 7), (3, 5))
     }  # fmt: skip
-    return _over_steps(curves, "MSR while training", folder)
+    return _over_steps(curves, "MSR while training")
 
 
 @styled
@@ -54,7 +53,7 @@ def fig09_batch_size(folder: str | Path = files.DATA) -> Figure:
         f"$b = {batch_size}$": (read_curves("success_rate", batch_size, 1e-3, folder=folder), shown)
         for batch_size, shown in ((64, 9), (256, 9), (1024, 5), (2048, 6))
     }
-    return _over_steps(curves, "MSR while training", folder)
+    return _over_steps(curves, "MSR while training")
 
 
 @styled
@@ -67,7 +66,7 @@ def fig10_loss(folder: str | Path = files.DATA) -> Figure:
         "with FE": (read_curves("loss", 2048, 1e-3, True, folder), 6),
         "without FE": (read_curves("loss", 2048, 1e-3, False, folder), 8),
     }
-    return _over_steps(curves, r"loss $\ell$", folder)
+    return _over_steps(curves, r"loss $\ell$")
 
 
 @styled
@@ -94,7 +93,6 @@ def greedy_curves(folder: str | Path = files.DATA) -> Figure:
         draw_greedy(axes, curves)
         axes.set(title=title, xlim=(0, end))
     all_axes[0].set_ylabel("greedy MSR")
-    mark_reduced(figure, folder, TUNING.name)
     return figure
 
 
@@ -147,12 +145,11 @@ def _colours(names: Collection[str]) -> list:
     return [FE_COLOURS.get(name, colour) for name, colour in zip(names, scale)]
 
 
-def _over_steps(curves: Mapping[str, tuple[Curves, int]], label: str, folder: str | Path) -> Figure:
+def _over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
     figure, axes = plt.subplots()
     draw_curves(axes, curves, label)
     steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
     axes.set(xlim=(0, steps), ylim=(0, 0.6) if "loss" in label else (0, 1.02))
-    mark_reduced(figure, folder, TUNING.name)
     return figure
 
 

@@ -39,7 +39,8 @@ def fig03_substacks() -> Figure:
     figure, axes = plt.subplots(figsize=(8.2, 6.6))
     across, down, gap = 0.0, 0.88, 0.3  # m
     for name, variants in SUBSTACKS.items():
-        width = max(_right_end(boxes) for boxes in variants)
+        boxes = np.concatenate(variants)
+        width = (boxes[:, 1] + PACKAGES[boxes[:, 0], 0]).max() * CELL
         for variant, boxes in enumerate(variants):
             _draw_substack(axes, boxes, across, (3 - variant) * down)
         axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
@@ -47,7 +48,9 @@ def fig03_substacks() -> Figure:
     for variant in range(3):
         middle = (3 - variant) * down + ROWS_HIGH * CELL / 2
         axes.text(-0.08, middle, f"variant {variant}", ha="right", va="center")
-    _scale_bar(axes, across - gap + 0.14, down)
+    bar = across - gap + 0.14
+    axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
+    axes.text(bar + 0.05, down + 0.25, "0.5 m", va="center")
     row = (0, 1, 2, 0)
     lift = -0.12
     for (column, variants), variant in zip(COLUMNS, row):
@@ -87,27 +90,13 @@ def _draw_substack(axes: Axes, boxes, x: float, z: float, fontsize: int = 8) -> 
     """A substack whose own origin is at (x, z) in m, with its border."""
     for package, left, lower in boxes:
         width, height = PACKAGES[package] * CELL
-        _draw_box(axes, package, x + left * CELL, z + lower * CELL, width, height, fontsize)
+        corner, colour = (x + left * CELL, z + lower * CELL), package_colour(package)
+        axes.add_patch(Rectangle(corner, width, height, fc=colour, ec="white", lw=0.8))
+        bright = np.dot(colour, (0.299, 0.587, 0.114)) > 0.55
+        look = {"ha": "center", "va": "center_baseline", "color": INK if bright else "white"}
+        middle = corner[0] + width / 2, corner[1] + height / 2
+        axes.text(*middle, str(package), fontsize=fontsize, **look)
     _draw_border(axes, boxes, x, z)
-
-
-def _right_end(boxes: Sequence[tuple[int, int, int]]) -> float:
-    return max(left + PACKAGES[package][0] for package, left, _ in boxes) * CELL
-
-
-def _draw_box(axes, package, left, lower, width, height, fontsize=8) -> None:
-    colour = package_colour(package)
-    axes.add_patch(Rectangle((left, lower), width, height, fc=colour, ec="white", lw=0.8))
-    bright = np.dot(colour, (0.299, 0.587, 0.114)) > 0.55
-    axes.text(
-        left + width / 2,
-        lower + height / 2,
-        str(package),
-        ha="center",
-        va="center_baseline",
-        fontsize=fontsize,
-        color=INK if bright else "white",
-    )
 
 
 def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
@@ -125,11 +114,6 @@ def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
         axes.plot([across - CELL, across], [up, up], **style)
 
 
-def _scale_bar(axes: Axes, x: float, z: float, length: float = 0.5) -> None:
-    axes.plot([x, x], [z, z + length], color=INK, lw=2, solid_capstyle="butt")
-    axes.text(x + 0.05, z + length / 2, f"{length} m", va="center")
-
-
 def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> None:
     axes.set(xlim=xlim, ylim=zlim, aspect="equal")
     axes.axis("off")
@@ -137,7 +121,7 @@ def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> N
 
 @styled
 def fig02_containers(
-    images: Sequence[np.ndarray], unloaded: Sequence[int] | None = None, columns: int = 8
+    images: Sequence[np.ndarray], unloaded: Sequence[int], columns: int = 8
 ) -> Figure:
     """Fig. 2: pictures of the containers of a vector environment in a grid.
 
@@ -146,7 +130,6 @@ def fig02_containers(
             environment returns them, in the order in which they are drawn.
         unloaded: items unloaded from each container, written below its picture.
         columns: pictures in a line.
-
     """
     images = _crop(np.stack(images))
     lines = -(-len(images) // columns)
@@ -155,16 +138,15 @@ def fig02_containers(
     figure, grid = plt.subplots(
         lines,
         columns,
-        figsize=(8, lines * (cell * height / width + (0.0 if unloaded is None else 0.12))),
+        figsize=(8, lines * (cell * height / width + 0.12)),
         squeeze=False,
     )
     for axes in grid.flat:
         axes.axis("off")
-    for number, (axes, image) in enumerate(zip(grid.flat, images)):
+    for axes, image, count in zip(grid.flat, images, unloaded):
         axes.imshow(image, interpolation="antialiased")
-        if unloaded is not None:
-            axes.text(0.5, 0.0, unloaded[number], transform=axes.transAxes, ha="center",
-                      va="top", fontsize=6, color="#555555")  # fmt: skip
+        axes.text(0.5, 0.0, count, transform=axes.transAxes, ha="center", va="top", fontsize=6,
+                  color="#555555")  # fmt: skip
     return figure
 
 
@@ -172,8 +154,6 @@ def _crop(images: np.ndarray) -> np.ndarray:
     """Cut away the margin that is white in all pictures."""
     drawn = (images < 255).any(axis=(0, 3))
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
-    if not len(rows):
-        return images
     return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
@@ -197,7 +177,8 @@ def side_views(positions: np.ndarray, views: Mapping[str, Mapping[str, np.ndarra
         draw_items(axes, positions[:, [0, 2]], groups)
         axes.set(xlim=(0, length), ylim=(0, height), ylabel="z (m)", title=title, aspect="equal")
     panels[-1, 0].set_xlabel("x (m), entrance on the right")
-    _legend(figure, *panels[0, 0].get_legend_handles_labels())
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
     return figure
 
 
@@ -254,9 +235,6 @@ def wall_view(
     axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
     axes.set(title=f"wall {wall}", xticks=[0, 1, 2], yticks=[0, 1, 2])
     axes.grid(False)
-    _legend(figure, [Patch(fc=COLOURS[meaning]) for meaning in groups], list(groups))
+    handles = [Patch(fc=COLOURS[meaning], label=meaning) for meaning in groups]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(groups))
     return figure
-
-
-def _legend(figure: Figure, handles: list, labels: list[str]) -> None:
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))

@@ -23,43 +23,33 @@ from unload.reproduce.style import styled
 from unload.support import files
 
 FOLDER = "obs_hist_equal"  # of the paper's own plots
+SEED = 0  # of the load
 # Of ranks instead of positions; all other colours mean what they mean in every picture.
 EQUALIZED = SEEN_COLOURS["ranks"]
 # Fig. 5: the paper's histogram. The edges lie just outside [-1, 1].
 BINS = np.linspace(-1.001, 1.001, 111)
 
 
-def observation_data(seed: int = 0, folder: str | Path = files.DATA) -> None:
+def observation_data(folder: str | Path = files.DATA) -> None:
     """Write ``obs_hist_equal/{all_items,Observation,Equalized_Observation}.csv``.
 
     Columns ``x`` and ``y``: scaled x and z of all items, of the 128 observed ones, and of the
     observed ones after equalization.
-
-    Args:
-        seed: of the load.
-        folder: of the data.
     """
-    points, record = measured(lambda: _positions(seed))
+    points, record = measured(_positions)
     tables = {
         name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
         for name, positions in points.items()
     }
-    publish(
-        Path(folder) / FOLDER,
-        "observation",
-        tables,
-        f"{COMMAND} observation",
-        {"seed": seed},
-        False,
-        [record],
-        float_format="%.6f",
-    )
+    place, command = Path(folder) / FOLDER, f"{COMMAND} observation"
+    settings = {"seed": SEED}
+    publish(place, "observation", tables, command, settings, False, [record], float_format="%.6f")
 
 
-def _positions(seed: int) -> dict[str, np.ndarray]:
+def _positions() -> dict[str, np.ndarray]:
     """Scaled positions, (items, 3), by the name of the file."""
     env = gymnasium.make("unload/Container-v0").unwrapped
-    observed, _ = env.reset(seed=seed)
+    observed, _ = env.reset(seed=SEED)
     everything = observation.scale(env.observed_positions())
     env.close()
     return {

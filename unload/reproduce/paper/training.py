@@ -1,6 +1,8 @@
 """The paper's training in the container (Sec. IV-B), for Figs. 11 and 12, and its policies.
 
-python -m unload.reproduce training
+    python -m unload.reproduce training
+
+The first plan, ``data/falls/FIRST_PLAN.md``, says why its grid has these cells and seeds.
 """
 
 from collections.abc import Sequence
@@ -12,16 +14,45 @@ import pandas as pd
 
 from unload import task
 from unload.agent.checkpoint import RunFolder
+from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import Greedy, save_policy
 from unload.env.container import ContainerEnv
 from unload.env.vector import ContainerVectorEnv
-from unload.reproduce.grid import read_grid, read_policies, train_grid
-from unload.reproduce.paper.grids import DEFAULT_SEEDS, DEFAULTS, PAPER
-from unload.reproduce.results import JOBS, write_table
+from unload.reproduce.grid import Cell, Grid, read_grid, read_policies, train_grid
+from unload.reproduce.results import COMMAND, JOBS, write_table
 from unload.reproduce.statistics import end_msr
 from unload.support import checks, files
 
+B2048 = TrainConfig()
+CONFIG = replace(B2048, batch_size=256)
+
+
+def _both(name: str, config: TrainConfig, seeds: int, masked_seeds: int) -> dict[str, Cell]:
+    """A cell without the mask in training, and one with it."""
+    return {
+        f"{name}_no_mask": Cell(config, range(seeds)),
+        f"{name}_mask": Cell(replace(config, mask=True), range(masked_seeds)),
+    }
+
+
+# The paper's configuration read in four ways, and two changes that hold its runs up.
+PAPER_CELLS = {
+    **_both("paper", CONFIG, 10, 10),
+    **_both("paper_b2048", B2048, 8, 8),
+}
+PAPER = Grid(
+    "falls/paper",
+    f"{COMMAND} training",
+    PAPER_CELLS
+    | {
+        **_both("averaged", replace(CONFIG, ties="average"), 5, 10),
+        "averaged_b2048_mask": Cell(replace(B2048, mask=True, ties="average"), range(10)),
+        **_both("positions", replace(CONFIG, equalize=False), 5, 5),
+    },
+)
+DEFAULTS = "paper_b2048_no_mask"  # the cell of ``TrainConfig``'s defaults, of Figs. 11 and 12
+DEFAULT_SEEDS = range(4)  # of its runs that the figures show; the first is the paper's line
 EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
 ASK_EVERY = 25  # unloaded items between two questions for the favourite
 PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # policies that play elsewhere
@@ -39,7 +70,6 @@ def training_data(
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
-    progress: bool = True,
     shipped: str | Path = files.SHIPPED,
 ) -> None:
     """Train the paper's configuration, see ``train_grid``, and write some of it by other names.
@@ -47,7 +77,7 @@ def training_data(
     These are what the paper's plots read and, in the folder ``shipped``, the policies that play
     elsewhere: ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
     """
-    kept = train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs, progress)
+    kept = train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs)
     if picks is None and (cells is None or DEFAULTS in cells):
         config = replace(PAPER.cells[DEFAULTS].config, seed=DEFAULT_SEEDS[0])
         run = RunFolder(kept / DEFAULTS / f"seed_{config.seed}")
@@ -67,14 +97,20 @@ def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
         wall_time: of each point of its curve, s since the epoch.
         folder: of the data.
     """
-    curve = default_curves(folder)[DEFAULT_SEEDS[0]]
+    curve = default_curves(folder)[DEFAULT_SEEDS[0]].reset_index(drop=True)
     for name, values in (
         ("loss_function_agent", curve["loss"]),
         ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
     ):
-        columns = {"Wall time": wall_time, "Step": curve["picks"], "Value": values}
-        table = pd.DataFrame({each: np.asarray(column) for each, column in columns.items()})
+        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
         write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
+
+
+def paper_runs(folder: str | Path = files.DATA) -> list[tuple[str, int, pd.DataFrame]]:
+    """Cell, seed and curve of each published run of the paper's four cells."""
+    curves = read_grid(PAPER, folder, PAPER_CELLS)
+    groups = curves.groupby(["cell", "seed"], sort=False)
+    return [(cell, seed, curve) for (cell, seed), curve in groups]
 
 
 def default_curves(folder: str | Path = files.DATA) -> dict[int, pd.DataFrame]:
@@ -105,9 +141,7 @@ def while_training(folder: str | Path = files.DATA) -> pd.DataFrame:
     rows = {}
     for seed, curve in default_curves(folder).items():
         msr = curve["success_rate"]
-        rows[seed] = {
-            "msr_start": msr.iloc[0], "msr_end": end_msr(curve), "msr_best": msr.max()
-        }  # fmt: skip
+        rows[seed] = {"msr_start": msr.iloc[0], "msr_end": end_msr(curve), "msr_best": msr.max()}
     return pd.DataFrame(rows).T.rename_axis("seed")
 
 
@@ -201,7 +235,6 @@ def favourites(
         (containers, unloaded / 25 + 1) bool.
     """
     checks.integer("containers", containers, 1)
-    checks.integer("unloaded", unloaded, 1)
     env = ContainerEnv(physics="table", max_picks=MOST_PICKS)
     rng = np.random.default_rng(seed)
     found = []

@@ -1,20 +1,25 @@
-"""The hyperparameter search of Sec. IV-A, for Figs. 8–10: its data, and what is measured of it.
+"""The hyperparameter search of Sec. IV-A (Figs. 8–10): its grid, its data, what is measured of it.
 
 python -m unload.reproduce tuning
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from unload import task
+from unload.agent.config import TrainConfig
 from unload.env.highest_item import GRID
-from unload.reproduce.grid import read_grid, train_grid
-from unload.reproduce.paper.grids import TUNING, tuning_cell, tuning_config
-from unload.support import files
+from unload.reproduce.grid import Cell, Grid, read_grid, train_grid
+from unload.reproduce.results import COMMAND
+from unload.support import checks, files
 
+LEARNING_RATES = (1e-1, 1e-2, 1e-3)
+BATCH_SIZES = (64, 256, 1024, 2048)
+RUN_COUNT = 10  # of each configuration
+STEPS = 3000  # K, one pick in each of 64 environments and one update per step
 # What the paper's plots read of the search: its folder, the column, batch size, learning rate, run.
 SHOWN = (
     ("with", "hitrate", 1024, 1e-1, 6),
@@ -36,17 +41,71 @@ RESAMPLES = 500  # of the runs, for intervals
 LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
 
 
+def tuning_config(
+    batch_size: int, learning_rate: float, run: int = 0, equalize: bool = True, steps: int = STEPS,
+    **changes,
+) -> TrainConfig:  # fmt: skip
+    """One run in the hyperparameter-tuning environment (Sec. IV-A).
+
+    Args:
+        batch_size: b.
+        learning_rate: μ.
+        run: number of the run, its seed.
+        equalize: with the paper's feature engineering (FE) or without.
+        steps: K.
+        **changes: further fields of ``TrainConfig``.
+    """
+    checks.integer("steps", steps, 1)
+    return TrainConfig(
+        env="unload/HighestItem-v0",
+        picks=steps * task.NUM_ENVS,
+        batch_size=batch_size,
+        learning_rate=learning_rate,
+        seed=run,
+        equalize=equalize,
+        log_interval=1,
+        **changes,
+    )
+
+
+def tuning_cell(batch_size: int, learning_rate: float, equalize: bool) -> str:
+    """The name of a cell of the search, such as ``with_fe_b64/lr_0.1``."""
+    return f"{'with' if equalize else 'without'}_fe_b{batch_size}/lr_{learning_rate:g}"
+
+
+def tuning_grid(
+    learning_rates: Sequence[float] = LEARNING_RATES,
+    batch_sizes: Sequence[int] = BATCH_SIZES,
+    runs: int = RUN_COUNT,
+    equalize: Sequence[bool] = (True, False),
+    steps: int = STEPS,
+) -> Grid:
+    """The paper's search, or a smaller one.
+
+    The slow runs, of large batches, come first, so that no process is left with one of them at
+    the end.
+    """
+    cells = {
+        tuning_cell(batch_size, learning_rate, equalized): Cell(
+            tuning_config(batch_size, learning_rate, equalize=equalized, steps=steps),
+            range(checks.integer("runs", runs, 1)),
+        )
+        for batch_size in sorted(batch_sizes, reverse=True)
+        for equalized in equalize
+        for learning_rate in learning_rates
+    }
+    return Grid("tuning/tuning", f"{COMMAND} tuning", cells, policies=False)
+
+
+TUNING = tuning_grid()
+
+
 def tuning_data(
-    picks: int | None = None,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = -1,
-    progress: bool = True,
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
 ) -> None:
     """Train the search, see ``train_grid``, and write what the paper's plots read of it."""
-    train_grid(TUNING, None, picks, folder, runs_dir, n_jobs, progress)
-    if picks is None:
-        export_tuning(folder)
+    train_grid(TUNING, folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
+    export_tuning(folder)
 
 
 def export_tuning(folder: str | Path) -> None:
@@ -56,23 +115,16 @@ def export_tuning(folder: str | Path) -> None:
     value per step and no header; the loss before the first update is ``nan``, which the plots
     leave out.
     """
-    for path, values in exported(folder).items():
-        files.write_text(
-            path, values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g")
-        )
-
-
-def exported(folder: str | Path) -> dict[Path, pd.Series]:
-    """Return the values that the paper's plots read of the published search, by their files."""
-    values = {}
     for fe, kind, batch_size, rate, run in SHOWN:
         cell = tuning_cell(batch_size, rate, fe == "with")
         curves = read_grid(TUNING, folder, [cell])
         name = f"{kind}_curve_bz_{batch_size}_lr_{rate:g}_agent_{run}.csv"
         column = {"hitrate": "success_rate", "loss": "loss"}[kind]
-        path = Path(folder) / f"dummy_sim_{fe}_hist_equal" / name
-        values[path] = curves.loc[curves["seed"] == run, column]
-    return values
+        values = curves.loc[curves["seed"] == run, column]
+        files.write_text(
+            Path(folder) / f"dummy_sim_{fe}_hist_equal" / name,
+            values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g"),
+        )
 
 
 def read_curves(
@@ -188,28 +240,24 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
     """
     below = np.flatnonzero(running_mean(success_rate) < SOLVED)
     solved_at = below[-1] + 1 if below.size else 0
-    return {
-        "final_msr": success_rate[-FINAL:].mean(),
-        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
-        **_loss_summary(loss),
-    }
-
-
-def _loss_summary(loss: np.ndarray) -> dict[str, float]:
     known = np.isfinite(loss)
     smooth = running_mean(loss)[known]
     lowest = np.minimum.accumulate(smooth)
     peak = np.argmax(smooth - lowest)
-    ends = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
-    return dict(zip(LOSSES, ends))
+    losses = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
+    return {
+        "final_msr": success_rate[-FINAL:].mean(),
+        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
+        **dict(zip(LOSSES, losses)),
+    }
 
 
 def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
     """One row per configuration of the published search: means over its runs of ``run_summary``.
 
     Columns: ``equalize``, ``batch_size``, ``learning_rate``, ``runs``; ``final_msr`` and its
-    standard deviation, lowest and highest value; ``solved``, the number of runs that end at
-    99 % or above, and ``solved_at`` of these; and the four losses.
+    standard deviation; ``solved``, the number of runs that end at 99 % or above, and ``solved_at``
+    of these; and the four losses.
     """
     rows = []
     for (cell, _), curve in read_grid(TUNING, folder).groupby(["cell", "seed"]):
@@ -226,8 +274,6 @@ def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
             runs=("final_msr", "size"),
             final_msr=("final_msr", "mean"),
             final_msr_std=("final_msr", "std"),
-            final_msr_min=("final_msr", "min"),
-            final_msr_max=("final_msr", "max"),
             solved=("solved_at", "count"),
             solved_at=("solved_at", "mean"),
             **{name: (name, "mean") for name in LOSSES},

@@ -15,11 +15,10 @@ from matplotlib.ticker import PercentFormatter
 
 from unload.reproduce.policies.comparison import PLAYERS
 from unload.reproduce.results import COMMAND, read_table
-from unload.reproduce.statistics import with_intervals
+from unload.reproduce.statistics import bootstrap_interval
 from unload.reproduce.style import COLOURS, styled
 from unload.support import files
 
-KEY = ["policy", "mask", "condition"]
 # Conditions from left to right and top to bottom; those of ``comparison`` and, with every box
 # simulated, those of ``robustness``.
 FULL = {"restore": "full, restored", "keep": "full, kept"}
@@ -48,26 +47,12 @@ def read_comparison(folder: str | Path = files.DATA) -> pd.DataFrame:
         FileNotFoundError: a table is missing; the message says how to compute it.
         ValueError: a table lacks a column.
     """
-    place = Path(folder) / "policies"
-    columns = [*KEY, "success_rate"]
-    table = read_table(place / "comparison.csv", f"{COMMAND} policies", columns)
-    columns = ["policy", "after_pick", "success_rate"]
-    full = read_table(place / "robustness.csv", f"{COMMAND} policies", columns)
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    columns = ["policy", "mask", "condition", "success_rate"]
+    table = read_table(place / "comparison.csv", command, columns)
+    full = read_table(place / "robustness.csv", command, ["policy", "after_pick", "success_rate"])
     full = full.assign(mask=True, condition=full["after_pick"].map(FULL))
-    return pd.concat([table, full], ignore_index=True)[[*KEY, "success_rate"]]
-
-
-def comparison_means(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """Mean MSR and 95 % bootstrap interval over the containers.
-
-    Returns:
-        Index ``policy``, ``mask``, ``condition``; columns ``runs``, how many containers,
-        ``success_rate``, ``success_rate_low`` and ``success_rate_high``.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_comparison``.
-    """
-    return with_intervals(read_comparison(folder), KEY, ["success_rate"]).set_index(KEY)
+    return pd.concat([table, full], ignore_index=True)[columns]
 
 
 @styled
@@ -82,12 +67,12 @@ def comparison_msr(folder: str | Path = files.DATA) -> Figure:
     Raises:
         FileNotFoundError, ValueError: see ``read_comparison``.
     """
-    means = comparison_means(folder)
+    table = read_comparison(folder)
     figure, panels = plt.subplots(
         len(CONDITIONS) // COLUMNS, COLUMNS, figsize=(8.4, 6.2), sharex=True, sharey=True
     )
     for axes, condition in zip(panels.flat, CONDITIONS):
-        _panel(axes, means.xs(condition, level="condition"))
+        _panel(axes, table[table["condition"] == condition])
         axes.set_title(condition, loc="left")
     panels[0, 0].set(xlim=(0, 1.04), ylim=(len(ROWS) - 0.5, -0.5))
     panels[0, 0].set_yticks(range(len(ROWS)), ROWS.values())
@@ -97,17 +82,19 @@ def comparison_msr(folder: str | Path = files.DATA) -> Figure:
     return figure
 
 
-def _panel(axes: Axes, means: pd.DataFrame) -> None:
+def _panel(axes: Axes, table: pd.DataFrame) -> None:
     """All policies under one condition."""
-    axes.set_title(f"{means['runs'].max():.0f} containers", loc="right", fontsize=7, color="0.45")
+    rates = dict(list(table.groupby(["policy", "mask"])["success_rate"]))
+    count = max(map(len, rates.values()))
+    axes.set_title(f"{count} containers", loc="right", fontsize=7, color="0.45")
     for row, (policy, mask) in enumerate(ROWS):
-        if (policy, mask) not in means.index:
+        if (policy, mask) not in rates:
             axes.text(0.03, row, NOT_PLAYED, va="center", fontsize=7, color="0.45")
             continue
-        _, mean, low, high = means.loc[policy, mask]
+        rate = rates[policy, mask]
         colour = COLOURS[SEEN.get(policy, policy)]
-        axes.plot([low, high], [row, row], color=colour)
-        axes.plot(mean, row, "o", color=colour, markerfacecolor=colour if mask else "white",
+        axes.plot(bootstrap_interval(rate), [row, row], color=colour)
+        axes.plot(rate.mean(), row, "o", color=colour, markerfacecolor=colour if mask else "white",
                   markersize=5, clip_on=False, zorder=3)  # fmt: skip
 
 
@@ -181,14 +168,8 @@ def steps(metres: np.ndarray, slope: float, ranks: np.ndarray) -> Figure:
                    label=name)  # fmt: skip
     right.set(xlabel="to the side or along the container (ranks)", ylabel="up (ranks)")
     right.set(ylim=(0, None), title="steps in ranks")
-    for axes in (left, right):
-        axes.legend(
-            loc="upper right",
-            fontsize=8,
-            framealpha=1,
-            frameon=True,
-            markerscale=3 if axes is right else 1,
-        )
+    for axes, scale in ((left, 1), (right, 3)):
+        axes.legend(loc="upper right", fontsize=8, framealpha=1, frameon=True, markerscale=scale)
     return figure
 
 

@@ -9,6 +9,7 @@ and a box on which nothing lies may be jammed between its neighbours.
 
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -22,21 +23,17 @@ from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Surroundings
 from unload.reproduce.policies.comparison import LEARNED, SIMPLE, digests, find_policy
 from unload.reproduce.results import COMMAND, keep_all, publish
-from unload.support import checks, files
+from unload.support import files
 
-EPISODES, PICKS = 10, 100
+EPISODES, PICKS = 10, 100  # of each policy; only the front walls of a load are simulated
 SEED = 2000  # of the loads; no other data uses it
+COLUMNS = ["policy", "after_pick", "episode", "success_rate", "free", "jammed"]
 # Who plays how; of the others, every decision with boxes restored would be the table's.
-PLAYED = {"keep": (*SIMPLE, *LEARNED), "restore": ("recommended",)}
+PLAYED = (*((name, "keep") for name in (*SIMPLE, *LEARNED)), ("recommended", "restore"))
 
 
 def robustness_data(
-    episodes: int = EPISODES,
-    picks: int = PICKS,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = 1,
-    progress: bool = True,
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = 1
 ) -> None:
     """Let policies unload the same containers: ``policies/robustness.csv``.
 
@@ -45,59 +42,34 @@ def robustness_data(
     goes on.
 
     Args:
-        episodes: containers per policy and ``after_pick``; only their front walls are
-            simulated, see ``front_walls``.
-        picks: per container, at most 100.
         folder: of the data.
         runs_dir: where finished episodes are kept.
         n_jobs: processes, as in joblib.
-        progress: show a progress bar.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
-    checks.integer("episodes", episodes, 1)
-    checks.integer("picks", picks, 1, PICKS)
-    found = {name: find_policy(name) for names in PLAYED.values() for name in names}
     weights = digests()
-    seeds = np.random.SeedSequence(SEED).generate_state(episodes).tolist()
-    containers = [
-        {"policy": name, "after_pick": after_pick, "episode": episode}
-        for after_pick, names in PLAYED.items()
-        for name in names
-        for episode in range(episodes)
-    ]
-    jobs = []
-    for container in containers:
-        name, after_pick, episode = container.values()
-        size = {"seed": seeds[episode], "picks": picks, "walls": FRONT_WALLS}
-        question = container | size | {"weights": weights.get(name), "settings": SETTINGS}
-        jobs.append((question, partial(play, found[name], after_pick, seeds[episode], picks)))
-    answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs, progress)
-    frame = pd.DataFrame([one | answer.value for one, answer in zip(containers, answers)])
-    settings = {"policies": weights, "episodes": episodes, "picks": picks, "seed": SEED}
-    publish(
-        Path(folder) / "policies",
-        "robustness",
-        {"robustness": frame},
-        f"{COMMAND} policies",
-        settings | {"front walls": FRONT_WALLS},
-        episodes < EPISODES or picks < PICKS,
-        [answer.record for answer in answers],
-    )
-
-
-def front_load(rng: np.random.Generator) -> Load:
-    """The front walls of a random load."""
-    return front_walls(stack_load(rng))
+    seeds = np.random.SeedSequence(SEED).generate_state(EPISODES).tolist()
+    containers, jobs = [], []
+    for (name, after_pick), (episode, seed) in product(PLAYED, enumerate(seeds)):
+        containers.append({"policy": name, "after_pick": after_pick, "episode": episode})
+        size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS}
+        question = containers[-1] | size | {"weights": weights.get(name), "settings": SETTINGS}
+        jobs.append((question, partial(play, find_policy(name), after_pick, seed, PICKS)))
+    answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
+    rows = [one | answer.value for one, answer in zip(containers, answers)]
+    tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
+    settings = {"policies": weights, "episodes": EPISODES, "picks": PICKS, "seed": SEED}
+    settings["front walls"] = FRONT_WALLS
+    records = [answer.record for answer in answers]
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    publish(place, "robustness", tables, command, settings, False, records)
 
 
 def play(
     policy: Policy,
     after_pick: str,
     seed: int,
-    picks: int = PICKS,
-    stack: Callable[[np.random.Generator], Load] = front_load,
+    picks: int,
+    stack: Callable[[np.random.Generator], Load] = lambda rng: front_walls(stack_load(rng)),
 ) -> dict[str, float]:
     """Let a policy unload one container, with the mask.
 
@@ -105,41 +77,28 @@ def play(
         policy: see ``unload.policies``.
         after_pick: ``"keep"`` or ``"restore"``, see ``FullPhysics``.
         seed: of the load and of the policy's random numbers.
-        picks: how many.
-        stack: makes the load, see ``ContainerEnv``.
+        picks: how many, fewer than the load has items.
+        stack: makes the load, see ``ContainerEnv``; the front walls of one of the paper's loads.
 
     Returns:
         ``success_rate``; ``free`` and ``jammed``, the shares of picks at items on which nothing
         rested in the neat load but what has been unloaded since, and of those that failed
-        nevertheless; ``median_displacement`` and ``max_displacement`` of the boxes that are
-        left, in m, at the end.
-
-    Raises:
-        ValueError: the load does not hold more items than ``picks``.
+        nevertheless.
     """
     rng = np.random.default_rng([seed])
     rewards, free = [], []
     env = ContainerEnv("full", after_pick, max_picks=picks, stack=stack)
-    try:
-        observation, info = env.reset(seed=seed)
-        physics = env.physics
-        if len(physics.load) <= picks:
-            raise ValueError(f"stack made {physics.load}; expected more than picks={picks} items")
-        around = Surroundings(physics.load, physics.present)
-        for _ in range(picks):
-            allowed = info["action_mask"]
-            action = int(policy(observation[np.newaxis], allowed[np.newaxis], rng)[0])
-            free.append(not around.on_top(int(env.visible[action])))
-            observation, reward, _, _, info = env.step(action)
-            rewards.append(reward)
-        moved = np.linalg.norm(physics.positions() - physics.load.positions, axis=1)
-        moved = moved[physics.present]
-    finally:
-        env.close()
+    observation, info = env.reset(seed=seed)
+    around = Surroundings(env.physics.load, env.physics.present)
+    for _ in range(picks):
+        allowed = info["action_mask"]
+        action = int(policy(observation[np.newaxis], allowed[np.newaxis], rng)[0])
+        free.append(not around.on_top(int(env.visible[action])))
+        observation, reward, _, _, info = env.step(action)
+        rewards.append(reward)
+    env.close()
     return {
         "success_rate": success_rate(rewards),
         "free": float(np.mean(free)),
         "jammed": float(np.mean(free & (np.array(rewards) < 0))),
-        "median_displacement": float(np.median(moved)),
-        "max_displacement": float(moved.max()),
     }

@@ -50,13 +50,8 @@ def speed_ratios(folder: str | Path = FOLDER) -> Figure:
         places = np.arange(len(group))
         axes.barh(places, group["ratio"], color=f"C{number}")
         for place, ratio, value, unit in zip(places, group["ratio"], group["value"], group["unit"]):
-            axes.text(
-                max(ratio, 1) * 1.15,
-                place,
-                f"{three_digits(value)} {unit}",
-                va="center",
-                fontsize=8,
-            )
+            text = f"{three_digits(value)} {unit}"
+            axes.text(max(ratio, 1) * 1.15, place, text, va="center", fontsize=8)
         axes.set_yticks(places, group["how"], fontsize=8)
         axes.set(xscale="log", ylim=(len(group) - 0.4, -0.6), xlim=(0.5, 20 * table["ratio"].max()))
         axes.set_title(what, loc="left", fontsize=9)
@@ -74,10 +69,8 @@ def cost_of_ways(cost: pd.Series) -> Figure:
         cost: way → µs.
     """
     figure, axes = plt.subplots(figsize=(5.6, 0.6 + 0.36 * len(cost)))
-    axes.barh(cost.index, cost)
-    for place, microseconds in enumerate(cost):
-        text = f" {microseconds:.3g} µs, {cost.iloc[0] / microseconds:.3g} ×"
-        axes.text(microseconds, place, text, va="center")
+    texts = [f"{each:.3g} µs, {cost.iloc[0] / each:.3g} ×" for each in cost]
+    axes.bar_label(axes.barh(cost.index, cost), texts, padding=3)
     axes.set(xlabel="time per observation (µs)", xlim=(0, 1.4 * cost.max()))
     axes.invert_yaxis()
     axes.grid(False, axis="y")

@@ -5,10 +5,10 @@ from dataclasses import asdict, replace
 import pytest
 
 from unload import TrainConfig, evaluate, load_policy
+from unload.reproduce import variants
 from unload.reproduce.fingerprint import training_fingerprint
 from unload.reproduce.grid import read_measures
-from unload.reproduce.variants import grids
-from unload.reproduce.variants.grids import GRIDS, judged, read_variants, variants_data
+from unload.reproduce.variants import GRIDS, judged, read_variants, variants_data
 from unload.support import files
 from unload.support.provenance import read_provenance
 
@@ -51,7 +51,7 @@ def test_rewards_stand_beside_the_setting_that_changes_nothing():
 
 
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
-    monkeypatch.setattr(grids, "LOADS", {"episodes": 3, "seed": 1000})
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 3, "seed": 1000})
     policy = load_policy("paper_seed_2")
     expected = [
         evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
@@ -62,7 +62,7 @@ def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
 def test_the_recommended_policy_is_judged_as_the_data_say():
     policy = load_policy("recommended")
     first = read_measures(GRIDS["recommended"]).iloc[0]
-    assert judged(policy, grids.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
+    assert judged(policy, variants.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
 
 
 def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
@@ -73,13 +73,11 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
             for cell, one in GRIDS[name].cells.items()
         }
         monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
-    monkeypatch.setattr(grids, "LOADS", {"episodes": 1, "seed": 1000})
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 1, "seed": 1000})
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
-    folders |= {"n_jobs": 1, "progress": False}
-    variants_data(["rewards"], 40, **folders)
-    rows = read_measures(GRIDS["rewards"], tmp_path / "reduced")
+    variants_data(["rewards", "recommended"], n_jobs=1, **folders)
+    rows = read_measures(GRIDS["rewards"], tmp_path)
     assert rows["cell"].nunique() == 3 and rows["msr_mask"].between(0, 1).all()
-    variants_data(["recommended"], **folders)
     provenance = read_provenance(tmp_path, "variants/recommended")
     assert provenance["fingerprint"] == training_fingerprint()
     assert not load_policy(tmp_path / "policies/recommended.safetensors").equalize

@@ -1,10 +1,10 @@
-"""Other networks, rewards and settings, and the recommended agent: a grid each.
+"""The paper's outlook: other networks, rewards and settings, and the agent that never fails.
 
     python -m unload.reproduce variants
 
-The first three differ from the paper's configuration in one thing, and in what makes them
-affordable: fewer picks and a smaller batch. Networks without a fused update are small, too, and
-so is the paper's beside them.
+Each is a grid. The first three differ from the paper's configuration in one thing, and in what
+makes them affordable: fewer picks and a smaller batch. Networks without a fused update are small,
+too, and so is the paper's beside them.
 """
 
 from collections.abc import Sequence
@@ -66,7 +66,10 @@ GRIDS = {
     # is a cell of the settings.
     "rewards": _grid(
         "variants/rewards",
-        cells={f"height_{share}": Cell(CONFIG, SEEDS, height_reward(share)) for share in SHARES},
+        cells={
+            f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share))
+            for share in SHARES
+        },
     ),
     "settings": _grid(
         "variants/settings",
@@ -87,11 +90,9 @@ OPTIONS = {"--grids": {"nargs": "+", "choices": GRIDS, "default": tuple(GRIDS)},
 
 def variants_data(
     grids: Sequence[str] = tuple(GRIDS),
-    picks: int | None = None,
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = -1,
-    progress: bool = True,
     shipped: str | Path = files.SHIPPED,
 ) -> None:
     """Train some grids, see ``train_grid``.
@@ -100,11 +101,9 @@ def variants_data(
 
     Args:
         grids: names in ``GRIDS``.
-        picks: of each run, those of the plan if None.
         folder: of the data.
         runs_dir: where the runs are kept.
         n_jobs: processes, see ``run_sweep``.
-        progress: show a progress bar.
         shipped: folder of the policy.
 
     Raises:
@@ -114,8 +113,8 @@ def variants_data(
     for name in grids:
         checks.one_of("grids", name, GRIDS)
     for name in grids:
-        kept = train_grid(GRIDS[name], None, picks, folder, runs_dir, n_jobs, progress)
-        if name == "recommended" and picks is None:
+        kept = train_grid(GRIDS[name], folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
+        if name == "recommended":
             best = load_policy(kept / "positions/seed_0/policy.safetensors")
             save_policy(best, Path(shipped) / "policies/recommended.safetensors")
 
