@@ -123,7 +123,9 @@ def _place_columns(path: Path, table: pd.DataFrame) -> tuple[str, ...]:
             raise ValueError(f"{path} has the column {column!r}; expected {name!r}, and once")
     corners, centres = (set(names) & set(table.columns) for names in (CORNER, CENTRE))
     if corners and centres:
-        raise ValueError(f"{path} has centres and corners, {sorted(centres | corners)}; expected either")
+        raise ValueError(
+            f"{path} has centres and corners, {sorted(centres | corners)}; expected either"
+        )
     place = CENTRE if centres else CORNER
     if table.empty or not {*place, *SIZES} <= set(table.columns):
         raise ValueError(
