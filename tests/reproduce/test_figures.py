@@ -80,9 +80,6 @@ FIGURES = FROM_DATA | {
         LINE, {"front": LINE}, LINE, np.add.outer(LINE, LINE)
     ),
     "steps": lambda: policies.steps(np.full((2, 2), 0.3), 0.4, np.ones((3, 3))),
-    "noise": lambda: policies.noise(
-        pd.DataFrame({("highest", True): LINE, ("highest", False): LINE}), pd.Series(LINE)
-    ),
     "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
     "laboratory_runs": lambda: falls.laboratory_runs(
         {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}

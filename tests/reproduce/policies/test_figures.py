@@ -1,7 +1,6 @@
 """Figures of the policies, and those of the speeds."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from unload.reproduce.policies import comparison, figures, robustness, speed
@@ -33,8 +32,3 @@ def test_bars_are_the_measured_ratios():
     bars = [bar.get_width() for axes in speed.speed_ratios().axes for bar in axes.patches]
     grouped = [ratio for _, group in table.groupby("what", sort=False) for ratio in group["ratio"]]
     assert np.allclose(bars, grouped)
-
-
-def test_ways_are_compared_with_the_first():
-    (axes,) = speed.cost_of_ways(pd.Series({"plain": 80.0, "fast": 20.0})).axes
-    assert [text.get_text() for text in axes.texts] == ["80 µs, 1 ×", "20 µs, 4 ×"]

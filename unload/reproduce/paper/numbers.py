@@ -1,4 +1,4 @@
-"""The paper's numbers beside ours, section by section, as notebook 10 shows them.
+"""The paper's numbers beside ours, section by section, as report/01 shows them.
 
 Ours are constants of the code, or measured within a minute; only the paper's are typed. Each
 function returns a table indexed by ``number``, all columns text: ``source`` (the section of the

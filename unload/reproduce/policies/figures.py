@@ -171,24 +171,3 @@ def steps(metres: np.ndarray, slope: float, ranks: np.ndarray) -> Figure:
     for axes, scale in ((left, 1), (right, 3)):
         axes.legend(loc="upper right", fontsize=8, framealpha=1, frameon=True, markerscale=scale)
     return figure
-
-
-@styled
-def noise(rates: pd.DataFrame, upside_down: pd.Series) -> Figure:
-    """MSR over the error of the observed positions.
-
-    Args:
-        rates: indexed by σ in m; a column for each policy and mask, with (name, bool) as labels.
-        upside_down: share of pairs whose upper box looks lower, with the same index.
-    """
-    figure, axes = plt.subplots(figsize=(5.4, 3.4))
-    for name, mask in rates:
-        axes.plot(100 * rates.index, rates[name, mask], "o-" if mask else "o--",
-                  color=COLOURS[SEEN.get(name, name)], markersize=4,
-                  label=name if mask else f"{name}, no mask")  # fmt: skip
-    axes.plot(100 * upside_down.index, upside_down, color="0.5",
-              label="pairs that look upside down")  # fmt: skip
-    axes.set(xlabel="σ (cm)", ylabel="MSR; share of pairs", ylim=(0, 1.03))
-    axes.yaxis.set_major_formatter(PercentFormatter(1))
-    axes.legend(fontsize=8)
-    return figure

@@ -59,19 +59,3 @@ def speed_ratios(folder: str | Path = FOLDER) -> Figure:
         axes.grid(False, axis="y")
     axes.set_xlabel("times as fast as the first way of its kind")
     return figure
-
-
-@styled
-def cost_of_ways(cost: pd.Series) -> Figure:
-    """The cost of some ways to do the same thing, and how many times as fast as the first each is.
-
-    Args:
-        cost: way → µs.
-    """
-    figure, axes = plt.subplots(figsize=(5.6, 0.6 + 0.36 * len(cost)))
-    texts = [f"{each:.3g} µs, {cost.iloc[0] / each:.3g} ×" for each in cost]
-    axes.bar_label(axes.barh(cost.index, cost), texts, padding=3)
-    axes.set(xlabel="time per observation (µs)", xlim=(0, 1.4 * cost.max()))
-    axes.invert_yaxis()
-    axes.grid(False, axis="y")
-    return figure
