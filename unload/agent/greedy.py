@@ -143,7 +143,7 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     except (TypeError, ValueError):
         held = False
     if not held:
-        raise TypeError(f"card is {policy.card!r}; expected what JSON can hold, such as str, float")
+        raise TypeError(f"card is {policy.card!r}; expected what JSON can hold, keys being str")
     settings = settings_of(policy) | {"card": card}
     write_weights(path, "policy", settings, policy.network.state_dict())
 
