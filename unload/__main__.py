@@ -4,7 +4,7 @@ import argparse
 import signal
 import sys
 
-from unload.agent.order import picking_order
+from unload.agent.order import NAMES, picking_order
 from unload.load.packing_list import EXAMPLE, read_load
 
 DESCRIPTION = """\
@@ -26,7 +26,8 @@ def main(arguments: list[str] | None = None) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("list", nargs="?", default=EXAMPLE, help="CSV file; an example if missing")
-    parser.add_argument("--policy", default="recommended", help="name, or a file of weights")
+    known = f"{', '.join(NAMES)}, or a file of weights"
+    parser.add_argument("--policy", default="recommended", help=known)
     parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
     options = parser.parse_args(arguments)
     try:

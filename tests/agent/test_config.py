@@ -26,11 +26,11 @@ def test_epsilon_falls_linearly_and_stays():
     config = TrainConfig(picks=6400, epsilon_init=0.9, epsilon_final=0.1, epsilon_fraction=0.5)
     values = [config.epsilon(picks) for picks in (0, 1600, 3200, 3201, 6400)]
     assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
-    assert TrainConfig(picks=64, epsilon_fraction=0).epsilon(0) == 0
+    assert TrainConfig(picks=6400, epsilon_fraction=0).epsilon(0) == 0
 
 
 def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
-    for fields in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64}):
+    for fields in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64, "picks": 128}):
         seeds = TrainConfig(seed=3, **fields).seeds()
         assert seeds == (1645421708, 4294262074, 3363538554)
 
@@ -42,6 +42,7 @@ def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
         ("ties", "coin", ValueError),
         ("picks", 0, ValueError),
         ("picks", 100, ValueError),  # no multiple of 64
+        ("picks", 2048, ValueError),  # not enough for an update by 2048
         ("seed", -1, ValueError),
         ("num_envs", 0, ValueError),
         ("learning_rate", -1e-3, ValueError),

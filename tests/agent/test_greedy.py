@@ -169,6 +169,9 @@ def test_a_card_comes_back_and_is_shown(tmp_path):
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
     with pytest.raises(TypeError, match="card is 'good'; expected a dict"):
         Greedy(peq(), True, card="good")
+    for card in ({"msr": np.float32(0.5)}, {3: "seed"}, {"seeds": {10: 0.5, 9: 1.0}}):
+        with pytest.raises(TypeError, match="card is {.*; expected what JSON can hold"):
+            save_policy(Greedy(peq(), True, card=card), path)
 
 
 def test_a_file_from_before_there_were_cards_says_so(tmp_path):

@@ -58,23 +58,6 @@ def test_samples_are_uniform_and_seeded(rng):
     assert (first == same).all()
 
 
-def test_sampling_refuses(rng):
-    replay = ReplayBuffer(10, 4)
-    with pytest.raises(ValueError, match="the replay buffer is empty"):
-        replay.sample_rows(1, rng)
-    replay.add(**picks(0, 2))
-    with pytest.raises(ValueError, match="batch_size is 0"):
-        replay.sample_rows(0, rng)
-    with pytest.raises(TypeError, match="rng is None; expected a numpy.random.Generator"):
-        replay.sample_rows(1, None)
-
-
-@pytest.mark.parametrize(("size", "items", "name"), [(0, 4, "size"), (4, 0, "items")])
-def test_bad_sizes_are_refused(size, items, name):
-    with pytest.raises(ValueError, match=f"{name} is 0"):
-        ReplayBuffer(size, items)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -83,6 +83,16 @@ def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
     assert report["error"].iloc[1] == ""
 
 
+def test_an_error_in_own_code_is_traced_in_the_runs_log(tmp_path):
+    def leaning_stack(rng):
+        raise RuntimeError("it fell over")
+
+    config = TrainConfig(**CONTAINER)
+    report = sweep.run_sweep({"run": config}, tmp_path, 1, progress=False, stack=leaning_stack)
+    assert report["error"].item() == "RuntimeError: it fell over"
+    assert "in leaning_stack" in (tmp_path / "run" / "log.txt").read_text()
+
+
 def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
     other = tuning_config(8, 1e-3, 0, steps=4, n_features=5)
     train(other, tmp_path / "set" / "run_0", progress=False)
@@ -136,13 +146,14 @@ def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path,
         ({"configs": {"a": 1}}, r"configs\['a'\] is 1; expected an unload.TrainConfig"),
         *(
             ({"configs": {name: tuning_config(8, 1e-3, 0)}}, "configs has the name .*relative path")
-            for name in ("", ".", "/a", "../a", "a/", "a//b")
+            for name in ("", ".", "/a", "../a", "a/", "a//b", 3)
         ),
         ({"folder": None}, "folder is None; expected a path"),
         ({"changes": 3}, "changes is 3; expected a dict"),
         ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
         ({"stack": 3}, "stack is 3; expected a function from a Generator to a Load"),
         ({"lifts": 3}, "lifts is 3; expected a path"),
+        ({"lifts": ""}, "lifts is ''; expected the name of a file"),
         ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
         ({"backend": "spark"}, "backend is 'spark'; expected one of 'loky', 'dask'"),
         ({"backend": "dask"}, "first create a Dask Client"),

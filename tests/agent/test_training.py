@@ -1,6 +1,7 @@
 import json
 import os
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -64,7 +65,8 @@ def test_what_a_run_leaves(tmp_path, config):
 
 def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
     """Row 5 again and again: it changes only when it is unloaded."""
-    config = TrainConfig(**CONTAINER | {"num_envs": 1, "picks": 11, "log_interval": 11})
+    small = {"num_envs": 1, "picks": 11, "log_interval": 11, "gradient_steps": 0}
+    config = TrainConfig(**CONTAINER | small)
     with begun(config, tmp_path) as run:
         run.agent.choose = lambda *arguments: np.array([5])
         for _ in range(11):
@@ -128,6 +130,11 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     with open(tmp_path / "log.txt", "w") as log:
         train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
     assert "200/200" in (tmp_path / "log.txt").read_text()
+    interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)
+    shown = []
+    with at_pick(3, lambda: shown.append(capsys.readouterr().out)):  # one that is repeated
+        train(TrainConfig(**CONTAINER), tmp_path / "resumed")
+    assert "4.00/200" in shown[0] and "200/200" in capsys.readouterr().out
     train(TrainConfig(**CONTAINER), tmp_path / "quiet", progress=False)
     assert capsys.readouterr() == ("", "")
 
@@ -197,9 +204,47 @@ def test_lifts_are_kept_when_a_run_is_stopped_and_refused_before_it_begins(tmp_p
         train(config, tmp_path / "run", progress=False, lifts=lifts)
     assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
     lifts.write_bytes(b"no table")
-    with pytest.raises(ValueError, match="lifts.npz is not a readable"):
+    with pytest.raises(ValueError, match="lifts: .*lifts.npz is not a readable"):
         train(config, tmp_path / "other", progress=False, lifts=lifts)
     assert not (tmp_path / "other").exists()
+
+
+def test_lifts_that_are_damaged_at_the_end_lose_no_run(tmp_path):
+    """It counts as finished, and is then read back without them."""
+    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    damage = at_step(50, lambda: lifts.write_bytes(b"no table"))
+    with damage, pytest.raises(ValueError, match="lifts: .*lifts.npz is not a readable"):
+        train(config, tmp_path / "run", progress=False, lifts=lifts)
+    with at_step(1, crash):
+        assert len(train(config, tmp_path / "run", progress=False, lifts=lifts).curve) == 10
+
+
+@pytest.mark.parametrize("broken", ["callback", "stack"])
+def test_an_error_in_what_is_handed_over_keeps_what_can_be_kept(tmp_path, monkeypatch, broken):
+    """The lifts; and the picks, unless a step was broken off."""
+    config, lifts, table = TrainConfig(**CONTAINER), tmp_path / "lifts.npz", LiftTable()
+    for place in ("unload.agent.training", "unload.env.vector"):
+        monkeypatch.setattr(f"{place}.shared_table", lambda: table)
+    loads, points = [], []
+
+    def stack(rng):
+        loads.append(own_load(rng, "continuous sizes"))
+        if broken == "stack" and len(loads) == 12:
+            raise Breakdown
+        return loads[-1]
+
+    def callback(point):
+        points.append(point["picks"])
+        if broken == "callback" and point["picks"] == 100:
+            raise Breakdown
+
+    usual = {"progress": False, "stack": stack, "lifts": lifts, "callback": callback}
+    with pytest.raises(Breakdown):
+        train(config, tmp_path / "run", **usual)
+    assert len(LiftTable.load(lifts)) == len(table) > 0
+    assert (tmp_path / "run" / "checkpoint.npz").exists() == (broken == "callback")
+    train(config, tmp_path / "run", **usual)
+    assert (points == list(range(20, 201, 20))) == (broken == "callback")
 
 
 def test_without_updates_the_weights_stay(tmp_path):
@@ -210,6 +255,18 @@ def test_without_updates_the_weights_stay(tmp_path):
             run.step()
         after = run.agent.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)
+
+
+@pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
+def test_a_run_of_the_fewest_picks_makes_one_update(tmp_path, replay_size, picks):
+    config = TrainConfig(**CONTAINER | {"replay_size": replay_size, "picks": picks})
+    with begun(config, tmp_path) as run:
+        while not run.rollout.finished:
+            before = run.curve.sums["updates"]
+            run.step()
+    assert before == 0 and np.isfinite(run.curve.points[-1][4])
+    with pytest.raises(ValueError, match=f"picks is {picks - 4}; expected at least {picks}, bec"):
+        replace(config, picks=picks - 4)
 
 
 @pytest.mark.parametrize("interval", [0, 60.0])
@@ -232,13 +289,20 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),
+        ({"lifts": ""}, ValueError, "lifts is ''; expected the name of a file"),
         ({"stack": 3}, TypeError, "stack is 3; expected"),
-        ({"stack": lambda rng: "load"}, TypeError, "load is 'load'; expected"),
+        ({"stack": lambda rng: "load"}, TypeError, "is 'load'; expected an unload.Load"),
+        (
+            {"stack": lambda rng: stack_load(np.random.default_rng())},
+            ValueError,
+            "stack made two different loads from generators in the same state; expected the same",
+        ),
         ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
         ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
         ({"run_dir": None}, TypeError, "run_dir is None; expected a path"),
         ({"run_dir": "/dev/null/run"}, OSError, "/dev/null"),
+        ({"run_dir": __file__}, OSError, __file__),
     ],
 )
 def test_bad_arguments_are_refused(tmp_path, given, error, message):

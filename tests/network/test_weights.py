@@ -57,6 +57,9 @@ def test_what_is_no_path_is_refused(tmp_path):
     ):
         with pytest.raises(TypeError, match="path is None; expected a path"):
             call()
+    for path in ("", "."):
+        with pytest.raises(ValueError, match=f"path is '{path}'; expected the name of a file"):
+            write_weights(path, "pair", {}, WEIGHTS)
     with pytest.raises(FileNotFoundError, match=r"expected a .safetensors file \(pair\)"):
         read_weights(tmp_path, "pair", print)
 

@@ -39,7 +39,7 @@ class RunFolder:
     """The folder of one training run.
 
     Args:
-        run_dir: made if it does not exist.
+        run_dir: made when it is locked or written to, if it does not exist.
 
     Attributes:
         path: of the folder.
@@ -48,27 +48,22 @@ class RunFolder:
     Raises:
         TypeError: ``run_dir`` is no path.
         ValueError: ``run_dir`` is empty.
-        OSError: it cannot be made.
     """
 
     def __init__(self, run_dir: str | Path) -> None:
         self.path = checks.path("run_dir", run_dir)
         if self.path == Path():
             raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
-        self.path.mkdir(parents=True, exist_ok=True)
         self.checkpoint = self.path / "checkpoint.npz"
         self._policy, self._curve = self.path / "policy.safetensors", self.path / "curve.csv"
         self._config = self.path / "config.json"
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other processes out of the folder, see ``files.locked``, unless it is finished.
+        """Keep other processes out of the folder, see ``files.locked``.
 
         What a killed process has left half written of the run's files is removed.
         """
-        if self.finished:  # to be read only, perhaps where nothing can be written
-            yield
-            return
         with files.locked(self.path):
             for path in (self.checkpoint, self._policy, self._curve, self._config):
                 for leftover in self.path.glob(f"{path.name}.*.partial"):
@@ -164,6 +159,7 @@ class RunFolder:
 
         Raises:
             ValueError: a file is damaged, or the run is of another configuration or stack.
+            FileNotFoundError: a file is missing.
         """
         stored = files.read_json(self._config)
         marks = stored.get("marks")

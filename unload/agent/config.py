@@ -14,42 +14,67 @@ ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """One training run. The defaults are the paper's (Sec. IV-B); * marks our own choice."""
+    """One training run. The defaults are the paper's (Sec. IV-B); * marks our own choice.
+
+    Attributes:
+        env: the task, ``"unload/Container-v0"`` or ``"unload/HighestItem-v0"``.
+        picks: K, over all environments; a multiple of ``num_envs``.
+        seed: * of loads, exploration, replay and weights.
+        num_envs: environments side by side (Fig. 2).
+        max_picks: of an episode (Sec. III-C).
+        learning_rate: μ, of Adam.
+        batch_size: b, picks per update.
+        replay_size: picks that the replay memory holds.
+        epsilon_init, epsilon_final: exploration rate at the start, and at the end of its fall.
+        epsilon_fraction: K_ε / K, the share of the picks over which it falls.
+        gamma: discount (Sec. III-E).
+        beta: threshold of the smooth-L1 loss (Sec. III-G).
+        network: ``"peq"`` (Sec. III-G); the others, in ``unload.network.variants``, take padded
+            rows for items in training.
+        n_features: * n, features per item.
+        equalize: whether observations are equalized (Sec. III-F).
+        ties: * ``"noise"`` or ``"average"``, see ``unload.equalize``.
+        position_noise: * m, see ``ContainerEnv``; 0 ranks equal coordinates in the items' order.
+        mask: * whether failed items are masked in training's choices, too.
+        shuffle_places: * whether x and y of each stored pick are permuted among its items, so that
+            no preference for a place can be learned (notebook 10); choices see them unpermuted.
+        gradient_steps: * updates per step of all environments.
+        target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
+        log_interval: * steps of all environments per point of the curve.
+        checkpoint_interval: * seconds.
+
+    Raises:
+        TypeError, ValueError: a field is not as described, or the picks are too few to learn from.
+    """
 
     env: str = "unload/Container-v0"
-    picks: int = 20_000_000  # K, over all environments
-    seed: int = 0  # * of loads, exploration, replay and weights
-    num_envs: int = 64  # Fig. 2
-    max_picks: int = 500  # of an episode, Sec. III-C
-    learning_rate: float = 1e-3  # μ
-    batch_size: int = 2048  # b
+    picks: int = 20_000_000
+    seed: int = 0
+    num_envs: int = 64
+    max_picks: int = 500
+    learning_rate: float = 1e-3
+    batch_size: int = 2048
     replay_size: int = 2**20
     epsilon_init: float = 1.0
     epsilon_final: float = 0.0
-    epsilon_fraction: float = 0.5  # K_ε / K
-    gamma: float = 0.0  # Sec. III-E
-    beta: float = 1.0  # Sec. III-G
-    # Sec. III-G; the others, in unload.network.variants, take padded rows for items in training.
+    epsilon_fraction: float = 0.5
+    gamma: float = 0.0
+    beta: float = 1.0
     network: str = "peq"
-    n_features: int = 64  # * n
-    equalize: bool = True  # Sec. III-F
-    ties: str = "noise"  # * see unload.equalize
-    # * m, see ContainerEnv; 0 leaves equal coordinates equal, and ranks them in the items' order.
+    n_features: int = 64
+    equalize: bool = True
+    ties: str = "noise"
     position_noise: float = POSITION_NOISE
-    mask: bool = False  # * whether failed items are masked in training's choices, too
-    # * x and y of each stored pick are permuted among its items, so that no place can be learned,
-    # and no preference for one can grow (notebook 10). Choices see the places as they are.
+    mask: bool = False
     shuffle_places: bool = False
-    gradient_steps: int = 1  # * updates per step of all environments
-    target_update_interval: int = 10_000  # * picks, as in Stable-Baselines3
-    log_interval: int = 500  # * steps of all environments per point of the curves
-    checkpoint_interval: float = 60.0  # * seconds
+    gradient_steps: int = 1
+    target_update_interval: int = 10_000
+    log_interval: int = 500
+    checkpoint_interval: float = 60.0
 
     def __post_init__(self) -> None:
-        checks.one_of("env", self.env, ENVS)
-        checks.one_of("ties", self.ties, TIES)
-        checks.one_of("network", self.network, NETWORKS)
-        for name in ("env", "ties", "network"):
+        for name, options in (("env", ENVS), ("ties", TIES), ("network", NETWORKS)):
+            checks.one_of(name, getattr(self, name), options)
             self._set(name, str(getattr(self, name)))
         for name in ("equalize", "mask", "shuffle_places"):
             self._set(name, checks.boolean(name, getattr(self, name)))
@@ -84,6 +109,12 @@ class TrainConfig:
         if self.replay_size < self.num_envs:
             raise ValueError(
                 f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
+            )
+        fewest = self.num_envs + min(self.batch_size, self.replay_size)
+        if self.gradient_steps and self.picks < fewest:
+            raise ValueError(
+                f"picks is {self.picks}; expected at least {fewest}, because the first update "
+                f"waits for batch_size={self.batch_size}"
             )
 
     def _set(self, name: str, value: object) -> None:

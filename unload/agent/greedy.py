@@ -1,5 +1,6 @@
 """The greedy choice among the allowed items; the policy of a trained network, and its file."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,8 @@ from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
 from unload.support.provenance import VERSION
 
-POLICIES = files.SHIPPED / "policies"
+# The policies that come with the package, by name.
+SHIPPED = {file.stem: file for file in sorted(files.SHIPPED.glob("policies/*.safetensors"))}
 
 
 def check_network(network: object) -> torch.nn.Module:
@@ -128,13 +130,21 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
 
     Raises:
         TypeError: ``policy`` is no ``Greedy`` of one of ``unload.network.variants.NETWORKS``,
-            or its weights are not float32.
+            its weights are not float32, or JSON cannot hold its card.
+        ValueError: ``path`` is empty or a folder.
         OSError: the file cannot be written.
     """
     if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
         known = ", ".join(kind.__name__ for kind in NETWORKS.values())
         raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
-    settings = settings_of(policy) | {"card": {"version": VERSION} | (policy.card or {})}
+    card = {"version": VERSION} | (policy.card or {})
+    try:
+        held = json.loads(json.dumps(card)) == card
+    except (TypeError, ValueError):
+        held = False
+    if not held:
+        raise TypeError(f"card is {policy.card!r}; expected what JSON can hold, keys being str")
+    settings = settings_of(policy) | {"card": card}
     write_weights(path, "policy", settings, policy.network.state_dict())
 
 
@@ -149,14 +159,13 @@ def load_policy(path: str | Path) -> Greedy:
         FileNotFoundError: there is no such file; the message lists the known names.
         ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
     """
-    known = {file.stem: file for file in sorted(POLICIES.glob("*.safetensors"))}
-    path = known.get(str(path), checks.path("path", path))
-    if not path.is_file():
+    file = SHIPPED.get(str(path), checks.path("path", path))
+    if not file.is_file():
         raise FileNotFoundError(
             f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "
-            + ", ".join(map(repr, known))
+            + ", ".join(map(repr, SHIPPED))
         )
-    return read_weights(path, "policy", policy_of)
+    return read_weights(file, "policy", policy_of)
 
 
 def settings_of(policy: Greedy) -> dict:

@@ -8,12 +8,13 @@ import pandas as pd
 
 from unload.agent import policies
 from unload.agent.evaluation import Policy
-from unload.agent.greedy import load_policy
+from unload.agent.greedy import SHIPPED, load_policy
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load, check_load
 from unload.support import checks
 
 BY_RULE = {rule.__name__: rule for rule in (policies.highest, policies.nearest, policies.random)}
+NAMES = (*BY_RULE, *SHIPPED)
 
 
 def picking_order(load: Load, policy: str | Path | Policy = "recommended", seed: int = 0):
@@ -36,13 +37,19 @@ def picking_order(load: Load, policy: str | Path | Policy = "recommended", seed:
         and they are the last rows.
 
     Raises:
-        TypeError, ValueError: an argument is not as described.
-        FileNotFoundError: there is no such policy.
+        TypeError, ValueError: an argument is not as described, or ``policy`` returns
+            something other than a row that its mask allows.
+        FileNotFoundError: there is no such policy; the message lists the names.
     """
     check_load(load)
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
     if isinstance(policy, (str, Path)):
-        policy = BY_RULE[policy] if policy in BY_RULE else load_policy(policy)
+        if str(policy) not in NAMES and not Path(policy).is_file():
+            raise FileNotFoundError(
+                f"policy is {str(policy)!r}; expected a .safetensors file of a policy, or one of "
+                + ", ".join(map(repr, NAMES))
+            )
+        policy = BY_RULE.get(str(policy)) or load_policy(policy)
     elif not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a name, a path or a function")
     env = ContainerEnv("table", max_picks=sys.maxsize, position_noise=0.0)
@@ -50,8 +57,10 @@ def picking_order(load: Load, policy: str | Path | Policy = "recommended", seed:
     picks, emptied = [], False
     while not emptied and info["action_mask"].any():
         chosen = policy(observation[np.newaxis], info["action_mask"][np.newaxis], rng)
-        chosen = checks.integer_array("what policy returned", chosen, (1,))
-        observation, reward, emptied, _, info = env.step(chosen[0])
+        row = int(checks.integer_array("what policy returned", chosen, (1,))[0])
+        if row not in np.flatnonzero(info["action_mask"]):
+            raise ValueError(f"what policy returned is {row}; expected a row that the mask allows")
+        observation, reward, emptied, _, info = env.step(row)
         picks.append((info["item"], info["distance"], reward > 0))
     env.close()
     table = pd.DataFrame(picks, columns=["item", "distance", "unloaded"])

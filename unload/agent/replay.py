@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from unload.support import checks
-
 
 def shuffle_places(
     observations: np.ndarray, rng: np.random.Generator, present: np.ndarray | None = None
@@ -46,9 +44,7 @@ class ReplayBuffer:
     """
 
     def __init__(self, size: int, items: int, next_state: bool = False) -> None:
-        self.size = size = checks.integer("size", size, 1)
-        items = checks.integer("items", items, 1)
-        self.total = 0
+        self.size, self.total = size, 0
         kinds: dict[str, tuple[tuple[int, ...], type]] = {
             "observations": ((items, 3), np.float32),
             "actions": ((), np.int64),
@@ -89,13 +85,5 @@ class ReplayBuffer:
         self.total += count
 
     def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
-        """Draw slots uniformly, with replacement, (batch_size,) int64.
-
-        Raises:
-            TypeError: ``rng`` is not a ``numpy.random.Generator``.
-            ValueError: nothing has been added yet.
-        """
-        checks.generator("rng", rng)
-        if not len(self):
-            raise ValueError("the replay buffer is empty; add picks before sampling")
-        return rng.integers(len(self), size=checks.integer("batch_size", batch_size, 1))
+        """Draw slots of picks that were added, uniformly, with replacement, (batch_size,) int64."""
+        return rng.integers(len(self), size=batch_size)

@@ -34,6 +34,9 @@ class Rollout:
         allowed: (num_envs, 128) bool, what may be picked in training: rows that hold an item,
             with ``config.mask`` only those that have not failed.
         steps: made so far; one pick in each environment per step.
+
+    Raises:
+        ValueError: ``stack`` does not follow its generator.
     """
 
     def __init__(self, config: TrainConfig, reach: int, stack: Callable | None = None) -> None:
@@ -54,6 +57,13 @@ class Rollout:
         )
         self.envs = cast(PickingVectorEnv, envs)
         self._see(*self.envs.reset(seed=config.seeds()[0]))
+        if stack is not None:
+            first, second = (stack(np.random.default_rng(0)).positions for _ in range(2))
+            if not np.array_equal(first, second):
+                raise ValueError(
+                    "stack made two different loads from generators in the same state; "
+                    "expected the same"
+                )
         # Of the episodes that the replay memory reaches back to, where all started together: first
         # step, generators there.
         self._starts = deque([(0, self.envs.starts())])

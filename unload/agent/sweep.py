@@ -4,8 +4,9 @@ import os
 import signal
 import sys
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 
@@ -38,10 +39,10 @@ def run_sweep(
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
     A run that fails is reported and does not stop the others. Each run uses one thread, shows its
-    own progress in ``log.txt`` in its folder, and leaves ``record.json`` there: the entries of
-    ``unload.support.provenance.run_record`` (of its last part, if it had been stopped), and
-    ``process``. If this process is killed, the runs of ``"loky"`` stop with a checkpoint at the
-    next point of their curves.
+    own progress in ``log.txt`` in its folder, the traceback of an error, too, and leaves
+    ``record.json`` there: the entries of ``unload.support.provenance.run_record`` (of its last
+    part, if it had been stopped), and ``process``. If this process is killed, the runs of
+    ``"loky"`` stop with a checkpoint at the next point of their curves.
 
     Args:
         configs: the runs by name, a relative path such as ``"mask/seed_3"``; the order is
@@ -71,7 +72,7 @@ def run_sweep(
     for name, config in configs.items():
         if not isinstance(config, TrainConfig):
             raise TypeError(f"configs[{name!r}] is {config!r}; expected an unload.TrainConfig")
-        path = PurePosixPath(name)
+        path = PurePosixPath(str(name))
         if str(path) != name or path.is_absolute() or {".", ".."} & {name, *path.parts}:
             raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
     checks.one_of("backend", backend, BACKENDS)
@@ -82,8 +83,8 @@ def run_sweep(
         checks.one_of("changes", name, configs)
     if stack is not None:
         check_stack(stack)
-    if lifts is not None:
-        lifts = checks.path("lifts", lifts)
+    if lifts is not None and checks.path("lifts", lifts).is_dir():
+        raise ValueError(f"lifts is {str(lifts)!r}; expected the name of a file")
     folders = {name: folder / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     loads = {"stack": stack, "lifts": lifts}
@@ -162,6 +163,7 @@ def _run(
         run = RunFolder(folder)
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if run.finished else folder / "log.txt"
+        folder.mkdir(parents=True, exist_ok=True)
         with open(log_path, "a") as log, one_thread():
             train_changed(config, folder, change, log, callback=stop_if_alone, **loads)
         if not (folder / "record.json").exists():
@@ -169,6 +171,8 @@ def _run(
             files.write_json(folder / "record.json", record, checked=True)
         return name, ""
     except Exception as error:  # whatever it was, the other runs go on
+        with suppress(OSError), open(folder / "log.txt", "a") as log:
+            traceback.print_exc(file=log)
         return name, f"{type(error).__name__}: {error}"
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import asdict
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import TextIO
 
@@ -206,13 +206,14 @@ def train(
             ``policy.safetensors`` and ``config.json``. ``curve.csv`` grows from second to second:
             ``pandas.read_csv("runs/mine/curve.csv").plot("picks", ["success_rate", "loss"])``
             draws it at any time.
-        progress: show a progress bar with speed, MSR and loss; in a text file if it is one.
+        progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
         stack: makes the loads, as in ``ContainerEnv``; the paper's if None. It must make the
             same load whenever it is called with a generator in the same state.
         lifts: file in which the lifts that PyBullet has computed are kept, because loads whose
             boxes have other sizes need many of them. Read at the start if it exists, and filled
-            up with each checkpoint and at the end; runs, one after the other or side by side,
-            may share it. It changes the speed of a run and nothing else.
+            up with each checkpoint and when the run ends, for whatever reason; runs, one after
+            the other or side by side, may share it. It changes the speed of a run and nothing
+            else; without it, a resumed run simulates the lifts of the repeated picks again.
         callback: is called at each point of the curve with that point, a dict by the columns of
             ``TrainResult.curve``: ``picks``, ``success_rate``, ``loss`` and so on. A run that is
             resumed calls it for new points only; an error in it ends the run.
@@ -221,15 +222,19 @@ def train(
         Policy and curve, read back from ``run_dir``.
 
     Raises:
-        TypeError: ``config`` is not a ``TrainConfig``.
-        ValueError: ``run_dir`` is empty or a file, or holds another configuration, another
-            stack or a damaged file; ``stack`` or ``lifts`` is given for an environment without
-            loads; the file of ``lifts`` is damaged, or of another physics.
-        OSError: ``run_dir`` cannot be written.
+        TypeError: an argument is not of the kind described.
+        ValueError: ``run_dir`` is empty, or holds another configuration, another stack or a
+            damaged file; ``stack`` or ``lifts`` is given for an environment without loads;
+            ``stack`` does not make the same load again; ``lifts`` is empty or a folder, or its
+            file is damaged, or of another physics.
+        OSError: ``run_dir`` is a file, cannot be written, or holds a finished run of which a file
+            is missing; ``lifts`` cannot be written.
         RuntimeError: another process is training in ``run_dir``; the message names it.
         FloatingPointError: the loss or a weight is no longer finite; the message names the
-            pick, and the last checkpoint is kept.
+            pick, and the last checkpoint, if there is one, is kept.
         KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
+        Exception: what ``callback`` raises, after a checkpoint, or ``stack``, where the run goes
+            on from the last checkpoint.
     """
     return train_changed(config, run_dir, unchanged, progress, stack, lifts, callback)
 
@@ -270,19 +275,29 @@ def train_changed(
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
-    if lifts is not None:
-        lifts = checks.path("lifts", lifts)
-    keep_lifts = partial(shared_table().exchange, lifts) if lifts is not None else lambda: None
-    keep_lifts()
+    if lifts is not None and checks.path("lifts", lifts).is_dir():
+        raise ValueError(f"lifts is {str(lifts)!r}; expected the name of a file")
+
+    def keep_lifts() -> None:
+        try:
+            if lifts is not None:
+                shared_table().exchange(lifts)
+        except ValueError as error:
+            raise ValueError(f"lifts: {error}") from error
+
     folder = RunFolder(run_dir)
+    if folder.finished:  # to be read only, perhaps where nothing can be written
+        return folder.result(config, stack)
+    keep_lifts()
     with folder.locked(), deferred_interrupts() as interrupts:
-        if not folder.finished:
+        if not folder.finished:  # by another process meanwhile
             run = Training(config, stack)
             change(run)
             try:
                 _go(run, folder, keep_lifts, callback, progress, interrupts)
             finally:
                 run.rollout.close()
+                keep_lifts()
         return folder.result(config, stack)
 
 
@@ -305,10 +320,13 @@ def _go(
             )
 
     first_shown = rollout.digest()
-    for picks in folder.restore(run):
-        stop_if_interrupted(picks)
-    saved, shown = time.monotonic(), 0.0
+    repeated = folder.restore(run)
+    next(repeated, None)  # its first step says where the bar begins
     with _progress_bar(rollout.picks, config.picks, progress) as bar:
+        for picks in repeated:
+            stop_if_interrupted(picks)
+            bar.update(config.num_envs)
+        saved, shown = time.monotonic(), 0.0
         while not rollout.finished:
             try:
                 run.step()
@@ -317,7 +335,7 @@ def _go(
                     run.agent.check_finite()
             except FloatingPointError as error:
                 raise FloatingPointError(
-                    f"after {rollout.picks} picks: {error}; the last checkpoint before is kept"
+                    f"after {rollout.picks} picks: {error}; the last checkpoint, if any, is kept"
                 ) from error
             if due:
                 folder.save(run)
@@ -331,11 +349,15 @@ def _go(
                 if time.monotonic() - shown > CURVE_INTERVAL:
                     folder.save_curve(run)
                     shown = time.monotonic()
-                if callback is not None:
-                    callback(point)
+                try:
+                    if callback is not None:
+                        callback(point)
+                except Exception:  # the step is complete
+                    run.agent.check_finite()
+                    folder.save(run)
+                    raise
             if due:  # and therefore saved
                 stop_if_interrupted(rollout.picks)
-    keep_lifts()
     folder.finish(run, first_shown)
 
 

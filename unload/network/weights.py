@@ -26,11 +26,14 @@ def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) ->
 
     Raises:
         TypeError: ``path`` is none, or a tensor is not float32; the message says of what ``kind``.
+        ValueError: ``path`` is empty or a folder.
         OSError: the file cannot be written.
     """
-    path = checks.path("path", path)
+    file = checks.path("path", path)
+    if file.is_dir():
+        raise ValueError(f"path is {str(path)!r}; expected the name of a file")
     content = weights_file(kind, settings, tensors)
-    files.write_atomically(path, lambda file: file.write(content))
+    files.write_atomically(file, lambda out: out.write(content))
 
 
 def weights_file(kind: str, settings: dict, tensors: dict) -> bytes:
