@@ -51,6 +51,7 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
             (checks.boolean, value, (), TypeError, "True or False")
             for value in (1, 0, 1.0, None, "yes", np.array([True]))
         ),
+        *((checks.file, value, (), ValueError, "the name of a file") for value in ("", "/")),
         (checks.jobs, 2.0, (), TypeError, "a number of processes, or -1 for one per core"),
         (checks.jobs, 0, (), ValueError, "a number of processes, or -1 for one per core"),
         *(
@@ -71,7 +72,8 @@ def test_one_of_takes_what_is_listed():
 
 
 def test_paths_and_generators(rng):
-    assert checks.path("x", "a/b") == Path("a/b") and checks.generator("x", rng) is rng
+    assert checks.path("x", "a/b") == checks.file("x", "a/b") == Path("a/b")
+    assert checks.generator("x", rng) is rng
     for check, wanted in ((checks.path, "path"), (checks.generator, "numpy.random.Generator")):
         with pytest.raises(TypeError, match=f"x is 3; expected a {wanted}"):
             check("x", 3)

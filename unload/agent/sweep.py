@@ -83,8 +83,8 @@ def run_sweep(
         checks.one_of("changes", name, configs)
     if stack is not None:
         check_stack(stack)
-    if lifts is not None and checks.path("lifts", lifts).is_dir():
-        raise ValueError(f"lifts is {str(lifts)!r}; expected the name of a file")
+    if lifts is not None:
+        checks.file("lifts", lifts)
     folders = {name: folder / name for name in configs}
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     loads = {"stack": stack, "lifts": lifts}

@@ -275,8 +275,8 @@ def train_changed(
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
-    if lifts is not None and checks.path("lifts", lifts).is_dir():
-        raise ValueError(f"lifts is {str(lifts)!r}; expected the name of a file")
+    if lifts is not None:
+        checks.file("lifts", lifts)
 
     def keep_lifts() -> None:
         try:

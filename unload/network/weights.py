@@ -29,11 +29,9 @@ def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) ->
         ValueError: ``path`` is empty or a folder.
         OSError: the file cannot be written.
     """
-    file = checks.path("path", path)
-    if file.is_dir():
-        raise ValueError(f"path is {str(path)!r}; expected the name of a file")
+    path = checks.file("path", path)
     content = weights_file(kind, settings, tensors)
-    files.write_atomically(file, lambda out: out.write(content))
+    files.write_atomically(path, lambda file: file.write(content))
 
 
 def weights_file(kind: str, settings: dict, tensors: dict) -> bytes:

@@ -58,6 +58,19 @@ def path(name: str, value: object) -> Path:
     return Path(value)
 
 
+def file(name: str, value: object) -> Path:
+    """Return ``value`` as the Path of a file, which may be missing.
+
+    Raises:
+        TypeError: it is no path.
+        ValueError: it is empty, or a folder.
+    """
+    named = path(name, value)
+    if named.is_dir():  # as the empty path is: the working directory
+        raise ValueError(f"{name} is {str(value)!r}; expected the name of a file")
+    return named
+
+
 def real(name: str, value: object, low: float, high: float = np.inf) -> float:
     """Return ``value`` as float; raise unless it is a finite number in [low, high].
 
