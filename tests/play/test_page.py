@@ -217,7 +217,7 @@ def test_lifts_agree_with_the_table_of_lifts_but_for_boxes_that_tip_aside():
                     physics.remove(item)
     finally:
         physics.close()
-    assert tipped <= 30, "the page says 0.7 % of 2,000"
+    assert tipped <= 20, "the page says 0.4 % of whole episodes"
 
 
 @needs_node

@@ -120,7 +120,7 @@ export class Container {
     return success;
   }
 
-  /** Whether nothing rests on a box. In 0.7 % of random picks, what rests on it would tip aside. */
+  /** Whether nothing rests on a box. In 0.4 % of random picks, what rests on it would tip aside. */
   liftable(item) {
     return this.above[item].every((other) => !this.present[other]);
   }

@@ -41,7 +41,11 @@ function set(text, anew) {
 }
 
 function pick(item) {
-  if (!element("mine").checked || !mine.visible.includes(item)) return;
+  if (!element("mine").checked || !(item >= 0)) return; // no box is there
+  if (!mine.visible.includes(item)) {
+    element("status").textContent = "This box is not among the 128 nearest ones.";
+    return;
+  }
   const how = mine.pick(item) ? "Unloaded." : "Failed: a box lies on it.";
   const unloaded = mine.present.filter((here) => !here).length;
   element("status").textContent = `${how} ${unloaded} of ${mine.picks} picks succeeded.`;
