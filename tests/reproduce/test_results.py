@@ -102,21 +102,11 @@ def test_a_table_that_cannot_be_written_has_no_provenance(tmp_path):
     assert not (tmp_path / "tea.provenance.json").exists()
 
 
-@pytest.mark.parametrize(
-    ("content", "error", "message"),
-    [
-        (None, FileNotFoundError, "t.csv is missing; make tea makes it"),
-        ("a\n1\n", ValueError, "t.csv has no b; expected a, b"),
-    ],
-)
-def test_another_table_is_refused(tmp_path, content, error, message):
+def test_a_table_is_read_and_another_one_refused(tmp_path):
     path = tmp_path / "t.csv"
-    if content is not None:
-        path.write_text(content)
-    with pytest.raises(error, match=message):
+    with pytest.raises(FileNotFoundError, match="t.csv is missing; make tea makes it"):
         read_table(path, "make tea", ["a", "b"])
-
-
-def test_a_table_is_read(tmp_path):
-    (tmp_path / "t.csv").write_text("a,b,c\n1,,x\n")
-    assert read_table(tmp_path / "t.csv", "make tea", ["b", "a"]).shape == (1, 3)
+    path.write_text("a,b,c\n1,,x\n")
+    assert read_table(path, "make tea", ["b", "a"]).shape == (1, 3)
+    with pytest.raises(ValueError, match="t.csv has no d; expected a, d"):
+        read_table(path, "make tea", ["a", "d"])
