@@ -9,7 +9,6 @@ first row of its kind and all of one run, say more. All is on one thread unless 
 
 import argparse
 import sys
-import time
 from datetime import date
 from functools import partial
 from importlib.metadata import version
@@ -26,8 +25,7 @@ from benchmarks.environments import lift_rates, pick_rates
 from benchmarks.training import training_rates
 from benchmarks.updates import update_times
 from unload.reproduce.policies.speed import FOLDER, three_digits
-from unload.reproduce.results import publish
-from unload.support.provenance import run_record
+from unload.reproduce.results import measured, publish
 
 COMMAND = "python benchmarks/run.py"
 
@@ -76,14 +74,12 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="measure less and keep nothing")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    start = time.monotonic()
-    table = speeds(options.quick)
-    show(table)
+    result = measured(partial(speeds, options.quick))
+    show(result.value)
     if options.quick:
         return
     settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
-    record = run_record(time.monotonic() - start)
-    publish(FOLDER, "benchmarks", {"speeds": table}, COMMAND, settings, False, [record])
+    publish(FOLDER, "benchmarks", {"speeds": result.value}, COMMAND, settings, [result])
 
 
 if __name__ == "__main__":

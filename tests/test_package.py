@@ -114,7 +114,7 @@ def test_rooms_are_in_the_order_that_the_readme_gives():
     ordered = levels(room_graph())
     assert len(ordered) <= 7
     sentence = " < ".join(", ".join(f"`{name}`" for name in level) for level in ordered)
-    assert f"imports run one way: {sentence}" in README.replace("\n", " "), sentence
+    assert f"run one way: {sentence}" in README.replace("\n", " "), sentence
 
 
 def test_no_module_imports_itself_through_others():

@@ -1,5 +1,6 @@
-"""Small networks that several tests of the agent use."""
+"""Small networks, and a policy that picks badly, for several tests."""
 
+import numpy as np
 import torch
 
 from unload import PEQNetwork
@@ -22,3 +23,8 @@ def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
 
 def weights(network: torch.nn.Module) -> list[torch.Tensor]:
     return [parameter.detach().clone() for parameter in network.parameters()]
+
+
+def lowest(observations: np.ndarray, masks: np.ndarray, rng) -> np.ndarray:
+    """A policy that goes for the lowest item, which has others on it."""
+    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)

@@ -2,15 +2,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.agent.networks import lowest
 from unload import evaluate, policies, success_rate
 from unload.env.vector import ContainerVectorEnv
 
 COLUMNS = ["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
-
-
-def lowest(observations, masks, rng) -> np.ndarray:
-    """A policy that goes for blocked items first."""
-    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
 
 
 def test_success_rate():

@@ -39,7 +39,7 @@ def test_64_containers_for_whole_episodes_and_beyond():
     play_both(CONTAINER, 64, 520, equalize=True)
 
 
-def test_what_can_be_lifted_is_that_of_the_single_environments():
+def test_what_can_be_seen_and_lifted_is_that_of_the_single_environments():
     array, side_by_side = make_pair(CONTAINER, 3)
     with pytest.raises(ResetNeeded):
         array.liftable()
@@ -48,6 +48,9 @@ def test_what_can_be_lifted_is_that_of_the_single_environments():
     for _ in range(40):
         expected = np.stack([env.unwrapped.liftable() for env in side_by_side.envs])
         assert_same(array.liftable(), expected)
+        for number, env in enumerate(side_by_side.envs):
+            assert (array.unwrapped.visible[number] == env.unwrapped.visible).all()
+            assert (array.unwrapped.action_masks()[number] == env.unwrapped.action_masks()).all()
         actions = observed[:, :, 2].argmax(axis=1)
         observed = array.step(actions)[0]
         side_by_side.step(actions)
@@ -144,20 +147,6 @@ def test_episodes_that_end_at_once(few_items):
     assert ends[:, 0].any() and ends[:, 1].any()
     together = ends.any(axis=1).sum(axis=1)
     assert 3 in together and {1, 2} & set(together.tolist())
-
-
-def test_visible_items_and_masks():
-    envs, side_by_side = make_pair(CONTAINER, 3)
-    envs.reset(seed=0)
-    side_by_side.reset(seed=0)
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        actions = rng.integers(128, size=3)
-        envs.step(actions)
-        side_by_side.step(actions)
-    for number, env in enumerate(side_by_side.envs):
-        assert (envs.unwrapped.visible[number] == env.unwrapped.visible).all()
-        assert (envs.unwrapped.action_masks()[number] == env.unwrapped.action_masks()).all()
 
 
 # --- the table ----------------------------------------------------------------------

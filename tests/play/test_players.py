@@ -38,8 +38,8 @@ def test_the_mask_ends_a_deadlock():
     run.play_to(120)
     assert all(pick.deadlocked for pick in run.picks[95:])
     stuck = run.unloaded()
-    run.change_mask(True, 100)
-    assert run.mask and len(run.picks) == 100
+    run.back_to(100)
+    run.mask = True
     run.play_to(120)
     assert run.unloaded() > stuck + 15
     assert not any(pick.deadlocked for pick in run.picks[100:])

@@ -62,7 +62,6 @@ FIGURES = FROM_DATA | {
     ),
     "fig03_substacks": loads.fig03_substacks,
     "fig07_network": diagrams.fig07_network,
-    "rows": lambda: loads.rows([(0, 1, 2, 0), (2, 2, 2, 2), (1, 0, 1, 0)]),
     "side_views": lambda: loads.side_views(LOAD.positions, {"": {"visible": VISIBLE}}),
     "wall_view": lambda: loads.wall_view(LOAD, 11, {"visible": VISIBLE}),
     "visibility": lambda: observation.visibility(LOAD.positions, VISIBLE),

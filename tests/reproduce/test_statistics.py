@@ -19,6 +19,12 @@ def curve(msr, loss=(0.5, 0.3, 0.5, 0.3)) -> pd.DataFrame:
     return pd.DataFrame({"picks": picks, "success_rate": along(msr), "loss": along(loss)})
 
 
+def course(msr, loss) -> pd.DataFrame:
+    """A run whose windows have these means."""
+    picks = statistics.WINDOW_PICKS * np.arange(1, len(msr) + 1)
+    return pd.DataFrame({"picks": picks, "success_rate": msr, "loss": loss})
+
+
 def test_the_end_is_the_last_tenth():
     run = curve([0.3, 0.3])
     run.loc[run["picks"] > 18_000_000, "success_rate"] = 0.7
@@ -36,10 +42,7 @@ def test_the_end_is_the_last_tenth():
     ],
 )
 def test_a_fall_leads_from_high_to_low(msr, found):
-    """Each value is the mean of a window."""
-    picks = statistics.WINDOW_PICKS * np.arange(1, len(msr) + 1)
-    run = pd.DataFrame({"picks": picks, "success_rate": msr, "loss": 0.1})
-    assert statistics.fell(run) is found
+    assert statistics.fell(course(msr, 0.1)) is found
 
 
 @pytest.mark.parametrize(
@@ -107,12 +110,6 @@ def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
     middle = first.mean() - second.mean()
     interval = statistics.welch_interval(first, second)
     assert interval == pytest.approx((middle - reach, middle + reach))
-
-
-def course(msr, loss):
-    return pd.DataFrame(
-        {"picks": 500_000 * np.arange(1, len(msr) + 1), "success_rate": msr, "loss": loss}
-    )
 
 
 def test_the_peak_of_the_loss_comes_after_a_rise():

@@ -125,12 +125,6 @@ def _with_a_text(content: bytes) -> bytes:
     return file.getvalue()
 
 
-def _flip_a_byte_of_data(content: bytes) -> bytes:
-    """Damage the first array's data, which a zip file's checksum covers."""
-    place = content.index(b"NUMPY") + 140
-    return content[:place] + bytes([content[place] ^ 0xFF]) + content[place + 1 :]
-
-
 @pytest.mark.parametrize(
     "damage",
     [
@@ -138,11 +132,10 @@ def _flip_a_byte_of_data(content: bytes) -> bytes:
         lambda content: b"not a zip file",
         lambda content: content[: len(content) // 2],
         lambda content: content[:-1],
-        _flip_a_byte_of_data,
         _as_npy,
         _with_a_text,
     ],
-    ids=["empty", "text", "half", "a byte short", "a wrong byte", "a single array", "more"],
+    ids=["empty", "text", "half", "a byte short", "a single array", "more"],
 )
 def test_damaged_arrays_are_refused_by_name(tmp_path, damage):
     path = tmp_path / "arrays.npz"

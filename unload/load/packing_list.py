@@ -1,6 +1,6 @@
 """Packing lists: the boxes of a load in a CSV file."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +52,8 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
             are both centres and corners; or a box has an edge that is no number or too short, has
             the id of another one, is not inside the container, overlaps another one, or floats: it
             stands neither on the floor nor, within 0.1 mm, on a box. The message names the first
-            rows, counted from 1 without the line of names, and the ids.
+            rows, counted from 1 without the line of names, and the ids; of the first one also
+            what stands in it.
     """
     path = checks.path("path", path)
     try:
@@ -65,48 +66,33 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
     ids = table["id"] if "id" in table.columns else pd.Series(range(1, len(table) + 1))
     ids = ids.astype(str).to_numpy()
 
-    def refuse(items: Iterable[int], problem: Callable[[int], str]) -> None:
+    cells = table[[*place, *SIZES]]
+    numbers = cells.apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
+
+    def refuse(items: Iterable[int], problem: str) -> None:
         items = list(items)
         if items:
             named = ", ".join(f"row {item + 1} (id {str(ids[item])!r})" for item in items[:5])
             more = f" and {len(items) - 5} more" if len(items) > 5 else ""
-            raise ValueError(f"{path}: {named}{more}: {problem(items[0])}")
+            first = ", ".join(f"{name} {cell!r}" for name, cell in cells.iloc[items[0]].items())
+            raise ValueError(f"{path}: {named}{more}: {problem}; the first has {first}")
 
-    def no_number(item: int) -> str:
-        column = cells.columns[np.isfinite(numbers[item]).argmin()]
-        return f"{column} is {cells.at[item, column]!r}; expected a length in m"
-
-    cells = table[[*place, *SIZES]]
-    numbers = cells.apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
     where, sizes = numbers[:, :3], numbers[:, 3:]
     positions = where if place is CENTRE else where + sizes / 2
     low, high = positions - sizes / 2, positions + sizes / 2
-    refuse(
-        np.flatnonzero(pd.Series(ids).duplicated(keep=False)),
-        lambda _: "the same id; expected one for each box",
-    )
-    refuse(np.flatnonzero(~np.isfinite(numbers).all(axis=1)), no_number)
-    refuse(
-        np.flatnonzero(sizes.min(axis=1) < SMALLEST_EDGE),
-        lambda item: f"edges of {sizes[item]} m; expected {SMALLEST_EDGE} m or more",
-    )
-    refuse(
-        np.flatnonzero(outside(low, high)),
-        lambda item: (
-            f"a box from {low[item]} to {high[item]} m; expected it inside the container, "
-            f"[0 0 0] to {task.CONTAINER}"
-        ),
-    )
-    refuse(overlapping(low, high), lambda _: "boxes that overlap; expected disjoint ones")
+    repeated = pd.Series(ids).duplicated(keep=False)
+    refuse(np.flatnonzero(repeated), "the same id; expected one for each box")
+    no_number = ~np.isfinite(numbers).all(axis=1)
+    refuse(np.flatnonzero(no_number), "a cell that is no number; expected lengths in m")
+    thin = sizes.min(axis=1) < SMALLEST_EDGE
+    refuse(np.flatnonzero(thin), f"a short edge; expected {SMALLEST_EDGE} m or more")
+    inside = f"[0 0 0] to {task.CONTAINER}"
+    refuse(np.flatnonzero(outside(low, high)), f"not in the container; expected {inside} m")
+    refuse(overlapping(low, high), "boxes that overlap; expected disjoint ones")
     packages = np.unique(np.rint(sizes / OVERLAP), axis=0, return_inverse=True)[1].reshape(-1)
     load = Load(positions, sizes, packages, slabs(low[:, 0] + OVERLAP, high[:, 0]), ids)
-    refuse(
-        np.flatnonzero(floating(low, load.contacts)),
-        lambda item: (
-            f"a box that floats at a height of {low[item, 2]} m; expected it on the floor "
-            "or on another box"
-        ),
-    )
+    floats = floating(low, load.contacts)
+    refuse(np.flatnonzero(floats), "a box that floats; expected it on the floor or on another box")
     return load
 
 

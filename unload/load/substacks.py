@@ -74,18 +74,18 @@ def package_colour(package: int) -> tuple[float, float, float]:
     return PACKAGE_COLOURS[package % len(PACKAGE_COLOURS)]
 
 
-def check_variants(name: str, variants: object, columns: int = len(COLUMNS)) -> np.ndarray:
+def check_variants(variants: object, columns: int = len(COLUMNS)) -> np.ndarray:
     """Return ``variants`` as a (rows, columns) int64 array.
 
     Raises:
         TypeError: it does not hold integers.
         ValueError: another shape, no rows, or an unknown variant.
     """
-    variants = checks.integer_array(name, variants, (None, columns))
+    variants = checks.integer_array("variants", variants, (None, columns))
     if not len(variants):
-        raise ValueError(f"{name} has no rows; expected at least one")
+        raise ValueError("variants has no rows; expected at least one")
     if not (0 <= variants.min() and variants.max() <= 2):
-        raise ValueError(f"{name} holds {variants.min()} to {variants.max()}; expected 0 to 2")
+        raise ValueError(f"variants holds {variants.min()} to {variants.max()}; expected 0 to 2")
     return variants
 
 
@@ -101,7 +101,7 @@ def wall_cells(variants: np.ndarray) -> np.ndarray:
     Raises:
         TypeError, ValueError: see ``check_variants``.
     """
-    variants = check_variants("variants", variants)
+    variants = check_variants(variants)
     return _cells(variants[np.newaxis], *_row(len(COLUMNS)))[:, 1:]
 
 
@@ -182,7 +182,7 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     variants = checks.integer_array("variants", variants, (None, None, columns))
     if not len(variants):
         raise ValueError("variants has no walls; expected at least one")
-    check_variants("variants", variants.reshape(-1, columns), columns)
+    check_variants(variants.reshape(-1, columns), columns)
     cells = _cells(variants, *_row(columns))
     positions, sizes = _boxes(cells, PACKAGES, task.CONTAINER[0] / len(variants), CELL * scale)
     return Load(positions, sizes, cells[:, 1], cells[:, 0])

@@ -43,7 +43,7 @@ class Run(Episode):
         mask: whether items that failed since the last success are excluded.
 
     Attributes:
-        mask: as given.
+        mask: as given; may be set anew between picks.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
@@ -74,9 +74,3 @@ class Run(Episode):
         allowed = self.allowed(self.mask)
         row = self._policy(self.observation[None], allowed[None], rng)[0]
         return int(self.visible[row])
-
-    def change_mask(self, mask: bool, count: int) -> None:
-        """Use the mask, or stop using it, after the first ``count`` picks."""
-        mask = checks.boolean("mask", mask)
-        self.back_to(count)
-        self.mask = mask

@@ -133,7 +133,8 @@ class Playground(widgets.VBox):
         """Go on from the pick that is shown, with the mask or without it."""
         run = self._run
         if run and run.mask != self.mask.value:
-            run.change_mask(self.mask.value, run.play_to(self.slider.value))
+            run.back_to(run.play_to(self.slider.value))
+            run.mask = self.mask.value
         self._show()
 
     def _show(self, lifted: bool = False) -> None:

@@ -75,7 +75,6 @@ def keep_all(
     folder: str | Path,
     jobs: Sequence[tuple[dict, Callable[[], Any]]],
     n_jobs: int,
-    progress: bool = True,
 ) -> list[Result]:
     """``kept`` for several questions, each with what computes its answer, side by side.
 
@@ -83,7 +82,6 @@ def keep_all(
         folder: of the answers.
         jobs: pairs of ``question`` and ``compute``.
         n_jobs: processes, as in joblib.
-        progress: show a progress bar.
 
     Raises:
         TypeError, ValueError: ``n_jobs`` is no number of processes.
@@ -92,7 +90,7 @@ def keep_all(
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question, compute) for question, compute in jobs
     )
-    bar = {"total": len(jobs), "unit": "result", "disable": not progress, "ncols": 100}
+    bar = {"total": len(jobs), "unit": "result", "ncols": 100}
     return list(tqdm(answers, file=sys.stdout, **bar))
 
 
@@ -102,10 +100,10 @@ def publish(
     tables: Mapping[str, pd.DataFrame],
     command: str,
     settings: dict,
-    reduced: bool,
-    records: Iterable[dict],
+    results: Iterable[Result],
     fingerprint: str | None = None,
     float_format: str = "%.6g",
+    reduced: bool = False,
 ) -> None:
     """Write tables of results and, last, their provenance.
 
@@ -115,16 +113,16 @@ def publish(
         tables: by name.
         command: what computes them again.
         settings: configuration and seeds.
-        reduced: whether the run is smaller than the one that ``data/`` holds.
-        records: of the runs, see ``unload.support.provenance.run_record``.
+        results: of which they are made; their records are joined.
         fingerprint: of the training that the results rest on, see ``training_fingerprint``;
             None if they rest on none, or on one that is not known.
         float_format: of the tables.
+        reduced: whether the run is smaller than the one that ``data/`` holds.
     """
     folder = Path(folder)
     for table_name, table in tables.items():
         write_table(folder / f"{table_name}.csv", table, float_format)
-    record = joined(records)
+    record = joined(result.record for result in results)
     if fingerprint is not None:
         record["fingerprint"] = fingerprint
     write_provenance(folder, name, command, settings, reduced, record)

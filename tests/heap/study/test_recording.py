@@ -31,8 +31,8 @@ def test_the_shipped_heaps_are_what_the_generator_makes():
 
 def test_heaps_are_those_of_their_seeds(quick_heaps, tmp_path):
     few, more = tmp_path / "few", tmp_path / "more"
-    make_heaps(FULL._replace(train=2, test=1), few, tmp_path, progress=False)
-    make_heaps(FULL._replace(train=3, test=2), more, tmp_path / "again", progress=False)
+    make_heaps(FULL._replace(train=2, test=1), few, tmp_path)
+    make_heaps(FULL._replace(train=3, test=2), more, tmp_path / "again")
     for split, count in (("train", 2), ("test", 1)):
         first = read_heaps(split, few / "heaps.npz")
         second = read_heaps(split, more / "heaps.npz")
@@ -72,7 +72,7 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
         lambda networks, weight: explorers.append(weight) or policy(networks, weight),
     )
     size = FULL._replace(picks=12, networks=2, steps=2)
-    make_networks(size, tmp_path / "data", tmp_path, progress=False)
+    make_networks(size, tmp_path / "data", tmp_path)
     assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
     assert len(explorers) == 2 and set(explorers) <= set(recording.WEIGHTS)
     picks = learned[-1]
@@ -85,11 +85,11 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
     assert provenance["reduced"] and provenance["runs"] == 4 + 4
     written = published.read_bytes()
     kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap").rglob("*.*")}
-    make_networks(size, tmp_path / "data", tmp_path, progress=False)
+    make_networks(size, tmp_path / "data", tmp_path)
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "heap").rglob("*.*")} == kept
     assert published.read_bytes() == written and len(learned) == 4
-    make_networks(size, tmp_path / "again", tmp_path / "again", progress=False)
+    make_networks(size, tmp_path / "again", tmp_path / "again")
     assert (tmp_path / "again" / "heap" / "networks.safetensors").read_bytes() == written
-    make_networks(size._replace(steps=3), tmp_path / "data", tmp_path, progress=False)
+    make_networks(size._replace(steps=3), tmp_path / "data", tmp_path)
     assert len(learned) == 12 and published.read_bytes() != written, "other settings, other files"
     assert len(list((tmp_path / "heap" / "picks").glob("*.npz"))) == 6, "other explorers, too"

@@ -99,7 +99,7 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
     some = dict(list(family().items())[:2])
     monkeypatch.setattr(study, "family", lambda: some)
     size = FULL._replace(test=2, first_rule_heaps=1, rule_heaps=2)
-    where = {"folder": tmp_path, "runs_dir": tmp_path, "progress": False}
+    where = {"folder": tmp_path, "runs_dir": tmp_path}
     with pytest.raises(FileNotFoundError, match="python -m unload.reproduce heap makes it"):
         study.compare(size, **where)
     rules = study.choose_rules(size, **where)
@@ -127,7 +127,7 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
         return {"boxes": 2.0 + number, "falls": 0.5}
 
     monkeypatch.setattr(study, "_play", made_up)
-    table = study.compare(size, tmp_path, tmp_path / "made up", progress=False)
+    table = study.compare(size, tmp_path, tmp_path / "made up")
     assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
     weights = [player["falls_weight"] for player in players if "networks" in player]
     assert weights == [0.0, 0.0, 1.0, 1.0]

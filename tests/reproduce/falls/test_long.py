@@ -1,7 +1,5 @@
 from dataclasses import replace
 
-import pytest
-
 from unload.reproduce.falls import long
 from unload.reproduce.grid import read_policies
 from unload.reproduce.paper.training import PAPER
@@ -32,8 +30,7 @@ def test_long_runs_have_seeds_that_no_plan_had_before():
     assert all(min(cell.seeds) >= 20 for cell in long.LONG.cells.values())
 
 
-@pytest.fixture
-def judged(tmp_path, monkeypatch):
+def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
     """One published policy and one network without training, in one container each."""
     monkeypatch.setattr(long, "UNTRAINED", 1)
     name = "paper_mask/seed_0"
@@ -44,10 +41,7 @@ def judged(tmp_path, monkeypatch):
     monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
     monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
     long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
-    return long.read_published(tmp_path)
-
-
-def test_policies_and_networks_are_judged_alike(judged):
+    judged = long.read_published(tmp_path)
     assert list(judged["cell"]) == ["paper_mask", "untrained"]
     policy, network = judged.itertuples()
     assert policy.judged_place == 1 > policy.judged_as_is

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.agent.networks import lowest
 from unload import policies
 from unload.load import view
 from unload.load.substacks import front_walls, stack_load
@@ -15,11 +16,6 @@ from unload.support import files
 def small(rng):
     """One wall of a load."""
     return front_walls(stack_load(rng), 1)
-
-
-def lowest(observations, masks, rng):
-    """The lowest item, which has others on it."""
-    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
 
 
 @pytest.fixture(scope="module")

@@ -22,9 +22,9 @@ def run_of(msr):
 def agreement_of(monkeypatch, *courses):
     """What agrees of runs of one cell, without the cell's name."""
     runs = [("paper_mask", seed, run_of(course)) for seed, course in enumerate(courses)]
-    monkeypatch.setattr(curves, "paper_runs", lambda folder: runs)
+    monkeypatch.setattr(curves, "paper_runs", lambda: runs)
     applied = pd.DataFrame({"msr_mask": [0.9, 1], "msr_no_mask": [0.2, 0.4]})
-    monkeypatch.setattr(curves, "in_fresh_containers", lambda folder: applied)
+    monkeypatch.setattr(curves, "in_fresh_containers", lambda: applied)
     agrees = curves.training()["agrees"]
     label = f": with the mask, b = 256, {len(runs)} runs"
     of_cell = agrees[agrees.index.str.endswith(label)]

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.agent.networks import lowest
 from unload import TrainConfig, evaluate, load_policy, policies
 from unload.reproduce import grid
 from unload.reproduce.grid import Cell, Grid, read_policies
@@ -118,7 +119,3 @@ def test_favourites_are_asked_for_while_a_player_unloads():
     assert lifted.shape == (2, 3)
     assert lifted.all()
     assert not training.favourites(lowest, policies.highest, containers=1, unloaded=25).any()
-
-
-def lowest(observations, masks, rng):
-    return np.where(masks.astype(bool), -observations[..., 2], -np.inf).argmax(axis=1)

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.agent.networks import lowest
 from unload import policies
 from unload.agent.evaluation import evaluate
 from unload.load.boxes import Load
@@ -25,10 +26,6 @@ def piles(rng: np.random.Generator) -> Load:
     positions = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     labels = np.zeros(len(positions), dtype=int)
     return Load(positions, np.full((len(positions), 3), 0.2), labels, labels)
-
-
-def lowest(observations, masks, rng):
-    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)
 
 
 def test_play_agrees_with_evaluate():

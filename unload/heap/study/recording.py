@@ -55,7 +55,6 @@ def make_heaps(
     folder: str | Path = files.SHIPPED,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
-    progress: bool = True,
 ) -> None:
     """Make the heaps of both splits; write ``heaps.npz`` and its provenance.
 
@@ -64,7 +63,7 @@ def make_heaps(
     counts = {"train": size.train, "test": size.test}
     names = [(split, number) for split, count in counts.items() for number in range(count)]
     jobs = [heap_job(SEEDS[split], number) for split, number in names]
-    answers = keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs, progress)
+    answers = keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs)
     heaps: dict[str, list[Heap]] = {split: [] for split in counts}
     for (split, _), answer in zip(names, answers):
         positions, orientations, packages = map(np.array, answer.value.values())
@@ -93,7 +92,6 @@ def make_networks(
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
-    progress: bool = True,
 ) -> None:
     """Record and learn in both rounds; write ``heap/networks.safetensors`` and its provenance."""
     place = Path(runs_dir) / NAME
@@ -106,14 +104,14 @@ def make_networks(
             episode_job(place / "picks", round_number, number, learned)
             for number in range(episodes)
         ]
-        answers = keep_all(place / "picks", jobs, n_jobs, progress)
+        answers = keep_all(place / "picks", jobs, n_jobs)
         recorded += [place / "picks" / answer.value for answer in answers]
         records += [answer.record for answer in answers]
         jobs = [
             network_job(place / "networks", recorded, seed, size.steps)
             for seed in range(size.networks)
         ]
-        answers = keep_all(place / "networks", jobs, n_jobs, progress)
+        answers = keep_all(place / "networks", jobs, n_jobs)
         learned = [place / "networks" / answer.value for answer in answers]
         records += [answer.record for answer in answers]
     networks = [network for path in learned for network in load_networks(path)]

@@ -88,30 +88,29 @@ def choose_rules(
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
-    progress: bool = True,
 ) -> pd.DataFrame:
     """Let the rules play training heaps, and the best of them more; write ``heap/rules.csv``.
 
     Returns:
         One row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and ``falls`` a pick.
     """
-    first = _played(candidates(), size.first_rule_heaps, runs_dir, n_jobs, progress)
+    first = _played(candidates(), size.first_rule_heaps, runs_dir, n_jobs)
     frame = _means(first)
     chosen = {rule: None for weight in WEIGHTS for rule in _ranked(frame, weight)[:KEPT]}
-    answers = first | _played(chosen, size.rule_heaps, runs_dir, n_jobs, progress)
+    answers = first | _played(chosen, size.rule_heaps, runs_dir, n_jobs)
     rules = _means(answers)
     settings = {
         "heaps": [size.first_rule_heaps, size.rule_heaps], "split": "train",
         "physics": RULE_PHYSICS, "picks": MAX_PICKS,
     }  # fmt: skip
-    records = [answer.record for of in answers.values() for answer in of]
+    results = [answer for of in answers.values() for answer in of]
     command, tables = f"{COMMAND} {NAME}", {"rules": rules}
-    publish(Path(folder) / NAME, "rules", tables, command, settings, size != FULL, records)
+    publish(Path(folder) / NAME, "rules", tables, command, settings, results, reduced=size != FULL)
     return rules
 
 
 def _played(
-    names: Iterable[str], heaps: int, runs_dir: str | Path, n_jobs: int, progress: bool
+    names: Iterable[str], heaps: int, runs_dir: str | Path, n_jobs: int
 ) -> dict[str, list[Result]]:
     """The episodes of rules on the first training heaps, by rule."""
     names = list(names)
@@ -120,7 +119,7 @@ def _played(
         for name in names
         for number in range(heaps)
     ]
-    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs, progress)
+    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs)
     return {name: answers[place * heaps : (place + 1) * heaps] for place, name in enumerate(names)}
 
 
@@ -217,7 +216,6 @@ def compare(
     folder: str | Path = files.DATA,
     runs_dir: str | Path = files.RUNS,
     n_jobs: int = 1,
-    progress: bool = True,
 ) -> pd.DataFrame:
     """Let all policies play the unseen heaps; write ``heap/{episodes,table}.csv``.
 
@@ -232,7 +230,7 @@ def compare(
     cells = plan(rules, place / "networks.safetensors")
     places = [(cell, number) for cell in cells for number in range(size.test)]
     jobs = [episode_job(cell.player, "test", number, PHYSICS) for cell, number in places]
-    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs, progress)
+    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs)
     episodes = pd.DataFrame(
         {"falls_weight": cell.falls_weight, "policy": cell.policy, "heap": number} | answer.value
         for (cell, number), answer in zip(places, answers)
@@ -243,9 +241,8 @@ def compare(
         "heaps": size.test, "physics": PHYSICS, "picks": MAX_PICKS,
         "best rules": {str(weight): best_rule(rules, weight) for weight in WEIGHTS},
     }  # fmt: skip
-    records = [answer.record for answer in answers]
     tables = {"episodes": episodes, "table": table}
-    publish(place, "table", tables, command, settings, size != FULL, records)
+    publish(place, "table", tables, command, settings, answers, reduced=size != FULL)
     return table
 
 
@@ -360,15 +357,7 @@ def by_price(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows).T
 
 
-def heap_data(
-    size: Size = FULL,
-    folder: str | Path = files.DATA,
-    shipped: str | Path = files.SHIPPED,
-    runs_dir: str | Path = files.RUNS,
-    n_jobs: int = 1,
-    progress: bool = True,
-) -> None:
-    """Make all data of heaps: the heaps in ``shipped``, the rest in ``folder``."""
-    make_heaps(size, shipped, runs_dir, n_jobs, progress)
-    for step in (make_networks, choose_rules, compare):
-        step(size, folder, runs_dir, n_jobs, progress)
+def heap_data(n_jobs: int) -> None:
+    """Make all data of heaps: the heaps that the package needs, and what ``data/heap`` holds."""
+    for step in (make_heaps, make_networks, choose_rules, compare):
+        step(n_jobs=n_jobs)

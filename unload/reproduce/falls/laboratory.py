@@ -252,8 +252,7 @@ def laboratory_data(
     place = Path(folder) / ("reduced/falls" if reduced else "falls")
     command = f"{COMMAND} laboratory"
     settings = {"config": asdict(CONFIG), "runs": len(rows)}
-    records = [result.record for result in results]
-    publish(place, "laboratory", tables, command, settings, reduced, records, fingerprint, "%.4g")
+    publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 
 def read_laboratory(folder: str | Path = files.DATA) -> pd.DataFrame:

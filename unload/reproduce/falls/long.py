@@ -84,9 +84,8 @@ def trace_data(
     ]
     tables = {"long_trace": pd.concat(traces)[["seed", *POINT]].astype({"picks": int})}
     settings = {"seeds": list(TRACED_SEEDS), "picks": picks}
-    records = [result.record for result in results]
     place, command = Path(folder) / "falls", f"{COMMAND} falls"
-    publish(place, "long_trace", tables, command, settings, False, records, fingerprint, "%.4g")
+    publish(place, "long_trace", tables, command, settings, results, fingerprint, "%.4g")
 
 
 def _trace(config: TrainConfig) -> list[dict[str, float]]:
@@ -130,9 +129,8 @@ def published_data(
     ]
     results = keep_all(Path(runs_dir) / "published", jobs, n_jobs)
     tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
-    records = [result.record for result in results]
     place, command = Path(folder) / "falls", f"{COMMAND} falls"
-    publish(place, "published", tables, command, LOADS, False, records, fingerprint)
+    publish(place, "published", tables, command, LOADS, results, fingerprint)
 
 
 def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:

@@ -87,7 +87,8 @@ def agreement_data(
         runs_dir: where the answers of ``full`` are kept.
         n_jobs: processes for ``full``, as in joblib.
     """
-    (states, frame), record = measured(partial(collect_lifts, LIFT_COUNT, FIRST_SEED))
+    collected = measured(partial(collect_lifts, LIFT_COUNT, FIRST_SEED))
+    states, frame = collected.value
     rng = np.random.default_rng(FIRST_SEED)
     frame["asked_full"], frame["walls"] = choose_for_full(frame, FULL_COUNT, rng)
     asked = frame.index[frame["asked_full"] != ""]
@@ -105,8 +106,7 @@ def agreement_data(
         "lift table": table_digest(),
     }
     tables, command = {NAME: frame[COLUMNS]}, f"{COMMAND} lifts"
-    records = [record, *(answer.record for answer in answers)]
-    publish(folder, NAME, tables, command, settings, False, records, float_format="%.6f")
+    publish(folder, NAME, tables, command, settings, [collected, *answers], float_format="%.6f")
 
 
 def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:

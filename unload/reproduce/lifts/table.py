@@ -43,11 +43,11 @@ def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = files.R
     runs_dir = Path(runs_dir) / "lifts"
     path = runs_dir / f"{EPISODES}_episodes_seed_{SEED}.npz"
     question = settings | {"physics": SETTINGS}
-    _, record = kept(runs_dir, question, partial(_fill, path))
+    filled = kept(runs_dir, question, partial(_fill, path))
     table = LiftTable.load(path)
     table.save(Path(folder) / "lifts.npz")
     settings["lifts"] = len(table)
-    publish(folder, "lifts", {}, f"{COMMAND} lifts", settings, False, [record])
+    publish(folder, "lifts", {}, f"{COMMAND} lifts", settings, [filled])
 
 
 def _fill(path: Path) -> None:

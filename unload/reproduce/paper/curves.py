@@ -4,7 +4,6 @@ Tables as those of ``numbers``, computed from ``data/``.
 """
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -27,7 +26,6 @@ from unload.reproduce.statistics import (
     welch_interval,
     windows,
 )
-from unload.support import files
 
 SETTLED = 200  # tuning steps after which the noise of the loss is measured
 CLAIMS = {  # of Fig. 8, by learning rate
@@ -43,18 +41,14 @@ CELLS = {
 }
 
 
-def tuning(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """The tuning environment: learning rates, batch sizes, feature engineering.
-
-    Args:
-        folder: of the data.
-    """
-    summary = tuning_summary(folder).set_index(["equalize", "batch_size", "learning_rate"])
+def tuning() -> pd.DataFrame:
+    """The tuning environment: learning rates, batch sizes, feature engineering."""
+    summary = tuning_summary().set_index(["equalize", "batch_size", "learning_rate"])
     reached, noise = {}, {}  # by batch size and feature engineering
     for key in [(size, True) for size in BATCH_SIZES] + [(2048, False)]:
-        msr = read_curves("success_rate", key[0], 1e-3, key[1], folder)
+        msr = read_curves("success_rate", key[0], 1e-3, key[1])
         reached[key] = greedy_reached(msr.values())
-        noise[key] = loss_noise(read_curves("loss", key[0], 1e-3, key[1], folder))
+        noise[key] = loss_noise(read_curves("loss", key[0], 1e-3, key[1]))
     return table(
         [
             *_learning_rates(summary.loc[True, 1024]),
@@ -135,20 +129,16 @@ def _since(reached: dict) -> str:
     return f"greedy MSR above 90 % from step {_steps(reached)} on"
 
 
-def training(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """The training, by the first plan's measures, see ``unload.reproduce.statistics``.
-
-    Args:
-        folder: of the data.
-    """
-    runs = paper_runs(folder)
+def training() -> pd.DataFrame:
+    """The training, by the first plan's measures, see ``unload.reproduce.statistics``."""
+    runs = paper_runs()
     rows = _start(np.array([curve["success_rate"].iloc[0] for _, _, curve in runs]))
-    losses = read_curves("loss", 2048, 1e-3, folder=folder).values()
+    losses = read_curves("loss", 2048, 1e-3).values()
     tuned = np.mean([_tuning_decrease(loss) for loss in losses])
     for row in cell_table(runs).itertuples():
         slopes = [_training_decrease(curve) for cell, _, curve in runs if cell == row.cell]
         rows += _cell(f"{CELLS[row.cell]}, {row.runs} runs", row, slopes, tuned)
-    applied = in_fresh_containers(folder)
+    applied = in_fresh_containers()
     for mask, column in (("without", "msr_no_mask"), ("with", "msr_mask")):
         label = f"MSR of the policies trained without the mask, b = 2048, applied {mask} it"
         msr = applied[column]

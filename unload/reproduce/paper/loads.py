@@ -1,6 +1,6 @@
 """Loads: their substacks (Fig. 3), containers side by side (Fig. 2), and one from two sides."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,7 +19,6 @@ from unload.load.substacks import (
     PACKAGES,
     RIGHT,
     ROWS_HIGH,
-    check_variants,
     package_colour,
 )
 from unload.load.view import COLOURS
@@ -61,32 +60,7 @@ def fig03_substacks() -> Figure:
     return figure
 
 
-@styled
-def rows(combinations: Iterable[Sequence[int]]) -> Figure:
-    """Rows of a wall one above the other, two in a line.
-
-    Args:
-        combinations: for each row the variants (0–2) of its left, two mid and right
-            substacks.
-
-    Raises:
-        TypeError, ValueError: see ``check_variants``.
-    """
-    combinations = check_variants("combinations", list(combinations))
-    lines = -(-len(combinations) // 2)
-    figure, grid = plt.subplots(lines, 2, figsize=(8.6, 1.6 * lines), squeeze=False)
-    for axes in grid.flat[len(combinations) :]:
-        axes.remove()
-    width, height = CELLS_WIDE * CELL, ROWS_HIGH * CELL
-    for axes, variants in zip(grid.flat, combinations):
-        for (column, substacks), variant in zip(COLUMNS, variants):
-            _draw_substack(axes, substacks[variant], column * CELL, 0.0, fontsize=7)
-        _bare(axes, (-0.03, width + 0.03), (-0.03, height + 0.03))
-        axes.set_title("variants " + " ".join(str(variant) for variant in variants), fontsize=9)
-    return figure
-
-
-def _draw_substack(axes: Axes, boxes, x: float, z: float, fontsize: int = 8) -> None:
+def _draw_substack(axes: Axes, boxes, x: float, z: float) -> None:
     """A substack whose own origin is at (x, z) in m, with its border."""
     for package, left, lower in boxes:
         width, height = PACKAGES[package] * CELL
@@ -95,7 +69,7 @@ def _draw_substack(axes: Axes, boxes, x: float, z: float, fontsize: int = 8) -> 
         bright = np.dot(colour, (0.299, 0.587, 0.114)) > 0.55
         look = {"ha": "center", "va": "center_baseline", "color": INK if bright else "white"}
         middle = corner[0] + width / 2, corner[1] + height / 2
-        axes.text(*middle, str(package), fontsize=fontsize, **look)
+        axes.text(*middle, str(package), fontsize=8, **look)
     _draw_border(axes, boxes, x, z)
 
 

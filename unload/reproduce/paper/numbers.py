@@ -6,7 +6,6 @@ paper), ``paper``, ``here``, and ``agrees``, which is "yes", "no", "in part", "n
 where the paper has no such number. ``paper_curves`` goes on with the tuning and the training.
 """
 
-from pathlib import Path
 from typing import NamedTuple
 
 import gymnasium
@@ -23,7 +22,7 @@ from unload.network.peq import PEQNetwork
 from unload.physics import bullet
 from unload.reproduce.paper.observation import BINS, read_points
 from unload.reproduce.paper.tuning import RUN_COUNT, STEPS
-from unload.support import checks, files
+from unload.support import checks
 
 CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
 
@@ -102,15 +101,12 @@ def constants() -> pd.DataFrame:
     )
 
 
-def loads_and_lifts(
-    rng: np.random.Generator, loads: int, folder: str | Path = files.DATA
-) -> pd.DataFrame:
+def loads_and_lifts(rng: np.random.Generator, loads: int) -> pd.DataFrame:
     """The size of a load, Tab. I, the appendix's lifts, and Fig. 5.
 
     Args:
         rng: draws the loads.
         loads: how many.
-        folder: of the data.
     """
     checks.integer("loads", loads, 1)
     counts = np.array([len(substacks.stack_load(rng)) for _ in range(loads)])
@@ -122,7 +118,7 @@ def loads_and_lifts(
             Row("items in a full container", "III-A", f"{low}–{high}", spread, inside),
             _tab_i(),
             *_lifts(),
-            _tallest_bar(folder),
+            _tallest_bar(),
         ]
     )
 
@@ -158,9 +154,9 @@ def lifted_distance(stack: int) -> float:
     return distance
 
 
-def _tallest_bar(folder: str | Path) -> Row:
+def _tallest_bar() -> Row:
     bars = [
-        np.histogram(read_points(name, folder)[:, 0], BINS)[0].max()
+        np.histogram(read_points(name)[:, 0], BINS)[0].max()
         for name in ("Observation", "Equalized_Observation")
     ]
     here = f"{bars[0]}; equalized {bars[1]}"

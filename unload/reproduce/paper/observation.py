@@ -36,14 +36,14 @@ def observation_data(folder: str | Path = files.DATA) -> None:
     Columns ``x`` and ``y``: scaled x and z of all items, of the 128 observed ones, and of the
     observed ones after equalization.
     """
-    points, record = measured(_positions)
+    result = measured(_positions)
     tables = {
         name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
-        for name, positions in points.items()
+        for name, positions in result.value.items()
     }
     place, command = Path(folder) / FOLDER, f"{COMMAND} observation"
     settings = {"seed": SEED}
-    publish(place, "observation", tables, command, settings, False, [record], float_format="%.6f")
+    publish(place, "observation", tables, command, settings, [result], float_format="%.6f")
 
 
 def _positions() -> dict[str, np.ndarray]:

@@ -123,9 +123,8 @@ def comparison_data(folder: str | Path = files.DATA, n_jobs: int = -1) -> None:
     )
     tables = {"comparison": pd.concat([result.value for result in results])}
     settings = {"policies": digests(), "loads": LOADS, "seed": SEED}
-    records = [result.record for result in results]
     place, command = Path(folder) / "policies", f"{COMMAND} policies"
-    publish(place, "comparison", tables, command, settings, False, records)
+    publish(place, "comparison", tables, command, settings, results)
 
 
 def compare(name: str, policy: Policy, mask: bool, condition: str) -> pd.DataFrame:

@@ -59,9 +59,8 @@ def robustness_data(
     tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
     settings = {"policies": weights, "episodes": EPISODES, "picks": PICKS, "seed": SEED}
     settings["front walls"] = FRONT_WALLS
-    records = [answer.record for answer in answers]
     place, command = Path(folder) / "policies", f"{COMMAND} policies"
-    publish(place, "robustness", tables, command, settings, False, records)
+    publish(place, "robustness", tables, command, settings, answers)
 
 
 def play(
