@@ -63,7 +63,8 @@ COPIED = ("unload", "tests", "data", "pyproject.toml", "README.md", ".gitignore"
 FEW_PICKS = " ".join(
     f"env/test_vector.py::test_{name}"
     for name in (
-        "visible_items_and_masks", "a_pick_that_is_interrupted_needs_a_reset",
+        "what_can_be_seen_and_lifted_is_that_of_the_single_environments",
+        "a_pick_that_is_interrupted_needs_a_reset",
         "episodes_that_end_at_once", "unknown_lifts_are_simulated_once_and_remembered",
         "fewer_boxes_may_have_more_contacts",
     )

@@ -13,7 +13,7 @@ def test_the_papers_configuration_is_the_default():
     assert (config.picks, config.num_envs, config.learning_rate) == (20_000_000, 64, 1e-3)
     assert (config.batch_size, config.replay_size) == (2048, 2**20)
     assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
-    assert config.network == "peq"
+    assert (config.network, config.n_features, config.max_picks, config.seed) == ("peq", 64, 500, 0)
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 
 

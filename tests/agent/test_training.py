@@ -58,6 +58,7 @@ def test_what_a_run_leaves(tmp_path, config):
     loaded = load_policy(folder / "policy.safetensors")
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
     assert curve["success_rate"].nunique() > 2
+    assert loaded.card["loads"] == "the paper's"
     assert loaded.card["msr"] == {"at the end of its training": curve["success_rate"].iloc[-1]}
     stored = json.loads((folder / "config.json").read_text())
     assert stored.pop("marks").keys() == {"first_loads", "policy.safetensors", "curve.csv"}

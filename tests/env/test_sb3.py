@@ -50,6 +50,14 @@ def test_it_gives_stable_baselines_what_gymnasium_shows(adapter):
     loop.close()
 
 
+def test_a_container_that_is_emptied_by_the_last_pick_is_not_truncated(boxes):
+    envs = ContainerVecEnv(1, max_picks=1, stack=lambda rng: boxes((1.2, 0.2)))
+    envs.reset()
+    *_, dones, infos = envs.step(np.zeros(1, int))
+    assert dones.all() and not infos[0]["TimeLimit.truncated"]
+    envs.close()
+
+
 def test_options_hold_for_the_next_reset(rng):
     envs = ContainerVecEnv(2, position_noise=0)
     envs.set_options({"load": stack_load(rng)})

@@ -17,6 +17,7 @@ from unload.load.boxes import (
     SMALLEST_EDGE,
     Load,
     contacts,
+    overlapping,
     slabs,
 )
 
@@ -50,6 +51,7 @@ def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
     load = one_box(positions=positions)
     positions[:] = 0
     assert load.positions.tolist() == [[3.5, 1.25, 0.5]]
+    assert one_box(ids=["a"]).ids.tolist() == ["a"]
 
 
 @pytest.mark.parametrize(
@@ -67,6 +69,7 @@ def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
         ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
         ({"packages": [-1]}, ValueError, "packages holds -1"),
         ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
+        ({"ids": ["a", "b"]}, ValueError, r"ids is \['a', 'b'\]; expected 1 different names"),
     ],
 )
 def test_bad_loads_are_refused(changes, error, message):
@@ -138,7 +141,14 @@ def test_slabs_join_what_overlaps_in_a_chain():
 def test_boxes_touch_up_to_the_tolerance(gap, touches):
     low = np.array([[0, 0, 0], [0, 1 + gap, 0]])
     found = contacts(low, low + 1)
+    assert found.starts.shape == (3, 3)
     assert found.of(BESIDE, 0).tolist() == ([1] if touches else [])
+
+
+def test_overlapping_names_the_two_in_their_order():
+    low = np.array([[0, 0, 0], [0, 0.5, 0], [0, 2, 0]])
+    for order, pair in (([0, 1, 2], [0, 1]), ([1, 2, 0], [0, 2]), ([0, 2], [])):
+        assert overlapping(low[order], low[order] + (1, 1, 0.4)) == pair
 
 
 def test_crossed_boxes_have_more_contacts_than_expected():
