@@ -66,7 +66,9 @@ def test_what_does_not_fit_is_refused_by_name_and_value(check, value, arguments,
     assert str(caught.value) == f"n is {value!r}; expected {wanted}"
 
 
-def test_paths_and_generators(rng):
+def test_options_paths_and_generators(rng):
+    for option in ("red", None):
+        checks.one_of("colour", option, ("red", None))
     assert checks.path("x", "a/b") == checks.file("x", "a/b") == Path("a/b")
     assert checks.generator("x", rng) is rng
     for check, wanted in ((checks.path, "path"), (checks.generator, "numpy.random.Generator")):
