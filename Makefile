@@ -19,7 +19,7 @@ test: $(VENV)/ready  ## run all tests, in two processes
 # experiments, figures, notebooks and benchmarks.
 quick: $(VENV)/ready  ## run most tests of the rooms in a minute or so (the Makefile says what it leaves out)
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow" -k "not (compiled or killed or full)" \
-	--ignore tests/reproduce --ignore tests/test_notebooks.py --ignore tests/test_benchmarks.py
+	--ignore tests/studies --ignore tests/test_notebooks.py 
 
 lint: $(VENV)/ready  ## check style and format, notebooks included, and the core's types
 	$(BIN)/ruff check
@@ -33,11 +33,11 @@ notebooks: $(VENV)/ready  ## run every notebook at its own counts and keep the o
 	$(BIN)/python notebooks/run.py --in-place
 
 paper: $(VENV)/ready  ## compute data/ at the paper's scale (hours; goes on where it was stopped), then notebooks
-	$(BIN)/python -m unload.reproduce paper
+	$(BIN)/python -m studies paper
 	$(BIN)/python notebooks/run.py --in-place
 
 bench: $(VENV)/ready  ## measure speeds and print their ratios
-	$(BIN)/python benchmarks/run.py
+	$(BIN)/python -m studies.speed.run
 
 dist: $(VENV)/ready  ## build the package to install elsewhere: build/dist/*.whl and *.tar.gz
 	rm -rf build/dist
@@ -54,7 +54,7 @@ browser: $(VENV)/ready-browser  ## use notebooks in JupyterLab and the page that
 	$(BIN)/python tests/browser/look.py
 
 mutants: $(VENV)/ready-mutants  ## change the code in small ways and count what the tests notice (an hour)
-	nice -n 10 $(BIN)/python benchmarks/mutants.py
+	nice -n 10 $(BIN)/python -m studies.speed.mutants
 
 clean:  ## remove the virtual environment and all intermediate results
 	rm -rf $(VENV) build runs
@@ -66,7 +66,8 @@ $(VENV)/ready: environment.txt pyproject.toml
 	     "but $(PYTHON) is $$($(PYTHON) --version). Try: make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable . \
+	--config-settings editable_mode=compat
 	touch $@
 
 $(VENV)/ready-book: $(VENV)/ready

@@ -15,7 +15,7 @@ from unload.support import files
 USE_ALL = """
 import numpy as np
 import unload
-from unload.heap.env import HeapEnv
+from studies.heap.env import HeapEnv
 from unload.physics.table import LIFTS_FILE, shared_table
 
 assert unload.__file__.startswith(FOLDER) and str(LIFTS_FILE).startswith(FOLDER)

@@ -84,7 +84,7 @@ def room(module: str) -> str:
 
     The study of heaps counts with ``reproduce``, so that ``heap/`` can be removed as one folder.
     """
-    if module.startswith("unload.heap.study"):
+    if module.startswith("studies.heap"):
         return "reproduce"
     return ".".join(module.split(".")[1:2]).removeprefix("__main__")  # which is unload's own, too
 
@@ -128,7 +128,7 @@ def test_only_the_top_imports_the_top():
     assert users.get("heap", set()) <= {"reproduce"}
     assert not users["play"]
     of_reproduce = [path for path in MODULES.values() if "reproduce" in path.parts]
-    assert not any(name.startswith("unload.heap") for path in of_reproduce for name in needs(path))
+    assert not any(name.startswith("studies.heap") for path in of_reproduce for name in needs(path))
     imported_first = {room(module) for module in needs(PACKAGE / "__init__.py")}
     assert not imported_first & {"reproduce", "heap", "play"}
 

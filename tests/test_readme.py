@@ -2,9 +2,9 @@
 
 import re
 
-from unload.reproduce.falls.long import read_published
-from unload.reproduce.paper.training import paper_runs
-from unload.reproduce.statistics import cell_table, end_msr, fell
+from studies.falls.long import read_published
+from studies.paper.training import paper_runs
+from studies.statistics import cell_table, end_msr, fell
 from unload.support import files
 
 README = (files.ROOT / "README.md").read_text()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import gymnasium
 
-from unload.support.provenance import VERSION as __version__
+from unload.task import VERSION as __version__
 
 if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.agent import policies
@@ -104,4 +104,3 @@ gymnasium.register(
     entry_point="unload.env.highest_item:HighestItemEnv",
     vector_entry_point="unload.env.vector:HighestItemVectorEnv",
 )
-gymnasium.register(id="unload/Heap-v0", entry_point="unload.heap.env:HeapEnv")

@@ -4,8 +4,8 @@ import torch
 from torch.nn.functional import smooth_l1_loss
 
 from unload import DQN, PEQNetwork
-from unload.agent.fast.learner import FusedLearner
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
+from unload.fast.learner import FusedLearner
 
 SIZE, ITEMS = ROWS_PER_PASS + 30, 9  # more than one chunk
 
@@ -66,9 +66,7 @@ def test_the_fused_update_takes_tanh_in_double_precision(rng, kind):
 def test_plain_means_plain_everywhere(rng, monkeypatch):
     """Without the fused update, nothing of it is called, neither to learn nor to choose."""
     for name in ("start_gradients", "best_actions"):
-        monkeypatch.setattr(
-            f"unload.agent.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain")
-        )
+        monkeypatch.setattr(f"unload.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain"))
     batch, targets = batch_of(rng)
     agent = DQN(network(), fused_update=False)
     agent.update(batch | {"rewards": targets})

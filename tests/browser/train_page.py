@@ -6,7 +6,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page
 
-from unload.play.page import PAGE
+from studies.play.page import PAGE
 
 SIZES = {"wide": (1400, 900), "narrow": (420, 800)}
 TRAIN_LIMIT = 240  # s, for a run of 32,000 picks on a busy machine

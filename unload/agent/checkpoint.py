@@ -12,6 +12,7 @@ import pandas as pd
 
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
+from unload.agent.identity import identity, unchanged
 from unload.agent.rollout import Rollout
 from unload.support import checks, files
 
@@ -33,6 +34,12 @@ class TrainResult(NamedTuple):
 
     policy: Greedy
     curve: pd.DataFrame
+
+
+def settings_of(config: TrainConfig, stack: Callable | None, change: Callable) -> dict:
+    """What a run is: its configuration, and the identity of its change and stack, None without."""
+    change = None if change is unchanged else identity(change)
+    return asdict(config) | {"change": change, "stack": stack and identity(stack)}
 
 
 class RunFolder:
@@ -84,7 +91,7 @@ class RunFolder:
         }
         arrays |= {
             "format": np.array(FORMAT),
-            "config": np.array(json.dumps(asdict(run.config))),
+            "config": np.array(json.dumps(run.settings)),
             "rng": np.array(json.dumps(run.rng.bit_generator.state)),
         }
         files.write_arrays(self.checkpoint, arrays)
@@ -115,7 +122,7 @@ class RunFolder:
             config = dict(json.loads(str(stored["config"])))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{self.checkpoint} holds no configuration: {error}") from error
-        self._check_same(config, run.config)
+        self._check_same(config, run.settings)
         parts: dict[str, dict[str, np.ndarray]] = {part: {} for part in STATEFUL}
         for name, array in stored.items():
             part, _, rest = name.partition(".")
@@ -147,15 +154,17 @@ class RunFolder:
         self.save_curve(run)
         marks = {"first_loads": first_shown}
         marks |= {path.name: files.digest(path) for path in (self._policy, self._curve)}
-        content = asdict(run.config) | {"marks": marks}
+        content = run.settings | {"marks": marks}
         # Last, because it marks the run as finished.
         files.write_json(self._config, content, checked=True)
 
-    def result(self, config: TrainConfig, stack: Callable | None = None) -> TrainResult:
+    def result(
+        self, config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
+    ) -> TrainResult:
         """Read back what a finished run has left.
 
         Args:
-            config, stack: of the run, see ``unload.train``.
+            config, stack, change: of the run, see ``training.train_changed``.
 
         Raises:
             ValueError: a file is damaged, or the run is of another configuration or stack.
@@ -164,7 +173,8 @@ class RunFolder:
         stored = files.read_json(self._config)
         marks = stored.get("marks")
         marks = marks if isinstance(marks, dict) else {}
-        self._check_same({name: stored[name] for name in stored if name != "marks"}, config)
+        stored = {name: stored[name] for name in stored if name != "marks"}
+        self._check_same(stored, settings_of(config, stack, change))
         rollout = Rollout(config, 1, stack)
         rollout.close()
         if marks.get("first_loads") != rollout.digest():
@@ -178,9 +188,9 @@ class RunFolder:
             self.checkpoint.unlink()
         return TrainResult(load_policy(self._policy), pd.read_csv(self._curve))
 
-    def _check_same(self, stored: dict, config: TrainConfig) -> None:
-        """Raise ValueError unless a stored configuration is ``config``."""
-        wanted = json.loads(json.dumps(asdict(config)))
+    def _check_same(self, stored: dict, settings: dict) -> None:
+        """Raise ValueError unless stored settings are ``settings``."""
+        wanted = json.loads(json.dumps(settings))
         # How often it is saved changes nothing in a run.
         names = [name for name in wanted | stored if name != "checkpoint_interval"]
         differing = [name for name in names if stored.get(name) != wanted.get(name)]

@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
-from unload.agent.fast import fused
-from unload.agent.fast.learner import FusedLearner
 from unload.agent.greedy import check_network
 from unload.agent.learner import PlainLearner
 from unload.agent.policies import any_allowed
+from unload.fast import fused
+from unload.fast.learner import FusedLearner
 from unload.support import checks
 
 
@@ -26,7 +26,7 @@ class DQN:
             reward alone and the target network is not asked.
         beta: threshold of the smooth-L1 loss (Sec. III-G); 1 in the paper.
         fused_update: choose and update by the compiled twin of plain PyTorch, see
-            ``unload.agent.fast``; wherever it applies if None.
+            ``unload.fast``; wherever it applies if None.
 
     Attributes:
         learner: the ``PlainLearner`` or ``FusedLearner`` that chooses and updates.

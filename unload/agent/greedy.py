@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from unload.agent.fast import fused
+from unload import task
 from unload.agent.learner import action_values, highest_values
 from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
+from unload.fast import fused
 from unload.network.variants import NETWORKS
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
-from unload.support.provenance import VERSION
 
 # The policies that come with the package, by name.
 SHIPPED = {file.stem: file for file in sorted(files.SHIPPED.glob("policies/*.safetensors"))}
@@ -137,7 +137,7 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
         known = ", ".join(kind.__name__ for kind in NETWORKS.values())
         raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
-    card = {"version": VERSION} | (policy.card or {})
+    card = {"version": task.VERSION} | (policy.card or {})
     try:
         held = json.loads(json.dumps(card)) == card
     except (TypeError, ValueError):

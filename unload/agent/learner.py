@@ -1,6 +1,6 @@
 """The update of a deep Q-network in plain PyTorch (Sec. II-B and III-G).
 
-This is the version to read first. ``unload.agent.fast.learner`` does the same for the paper's
+This is the version to read first. ``unload.fast.learner`` does the same for the paper's
 network on a CPU, a few hundred times faster; a test holds the two equal.
 """
 

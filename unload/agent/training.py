@@ -19,10 +19,11 @@ import torch
 from tqdm import tqdm
 
 from unload import task
-from unload.agent.checkpoint import RunFolder, TrainResult
+from unload.agent.checkpoint import RunFolder, TrainResult, settings_of
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy
+from unload.agent.identity import unchanged
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
@@ -113,6 +114,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
+        change: is made at the end, see ``train_changed``.
 
     Attributes:
         rollout: the environments and the picks made in them.
@@ -122,8 +124,13 @@ class Training:
         rng: draws exploration and batches.
     """
 
-    def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
-        self.config, self._stack = config, stack
+    def __init__(
+        self,
+        config: TrainConfig,
+        stack: Callable | None = None,
+        change: Callable[["Training"], None] = unchanged,
+    ) -> None:
+        self.config, self.settings = config, settings_of(config, stack, change)
         warn_of_other_bits(torch.backends.cpu.get_cpu_capability())
         _, rng_seed, weights_seed = config.seeds()
         self.rng = np.random.default_rng(rng_seed)
@@ -137,6 +144,7 @@ class Training:
         )
         self.curve = Curve()
         self.rollout = Rollout(config, self.replay.size, stack)
+        change(self)
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before.
@@ -172,10 +180,11 @@ class Training:
 
     def policy(self) -> Greedy:
         """Return a copy of what has been learned so far, with a card."""
-        config, stack = self.config, self._stack
+        config = self.config
         card = {
             "configuration": asdict(config),
-            "loads": "the paper's" if stack is None else getattr(stack, "__qualname__", "own"),
+            "change": self.settings["change"],
+            "loads": self.settings["stack"] or "the paper's",
             "picks": self.rollout.picks,
             "msr": {"at the end of its training": self.curve.table()["success_rate"].iloc[-1]},
         }
@@ -239,10 +248,6 @@ def train(
     return train_changed(config, run_dir, unchanged, progress, stack, lifts, callback)
 
 
-def unchanged(run: Training) -> None:
-    """The change that leaves a run as its configuration has it."""
-
-
 def train_changed(
     config: TrainConfig,
     run_dir: str | Path,
@@ -262,7 +267,7 @@ def train_changed(
             (``run.replay.total``), but on nothing else; otherwise a resumed run would differ.
 
     Raises:
-        As ``train``. The change is not written to ``run_dir``: each one needs a folder of its own.
+        As ``train``; also where ``run_dir`` holds a run with another change.
     """
     if not isinstance(config, TrainConfig):
         raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
@@ -287,18 +292,17 @@ def train_changed(
 
     folder = RunFolder(run_dir)
     if folder.finished:  # to be read only, perhaps where nothing can be written
-        return folder.result(config, stack)
+        return folder.result(config, stack, change)
     keep_lifts()
     with folder.locked(), deferred_interrupts() as interrupts:
         if not folder.finished:  # by another process meanwhile
-            run = Training(config, stack)
-            change(run)
+            run = Training(config, stack, change)
             try:
                 _go(run, folder, keep_lifts, callback, progress, interrupts)
             finally:
                 run.rollout.close()
                 keep_lifts()
-        return folder.result(config, stack)
+        return folder.result(config, stack, change)
 
 
 def _go(

@@ -7,10 +7,10 @@ import numpy as np
 from unload import task
 from unload.env import observation
 from unload.env.base import PickingVectorEnv
-from unload.env.fast import containers
-from unload.env.fast.ranking import nearest_first
 from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
+from unload.fast import containers
+from unload.fast.ranking import nearest_first
 from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
 from unload.load.view import snapshot

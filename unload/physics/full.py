@@ -34,9 +34,7 @@ class FullPhysics(Physics):
 
     def _reset(self, load: Load) -> None:
         self._stop()
-        # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
-        # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
-        self._world = World(maximal_coordinates=self.after_pick == "keep")
+        self._world = self._make_world()
         length, width, height = task.CONTAINER
         for position, size in (
             ((length / 2, width / 2, -0.5), (length + 2, width + 2, 1)),  # floor
@@ -45,15 +43,27 @@ class FullPhysics(Physics):
             ((-0.5, width / 2, height / 2), (1, width + 2, height)),  # rear wall
             ((0, 0, DEPOT - 0.5), (2000, 2000, 1)),
         ):
-            self._world.add_box(position, size, 0)
-        sizes = np.rint(load.sizes / RESOLUTION) * RESOLUTION
+            self._add_box(position, size, 0)
+        sizes = self._slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION)
         self._bodies = [
-            self._world.add_box(position, slim(size), task.MASS)
+            self._add_box(position, size, task.MASS)
             for position, size in zip(load.positions, sizes)
         ]
         self._poses: list[tuple] = [
             (tuple(position), UPRIGHT) for position in load.positions.tolist()
         ]
+
+    def _make_world(self) -> World:
+        # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
+        # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
+        return World(maximal_coordinates=self.after_pick == "keep")
+
+    def _slim(self, sizes: np.ndarray) -> np.ndarray:
+        """(n, 3) edges of the bodies that stand for boxes of ``sizes``, in m."""
+        return slim(sizes)
+
+    def _add_box(self, position, size, mass: float) -> int:
+        return self._world.add_box(position, size, mass)
 
     def _park(self, body: int) -> None:
         """Move a body to a place of its own in the depot."""

@@ -1,1 +1,0 @@
-"""How fast the parts are. ``python benchmarks/run.py`` measures and prints it all."""

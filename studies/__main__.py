@@ -1,0 +1,87 @@
+"""The command line: each experiment is a part, with the options that its module declares."""
+
+import argparse
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+
+from studies.falls import laboratory, long
+from studies.lifts import agreement, table
+from studies.paper import observation, training, tuning
+from studies.policies import comparison, robustness, variants
+from studies.results import COMMAND, JOBS
+from studies.seamless import training as seamless
+
+
+def lifts(n_jobs: int) -> None:
+    """Make the lift table, and ask the physics that it stands for about the same lifts."""
+    table.lift_data()
+    agreement.agreement_data(n_jobs=n_jobs)
+
+
+def policies(n_jobs: int) -> None:
+    """Measure policies, and compare them by the lift table, and with every box simulated."""
+    comparison.write_cards()
+    comparison.comparison_data(n_jobs=n_jobs)
+    robustness.robustness_data(n_jobs=n_jobs)
+
+
+def heap(n_jobs: int) -> None:
+    """Make all data of heaps. Nothing else of them is imported here, see ``PARTS``."""
+    import_module("studies.heap.table").heap_data(n_jobs=n_jobs)
+
+
+# Part → summary, what makes its data, and its options.
+PARTS: dict[str, tuple[str, Callable, dict]] = {
+    "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
+    "observation": ("Figs. 4–6", observation.observation_data, {}),
+    "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
+    "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
+    "variants": ("other networks, rewards and settings", variants.variants_data, variants.OPTIONS),
+    "policies": ("policies compared", policies, JOBS),
+    "laboratory": (
+        "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
+    ),
+    "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
+    "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
+}  # fmt: skip
+if find_spec("studies.heap"):  # a room that may be taken out
+    PARTS["heap"] = "heaps, of which a rake picks several boxes at once", heap, JOBS
+
+
+def paper(n_jobs: int) -> None:
+    """Make all data."""
+    for _, make, options in PARTS.values():
+        make(**({"n_jobs": n_jobs} if "--jobs" in options else {}))
+
+
+ALL = {"paper": ("all of them", paper, JOBS)}
+LISTED = "\n".join(f"    {COMMAND} {name:<15} {text}" for name, (text, *_) in (PARTS | ALL).items())
+DESCRIPTION = f"""\
+The data behind the paper's figures, computed and kept in ``data/`` with its provenance.
+
+{LISTED}
+
+File names and columns are those that the paper's own plots read. What has been computed is
+kept in ``runs/``: a command that was stopped goes on where it was, and what is finished is
+not repeated. Each training run writes its progress to ``log.txt`` in its folder there.
+"""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        COMMAND, description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parts = parser.add_subparsers(dest="part", required=True, metavar="part")
+    for name, (_, make, options) in (PARTS | ALL).items():
+        part = parts.add_parser(name, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+        part.set_defaults(make=make)
+        for option, details in options.items():
+            part.add_argument(option, **details)
+    chosen = vars(parser.parse_args())
+    del chosen["part"]
+    chosen.pop("make")(**chosen)
+
+
+if __name__ == "__main__":
+    main()

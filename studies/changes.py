@@ -1,0 +1,204 @@
+"""What experiments change in a ``Training``, see ``train_changed``.
+
+Each change is made before the first pick, and those of long runs depend on the pick alone, so that
+a resumed run stays the same.
+
+Observations are (batch, items, 3), x along the depth, y across the container, z upward. A change
+of them is a function ``(observations, rng) -> observations``; it may write into what it is given.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from functools import cache, partial
+
+import numpy as np
+
+from unload import task
+from unload.agent.evaluation import Policy
+from unload.agent.identity import unchanged
+from unload.agent.replay import shuffle_places
+from unload.agent.training import Training
+from unload.env.container import ContainerEnv
+from unload.env.equalization import equalize
+from unload.load.boxes import Load
+
+Change = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+DEEPEST = task.MAX_PICKS - 25  # boxes: an episode of 25 picks ends where one of 500 would
+
+
+def height_reward(run: Training, share: float) -> None:
+    """Make a failed pick the less bad, the higher its item (Sec. V-A).
+
+    Args:
+        run: that learns.
+        share: h, in [0, 1]. A failed pick is learned from as -1 + h (z + 1) / 2, z as observed;
+            the learning curve keeps the rewards of the environment.
+    """
+    add = run.replay.add
+
+    def add_shaped(
+        observations: np.ndarray, actions: np.ndarray, rewards: np.ndarray, **rest: np.ndarray
+    ) -> None:
+        heights = (observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
+        shaped = np.where(rewards < 0, rewards + share * heights, rewards)
+        add(observations=observations, actions=actions, rewards=shaped, **rest)
+
+    run.replay.add = add_shaped
+
+
+def mirror(
+    observations: np.ndarray, rng: np.random.Generator, axes: tuple[int, ...] = (0, 1)
+) -> np.ndarray:
+    """Give x and y of each observation random signs: a pick and its mirror images are alike."""
+    signs = rng.choice(np.array([-1, 1], np.float32), (len(observations), 1, len(axes)))
+    observations[..., axes] *= signs
+    return observations
+
+
+def store(run: Training, change: Change) -> None:
+    """Change each observation as it is stored in the replay memory; choices see it as it was."""
+    add = run.replay.add
+
+    def add_changed(observations: np.ndarray, **rest: np.ndarray) -> None:
+        rng = np.random.default_rng((run.config.seed, run.replay.total))
+        add(observations=change(observations.copy(), rng), **rest)
+
+    run.replay.add = add_changed
+
+
+def see(run: Training, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Change what is seen, in choosing and in learning alike."""
+    choose, add = run.agent.choose, run.replay.add
+    run.agent.choose = lambda observations, *rest: choose(change(observations), *rest)
+    run.replay.add = lambda observations, **rest: add(observations=change(observations), **rest)
+
+
+def untilted(run: Training, axes: tuple[int, ...] = (0, 1)) -> None:
+    """Choose by what is seen with random signs; the replay memory holds it as it was.
+
+    Whatever side the network prefers, it prefers each side equally often, and digs out none.
+    """
+    choose, rng = run.agent.choose, np.random.default_rng(run.config.seed)
+    run.agent.choose = lambda observations, *rest: choose(
+        mirror(observations.copy(), rng, axes), *rest
+    )
+
+
+def without(observations: np.ndarray, axes: tuple[int, ...] = (0, 1)) -> np.ndarray:
+    """Observations with some coordinates set to 0."""
+    observations = observations.copy()
+    observations[..., axes] = 0
+    return observations
+
+
+def ranked(observations: np.ndarray, averaged: tuple[int, ...]) -> np.ndarray:
+    """Ranks of positions: ties share their mean rank in some axes, noise breaks them in others."""
+    seen = equalize(observations, "noise")
+    seen[..., averaged] = equalize(observations[..., averaged], "average")
+    return seen
+
+
+def successes_only(run: Training, start: int) -> None:
+    """Store no failed pick from ``start`` picks on.
+
+    In its place a successful one of the same step is stored twice, so that the memory reaches as
+    far back as otherwise; where all of a step failed, the last successful step is stored again.
+    """
+    add, last = run.replay.add, {}
+
+    def add_successes(**picks: np.ndarray) -> None:
+        won = np.flatnonzero(picks["rewards"] > 0)
+        if run.replay.total >= start and len(won) < len(picks["rewards"]):
+            rows = np.resize(won, len(picks["rewards"]))
+            picks = {name: each[rows] for name, each in picks.items()} if len(won) else last
+        last.update(picks)
+        add(**picks)
+
+    run.replay.add = add_successes
+
+
+def best_actions(
+    observations: np.ndarray, allowed: np.ndarray, preference: float = 0.0
+) -> np.ndarray:
+    """The choice of a policy that prefers a side: the highest z + ``preference`` · y."""
+    score = observations[..., 2] + preference * observations[..., 1]
+    return np.where(allowed, score, -np.inf).argmax(axis=1)
+
+
+def taught(run: Training, preference: float) -> None:
+    """Let the policy of ``best_actions`` choose."""
+    run.agent.learner.best_actions = partial(best_actions, preference=preference)
+
+
+def left(policy: Policy, picks: int, seed: int) -> Load:
+    """What a policy leaves of one of the paper's loads after some picks, with the mask."""
+    env, rng = ContainerEnv(physics="table", max_picks=picks + 1), np.random.default_rng(seed)
+    observation, info = env.reset(seed=seed)
+    for _ in range(picks):
+        action = policy(observation[None], info["action_mask"][None], rng)[0]
+        observation, *_, info = env.step(int(action))
+    load, present = env.physics.load, env.physics.present
+    env.close()
+    return Load(
+        *(each[present] for each in (load.positions, load.sizes, load.packages, load.walls))
+    )
+
+
+@cache
+def dug_loads(preference: float, count: int = 128, seed: int = 0) -> list[Load]:
+    """Loads of which the policy of ``best_actions`` has unloaded up to 475 boxes, on ranks."""
+
+    def policy(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        return best_actions(equalize(observations), masks.astype(bool), preference)
+
+    depths = np.random.default_rng(seed).integers(DEEPEST + 1, size=count)
+    return [left(policy, int(depth), seed + each) for each, depth in enumerate(depths)]
+
+
+def dug(run: Training, preference: float) -> None:
+    """From the second episode on, fill the containers with ``dug_loads``."""
+    loads = dug_loads(preference)
+    run.rollout.envs.unwrapped.stack = lambda rng: loads[rng.integers(len(loads))]
+
+
+def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None:
+    """Let another network choose, which learns from the same picks with a change of its own.
+
+    Args:
+        run: whose network only watches.
+        change: of the network that chooses.
+        seed: is added to the run's for the first weights and batches of that network.
+    """
+    active = Training(replace(run.config, seed=run.config.seed + seed))
+    active.rollout.close()
+    change(active)
+    run.agent.choose, add = active.agent.choose, run.replay.add
+
+    def add_to_both(**picks: np.ndarray) -> None:
+        add(**picks)
+        active.replay.add(**picks)
+        if len(active.replay) >= run.config.batch_size:
+            active.start_update()()
+
+    run.replay.add = add_to_both
+
+
+def perfect_start(run: Training, change: Callable[[Training], None] = unchanged) -> None:
+    """Start from the weights of a run with places dealt anew; then ``change``."""
+    teacher = Training(replace(run.config, epsilon_init=1.0))
+    shuffled(teacher)
+    while not teacher.rollout.finished:
+        teacher.step()
+    teacher.rollout.close()
+    run.agent.network.load_state_dict(teacher.agent.network.state_dict())
+    change(run)
+
+
+def several(run: Training, makes: Iterable[Callable[[Training], None]]) -> None:
+    """Make some changes, one after the other."""
+    for make in makes:
+        make(run)
+
+
+mirrored = partial(store, change=mirror)
+shuffled = partial(store, change=shuffle_places)  # as TrainConfig(shuffle_places=True)

@@ -1,0 +1,168 @@
+"""The figures of why runs fall."""
+
+from collections.abc import Mapping
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from studies.falls.laboratory import PREFERENCES, PUPILS
+from studies.paper.training import PAPER_CELLS
+from studies.statistics import PAPER_MSR, end_msr, t_interval
+from studies.style import COLOURS, styled
+from unload import task
+
+NAMES = {
+    "ranks": "ranks",
+    "shuffled": "places dealt anew",
+    "averaged": "ties averaged",
+    "level": "level loads",
+}
+# Name and colour of each of ``PUPILS``.
+PUPIL_LOOKS = [(name, COLOURS[kind]) for kind, name in NAMES.items()]
+TITLES = {
+    "paper_no_mask": "mask off, b = 256",
+    "paper_mask": "mask on, b = 256",
+    "paper_b2048_no_mask": "mask off, b = 2048",
+    "paper_b2048_mask": "mask on, b = 2048",
+}
+
+
+@styled
+def four_cells(curves: pd.DataFrame) -> Figure:
+    """MSR while training of every run of the paper's four cells, and the end of each.
+
+    Args:
+        curves: see ``read_grid``; other cells are left out.
+    """
+    figure, panels = plt.subplots(2, 2, figsize=(7, 4.6), sharex=True, sharey=True)
+    for axes, cell in zip(panels.flat, PAPER_CELLS):
+        runs = [run for _, run in curves[curves["cell"] == cell].groupby("seed")]
+        for run in runs:
+            axes.plot(run["picks"] / 1e6, 100 * run["success_rate"], "C1", lw=0.5, alpha=0.5)
+        ends = 100 * np.array([end_msr(run) for run in runs])
+        axes.plot(np.full(len(ends), 21), ends, "k.", ms=4, clip_on=False)
+        low, high = t_interval(ends)
+        axes.errorbar(
+            22.3, ends.mean(), [[ends.mean() - low], [high - ends.mean()]],
+            fmt="k_", capsize=3, clip_on=False,
+        )  # fmt: skip
+        axes.axhline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
+        axes.set(title=f"{TITLES[cell]}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
+    figure.supxlabel("million picks; dots: mean over the last tenth, with its 95 % t interval")
+    figure.supylabel("MSR while training (%)")
+    return figure
+
+
+@styled
+def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
+    """Learning curves of the laboratory, side by side in one panel.
+
+    Args:
+        curves: name → curve of a run, see ``unload.agent.training``.
+    """
+    figure, axes = plt.subplots()
+    for (name, curve), (_, colour) in zip(curves.items(), PUPIL_LOOKS):
+        msr = 100 * curve["success_rate"]
+        axes.plot(curve["picks"] / 1e6, msr, label=name, color=colour, lw=1)
+    axes.set(xlabel="million picks", ylabel="MSR while training (%)", ylim=(0, 102))
+    axes.legend()
+    return figure
+
+
+@styled
+def surfaces(profiles: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
+    """What policies leave of the loads, seen from the entrance.
+
+    Args:
+        profiles: name → what ``measures.surface`` returns.
+    """
+    figure, axes = plt.subplots(figsize=(5.2, 3.4))
+    width, _, height = task.CONTAINER[[1, 0, 2]]
+    for (name, (places, heights)), (_, colour) in zip(profiles.items(), PUPIL_LOOKS):
+        axes.plot(places, heights, color=colour, label=name)
+        axes.fill_between(places, heights, color=colour, alpha=0.1, lw=0)
+    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y, across the container (m)",
+             ylabel="mean height of the load (m)")  # fmt: skip
+    axes.legend(loc="lower left")
+    return figure
+
+
+@styled
+def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
+    """How a preference grows: what it does to the load, and what a network learns from that.
+
+    Args:
+        trace: see ``laboratory.read_trace``.
+        runs: see ``laboratory.read_laboratory``.
+    """
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9, 3.2))
+    for cell in ("ranks", "shuffled"):
+        points = trace[trace["cell"] == cell]
+        preference = points["slope_y"] / points["slope_z"].abs()
+        left.plot(preference, points["tilt_y"], ".", color=COLOURS[cell], ms=3, label=NAMES[cell])
+    left.set(xlabel="preference: slope across / upward", ylabel="tilt of the load", xlim=(-2, 2))
+    left.legend(markerscale=3)
+    middle.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
+    for pupil, (name, colour) in zip(PUPILS, PUPIL_LOOKS):
+        cells = [f"{pupil}_{preference}" for preference in PREFERENCES]
+        groups = [runs[runs["cell"] == cell] for cell in cells]
+        learned = [(group["slope_y"] / group["slope_z"].abs()).mean() for group in groups]
+        middle.plot(PREFERENCES, learned, "o-", ms=3, color=colour, label=name)
+        if pupil == "taught":
+            success = [100 * group["mean"].mean() for group in groups]
+            right.plot(PREFERENCES, success, "o-", ms=3, color=colour)
+    middle.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
+    middle.legend(fontsize=8)
+    right.set(xlabel="preference of the teacher", ylabel="teacher's MSR (%)", ylim=(0, 102))
+    return figure
+
+
+@styled
+def fall(points: pd.DataFrame) -> Figure:
+    """A run before and in its fall: MSR and mistakes, preference, tilt.
+
+    Args:
+        points: of one run, see ``laboratory.point``.
+    """
+    figure, panels = plt.subplots(3, 1, figsize=(6.5, 5.6), sharex=True)
+    picks = points["picks"] / 1e6
+    panels[0].plot(picks, 100 * points["success_rate"], "k", label="MSR while training")
+    panels[0].plot(picks, 100 * points["wrong"], "C1", label="highest score is blocked")
+    panels[0].plot(
+        picks, 100 * points["wrong_without_place"], "C0", label="the same with x = y = 0"
+    )
+    panels[0].plot(
+        picks, 50 * (1 + points["height_of_wrong"]), "C1.", ms=3, label="its rank in height"
+    )
+    panels[0].set(ylabel="%", ylim=(-2, 102))
+    for axis, style in (("x", ":"), ("y", "-")):
+        preference = points[f"slope_{axis}"] / points["slope_z"].abs()
+        panels[1].plot(picks, preference, f"C3{style}", label=f"along {axis}")
+        panels[2].plot(picks, points[f"tilt_{axis}"], f"C4{style}", label=f"along {axis}")
+    panels[1].set(ylabel="preference")
+    panels[2].set(ylabel="tilt of the load", xlabel="million picks")
+    for axes in panels:
+        axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1, 0.5))
+    return figure
+
+
+@styled
+def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """MSR over the last tenth, a dot per run and a line per cell.
+
+    Args:
+        runs: ``cell`` and ``end``.
+        names: cell → what it is called; drawn from top to bottom.
+    """
+    figure, axes = plt.subplots(figsize=(6.5, 0.27 * len(names) + 0.8))
+    rng = np.random.default_rng(0)  # dots of a line are spread a little, to be told apart
+    for line, cell in enumerate(names):
+        end = 100 * runs.loc[runs["cell"] == cell, "end"]
+        heights = line + rng.uniform(-0.2, 0.2, len(end))
+        axes.plot(end, heights, ".", color="C0" if end.min() >= 97 else "C1", ms=5, alpha=0.6)
+    axes.set(xlim=(0, 101), ylim=(len(names) - 0.4, -0.6), xlabel="MSR over the last tenth (%)")
+    axes.set_yticks(range(len(names)), names.values())
+    axes.grid(axis="y", visible=False)
+    return figure

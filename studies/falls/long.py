@@ -1,0 +1,146 @@
+"""Runs of the paper's length: trained with what the laboratory says changed, traced, and judged.
+
+    python -m studies falls
+
+Judged are all published policies, with a part of what they see blanked, and networks without
+training.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+import torch
+
+from studies import changes
+from studies.falls import measures
+from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
+from studies.fingerprint import training_fingerprint
+from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
+from studies.paper.training import PAPER
+from studies.results import COMMAND, JOBS, keep_all, publish, read_table
+from unload.agent.config import TrainConfig
+from unload.network.peq import PEQNetwork
+from unload.support import files
+
+CONFIG = TrainConfig(batch_size=256, mask=True)
+NO_MASK, B2048 = replace(CONFIG, mask=False), TrainConfig(mask=True)
+SEEDS, FEW_SEEDS = range(20, 25), range(20, 23)
+EXPLORED = 10_000_000  # picks after which the agent no longer explores
+TRACED_SEEDS = (20, 21)
+TRACE_EVERY = 32_000  # picks: an episode of all containers
+LONG = Grid(
+    "falls/long",
+    f"{COMMAND} falls",
+    {
+        "shuffled": Cell(CONFIG, SEEDS, changes.shuffled),
+        "ranks": Cell(CONFIG, SEEDS),
+        "shuffled_no_mask": Cell(NO_MASK, SEEDS, changes.shuffled),
+        "successes": Cell(CONFIG, SEEDS, partial(changes.successes_only, start=EXPLORED)),
+        "ranks_no_mask": Cell(NO_MASK, SEEDS),
+        "episodes_25": Cell(replace(CONFIG, max_picks=25), FEW_SEEDS),
+        "mirrored": Cell(CONFIG, SEEDS, changes.mirrored),
+        "shuffled_b2048": Cell(B2048, FEW_SEEDS, changes.shuffled),
+        "shuffled_b2048_no_mask": Cell(replace(B2048, mask=False), FEW_SEEDS, changes.shuffled),
+    },
+)
+LOADS = {"episodes": 100, "seed": 1000}  # that policies are judged in, 500 picks each
+UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
+COLUMNS = ["cell", "seed", *JUDGED]
+OPTIONS = {"--cells": {"nargs": "+", "choices": LONG.cells}, **JOBS}
+
+
+def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
+    """Train the long runs, see ``train_grid``; then trace two, and judge all published policies.
+
+    Of some cells alone, nothing is traced or judged.
+    """
+    train_grid(LONG, cells, n_jobs=n_jobs)
+    if cells is None:
+        trace_data(n_jobs=n_jobs)
+        published_data(n_jobs=n_jobs)
+
+
+def trace_data(
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+) -> None:
+    """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``.
+
+    Arguments as of ``published_data``.
+    """
+    fingerprint, picks = training_fingerprint(), CONFIG.picks
+    jobs = [
+        (
+            {"seed": seed, "picks": picks, "every": TRACE_EVERY, "fingerprint": fingerprint},
+            partial(_trace, replace(CONFIG, seed=seed)),
+        )
+        for seed in TRACED_SEEDS
+    ]
+    results = keep_all(Path(runs_dir) / "falls/trace", jobs, n_jobs)
+    traces = [
+        pd.DataFrame(result.value).assign(seed=seed) for seed, result in zip(TRACED_SEEDS, results)
+    ]
+    tables = {"long_trace": pd.concat(traces)[["seed", *POINT]].astype({"picks": int})}
+    settings = {"seeds": list(TRACED_SEEDS), "picks": picks}
+    place, command = Path(folder) / "falls", f"{COMMAND} falls"
+    publish(place, "long_trace", tables, command, settings, results, fingerprint, "%.4g")
+
+
+def _trace(config: TrainConfig) -> list[dict[str, float]]:
+    """The points of a run's trace, see ``laboratory.point``."""
+    points: list[dict[str, float]] = []
+    train_in_laboratory(config, watch=lambda run: points.append(point(run)), every=TRACE_EVERY)
+    return points
+
+
+def read_long_trace(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """The points of the traced long runs."""
+    path = Path(folder) / "falls/long_trace.csv"
+    return read_table(path, f"{COMMAND} falls", ["seed", *POINT])
+
+
+def published_data(
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+) -> None:
+    """Judge each published policy in fresh containers: ``falls/published.csv``.
+
+    A row per policy: its cell and seed; its MSR as it is and with x, y or both set to 0, with the
+    mask on. The cell ``untrained`` holds networks as they are drawn.
+
+    Args:
+        folder: of the data.
+        runs_dir: where what has been measured is kept.
+        n_jobs: processes, as in joblib.
+    """
+    fingerprint = training_fingerprint()
+    judged = {
+        name: (replace(grid.cells[cell_of(name)].config, mask=True), policy.network)
+        for grid in (PAPER, LONG)
+        for name, policy in read_policies(Path(folder) / f"{grid.name}.safetensors").items()
+    }
+    for seed in range(UNTRAINED):
+        network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
+        judged[f"untrained/seed_{seed}"] = PAPER.cells["paper_mask"].config, network
+    jobs = [
+        ({"name": name, "fingerprint": fingerprint, **LOADS}, partial(_judge, name, *each))
+        for name, each in judged.items()
+    ]
+    results = keep_all(Path(runs_dir) / "published", jobs, n_jobs)
+    tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
+    place, command = Path(folder) / "falls", f"{COMMAND} falls"
+    publish(place, "published", tables, command, LOADS, results, fingerprint)
+
+
+def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
+    cell, _, seed = name.partition("/seed_")
+    row: dict[str, object] = {"cell": cell, "seed": int(seed)}
+    for column, blank in zip(JUDGED, measures.BLANKED.values()):
+        row[column] = measures.judged(network, config, blank, loads=LOADS)
+    return row
+
+
+def read_published(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """The table of ``published_data``."""
+    return read_table(Path(folder) / "falls/published.csv", f"{COMMAND} falls", COLUMNS)

@@ -1,0 +1,116 @@
+"""What is measured of a network and of the containers that its policy leaves behind."""
+
+from collections.abc import Callable
+
+import numpy as np
+import torch
+
+from studies.changes import left, without
+from unload import task
+from unload.agent.config import TrainConfig
+from unload.agent.evaluation import Policy, evaluate
+from unload.agent.greedy import greedy_actions
+from unload.network.peq import PEQNetwork
+
+Seen = Callable[[np.ndarray], np.ndarray]
+HEIGHT_BINS = 12
+NEAR = 2.4  # m from the entrance, what the surface is of
+BLANKED = {"as_is": (), "x": (0,), "y": (1,), "place": (0, 1)}  # coordinates set to 0 in choosing
+LOADS = {"episodes": 16, "seed": 1000}  # of fresh containers, 500 picks each
+
+
+def slopes(network: PEQNetwork, observations: np.ndarray) -> np.ndarray:
+    """Mean slope of the score along x, y and z over the upper half of the items, (3,).
+
+    The score is what decides among the items of an observation: tanh's argument without the pooled
+    part, which moves all of them alike.
+    """
+    heights = observations[..., 2]
+    upper = torch.from_numpy(observations[heights > np.median(heights)]).requires_grad_()
+    score = torch.relu(network.extractor(upper)) @ network.scorer.weight[0, : network.n_features]
+    (gradient,) = torch.autograd.grad(score.sum(), upper)
+    return gradient.numpy().mean(axis=0)
+
+
+def tilt(observations: np.ndarray, liftable: np.ndarray) -> np.ndarray:
+    """How far x and y tell which of the items at the same height can be lifted, (2,).
+
+    The coefficients of x and y in a least-squares fit of ``liftable``, 0 or 1, with a constant for
+    each of 12 bins of the height.
+
+    Args:
+        observations: (k, items, 3), ranks or positions.
+        liftable: (k, items) bool.
+    """
+    place, height = observations[..., :2].reshape(-1, 2), observations[..., 2].ravel()
+    edges = np.linspace(height.min(), height.max(), HEIGHT_BINS + 1)[1:-1]
+    bins = np.eye(HEIGHT_BINS)[np.digitize(height, edges)]
+    fit = np.linalg.lstsq(np.hstack([bins, place]), liftable.ravel().astype(float), rcond=None)
+    return fit[0][-2:]
+
+
+def mistakes(
+    network: PEQNetwork, observations: np.ndarray, liftable: np.ndarray
+) -> tuple[float, float, float]:
+    """Share of observations whose favourite cannot be lifted, as it is and without place.
+
+    Returns:
+        Both shares, and the mean height of the favourites that cannot be lifted, NaN without any.
+    """
+    rows, wrong = np.arange(len(observations)), []
+    for seen in (observations, without(observations)):
+        best = greedy_actions(network, seen, np.ones_like(liftable))
+        wrong.append(~liftable[rows, best])
+        if seen is observations:
+            heights = observations[rows, best, 2][wrong[0]]
+    return wrong[0].mean(), wrong[1].mean(), heights.mean() if len(heights) else np.nan
+
+
+def judged(
+    network: PEQNetwork,
+    config: TrainConfig,
+    blank: tuple[int, ...] = (),
+    seen: Seen | None = None,
+    loads: dict = LOADS,
+) -> float:
+    """MSR of a trained network's choices in fresh containers.
+
+    Args:
+        network: of the policy.
+        config: that it was trained with, which says what is seen and whether the mask is on.
+        blank: coordinates that are set to 0.
+        seen: what the network saw of the observations, if they were changed.
+        loads: ``episodes`` and ``seed`` of the containers, see ``unload.evaluate``.
+    """
+
+    def policy(observations, masks, rng):
+        if seen is not None:
+            observations = seen(observations)
+        return greedy_actions(network, without(observations, blank), masks)
+
+    env = {"equalize": config.equalize, "ties": config.ties}
+    return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
+
+
+def surface(policy: Policy, picks: int = 300, containers: int = 8) -> tuple[np.ndarray, np.ndarray]:
+    """What a policy leaves of the loads, within 2.4 m of the entrance and seen from there.
+
+    Args:
+        policy: see ``unload.policies``; it plays with the mask on.
+        picks: in each container.
+        containers: how many.
+
+    Returns:
+        Places across the containers, (100,) in m, and the mean height of the highest box there,
+        (100,) in m.
+    """
+    places = (np.arange(100) + 0.5) / 100 * task.CONTAINER[1]
+    heights = np.zeros((containers, len(places)))
+    for container in range(containers):
+        load = left(policy, picks, seed=container)
+        near = load.positions[:, 0] > task.CONTAINER[0] - NEAR
+        for centre, size in zip(load.positions[near], load.sizes[near]):
+            above = np.abs(places - centre[1]) < size[1] / 2
+            top = np.maximum(heights[container], centre[2] + size[2] / 2)
+            heights[container] = np.where(above, top, heights[container])
+    return places, heights.mean(axis=0)

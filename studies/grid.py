@@ -1,0 +1,274 @@
+"""A grid of training runs: train it, publish it, read it back.
+
+An experiment is a grid: named cells, each a configuration that is trained with several seeds,
+and perhaps something changed in its runs that no configuration offers. All runs of a grid are
+published together: a table of each measure, in which a run is a column; one file of policies;
+one record of where they come from.
+
+A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<table>/<name>``, its
+curves are published in a table of that name, so that no file of a large grid becomes large.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+import torch
+
+from studies.fingerprint import training_fingerprint
+from studies.provenance import joined, read_provenance, write_provenance
+from studies.results import COMMAND, read_table, write_table
+from studies.sweep import run_sweep
+from unload.agent.checkpoint import RunFolder
+from unload.agent.config import TrainConfig
+from unload.agent.greedy import Greedy, policy_of, settings_of
+from unload.agent.identity import unchanged
+from unload.agent.training import Training
+from unload.network.weights import read_weights, write_weights
+from unload.support import checks, files
+
+# Of a curve, what is published, and its digits: a success rate of 64 picks needs six.
+COLUMNS = {"success_rate": "%.6g", "loss": "%.5g"}
+
+
+class Cell(NamedTuple):
+    """Runs that differ in their seed alone.
+
+    Attributes:
+        config: of the runs; its own seed does not count.
+        seeds: of the runs that are planned.
+        change: what is changed in each run, see ``unload.agent.training.train_changed``.
+    """
+
+    config: TrainConfig
+    seeds: Sequence[int]
+    change: Callable[[Training], None] = unchanged
+
+
+class Grid(NamedTuple):
+    """Cells that are published together.
+
+    Attributes:
+        name: of the data in ``data/``, with its folder, such as ``"falls/long"``.
+        command: what trains the grid.
+        cells: by name.
+        measure: of a trained policy and its configuration. A grid with one publishes what it
+            returns, a row per run, instead of curves and policies.
+        policies: whether the trained policies are published beside the curves.
+    """
+
+    name: str
+    command: str
+    cells: Mapping[str, Cell]
+    measure: Callable[[Greedy, TrainConfig], dict[str, float]] | None = None
+    policies: bool = True
+
+    def configs(self, picks: int | None = None) -> dict[str, TrainConfig]:
+        """The configuration of each planned run by its name, ``<cell>/seed_<seed>``."""
+        return {
+            f"{name}/seed_{seed}": replace(cell.config, seed=seed, picks=picks or cell.config.picks)
+            for name, cell in self.cells.items()
+            for seed in cell.seeds
+        }
+
+
+def train_grid(
+    grid: Grid,
+    cells: Sequence[str] | None = None,
+    picks: int | None = None,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+) -> Path:
+    """Train the runs of a grid that are not finished, and publish all that are.
+
+    Args:
+        grid: of the runs.
+        cells: to train, all if None.
+        picks: of each run, those of the plan if None.
+        folder: of the data; a reduced grid goes to its folder ``reduced``.
+        runs_dir: where the runs are kept, apart from those of code that trained otherwise.
+        n_jobs: processes, see ``run_sweep``.
+
+    Returns:
+        The folder that holds the folders of the runs, by their names.
+
+    Raises:
+        ValueError: an unknown cell.
+        RuntimeError: runs failed; the message says which and why. The others are published.
+    """
+    for cell in cells or ():
+        checks.one_of("cells", cell, grid.cells)
+    configs = grid.configs(picks)
+    wanted = {
+        name: config for name, config in configs.items() if not cells or cell_of(name) in cells
+    }
+    fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
+    kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
+    changes = {name: grid.cells[cell_of(name)].change for name in wanted}
+    report = run_sweep(wanted, kept, n_jobs, changes=changes)
+    publish_grid(grid, configs, kept, Path(folder), picks is not None, fingerprint)
+    failed = report[report["error"] != ""]
+    if len(failed):
+        raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
+    return kept
+
+
+def publish_grid(
+    grid: Grid,
+    configs: Mapping[str, TrainConfig],
+    kept: Path,
+    folder: Path,
+    reduced: bool,
+    fingerprint: str,
+) -> None:
+    """Publish the finished runs in ``kept``, and their provenance.
+
+    Raises:
+        ValueError: more runs are published already than are finished in ``kept``.
+    """
+    place = folder / "reduced" / grid.name if reduced else folder / grid.name
+    records = {name: kept / name / "record.json" for name in configs}
+    done = {name: config for name, config in configs.items() if records[name].exists()}
+    provenance = place.parent / f"{place.name}.provenance.json"
+    there = read_provenance(place.parent, place.name)["runs"] if provenance.exists() else 0
+    if len(done) < there:
+        raise ValueError(
+            f"{kept} holds {len(done)} finished runs; expected at least as many as the {there} "
+            f"that {place}.csv holds"
+        )
+    if not done:
+        return
+    policies, curves = {}, {}
+    for name, config in done.items():
+        policies[name], curves[name] = RunFolder(kept / name).result(
+            config, change=grid.cells[cell_of(name)].change
+        )
+    if grid.measure is None:
+        write_curves(place, curves)
+        if grid.policies:
+            write_policies(place.with_name(f"{place.name}.safetensors"), policies)
+    else:
+        rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
+        write_measures(place, rows)
+    first = {
+        name: asdict(configs[f"{name}/seed_{cell.seeds[0]}"]) for name, cell in grid.cells.items()
+    }
+    record = joined(files.read_json(records[name]) for name in done)
+    record |= {"fingerprint": fingerprint, "planned": len(configs)}
+    write_provenance(place.parent, place.name, grid.command, first, reduced, record)
+
+
+def cell_of(run: str) -> str:
+    """The cell of a run, by its name."""
+    return run.rpartition("/seed_")[0]
+
+
+def _table_path(place: Path, cell: str, column: str) -> Path:
+    """Of the table that holds a column of a cell's curves."""
+    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}.csv")
+
+
+def write_curves(place: Path, curves: Mapping[str, pd.DataFrame]) -> None:
+    """Write curves by the names of their runs; all have the same picks.
+
+    ``<place>_success_rate.csv`` and ``<place>_loss.csv`` have a row per point of the curves, its
+    ``picks``, and a column per run.
+    """
+    picks = next(iter(curves.values()))["picks"]
+    for column, digits in COLUMNS.items():
+        tables: dict[Path, dict[str, pd.Series]] = {}
+        for name, curve in curves.items():
+            path = _table_path(place, cell_of(name), column)
+            tables.setdefault(path, {"picks": picks})[name] = curve[column]
+        for path, table in tables.items():
+            write_table(path, pd.DataFrame(table), digits)
+
+
+def write_measures(place: Path, rows: Mapping[str, dict[str, float]]) -> None:
+    """Write ``<place>.csv``: what is measured, by the names of the runs."""
+    table = pd.DataFrame(list(rows.values()))
+    table.insert(0, "cell", [cell_of(name) for name in rows])
+    table.insert(1, "seed", [int(name.rpartition("/seed_")[2]) for name in rows])
+    write_table(place.with_name(f"{place.name}.csv"), table)
+
+
+def read_grid(
+    grid: Grid, folder: str | Path = files.DATA, cells: Iterable[str] | None = None
+) -> pd.DataFrame:
+    """The published curves of a grid, in the order of its cells.
+
+    Args:
+        grid: of the curves.
+        folder: of the data.
+        cells: of the curves, all if None.
+
+    Returns:
+        A row per point: ``cell``, ``seed``, ``picks``, ``success_rate`` (MSR while training since
+        the point before) and ``loss``.
+
+    Raises:
+        FileNotFoundError: it has not been published.
+        ValueError: an unknown cell.
+    """
+    wanted = list(grid.cells if cells is None else cells)
+    for cell in wanted:
+        checks.one_of("cells", cell, grid.cells)
+    columns = [_read_column(grid, Path(folder) / grid.name, wanted, column) for column in COLUMNS]
+    curves = columns[0].assign(loss=columns[1]["loss"])
+    names = curves.pop("run").str.rpartition("/seed_")
+    curves.insert(0, "cell", names[0])
+    curves.insert(1, "seed", names[2].astype(int))
+    return curves
+
+
+def _read_column(grid: Grid, place: Path, cells: list[str], column: str) -> pd.DataFrame:
+    """A column of the curves of some cells: ``picks``, ``run`` and the column."""
+    parts = []
+    for path in dict.fromkeys(_table_path(place, cell, column) for cell in cells):
+        table = read_table(path, grid.command, ["picks"])
+        table = table[[name for name in table if name == "picks" or cell_of(name) in cells]]
+        parts.append(table.melt("picks", var_name="run", value_name=column))
+    return pd.concat(parts, ignore_index=True)
+
+
+def read_measures(grid: Grid, folder: str | Path = files.DATA) -> pd.DataFrame:
+    """What a grid's ``measure`` has returned, a row per run: ``cell``, ``seed`` and its entries.
+
+    Raises:
+        FileNotFoundError: it has not been published.
+    """
+    return read_table(Path(folder) / f"{grid.name}.csv", grid.command, ["cell", "seed"])
+
+
+def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
+    """Write many policies into one file of weights, by name."""
+    tensors, settings = {}, {}
+    for name, policy in policies.items():
+        tensors |= {f"{name}/{k}": v.clone() for k, v in policy.network.state_dict().items()}
+        settings[name] = settings_of(policy)
+    write_weights(path, "policies", settings, tensors)
+
+
+def read_policies(path: str | Path) -> dict[str, Greedy]:
+    """The policies of ``write_policies``, by name.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: the file was changed or damaged.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is missing; {COMMAND} makes it")
+    return read_weights(path, "policies", _policies)
+
+
+def _policies(settings: dict, tensors: dict[str, torch.Tensor]) -> dict[str, Greedy]:
+    """The policies of a file."""
+    of_run: dict[str, dict] = {name: {} for name in settings}
+    for name, tensor in tensors.items():
+        run, _, part = name.rpartition("/")
+        of_run[run][part] = tensor
+    return {name: policy_of(each, of_run[name]) for name, each in settings.items()}

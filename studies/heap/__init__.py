@@ -1,0 +1,10 @@
+"""Heaps: an unordered load, of which a rake picks several boxes at once.
+
+Read ``boxes``, ``rake``, ``generate``, ``observation``, ``env``, ``policies``, ``network`` and
+``learning``, in this order; ``recording``, ``table`` and ``figures`` then compare the policies.
+Importing this registers ``unload/Heap-v0``.
+"""
+
+import gymnasium
+
+gymnasium.register(id="unload/Heap-v0", entry_point="studies.heap.env:HeapEnv")

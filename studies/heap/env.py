@@ -1,0 +1,254 @@
+"""The heap as a Gymnasium environment."""
+
+from collections.abc import Sequence
+from functools import cache
+
+import gymnasium
+import numpy as np
+from gymnasium.utils import seeding
+
+from studies.heap import generate
+from studies.heap.boxes import Heap, check_heap
+from studies.heap.observation import (
+    COLUMNS,
+    FELL,
+    ROWS,
+    UNLOADED,
+    Camera,
+    camera_boxes,
+    features,
+    true_boxes,
+)
+from studies.heap.rake import Outcome, Rake
+from unload import task
+from unload.env.base import AllOrReset, EpisodeEnv
+from unload.physics.bullet import FRICTION
+from unload.support import checks
+
+MAX_PICKS = 15  # they unload some 25 to 40 of 100 boxes, the front of the heap
+OBSERVATIONS = {"truth": true_boxes, "camera": camera_boxes}
+LARGEST = 20.0  # of the observation: twice what a box 10 m away would show
+
+
+class HeapEnv(EpisodeEnv):
+    """Unload a heap by choosing, at each step, the box that a rake drags.
+
+    ## Description
+    About 100 boxes of the paper's 13 packages lie in any orientation in the last 3 m of the
+    container, between the rear wall at x = 4 m and the door at 7 m. The rake drags the chosen
+    box towards the door, at 1 m/s, with at most 60 N (the weight of six boxes), for 0.7 m (the
+    longest edge of a box) or 1 s. The box came if it moved 0.63 m, nine tenths of that. Other
+    boxes are pushed, carried or lose their support. The conveyor's edge stands at the foremost
+    face of the heap, where it cannot count boxes that creep by millimetres, but never more
+    than 0.2 m outside the door: it does not give way to boxes that come out. After 0.5 s of
+    rest, in which a box falls by 1.2 m, boxes whose centre is beyond the edge are unloaded; so
+    is the dragged one if it came. Rest and unloading are repeated, four times at most, until
+    nothing more is unloaded and no box is faster than 0.2 m/s: a toppling box is, a creeping
+    one is not. The other boxes stay as physics has left them; the next pick begins at rest.
+
+    ## Action space
+    ``Discrete(96)``: the row of the observation to drag. A row without a box is a pick that
+    fails and changes nothing. A row that is masked may be dragged again.
+
+    ## Observation space
+    ``Box(-20, 20, (96, 13), float32)``: one row for each visible box, from the door to the
+    rear; rows without a box are 0. A box is visible if a depth camera of 128 × 96 pixels, 2 m
+    outside the door and 2.4 m high, shows at least four pixels of it. That is true of about 55
+    boxes. No row tells of hidden boxes, unless none is visible: then there is a row for each.
+
+    ======  ===============================================================================  ====
+    Column  Observation                                                                      unit
+    ======  ===============================================================================  ====
+    0       distance of the centre behind the conveyor's edge, by the foremost visible face  m
+    1       y of the centre, from the middle                                                 m
+    2       z of the centre                                                                  m
+    3–5     extents of the upright block around the box, along x, y, z                       m
+    6–8     edges of the box, longest first                                                  m
+    9       tilt: angle between the vertical and the nearest axis of the box                 rad
+    10      share of the block's top that no visible block covers                            1
+    11      share of the block's front that no visible block covers                          1
+    12      visible pixels                                                                   1000
+    ======  ===============================================================================  ====
+
+    With ``observation="camera"`` all of this is computed from the points that the camera sees
+    of each box, which its segmentation keeps apart; what is hidden of a box is not known.
+
+    ## Rewards
+    Boxes unloaded by the pick, less ``falls_weight`` for each other box that dropped by more
+    than 0.5 m, and may be damaged.
+
+    ## Starting state
+    One of ``heaps``, drawn with equal probability.
+
+    ## Episode end
+    Termination when the last box is unloaded, truncation after ``max_picks`` picks.
+
+    ## Information
+    ``reset`` and ``step`` return a dict with
+
+    - ``action_mask``: (96,) int8, 0 for rows without a box, and for boxes that did not come
+      since the last pick that unloaded something (if that is all of them, they are allowed
+      again);
+    - ``item_mask``: (96,) int8, 0 for rows without a box;
+    - ``left``: int, boxes in the heap;
+
+    and ``step`` also
+
+    - ``unloaded`` and ``falls``: int, the two parts of the reward;
+    - ``box``: int, the dragged box's number in the heap before the pick, -1 if there was none;
+    - ``moved``: float, m, how far it came, and ``came``: bool;
+    - ``fates``: (96,) int8, what happened to the box in each row of the observation before the
+      pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
+
+    ## Pictures and arrays
+    There is no render mode: ``studies.heap.figures`` draws recorded picks. There is no array
+    of heaps either, because nearly all of a pick is PyBullet's time;
+    ``gymnasium.make_vec(id, n, vectorization_mode="async")`` gives each heap a process.
+
+    Args:
+        split: ``"train"`` or ``"test"``, which of the stored heaps are played.
+        heaps: other heaps to play, instead of a split.
+        physics: ``"whole"``, ``"coarse"`` or ``"near"``, see ``Rake``.
+        observation: ``"truth"``, or ``"camera"`` for what the depth camera tells.
+        falls_weight: λ, boxes that a fall costs.
+        max_picks: greatest length of an episode.
+        friction: of boxes, floor and walls, see ``Rake``.
+        mass: kg, of each box.
+
+    Attributes:
+        heap: the ``Heap`` as it is.
+        visible: (96,) int64, the box in each row of the observation, -1 in rows without.
+
+    Raises:
+        TypeError, ValueError: an argument or an action is not as described.
+        FileNotFoundError: the stored heaps are missing.
+        gymnasium.error.ResetNeeded: ``step`` before ``reset``, or after an episode's end.
+        gymnasium.error.ClosedEnvironmentError: use after ``close``.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(
+        self,
+        split: str = "train",
+        heaps: Sequence[Heap] | None = None,
+        physics: str = "whole",
+        observation: str = "truth",
+        falls_weight: float = 1.0,
+        max_picks: int = MAX_PICKS,
+        friction: float = FRICTION,
+        mass: float = task.MASS,
+    ) -> None:
+        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+        self.max_picks = checks.integer("max_picks", max_picks, 1)
+        checks.one_of("observation", observation, OBSERVATIONS)
+        self._boxes_seen = OBSERVATIONS[observation]
+        checks.one_of("split", split, generate.SPLITS)
+        if not isinstance(heaps, Sequence | None):
+            raise TypeError(f"heaps is {heaps!r}; expected a sequence of Heap, or None")
+        self.heaps = stored_heaps(split) if heaps is None else tuple(heaps)
+        if not self.heaps:
+            raise ValueError("heaps is empty; expected at least one Heap")
+        for number, heap in enumerate(self.heaps):
+            check_heap(f"heaps[{number}]", heap)
+        self.observation_space = gymnasium.spaces.Box(
+            -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
+        )
+        self.action_space = gymnasium.spaces.Discrete(ROWS)
+        self._rake, self._camera = Rake(physics, friction, mass), Camera()
+        self._state = "not started"
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Start with one of the heaps; ``options={"heap": heap}`` gives the heap to use."""
+        self._check_open()
+        options = {} if options is None else options
+        checks.entries("options", options, ())
+        if set(options) - {"heap"}:
+            raise ValueError(f"options is {options!r}; expected heap")
+        heap = options.get("heap")
+        if heap is not None:
+            check_heap("options['heap']", heap)
+        if seed is not None:
+            self._np_random, self._np_random_seed = seeding.np_random(seed)
+        if heap is None:
+            heap = self.heaps[self.np_random.integers(len(self.heaps))]
+        with AllOrReset(self):
+            self.heap, self._failed, self._picks = heap, np.zeros(len(heap), bool), 0
+            self._state = "running"
+            self._look()
+        return self._observation.copy(), self._info()
+
+    def step(self, action: int):
+        self._check_running()
+        if isinstance(action, np.ndarray) and action.ndim == 0:
+            action = action.item()  # what a learned policy may return
+        row = checks.integer("action", action, 0, ROWS - 1)
+        box = int(self.visible[row])
+        fates = np.zeros(ROWS, np.int8)
+        pick = {
+            "unloaded": np.int64(0), "falls": np.int64(0), "box": np.int64(box),
+            "moved": np.float64(0), "came": np.False_, "fates": fates,
+        }  # fmt: skip
+        with AllOrReset(self):
+            self._picks += 1
+            if box >= 0:
+                outcome = self._rake.pick(self.heap, box)
+                pick |= {
+                    "unloaded": outcome.unloaded.sum(),
+                    "falls": outcome.fallen.sum(),
+                    "moved": np.float64(outcome.moved),
+                    "came": np.bool_(outcome.came),
+                }
+                seen = self.visible >= 0
+                numbers = self.visible[seen]
+                fates[seen] = UNLOADED * outcome.unloaded[numbers] + FELL * outcome.fallen[numbers]
+                self._take(outcome, box)
+        reward = float(pick["unloaded"] - self.falls_weight * pick["falls"])
+        terminated, truncated = len(self.heap) == 0, self._picks >= self.max_picks
+        if terminated or truncated:
+            self._state = "finished"
+        return self._observation.copy(), reward, terminated, truncated, self._info() | pick
+
+    def action_masks(self) -> np.ndarray:
+        """(96,) bool, ``info["action_mask"]``."""
+        self._check_started()
+        allowed = self.visible >= 0
+        untried = allowed.copy()
+        untried[allowed] = ~self._failed[self.visible[allowed]]
+        return untried if untried.any() else allowed
+
+    def close(self) -> None:
+        """Disconnect both clients; may be called again."""
+        self._rake.close()
+        self._camera.close()
+        self._state = "closed"
+
+    def _take(self, outcome: Outcome, box: int) -> None:
+        if outcome.unloaded.any():
+            self._failed = np.zeros(len(outcome.heap), bool)
+        else:
+            self._failed[box] = True
+        self.heap = outcome.heap
+        self._look()
+
+    def _look(self) -> None:
+        """Update which boxes are visible, and the observation of them."""
+        self.visible = np.full(ROWS, -1)
+        self._observation = np.zeros(self.observation_space.shape, np.float32)
+        if len(self.heap):
+            seen = self._boxes_seen(self.heap, self._camera.scan(self.heap))
+            self.visible[: len(seen.numbers)] = seen.numbers
+            self._observation = np.clip(features(seen), -LARGEST, LARGEST)
+
+    def _info(self) -> dict:
+        return {
+            "action_mask": self.action_masks().astype(np.int8),
+            "item_mask": (self.visible >= 0).astype(np.int8),
+            "left": np.int64(len(self.heap)),
+        }
+
+
+@cache
+def stored_heaps(split: str) -> tuple[Heap, ...]:
+    """The stored heaps of a split, read once."""
+    return tuple(generate.read_heaps(split))

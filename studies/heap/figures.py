@@ -1,0 +1,234 @@
+"""Figures of heaps: what a pick does, and the policies compared."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
+from studies.heap.policies import RULES
+from studies.heap.rake import Outcome
+from studies.heap.recording import NAME
+from studies.heap.table import (
+    LEARNED,
+    MEASURES,
+    ORACLE,
+    REFERENCE,
+    SHOWN_WEIGHT,
+    read_heap_table,
+)
+from studies.style import COLOURS as RULE_COLOURS
+from studies.style import mark_reduced, styled
+from unload.load.view import COLOURS, CORNERS, EYE, SEAM, project
+from unload.support import files
+
+# What happens to a box in a pick, and its colour. The later ones win.
+MEANINGS = {
+    "stays": COLOURS["unseen"],
+    "comes along": COLOURS["liftable"],
+    "falls": COLOURS["failed"],
+    "is dragged": COLOURS["tried"],
+}
+OUTSIDE = FARTHEST_EDGE + 0.6  # m, how far the pictures reach
+FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+LIGHT = np.array([0.55, -0.45, 0.7]) / np.linalg.norm([0.55, -0.45, 0.7])
+LINES = {REFERENCE: RULE_COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
+# Where the names of rules stand that lie close together: offset in points, and alignment.
+NAME_PLACES = {
+    "clear above": ((-2, 9), "center"), "nearest": ((0, -13), "center"),
+    "highest": ((5, -12), "left"), "random": ((5, -12), "left"),
+}  # fmt: skip
+UNITS = {"boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick"}
+
+
+def corners(heap: Heap) -> np.ndarray:
+    """(n, 8, 3) float64, m: corners of the boxes as they are drawn, a little smaller."""
+    own = (CORNERS - 0.5) * np.maximum(heap.sizes - SEAM, heap.sizes / 2)[:, None]
+    return heap.positions[:, None] + own @ heap.axes().transpose(0, 2, 1)
+
+
+def meanings(outcome: Outcome, box: int) -> np.ndarray:
+    """(n,) int, the number in ``MEANINGS`` of what a pick does to each box before it."""
+    numbers = np.zeros(len(outcome.unloaded), int)
+    numbers[outcome.unloaded] = 1
+    numbers[outcome.fallen] = 2
+    numbers[box] = 3
+    return numbers
+
+
+def colours_of(numbers: np.ndarray) -> np.ndarray:
+    """(n, 3) float, the colours of meanings that are given by their places in ``MEANINGS``."""
+    return np.array(list(MEANINGS.values()))[numbers]
+
+
+def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray, title: str = "") -> None:
+    """Draw a heap as seen from outside the door, the conveyor's edge as a line on the floor.
+
+    Args:
+        axes: where.
+        heap: the boxes.
+        colours: (n, 3) float in [0, 1], red, green and blue of each box.
+        title: of the picture.
+    """
+    for line in _room(heap.edge()):
+        axes.plot(*project(line).T, color="0.6", lw=0.8, zorder=0)
+    faces = corners(heap)[:, FACES].reshape(-1, 4, 3)
+    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    # Away from the box's own centre, whichever way round its corners are listed.
+    middle = faces.mean(axis=1)
+    outward = middle - np.repeat(heap.positions, len(FACES), axis=0)
+    normals *= np.sign((normals * outward).sum(axis=1))[:, None]
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    towards = ((EYE - middle) * normals).sum(axis=1) > 0
+    order = np.argsort(-np.linalg.norm(middle - EYE, axis=1), kind="stable")
+    order = order[towards[order]]
+    shade = 0.72 + 0.28 * (normals[order] @ LIGHT)
+    colours = np.repeat(colours, len(FACES), axis=0)[order] * shade[:, None]
+    axes.add_collection(
+        PolyCollection(
+            project(faces[order]),
+            facecolors=np.clip(colours, 0, 1),
+            edgecolors=0.5 * np.clip(colours, 0, 1),
+            linewidths=0.4,
+        )
+    )
+    frame = project(
+        np.array([(x, y, z) for x in (REAR, OUTSIDE) for y in (0, WIDTH) for z in (0, 2.3)])
+    )
+    axes.set(
+        aspect="equal",
+        xlim=(frame[:, 0].min(), frame[:, 0].max()),
+        ylim=(frame[:, 1].min(), frame[:, 1].max()),
+        title=title,
+    )
+    axes.axis("off")
+
+
+def _room(edge: float) -> list[np.ndarray]:
+    """Lines (2, 3): the floor's outline, the rear wall's, and the conveyor's edge."""
+    rear = [(REAR, 0, 0), (REAR, WIDTH, 0), (REAR, WIDTH, 2.3), (REAR, 0, 2.3)]
+    lines = list(zip(rear, rear[1:] + rear[:1]))
+    lines += [((REAR, y, 0), (OUTSIDE, y, 0)) for y in (0, WIDTH)]
+    return [np.array(line) for line in (*lines, ((edge, 0, 0), (edge, WIDTH, 0)))]
+
+
+def add_legend(figure: Figure) -> None:
+    handles = [Patch(facecolor=c, edgecolor="0.5", label=name) for name, c in MEANINGS.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(MEANINGS), frameon=False)
+
+
+@styled
+def episodes(played: Mapping[str, tuple[Sequence[Heap], np.ndarray, Sequence[Outcome]]]) -> Figure:
+    """Episodes line by line, before the first, the middle and the last pick.
+
+    Args:
+        played: name → heaps before the picks, boxes dragged (t,) and outcomes of the t picks;
+            the heaps are coloured by what the next pick will do.
+    """
+    figure, grid = plt.subplots(len(played), 3, figsize=(9, 2.7 * len(played)), squeeze=False)
+    for line, (name, (heaps, boxes, outcomes)) in zip(grid, played.items()):
+        unloaded = np.cumsum([0, *(one.unloaded.sum() for one in outcomes)])
+        falls = np.cumsum([0, *(one.fallen.sum() for one in outcomes)])
+        for axes, pick in zip(line, (0, len(outcomes) // 2, len(outcomes) - 1)):
+            colours = colours_of(meanings(outcomes[pick], int(boxes[pick])))
+            title = f"{name}, pick {pick + 1}: {unloaded[pick]} unloaded, {falls[pick]} fallen"
+            draw_heap(axes, heaps[pick], colours, title)
+            axes.title.set_fontsize(8)
+    add_legend(figure)
+    return figure
+
+
+@styled
+def expected_fates(
+    before: Heap, box: int, visible: np.ndarray, chances: np.ndarray, outcome: Outcome
+) -> Figure:
+    """What a network expects of each visible box when one is dragged, and what happens.
+
+    Args:
+        before: the heap.
+        box: that is dragged.
+        visible: (m,) int, the numbers of the visible boxes.
+        chances: (m, 2) float, probabilities that each of them is unloaded, and that it falls:
+            the share of these colours in the box's own.
+        outcome: of the pick.
+    """
+    stays, comes, falls, dragged = colours_of(np.arange(len(MEANINGS)))
+    share = chances / np.maximum(chances.sum(axis=1, keepdims=True), 1)
+    colours = np.tile(stays, (len(before), 1))
+    colours[visible] += share[:, :1] * (comes - stays) + share[:, 1:] * (falls - stays)
+    colours[box] = dragged
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+    draw_heap(left, before, colours, "expected by the network")
+    draw_heap(right, before, colours_of(meanings(outcome, box)), "what the pick does")
+    add_legend(figure)
+    return figure
+
+
+@styled
+def policies(folder: str | Path = files.DATA) -> Figure:
+    """Boxes, falls and their balance for each policy at λ = 1, with 95 % intervals.
+
+    Args:
+        folder: of ``heap/table.csv``.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    table = read_heap_table(folder)
+    rows = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
+    places = np.arange(len(rows))[::-1]
+    figure, grid = plt.subplots(1, len(MEASURES), figsize=(9, 3.0), sharey=True)
+    for axes, measure in zip(grid, MEASURES):
+        for place, (name, row) in zip(places, rows.iterrows()):
+            low, value, high = row[f"{measure}_low"], row[measure], row[f"{measure}_high"]
+            colour = LINES.get(name, "0.55")
+            axes.plot([low, high], [place, place], color=colour, lw=2)
+            axes.plot(value, place, "o", color=colour, ms=5)
+        axes.set(yticks=places, yticklabels=list(rows.index), xlabel=UNITS[measure])
+    mark_reduced(figure, Path(folder) / NAME, "table")
+    return figure
+
+
+@styled
+def throughput_falls(folder: str | Path = files.DATA) -> Figure:
+    """Boxes and falls per pick on unseen heaps: a point for each rule, a curve over λ for others.
+
+    Args:
+        folder: of ``heap/table.csv``.
+
+    Raises:
+        FileNotFoundError: the table is missing; the message names the command.
+    """
+    figure, axes = plt.subplots(figsize=(6.4, 4.2))
+    for name, rows in read_heap_table(folder).groupby("policy", sort=False):
+        rows = rows.sort_values("falls_weight")
+        colour = LINES.get(name, "0.6")
+        x, y = (
+            np.abs(rows[[f"{part}_low", f"{part}_high"]].to_numpy().T - rows[part].to_numpy())
+            for part in ("falls", "boxes")
+        )
+        axes.errorbar(rows["falls"], rows["boxes"], y, x, "o", color=colour, ms=4, lw=0.8)
+        label = name if name in LINES else None
+        axes.plot(rows["falls"], rows["boxes"], "o-", color=colour, ms=4, lw=1.6, label=label)
+        marks = {}
+        if name in RULES:
+            marks = {name: rows.iloc[0]}
+        elif name == LEARNED:
+            marks = {f"λ = {row['falls_weight']:g}": row for _, row in rows.iterrows()}
+        for text, row in marks.items():
+            usual = ((5, 4), "left") if name in RULES else ((-4, 5), "right")
+            place, side = NAME_PLACES.get(text, usual)
+            axes.annotate(
+                text, (row["falls"], row["boxes"]), xytext=place, textcoords="offset points",
+                ha=side, fontsize=8, color="0.4" if name in RULES else colour,
+            )  # fmt: skip
+    axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"])
+    axes.set_xlim(left=0)
+    axes.legend(loc="lower right", fontsize=8)
+    mark_reduced(figure, Path(folder) / NAME, "table")
+    return figure

@@ -1,0 +1,229 @@
+"""Learning from recorded picks what dragging a box does: regression."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from torch import nn
+
+from studies.heap.network import FateNetwork, expected_of, fate_loss
+from studies.heap.observation import COLUMN, COLUMNS, ROWS
+from studies.heap.policies import check_batch
+from unload.network.weights import read_weights, write_weights
+from unload.support import checks
+
+BATCH = 128
+LEARNING_RATE = 5e-3  # with 0.001, STEPS are far too few; with 0.01 it learns less again
+STEPS = 4000  # 10 times through 50,000 picks
+WEIGHT_DECAY = 1e-4
+AT_ONCE = 32  # observations of which all rows are asked for: pairs take 25 MB a layer
+
+
+@dataclass(frozen=True, eq=False)
+class Picks:
+    """Recorded picks.
+
+    Attributes:
+        observations: (n, 96, 13) float32, before the pick.
+        actions: (n,) int64, the row that was dragged.
+        unloaded, falls: (n,) float32.
+        fates: (n, 96) int8, what happened to the box in each row, see ``HeapEnv``.
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    unloaded: np.ndarray
+    falls: np.ndarray
+    fates: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+
+def joined(picks: Sequence[Picks]) -> Picks:
+    """All picks as one."""
+    names = Picks.__dataclass_fields__
+    return Picks(*(np.concatenate([getattr(each, name) for each in picks]) for name in names))
+
+
+def holds_box(observations: torch.Tensor) -> torch.Tensor:
+    """(..., 96) bool, the rows of an observation that hold a box: its edges are not 0."""
+    return observations[..., COLUMN["longest"]] > 0
+
+
+def without_empty_rows(observations: torch.Tensor) -> torch.Tensor:
+    """Observations up to the last row that holds a box in any: pairs of rows are many."""
+    used = holds_box(observations).any(dim=0).nonzero()
+    return observations[..., : int(used.max()) + 1 if len(used) else 1, :]
+
+
+def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
+    """Learn what dragging a box brings.
+
+    Counts are learned by the Poisson likelihood, fates and the probability of a fall by their
+    own. Each batch is mirrored at the middle of the container with probability 0.5, because the
+    physics is the same. The learning rate falls along a cosine to 0.
+
+    Args:
+        picks: the data.
+        seed: of weights and batches.
+        steps: of the optimizer, a batch each.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+    checks.integer("steps", steps, 1)
+    if not len(picks):
+        raise ValueError("picks is empty; expected at least one")
+    generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
+    network = FateNetwork(generator=generator)
+    arrays = picks.observations, picks.actions, picks.unloaded, picks.falls, picks.fates
+    data = _Batch(*map(torch.from_numpy, arrays), torch.from_numpy(picks.falls > 0).float())
+    adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
+    for rows in batches(len(picks), steps, generator):
+        batch = _Batch(*(each[rows] for each in data))
+        if torch.rand((), generator=generator) < 0.5:
+            batch = batch._replace(observations=mirrored(batch.observations))
+        loss = _loss(network, batch)
+        adam.zero_grad()
+        loss.backward()
+        adam.step()
+        schedule.step()
+    return network.eval()
+
+
+class _Batch(NamedTuple):
+    """Recorded picks as tensors."""
+
+    observations: torch.Tensor
+    actions: torch.Tensor
+    boxes: torch.Tensor
+    falls: torch.Tensor
+    fates: torch.Tensor
+    fell: torch.Tensor  # whether anything fell
+
+
+def _loss(network: FateNetwork, batch: _Batch) -> torch.Tensor:
+    """Negative log-likelihood of a batch, per pick."""
+    observations = without_empty_rows(batch.observations)
+    present = holds_box(observations)
+    fates = network.fates(observations, present, batch.actions)
+    expected = expected_of(fates, present)
+    found = batch.fates[:, : observations.shape[1]]
+    loss = fate_loss(fates, present, found, batch.boxes, batch.falls)
+    fell = nn.functional.binary_cross_entropy_with_logits(expected.fall_logits[:, 0], batch.fell)
+    boxes, falls = (
+        nn.functional.poisson_nll_loss(mean[:, 0], count, log_input=False)
+        for mean, count in ((expected.boxes, batch.boxes), (expected.falls, batch.falls))
+    )
+    return loss + boxes + falls + fell
+
+
+def batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
+    """Rows of each batch: all of them in random order, again and again."""
+    while steps > 0:
+        some = torch.randperm(count, generator=generator).split(BATCH)[:steps]
+        yield from some
+        steps -= len(some)
+
+
+def mirrored(observations: torch.Tensor) -> torch.Tensor:
+    """Observations of the heap as a mirror along the container's middle shows it."""
+    signs = torch.ones(observations.shape[-1])
+    signs[COLUMN["y"]] = -1
+    return observations * signs
+
+
+class Learned:
+    """Policy that picks the allowed box with the highest boxes - λ falls.
+
+    Args:
+        networks: their answers are averaged.
+        falls_weight: λ.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+
+    def __init__(self, networks: Sequence[FateNetwork], falls_weight: float = 1.0) -> None:
+        if not networks:
+            raise ValueError("networks is empty; expected at least one FateNetwork")
+        self.networks = list(networks)
+        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+
+    def __call__(
+        self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        observations, allowed = check_batch(observations, masks)
+        boxes, falls, _ = self.expected(observations)
+        return np.where(allowed, boxes - self.falls_weight * falls, -np.inf).argmax(axis=1)
+
+    @torch.no_grad()
+    def expected(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Expected boxes and falls and the probability of a fall, (batch, 96) float32 each.
+
+        Rows without a box mean nothing.
+        """
+        whole = np.zeros((3, *np.shape(observations)[:2]), np.float32)
+        for start in range(0, len(observations), AT_ONCE):
+            chunk = np.asarray(observations[start : start + AT_ONCE], np.float32)
+            rows = without_empty_rows(torch.from_numpy(chunk))
+            answers = [network(rows, holds_box(rows)) for network in self.networks]
+            boxes, falls, logits = (torch.stack(part) for part in zip(*answers))
+            parts = torch.stack([boxes, falls, logits.sigmoid()]).mean(dim=1)
+            whole[:, start : start + AT_ONCE, : rows.shape[1]] = parts.numpy()
+        return tuple(whole)
+
+    @torch.no_grad()
+    def fates(self, observation: np.ndarray, row: int) -> np.ndarray:
+        """(96, 2) float32, probabilities that each visible box is unloaded, and that it falls.
+
+        Args:
+            observation: (96, 13), of one heap.
+            row: of the box that is dragged.
+
+        Raises:
+            TypeError, ValueError: an argument is not as described.
+        """
+        observation = checks.finite_array("observation", observation, (ROWS, len(COLUMNS)))
+        asked = torch.tensor([checks.integer("row", row, 0, ROWS - 1)])
+        rows = torch.from_numpy(observation[None].astype(np.float32))
+        logits = [network.fates(rows, holds_box(rows), asked).logits for network in self.networks]
+        chances = torch.stack(logits).sigmoid().mean(dim=0)[0, 0]
+        return (chances * holds_box(rows)[0, :, None]).numpy()
+
+
+def save_networks(networks: Sequence[FateNetwork], path: str | Path) -> None:
+    """Write the weights of several networks into one file, see ``write_weights``."""
+    weights = {
+        f"{number}.{name}": weight
+        for number, network in enumerate(networks)
+        for name, weight in network.state_dict().items()
+    }
+    settings = {"n_features": [network.n_features for network in networks]}
+    write_weights(path, "heap networks", settings, weights)
+
+
+def load_networks(path: str | Path) -> list[FateNetwork]:
+    """Read what ``save_networks`` wrote.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        ValueError: it is damaged or holds something else.
+    """
+    return read_weights(path, "heap networks", _networks)
+
+
+def _networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
+    """The networks of a file."""
+    networks = []
+    for number, n_features in enumerate(settings["n_features"]):
+        network, start = FateNetwork(n_features), f"{number}."
+        own = {name: weights[name] for name in weights if name.startswith(start)}
+        network.load_state_dict({name.removeprefix(start): own[name] for name in own})
+        networks.append(network.eval())
+    return networks

@@ -1,0 +1,169 @@
+"""The network: what dragging each visible box would do to every visible box.
+
+It is permutation equivariant, as the paper's (Sec. III-F), but what a box's neighbours do
+matters here: the box that is dragged pushes those before it and drops those on it.
+"""
+
+from typing import NamedTuple
+
+import torch
+from torch import nn
+
+from studies.heap.observation import COLUMN, COLUMNS, FELL, UNLOADED
+from unload.support import checks
+
+FEATURES = 64
+PAIR_COLUMNS = 6  # see ``pair_columns``
+HEADS = 3
+FATES = 2  # a box may be unloaded, and may fall, or both
+
+
+class Expected(NamedTuple):
+    """What dragging each box would bring; each (batch, asked) float32."""
+
+    boxes: torch.Tensor  # unloaded, expected number
+    falls: torch.Tensor  # expected number
+    fall_logits: torch.Tensor  # of the probability that anything falls
+
+
+class Fates(NamedTuple):
+    """What happens to the boxes when one is dragged; all float32.
+
+    Attributes:
+        logits: (batch, asked, items, 2), of the probabilities that each visible box is
+            unloaded, and that it falls. The box that is dragged is one of them.
+        hidden: (batch, asked, 2), expected numbers of hidden boxes that are unloaded, and fall.
+        fall_logits: (batch, asked), of the probability that anything falls.
+    """
+
+    logits: torch.Tensor
+    hidden: torch.Tensor
+    fall_logits: torch.Tensor
+
+
+class FateNetwork(nn.Module):
+    """The fate of every box when one is dragged.
+
+    For every pair of the dragged box and another one, a two-layer network reads both rows and
+    how the two blocks lie to each other (``pair_columns``). The sum and the maximum of what all
+    pairs say tell each pair what else is around the dragged box, because a third box may lie
+    between the two.
+
+    A pick is recorded with what it has done to every visible box. Therefore each pair is learned
+    from the fate of one box, and not only from what all of them together have brought.
+
+    Args:
+        n_features: of each layer.
+        generator: draws the weights, U(±1/√inputs); torch's global one if None.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described.
+    """
+
+    def __init__(
+        self, n_features: int = FEATURES, generator: torch.Generator | None = None
+    ) -> None:
+        super().__init__()
+        self.n_features = n = checks.integer("n_features", n_features, 1)
+        self.own = nn.Linear(len(COLUMNS), n)
+        self.chosen = nn.Linear(len(COLUMNS), n)
+        self.other = nn.Linear(len(COLUMNS), n, bias=False)
+        self.pair = nn.Linear(PAIR_COLUMNS, n, bias=False)
+        self.message = nn.Linear(n, n)
+        self.hidden = nn.Linear(3 * n, n)
+        self.last = nn.Linear(n, n)
+        self.heads = nn.Linear(n, HEADS)
+        self.heard = nn.Linear(n, n)
+        self.context = nn.Linear(n, n, bias=False)
+        self.fate = nn.Linear(n, FATES)
+        for layer in self.children():
+            for weight in layer.parameters():
+                bound = layer.in_features**-0.5
+                nn.init.uniform_(weight, -bound, bound, generator=generator)
+
+    def fates(
+        self,
+        observations: torch.Tensor,
+        present: torch.Tensor,
+        rows: torch.Tensor | None = None,
+    ) -> Fates:
+        """Fates of all boxes for each row, or for one chosen row of each observation.
+
+        Args:
+            observations: (batch, items, 13) float32, see ``HeapEnv``.
+            present: (batch, items) bool, the rows that hold a box.
+            rows: (batch,) int64, the rows asked for; all if None. Training asks for one, since
+                each observation was followed by one pick; that costs a share of 1 / items.
+        """
+        asked = observations
+        if rows is not None:
+            asked = observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
+        messages = self._messages(asked, observations, present)
+        pooled = [messages.sum(dim=2) / 16, messages.amax(dim=2)]
+        around = torch.relu(self.hidden(torch.cat([torch.relu(self.own(asked)), *pooled], dim=2)))
+        pair = torch.relu(self.heard(messages) + self.context(around)[:, :, None])
+        heads = self.heads(torch.relu(self.last(around)))
+        return Fates(self.fate(pair), nn.functional.softplus(heads[..., :2]), heads[..., 2])
+
+    def forward(
+        self,
+        observations: torch.Tensor,
+        present: torch.Tensor,
+        rows: torch.Tensor | None = None,
+    ) -> Expected:
+        """Sums of ``fates``, with the same arguments."""
+        return expected_of(self.fates(observations, present, rows), present)
+
+    def _messages(
+        self, asked: torch.Tensor, others: torch.Tensor, present: torch.Tensor
+    ) -> torch.Tensor:
+        """What each other box means to each one asked for, (batch, asked, others, n) ≥ 0."""
+        relation = pair_columns(asked, others)
+        message = self.chosen(asked)[:, :, None] + self.other(others)[:, None]
+        message = torch.relu(self.message(torch.relu(message + self.pair(relation))))
+        # Messages are >= 0, so that 0 adds nothing to the sum and leaves the maximum.
+        return message * present[:, None, :, None]
+
+
+def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
+    """How the blocks of boxes lie to those of others, (batch, asked, others, 6), m.
+
+    Distance of the centres along x, y and z, and the gap between the blocks along x, y and z,
+    negative where they overlap: both decide whether one pushes, carries or clears the other.
+    """
+    place = [COLUMN["behind"], COLUMN["y"], COLUMN["z"]]
+    block = [COLUMN["extent_x"], COLUMN["extent_y"], COLUMN["extent_z"]]
+    apart = others[:, None, :, place] - asked[:, :, None, place]
+    reach = (others[:, None, :, block] + asked[:, :, None, block]) / 2
+    return torch.cat([apart, apart.abs() - reach], dim=3)
+
+
+def expected_of(fates: Fates, present: torch.Tensor) -> Expected:
+    """Sums of fates over the boxes that are there."""
+    visible = (fates.logits.sigmoid() * present[:, None, :, None]).sum(dim=2)
+    boxes, falls = (visible + fates.hidden).unbind(2)
+    return Expected(boxes, falls, fates.fall_logits)
+
+
+def fate_loss(
+    fates: Fates,
+    present: torch.Tensor,
+    found: torch.Tensor,
+    boxes: torch.Tensor,
+    falls: torch.Tensor,
+) -> torch.Tensor:
+    """Negative log-likelihood of what one pick of each observation has done, per pick.
+
+    Args:
+        fates: of the box that was dragged in each observation.
+        present: (batch, items) bool.
+        found: (batch, items) int, the bits ``UNLOADED`` and ``FELL`` of each visible box.
+        boxes, falls: (batch,) float32, of the pick, hidden boxes included.
+    """
+    bits = torch.stack([(found & UNLOADED) > 0, (found & FELL) > 0], dim=2).float()
+    each = nn.functional.binary_cross_entropy_with_logits(
+        fates.logits[:, 0], bits, reduction="none"
+    )
+    hidden = torch.stack([boxes, falls], dim=1) - bits.sum(dim=1)
+    counts = nn.functional.poisson_nll_loss(fates.hidden[:, 0], hidden, log_input=False)
+    return (each * present[..., None]).sum(dim=(1, 2)).mean() + FATES * counts

@@ -1,0 +1,191 @@
+"""Picking rules that need no learning, an oracle, and the episodes that policies play.
+
+Policies are functions ``policy(observations, masks, rng) -> actions`` on a batch, as in
+``unload.policies``: observations (batch, 96, 13) float as ``HeapEnv`` gives them, masks
+(batch, 96). A rule scores each visible box, and the allowed box of the highest score is picked.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from studies.heap.boxes import Heap
+from studies.heap.env import HeapEnv
+from studies.heap.observation import COLUMN, COLUMNS, EYE
+from studies.heap.rake import Outcome, Rake
+from unload.agent.policies import any_allowed
+from unload.support import checks
+
+Score = Callable[[np.ndarray], np.ndarray]  # (batch, 96, 13) → (batch, 96)
+TRIED_AGAIN = 8  # boxes, by an oracle
+
+
+def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the observations as a float64 array and the masks as bool.
+
+    Raises:
+        TypeError, ValueError: they are not as described above, or a mask allows no box.
+    """
+    observations = checks.finite_array("observations", observations, (None, None, len(COLUMNS)))
+    allowed = checks.flag_array("masks", masks, observations.shape[:2])
+    if not allowed.any(axis=1).all():
+        row = int(np.argmin(allowed.any(axis=1)))
+        raise ValueError(f"masks is all zero in row {row}; expected at least one box to pick")
+    return observations, allowed
+
+
+def best(score: Score) -> Callable:
+    """The policy that picks the allowed box with the highest score, the foremost if several."""
+
+    def policy(observations, masks, rng):
+        observations, allowed = check_batch(observations, masks)
+        return np.where(allowed, score(observations), -np.inf).argmax(axis=1)
+
+    return policy
+
+
+def linear(weights: Mapping[str, float]) -> Score:
+    """The score that is a weighted sum of columns of the observation.
+
+    Raises:
+        ValueError: a name is no column.
+    """
+    for name in weights:
+        checks.one_of("a column", name, COLUMNS)
+    vector = np.array([weights.get(name, 0.0) for name in COLUMNS])
+    return lambda observations: observations @ vector
+
+
+def random(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Any allowed box, each with the same probability."""
+    _, allowed = check_batch(observations, masks)
+    return any_allowed(allowed, checks.generator("rng", rng))
+
+
+def _nearness(observations: np.ndarray) -> np.ndarray:
+    """Minus the squared distance from the camera, as if the foremost face stood at the door."""
+    place = observations[..., [COLUMN["behind"], COLUMN["y"], COLUMN["z"]]]
+    return -((place - (-2.0, 0.0, EYE[2])) ** 2).sum(axis=-1)
+
+
+def _clear_above(observations: np.ndarray) -> np.ndarray:
+    """The foremost box among those of which at most a tenth is covered."""
+    clear = observations[..., COLUMN["clear_above"]] >= 0.9
+    return 10 * clear - observations[..., COLUMN["behind"]]
+
+
+RULES = {
+    "random": random,
+    "highest": best(linear({"z": 1})),
+    "nearest": best(_nearness),
+    "lowest": best(linear({"z": -1})),
+    "foremost": best(linear({"behind": -1})),
+    "clear above": best(_clear_above),
+}
+
+
+class Oracle:
+    """Policy that tries every allowed box of an environment's heap, and picks the best.
+
+    It tries all of them in the coarse physics, and the ``TRIED_AGAIN`` best ones again in the
+    physics of the environment, in which it does not err about them; but the best box of all may
+    not be among them. It is greedy: one that looks farther ahead could gain more in an episode.
+    No rule or network may know what it knows.
+
+    Args:
+        env: whose heap it is.
+        falls_weight: λ of what it maximizes, boxes - λ falls.
+        physics: of the environment, see ``Rake``.
+    """
+
+    def __init__(self, env: HeapEnv, falls_weight: float, physics: str = "whole") -> None:
+        self.env = env
+        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+        self._rakes = [Rake("coarse"), Rake(physics)]
+
+    def __call__(self, observations, masks, rng: np.random.Generator) -> np.ndarray:
+        rows = np.flatnonzero(masks[0])
+        for rake in self._rakes:
+            values = [self._value(rake, row) for row in rows.tolist()]
+            rows = rows[np.argsort(np.negative(values), kind="stable")][:TRIED_AGAIN]
+        return rows[:1]
+
+    def _value(self, rake: Rake, row: int) -> float:
+        outcome = rake.pick(self.env.heap, int(self.env.visible[row]))
+        return float(outcome.unloaded.sum() - self.falls_weight * outcome.fallen.sum())
+
+    def close(self) -> None:
+        """Disconnect its clients; may be called again."""
+        for rake in self._rakes:
+            rake.close()
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """What happened in an episode of t picks.
+
+    Attributes:
+        observations: (t, 96, 13) float32, before each pick.
+        actions: (t,) int64, dragged rows.
+        boxes: (t,) int64, dragged boxes, by their numbers in the heap before each pick.
+        unloaded, falls: (t,) int64, of each pick.
+        moved: (t,) float64, m, how far the dragged box came.
+        fates: (t, 96) int8, what happened to the box in each row, see ``HeapEnv``.
+        heaps: t + 1 heaps, before each pick and after the last.
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    boxes: np.ndarray
+    unloaded: np.ndarray
+    falls: np.ndarray
+    moved: np.ndarray
+    fates: np.ndarray
+    heaps: tuple[Heap, ...]
+
+
+_TOLD = "box", "unloaded", "falls", "moved", "fates"  # by the environment, in this order
+
+
+def play(env: HeapEnv, policy: Callable, heap: Heap, seed: int) -> Episode:
+    """Let a policy play a heap until the episode ends.
+
+    Args:
+        env: in which it plays.
+        policy: as above.
+        heap: to begin with.
+        seed: of the policy's random numbers.
+    """
+    rng = np.random.default_rng(checks.integer("seed", seed, 0))
+    observation, info = env.reset(options={"heap": heap})
+    picks, heaps, ended = [], [env.heap], False
+    while not ended:
+        (action,) = policy(observation[None], info["action_mask"][None], rng)
+        after, _, terminated, truncated, info = env.step(int(action))
+        ended = terminated or truncated
+        picks.append((observation, action, *(info[name] for name in _TOLD)))
+        heaps.append(env.heap)
+        observation = after
+    return Episode(*(np.array(column) for column in zip(*picks)), tuple(heaps))
+
+
+def outcomes(episode: Episode, rake: Rake) -> list[Outcome]:
+    """What each pick of an episode has done, box by box.
+
+    It is computed again, which gives the same to the bit, because a pick is a function of the
+    heap and the box.
+
+    Args:
+        episode: of the picks.
+        rake: with the physics of the environment that was played.
+
+    Raises:
+        ValueError: the rake's physics is another.
+    """
+    found = []
+    for heap, box, after in zip(episode.heaps, episode.boxes.tolist(), episode.heaps[1:]):
+        found.append(rake.pick(heap, box))
+        if not np.array_equal(found[-1].heap.positions, after.positions):
+            raise ValueError(f"rake has other physics than the episode's; it is {rake.physics}")
+    return found

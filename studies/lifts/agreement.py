@@ -1,0 +1,305 @@
+"""Do the three physics agree? The same lifts, asked of ``table``, ``local`` and ``full``.
+
+    python -m studies lifts
+
+Containers are unloaded by several policies, from seeds that nothing else uses. At several
+stages some of the visible items are lifted, each from the same state; most of them are
+hard cases, with one or two boxes on top. ``full`` is slow and asked about some lifts only:
+a few of each of many states, drawn without looking at any answer; as many with three or more
+boxes on top, which ``table`` answers without a simulation; and all that are close, for which
+``local`` finds a distance near the threshold. These worlds are fresh; what drift does to the picks
+of a policy, ``studies.policies.robustness`` tells.
+"""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from hashlib import blake2b
+from pathlib import Path
+from typing import NamedTuple
+
+import gymnasium
+import numpy as np
+import pandas as pd
+
+from studies.results import COMMAND, keep_all, measured, publish, read_table
+from studies.statistics import share_interval
+from unload import task
+from unload.agent import policies
+from unload.load.boxes import Load
+from unload.load.substacks import WALLS
+from unload.physics.bullet import SETTINGS
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+from unload.physics.situation import Surroundings
+from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
+from unload.support import files
+
+NAME = "lift_agreement"
+NEAR_WALLS = 5  # the item's own wall and two on each side
+LIFT_COUNT = 5000  # at least, compared in table and local
+FULL_COUNT = 300  # of these, drawn for full at least, and as many with three or more boxes on top
+FIRST_SEED = 1_000_000  # of the containers; no other data uses it or the next ones
+STAGES = (0, 100, 200, 300, 400, 500)  # picks after which items are lifted
+WANTED = (2, 4, 4, 2)  # lifts per state with 0, 1, 2, and 3 or more boxes on top
+PER_STATE = 3  # lifts of a state that are drawn for full
+WHOLE = 5  # of every so many states drawn, one is asked about in the whole container
+CLOSE = (0.1, 0.3)  # m, distances in local that count as close to the threshold
+ASKED_FULL = ("drawn", "buried", "close")
+COLUMNS = [
+    "policy", "seed", "picks", "item", "on_top", "situation",
+    "asked_full", "walls", "table", "local", "full",
+]  # fmt: skip
+UNLOADED_BY = {
+    "random": policies.random,
+    "nearest": policies.nearest,
+    "highest": policies.highest,
+    "mixed": policies.mixed(policies.highest, 0.3),
+}
+
+
+class State(NamedTuple):
+    """A container on its way to be unloaded.
+
+    Attributes:
+        policy, seed, picks: how it got there, see ``container_states``.
+        load: what it was filled with.
+        present: (n,) bool, the items that are left.
+        visible: (128,) int64, the items that can be picked.
+    """
+
+    policy: str
+    seed: int
+    picks: int
+    load: Load
+    present: np.ndarray
+    visible: np.ndarray
+
+
+def agreement_data(
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = 1
+) -> None:
+    """Compare lifts; write ``folder/lift_agreement.csv`` and its provenance.
+
+    A run that was stopped goes on with the answers of ``full`` that it has.
+
+    Args:
+        folder: of the data.
+        runs_dir: where the answers of ``full`` are kept.
+        n_jobs: processes for ``full``, as in joblib.
+    """
+    collected = measured(partial(collect_lifts, LIFT_COUNT, FIRST_SEED))
+    states, frame = collected.value
+    rng = np.random.default_rng(FIRST_SEED)
+    frame["asked_full"], frame["walls"] = choose_for_full(frame, FULL_COUNT, rng)
+    asked = frame.index[frame["asked_full"] != ""]
+    columns = (frame.loc[asked, name] for name in ("state", "item", "walls"))
+    jobs = [fresh_job(states[state], item, walls) for state, item, walls in zip(*columns)]
+    answers = keep_all(Path(runs_dir) / "agreement", jobs, n_jobs)
+    frame["full"] = pd.Series([answer.value for answer in answers], asked, "float64")
+    settings = {
+        "lifts": len(frame),
+        "situations": int(frame["situation"].nunique()),
+        **{f"in full, {why}": int((frame["asked_full"] == why).sum()) for why in ASKED_FULL},
+        "first seed": FIRST_SEED,
+        "policies": list(UNLOADED_BY),
+        "stages (picks)": STAGES,
+        "lift table": table_digest(),
+    }
+    tables, command = {NAME: frame[COLUMNS]}, f"{COMMAND} lifts"
+    publish(folder, NAME, tables, command, settings, [collected, *answers], float_format="%.6f")
+
+
+def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """The table that ``agreement_data`` wrote, one row per lift.
+
+    Returns:
+        ``policy``, ``seed`` and ``picks`` name the state of the container; ``item`` is the
+        box lifted, ``on_top`` the number of boxes on it; lifts with equal ``situation``
+        are the same to ``local``; ``table``, ``local`` and ``full`` are how far the box moved
+        in m, NaN where ``full`` was not asked.
+
+        Of ``full``: ``asked_full`` says why it was asked, "drawn", "buried" or "close", and is
+        empty where it was not; ``walls`` is how many item walls it simulated, 0 for none, 5 for
+        the item's own and two on each side, 12 for the whole container.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    frame = read_table(Path(folder) / f"{NAME}.csv", f"{COMMAND} lifts", COLUMNS)
+    return frame.fillna({"asked_full": ""})
+
+
+def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
+    """The lifts that succeed in one physics and not in the other; both must be known."""
+    known = frame[frame[one].notna() & frame[other].notna()]
+    lifted = known[[one, other]] >= task.LIFT_THRESHOLD
+    return known[lifted[one] != lifted[other]]
+
+
+def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
+    """How often two physics decide differently, and 95 % bounds on how often they may.
+
+    Args:
+        frame: see ``read_agreement``.
+
+    Returns:
+        Indexed by what is compared: ``lifts``; from how many ``states`` of a container;
+        ``situations``, how many distinct ones; ``differ``, the lifts decided differently; ``low``
+        and ``high``, the Clopper–Pearson interval of their share. Between ``table`` and ``local``
+        each situation counts once, because both give equal situations equal answers.
+    """
+    once = frame.drop_duplicates("situation")
+    asked, why = frame[frame["asked_full"] != ""], frame["asked_full"]
+    groups = {
+        "table, local": (once, "table"),
+        "table, local: three or more on top": (once[once["on_top"] >= HELD_DOWN], "table"),
+        "local, full: drawn": (frame[why == "drawn"], "full"),
+        "local, full: three or more on top": (asked[asked["on_top"] >= HELD_DOWN], "full"),
+        "local, full: close": (frame[why == "close"], "full"),
+        "local, full: all": (asked, "full"),
+    }
+    rows = {}
+    for name, (lifts, other) in groups.items():
+        differ = len(disagreements(lifts, "local", other))
+        low, high = share_interval(differ, len(lifts))
+        rows[name] = {
+            "lifts": len(lifts),
+            "states": lifts.groupby(["seed", "picks"]).ngroups,
+            "situations": lifts["situation"].nunique(),
+            "differ": differ,
+            "low": low,
+            "high": high,
+        }
+    return pd.DataFrame(rows.values(), index=rows)
+
+
+def table_digest() -> str:
+    """Name of the lift table that ships: a digest of its file."""
+    return blake2b(LIFTS_FILE.read_bytes(), digest_size=8).hexdigest()
+
+
+def container_states(policy: str, seed: int) -> Iterator[State]:
+    """The states of one container at each of ``STAGES``, unloaded with ``table``."""
+    env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
+    rng = np.random.default_rng([seed, 1])  # not what draws the load
+    observation, info = env.reset(seed=seed)
+    for picks in range(max(STAGES) + 1):
+        if picks in STAGES:
+            present, visible = env.physics.present.copy(), env.visible.copy()
+            yield State(policy, seed, picks, env.physics.load, present, visible)
+        if picks < max(STAGES):
+            chosen = UNLOADED_BY[policy](observation[None], info["action_mask"][None], rng)
+            observation, _, _, _, info = env.step(chosen[0])
+    env.close()
+
+
+def collect_lifts(lifts: int, seed: int) -> tuple[list[State], pd.DataFrame]:
+    """At least so many lifts, asked of ``table``, with the lifts that ship, and of ``local``.
+
+    Containers take turns in ``UNLOADED_BY``, with the seeds ``seed``, ``seed + 1``, …
+
+    Returns:
+        The states, and the columns of ``read_agreement`` without those of ``full`` but
+        with ``state``, an index into the states.
+    """
+    both = {"table": TablePhysics(shared_table()), "local": LocalPhysics()}
+    states, rows, names = [], [], list(UNLOADED_BY)
+    numbers: dict[bytes, int] = {}  # of situations
+    rng = np.random.default_rng([seed, 2])
+    while len(rows) < lifts:
+        container = len(states) // len(STAGES)
+        for state in container_states(names[container % len(names)], seed + container):
+            for physics in both.values():
+                physics.reset(state.load)
+                for item in np.flatnonzero(~state.present):
+                    physics.remove(item)
+            named = {"state": len(states), "policy": state.policy, "seed": state.seed}
+            surroundings = both["local"].surroundings
+            for item in choose_items(state, surroundings, rng):
+                situation = surroundings.situation(item)
+                row = {
+                    "picks": state.picks,
+                    "item": item,
+                    "on_top": situation.on_top,
+                    "situation": numbers.setdefault(situation.key, len(numbers)),
+                }
+                rows.append(named | row | {name: way.lift(item) for name, way in both.items()})
+            states.append(state)
+    for physics in both.values():
+        physics.close()
+    return states, pd.DataFrame(rows)
+
+
+def choose_items(state: State, surroundings: Surroundings, rng: np.random.Generator) -> list[int]:
+    """Some visible items, as many of each kind as ``WANTED`` says or as there are."""
+    on_top = [len(surroundings.on_top(item)) for item in state.visible]
+    kinds = np.minimum(on_top, len(WANTED) - 1)
+    chosen = []
+    for kind, wanted in enumerate(WANTED):
+        items = state.visible[kinds == kind]
+        chosen += rng.choice(items, min(wanted, len(items)), replace=False).tolist()
+    return chosen
+
+
+def choose_for_full(
+    frame: pd.DataFrame, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Why each lift is asked of ``full``, "" if it is not, and how many walls are simulated.
+
+    States are drawn, and ``PER_STATE`` lifts of each, until at least ``count`` lifts are; one
+    state in ``WHOLE`` is asked about in the whole container, which takes seven times as long.
+    """
+    why, walls = np.full(len(frame), "", object), np.zeros(len(frame), np.int64)
+    for turn, state in enumerate(rng.permutation(frame["state"].unique())):
+        if (why == "drawn").sum() >= count:
+            break
+        rows = np.flatnonzero(frame["state"] == state)
+        rows = rng.choice(rows, min(PER_STATE, len(rows)), replace=False)
+        why[rows], walls[rows] = "drawn", NEAR_WALLS if turn % WHOLE else WALLS
+    buried = np.flatnonzero((frame["on_top"] >= HELD_DOWN) & (why == ""))
+    why[rng.choice(buried, min(count, len(buried)), replace=False)] = "buried"
+    why[frame["local"].between(*CLOSE) & (why == "")] = "close"
+    walls[np.isin(why, ("buried", "close"))] = NEAR_WALLS
+    return why, walls
+
+
+def boxes_left(state: State, wall: int, walls: int) -> tuple[Load, np.ndarray]:
+    """The boxes that are left in a state, in some item walls, and their numbers in its load.
+
+    Args:
+        state: of the container.
+        wall: in the middle.
+        walls: how many, ``NEAR_WALLS`` (fewer where the load ends) or ``WALLS`` for all.
+    """
+    load = state.load
+    near = (abs(load.walls - wall) <= NEAR_WALLS // 2) | (walls == WALLS)
+    items = np.flatnonzero(state.present & near)
+    fields = load.positions, load.sizes, load.packages, load.walls
+    return Load(*(field[items] for field in fields)), items
+
+
+def fresh_job(state: State, item: int, walls: int) -> tuple[dict, Callable[[], float]]:
+    """Question and computation of one lift in a fresh world, for ``results.keep_all``.
+
+    In a world that has seen other lifts, the answer depends on them (by a millimetre or so),
+    and so on the order in which the items are lifted.
+
+    Args:
+        state: of the container.
+        item: to lift.
+        walls: how many are simulated, the item's own in the middle.
+    """
+    left, items = boxes_left(state, state.load.walls[item], walls)
+    box = int(np.searchsorted(items, item))
+    boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
+    question = {"settings": SETTINGS, "boxes": boxes, "item": box}
+    return question, partial(fresh_distance, left, box)
+
+
+def fresh_distance(load: Load, item: int) -> float:
+    """How far ``full`` moves an item of a load that has seen no other lift, in m."""
+    physics = FullPhysics()
+    physics.reset(load)
+    distance = physics.lift(item)
+    physics.close()
+    return distance

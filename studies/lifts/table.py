@@ -1,0 +1,83 @@
+"""The lift table: lifts that fresh containers commonly meet.
+
+    python -m studies lifts
+
+An empty table is filled by playing with varied policies: the highest or the nearest item,
+mixed with random ones to various degrees, or the item that is farthest in some direction; and
+with random picks far longer, because these leave the most situations behind.
+"""
+
+import sys
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+from tqdm import tqdm
+
+from studies.results import COMMAND, kept, publish
+from unload import task
+from unload.agent import policies
+from unload.physics.bullet import SETTINGS
+from unload.physics.table import LiftTable
+from unload.support import files
+
+EPISODES, SEED = 12, 0  # of 64 containers, for each policy
+RANDOM_SHARE = 40  # times as many episodes of random picks
+
+
+def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = files.RUNS) -> None:
+    """Write ``lifts.npz``, see ``unload.physics.table.LiftTable``.
+
+    Args:
+        folder: of the table.
+        runs_dir: where the table is kept, not to be computed again.
+    """
+    settings = {
+        "episodes of 64 containers per taste": EPISODES,
+        "of random picks": RANDOM_SHARE * EPISODES,
+        "seed": SEED,
+    }
+    runs_dir = Path(runs_dir) / "lifts"
+    path = runs_dir / f"{EPISODES}_episodes_seed_{SEED}.npz"
+    question = settings | {"physics": SETTINGS}
+    filled = kept(runs_dir, question, partial(_fill, path))
+    table = LiftTable.load(path)
+    table.save(Path(folder) / "lifts.npz")
+    settings["lifts"] = len(table)
+    publish(folder, "lifts", {}, f"{COMMAND} lifts", settings, [filled])
+
+
+def _fill(path: Path) -> None:
+    """Fill an empty table by playing, and save it."""
+    rng = np.random.default_rng(SEED)
+    envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS).unwrapped
+    envs.table = LiftTable()
+    jobs = list(product(range(EPISODES), _filling_policies(rng)))
+    for _, policy in tqdm(jobs, unit="episode", ncols=100, file=sys.stdout):
+        observations, infos = envs.reset(seed=int(rng.integers(2**31)))
+        for _ in range(task.MAX_PICKS):
+            actions = policy(observations, infos["action_mask"], rng)
+            observations, _, _, _, infos = envs.step(actions)
+    envs.close()
+    envs.table.save(path)
+
+
+def _filling_policies(rng: np.random.Generator) -> list[Callable]:
+    """Policies that lead a container through very different states."""
+    return [
+        *[policies.random] * RANDOM_SHARE,
+        *(
+            policies.mixed(favourite, share)
+            for favourite in (policies.highest, policies.nearest)
+            for share in (0.0, 0.1, 0.3, 0.6)
+        ),
+        *(policies.mixed(partial(_farthest, direction=rng.normal(size=3)), 0.2) for _ in range(12)),
+    ]
+
+
+def _farthest(observations, masks, rng, direction: np.ndarray) -> np.ndarray:
+    """The policy that picks the item farthest in a direction, (3,) in scaled positions."""
+    return np.where(masks, observations @ direction, -np.inf).argmax(axis=1)

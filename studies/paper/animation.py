@@ -1,0 +1,174 @@
+"""The README's moving picture: agents unload the same load side by side."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+from PIL import Image
+
+from studies.style import styled
+from unload import task
+from unload.agent.evaluation import Policy
+from unload.env import observation
+from unload.env.container import ContainerEnv
+from unload.load.boxes import Load
+from unload.load.view import COLOURS, back_to_front, corners, draw, pixels
+from unload.support import checks, files
+
+WIDTH, HEIGHT = 4.4, 4.4  # of one agent's half, in inches at 100 pixels each
+RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
+STUCK = task.N_VISIBLE  # failed picks in a row after which an agent counts as stuck
+SLOW, STEP = 10, 9  # frames of one pick each at the beginning, and picks per frame at last
+FIRST, EARLY, LATE, LAST = 1500, 240, 80, 5000  # ms that frames are shown
+FAINT, RAIL = "#6f6f6f", "#e4e4e1"
+PALETTE = 127  # colours of all frames, besides white
+LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
+
+
+class Episode(NamedTuple):
+    """What an agent picked in one container, until it was empty or the agent was stuck.
+
+    Attributes:
+        load: the items.
+        positions: (n, 3) float64, where the agent saw them, m.
+        items: (picks,) int64, the item of each pick.
+        unloaded: (picks,) bool, whether it was unloaded.
+    """
+
+    load: Load
+    positions: np.ndarray
+    items: np.ndarray
+    unloaded: np.ndarray
+
+
+def record_episode(policy: Policy, seed: int, **env_kwargs) -> Episode:
+    """Let an agent unload a container without the mask.
+
+    The episode ends when the container is empty, or after 128 failed picks in a row.
+
+    Args:
+        policy: see ``unload.policies``.
+        seed: of the load and of the policy's random numbers.
+        **env_kwargs: arguments of ``ContainerEnv``, such as ``stack``.
+    """
+    env = ContainerEnv(physics="table", max_picks=10**6, **env_kwargs)
+    rng = np.random.default_rng(checks.integer("seed", seed, 0))
+    seen, info = env.reset(seed=seed)
+    positions = env.observed_positions()
+    items, unloaded, emptied = [], [], False
+    while not emptied and (len(items) < STUCK or any(unloaded[-STUCK:])):
+        action = int(policy(seen[None], info["item_mask"][None], rng)[0])
+        seen, reward, emptied, _, info = env.step(action)
+        items.append(info["item"])
+        unloaded.append(reward > 0)
+    load = env.physics.load
+    env.close()
+    return Episode(load, positions, np.array(items), np.array(unloaded))
+
+
+def save_unloading(episodes: Mapping[str, Episode], path: str | Path) -> list[Image.Image]:
+    """Write a GIF of agents that pick at the same pace; the same bytes for the same episodes.
+
+    Args:
+        episodes: title → episode, from left to right.
+        path: of the GIF.
+
+    Returns:
+        Its frames.
+    """
+    counts = picks_of_frames(max(len(episode.items) for episode in episodes.values()))
+    frames = [_frame(episodes, *span) for span in zip([0, *counts], counts)]
+    palette = _palette(frames)
+    first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
+    late = len(frames) - 2 - SLOW
+    durations = [FIRST, *[EARLY] * SLOW, *[LATE] * late][: len(frames) - 1] + [LAST]
+    files.write_atomically(
+        path,
+        lambda file: first.save(
+            file, "GIF", save_all=True, append_images=others, duration=durations, loop=0
+        ),
+    )
+    return frames
+
+
+def picks_of_frames(picks: int) -> list[int]:
+    """How many picks are over in each frame: none, one more each, then more; the end twice."""
+    counts = list(range(min(SLOW, picks) + 1))
+    while counts[-1] < picks:
+        counts.append(min(picks, counts[-1] + min(STEP, len(counts) - SLOW + 1)))
+    return [*counts, picks]
+
+
+def _palette(frames: list[Image.Image]) -> Image.Image:
+    """An image with one palette for all frames, taken from the first, a middle and the last."""
+    chosen = [frames[0], frames[len(frames) // 2], frames[-1]]
+    sample = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in chosen])
+    sample = sample[sample.min(axis=1) < 246]  # white is added, or it would become a light grey
+    colours = Image.fromarray(sample[np.newaxis]).quantize(PALETTE).getpalette()[: 3 * PALETTE]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*colours, 255, 255, 255])
+    return palette
+
+
+@styled
+def _frame(episodes: Mapping[str, Episode], before: int, now: int) -> Image.Image:
+    """All agents after ``now`` picks; those after the first ``before`` are marked."""
+    figure = Figure((WIDTH * len(episodes), HEIGHT), dpi=100, layout="none")
+    for half, (title, episode) in zip(figure.subfigures(1, len(episodes), squeeze=False)[0],
+                                      episodes.items()):  # fmt: skip
+        _draw_half(half, title, episode, before, now)
+    handles = [Patch(color=COLOURS[meaning], label=text) for meaning, text in LEGEND.items()]
+    figure.legend(handles=handles, loc="lower center", ncols=len(handles))
+    return Image.fromarray(pixels(figure))
+
+
+def _draw_half(half: Figure, title: str, episode: Episode, before: int, now: int) -> None:
+    """One agent: its title, how far it has come, what its last pick was, and its container."""
+    load, _, items, unloaded = episode
+    count, bold = int(unloaded[:now].sum()), {"fontsize": 13, "fontweight": "bold"}
+    half.text(0.04, 0.94, title, **bold)
+    half.text(0.96, 0.94, f"{count} of {len(load)}", ha="right", **bold)
+    for length, colour in ((1, RAIL), (count / len(load), COLOURS["liftable"])):
+        half.add_artist(Rectangle((0.04, 0.9), 0.92 * length, 0.015, color=colour))
+    text, colour = _state(episode, now)
+    half.text(0.04, 0.84, text, color=colour, fontsize=11)
+    low, high, colours = _boxes(episode, before, now)
+    draw(half.add_axes((0.02, 0.08, 0.96, 0.75)), low, high, colours)
+
+
+def _state(episode: Episode, now: int) -> tuple[str, str | tuple]:
+    """What to say of the last pick, and the colour to say it in."""
+    items, unloaded = episode.items, episode.unloaded
+    if unloaded[-1] and now >= len(items):
+        text = f"empty after {len(items)} picks, {(~unloaded).sum()} of them failed"
+        return text, COLOURS["liftable"]
+    picked = items[:now]
+    others = np.flatnonzero(unloaded[:now] | (picked != picked[-1:]))
+    fails = now - (int(others[-1]) + 1 if len(others) else 0)  # of the same box, at the end
+    if fails > 1:
+        return f"deadlock: the same box fails, {fails} times", COLOURS["failed"]
+    return f"pick {now}", FAINT
+
+
+def _boxes(episode: Episode, before: int, now: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners and colours of the boxes in the order in which they are drawn, see ``draw``."""
+    load, positions, items, unloaded = episode
+    present = np.ones(len(load), dtype=bool)
+    present[items[:before][unloaded[:before]]] = False
+    rising = items[before:now][unloaded[before:now]]
+    left = np.flatnonzero(present)
+    seen = left[observation.nearest(positions[left])] if len(left) else left
+    failed = items[-1:] if now > len(items) else items[before:now][~unloaded[before:now]]
+    colours = np.tile(COLOURS["unseen"], (len(load), 1))
+    for meaning, those in (("visible", seen), ("liftable", rising), ("failed", failed)):
+        colours[those] = COLOURS[meaning]
+    low, high = corners(load, np.arange(len(load)))
+    order = back_to_front(low, high)
+    for corner in (low, high):
+        corner[rising, 2] += RISE
+    # What fails is drawn last, so that it is seen through all others.
+    order = np.concatenate([order[present[order]], np.unique(failed[present[failed]])])
+    return low[order], high[order], colours[order]

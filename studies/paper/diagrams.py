@@ -1,0 +1,186 @@
+"""Two diagrams: the task as a Markov decision process (Fig. 1), and the network (Fig. 7)."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch, Rectangle
+
+from studies.style import styled
+from unload import task
+
+INK = "#333333"
+PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
+WIDTH, HEIGHT = 14, 6.5  # of a block of Fig. 1
+COLUMNS = (15, 35, 55, 75)  # left edges of the blocks
+# From left to right: what a block is called, and what it does.
+AGENT = (
+    ("equalization", "ranks, Alg. 1"),
+    ("PEQ network", "one score per item"),
+    ("action mask", "failed items are out"),
+    ("choice", "ε-greedy"),
+)
+ENVIRONMENT = (
+    ("observation", "128 nearest, scaled"),
+    ("container", "800–1000 items"),
+    ("moved ≥ 0.2 m?", "yes: unload, no: leave"),
+    ("lift", "PyBullet: 20 N, 0.3 s"),
+)
+ROWS, FEATURES = 7, 6  # of Fig. 7: items and features that are drawn, of 128 and n
+TOP, CELL_HEIGHT = 6.2, 0.36  # of the tensors
+MIDDLE = TOP - ROWS * CELL_HEIGHT / 2  # height of the main line of arrows
+BLUE, GREEN, RED, OCHRE, PURPLE = "#2878b5", "#45a661", "#de5638", "#c98a1b", "#9467bd"
+
+
+@styled
+def fig01_mdp() -> Figure:
+    """Fig. 1: agent and environment of the task, and what passes between them."""
+    figure, axes = plt.subplots(figsize=(10.4, 3.7))
+    axes.set(xlim=(0, 104), ylim=(0, 37), aspect="equal")
+    axes.axis("off")
+    for name, (low, colour) in PANELS.items():
+        _rounded(axes, 12, low, 80, 17, fc=colour, ec="none")
+        axes.text(13.5, low + 15.8, name, fontsize=12, fontweight="bold", va="top")
+    upper, lower = 25.5, 3  # lower edges of the blocks
+    for blocks, low in ((AGENT, upper), (ENVIRONMENT, lower)):
+        for x, (title, text) in zip(COLUMNS, blocks):
+            _block(axes, x, low, title, text)
+    middle, below = upper + HEIGHT / 2, lower + HEIGHT / 2
+    for left, right in zip(COLUMNS, COLUMNS[1:]):
+        _path(axes, [(left + WIDTH, middle), (right, middle)])
+        _path(axes, [(right, below), (left + WIDTH, below)])
+    axes.text(52, middle + 0.5, r"$\hat{q}$", ha="center", va="bottom", color=INK)
+    _rounded(axes, 20, 20.2, 32, 3, fc="white", ec=INK)
+    text = r"learning: replay buffer, smooth-$L_1$ loss ($\gamma = 0$)"
+    axes.text(36, 21.7, text, ha="center", va="center", fontsize=8)
+    _path(axes, [(42, 23.2), (42, upper)], (0, (3, 2)))
+
+    # Action on the right, observation on the left, reward and mask between the panels.
+    _path(axes, [(89, middle), (98, middle), (98, below), (89, below)])
+    axes.text(99, 17.5, "action\n$u_k$: row of\nthe item\nto pick", va="center")
+    _path(axes, [(15, below), (6, below), (6, middle), (15, middle)])
+    axes.text(5, 17.5, "next\nobservation\n$x_{k+1}$", va="center", ha="right")
+    _path(axes, [(58, lower + HEIGHT), (58, 21.7), (52, 21.7)])
+    axes.text(57, 14, r"reward $r_{k+1} = \pm 1$", va="center", ha="right")
+    _path(axes, [(66, lower + HEIGHT), (66, upper)])
+    axes.text(67, 14, "mask of failed items", va="center")
+    return figure
+
+
+@styled
+def fig07_network(n_features: int = 64) -> Figure:
+    """Fig. 7: observations → features → features beside their pooled values → action values.
+
+    The cells are shaded by a forward pass of a small network of this kind, so that the
+    pooled blocks are seen to be the same for every item.
+
+    Args:
+        n_features: n, for the parameter counts below the drawing.
+    """
+    n = n_features
+    observed, features, pooled, values = _forward_pass()
+    figure, axes = plt.subplots(figsize=(11, 4.2))
+    axes.set(xlim=(0, 22), ylim=(-0.7, 7.6), aspect="equal")
+    axes.axis("off")
+
+    items = task.N_VISIBLE
+    _tensor(axes, 0.4, observed, 0.4, BLUE)
+    _label(axes, 1.0, r"observations $x$", f"[{items}, 3]")
+    _operation(axes, 2.4, MIDDLE, "learnable\nfeature\nextractor\n$f_1$")
+    _tensor(axes, 5.8, features, 0.36, BLUE)
+    _label(axes, 6.88, r"learned features $x_{\mathrm{LF}}$", f"[{items}, n]")
+    own_left, width = 11.6, 0.22
+    for block, (name, colour) in enumerate(
+        (("own", BLUE), ("min", GREEN), ("max", RED), ("mean", OCHRE))
+    ):
+        cells = features if name == "own" else np.tile(pooled[block - 1], (ROWS, 1))
+        left = own_left + block * FEATURES * width
+        _tensor(axes, left, cells, width, colour)
+        centre = left + FEATURES * width / 2
+        axes.text(centre, TOP + 0.2, name, ha="center", size=9, color=colour)
+    _label(axes, 14.24, r"enhanced features $x_{\mathrm{EF}}$", f"[{items}, 4n]", lift=0.75)
+    _operation(axes, 17.6, MIDDLE, "relation\nscorer\n$f_4$")
+    _tensor(axes, 20.7, values[:, None], 0.44, PURPLE)
+    _label(axes, 20.92, "q-values", f"[{items}, 1]")
+
+    # The branch over all items.
+    _operation(axes, 8.3, 1.75, "global relation\nextractor $f_2$", width=3.3, height=1.5)
+    down, up = 6.88, own_left + 2.5 * FEATURES * width
+    shapes_low = TOP - ROWS * CELL_HEIGHT - 0.75
+    _path(axes, [(down, shapes_low), (down, 1.75), (8.3, 1.75)])
+    _path(axes, [(11.6, 1.75), (up, 1.75), (up, shapes_low)])
+    axes.text(11.75, 1.9, r"$x_{\mathrm{GC}}$  [3n], to each item", size=9, color=INK)
+
+    for start, end in ((1.7, 2.4), (4.9, 5.8), (8.05, 11.5), (16.95, 17.6), (20.1, 20.7)):
+        _path(axes, [(start, MIDDLE), (end, MIDDLE)])
+    for x, formula, count in (
+        (3.65, "linear 3 → n, ReLU\nper item", f"3n + n parameters\n({4 * n} for n = {n})"),
+        (9.95, "min, max, mean\nover the items", "no parameters"),
+        (18.85, "linear 4n → 1, tanh\nper item", f"4n + 1 parameters\n({4 * n + 1} for n = {n})"),
+    ):
+        low = 0.85 if x == 9.95 else MIDDLE - 1.4
+        axes.text(x, low, formula, ha="center", va="top", size=8.5, color=INK, linespacing=1.3)
+        axes.text(x, low - 0.92, count, ha="center", va="top", size=8.5, color="#777777")
+    return figure
+
+
+def _rounded(axes: Axes, x: float, y: float, width: float, height: float, **look) -> None:
+    shape = "round,pad=0,rounding_size=0.8"
+    axes.add_patch(FancyBboxPatch((x, y), width, height, shape, **look))
+
+
+def _block(axes: Axes, x: float, y: float, title: str, text: str) -> None:
+    _rounded(axes, x, y, WIDTH, HEIGHT, fc="white", ec=INK, lw=1)
+    middle = x + WIDTH / 2
+    axes.text(middle, y + 4.2, title, ha="center", va="center", fontweight="bold", fontsize=9)
+    axes.text(middle, y + 1.9, text, ha="center", va="center", fontsize=7.5, color="#555555")
+
+
+def _forward_pass() -> tuple[np.ndarray, ...]:
+    """Shades in [0, 1]: observations, features, (min, max, mean) of the features, values."""
+    rng = np.random.default_rng(3)
+    observed = rng.uniform(-1, 1, (ROWS, 3))
+    features = np.maximum(observed @ rng.normal(size=(3, FEATURES)) + 1, 0)
+    features /= features.max()
+    pooled = np.array([features.min(axis=0), features.max(axis=0), features.mean(axis=0)])
+    values = np.tanh(features @ rng.normal(size=FEATURES) + pooled.mean())
+    return (observed + 1) / 2, features, pooled, (values + 1) / 2
+
+
+def _tensor(axes: Axes, left: float, shades: np.ndarray, width: float, colour: str) -> None:
+    """A matrix, one row per item, whose cells are shaded from pale to ``colour``."""
+    shade = LinearSegmentedColormap.from_list("shade", ["#f4f4f4", colour])
+    for row, cells in enumerate(shades):
+        for column, value in enumerate(cells):
+            corner = (left + column * width, TOP - (row + 1) * CELL_HEIGHT)
+            axes.add_patch(
+                Rectangle(corner, width, CELL_HEIGHT, fc=shade(value), ec="white", lw=0.8)
+            )
+    height, total = len(shades) * CELL_HEIGHT, shades.shape[1] * width
+    axes.add_patch(Rectangle((left, TOP - height), total, height, fill=False, ec=INK, lw=0.8))
+
+
+def _label(axes: Axes, centre: float, name: str, shape: str, lift: float = 0.2) -> None:
+    """The name of a tensor above it and its shape below it."""
+    axes.text(centre, TOP + lift, name, ha="center", size=10.5)
+    axes.text(centre, TOP - ROWS * CELL_HEIGHT - 0.2, shape, ha="center", va="top", size=9.5)
+
+
+def _operation(
+    axes: Axes, left: float, middle: float, name: str, width: float = 2.5, height: float = 2.4
+) -> None:
+    axes.add_patch(
+        FancyBboxPatch(
+            (left + 0.12, middle - height / 2 + 0.12), width - 0.24, height - 0.24,
+            boxstyle="round,pad=0.12", fc="#e8f0f7", ec=BLUE, lw=1.1,
+        )
+    )  # fmt: skip
+    axes.text(left + width / 2, middle, name, ha="center", va="center", size=10)
+
+
+def _path(axes: Axes, corners: list[tuple[float, float]], style: str | tuple = "-") -> None:
+    """A line along the corners that ends in an arrow head."""
+    axes.plot(*np.transpose(corners[:-1]), color=INK, lw=1.2, solid_capstyle="butt")
+    look = {"arrowstyle": "-|>", "color": INK, "lw": 1.2, "ls": style, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=corners[-1], xytext=corners[-2], arrowprops=look)

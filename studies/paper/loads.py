@@ -1,0 +1,214 @@
+"""Loads: their substacks (Fig. 3), containers side by side (Fig. 2), and one from two sides."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch, Rectangle
+
+from studies.style import styled
+from unload import task
+from unload.load.boxes import Load
+from unload.load.substacks import (
+    CELL,
+    CELLS_WIDE,
+    COLUMNS,
+    LEFT,
+    MID,
+    PACKAGES,
+    RIGHT,
+    ROWS_HIGH,
+    package_colour,
+)
+from unload.load.view import COLOURS
+from unload.support import checks
+
+SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
+INK = "#333333"
+
+
+@styled
+def fig03_substacks() -> Figure:
+    """Fig. 3: the nine substacks, and how four of them interlock to a row of a wall.
+
+    Numbers are packages 0–12; everything is drawn to the same scale.
+    """
+    figure, axes = plt.subplots(figsize=(8.2, 6.6))
+    across, down, gap = 0.0, 0.88, 0.3  # m
+    for name, variants in SUBSTACKS.items():
+        boxes = np.concatenate(variants)
+        width = (boxes[:, 1] + PACKAGES[boxes[:, 0], 0]).max() * CELL
+        for variant, boxes in enumerate(variants):
+            _draw_substack(axes, boxes, across, (3 - variant) * down)
+        axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
+        across += width + gap
+    for variant in range(3):
+        middle = (3 - variant) * down + ROWS_HIGH * CELL / 2
+        axes.text(-0.08, middle, f"variant {variant}", ha="right", va="center")
+    bar = across - gap + 0.14
+    axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
+    axes.text(bar + 0.05, down + 0.25, "0.5 m", va="center")
+    row = (0, 1, 2, 0)
+    lift = -0.12
+    for (column, variants), variant in zip(COLUMNS, row):
+        _draw_substack(axes, variants[variant], column * CELL, lift)
+    label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
+    axes.text(CELLS_WIDE * CELL + 0.08, lift + ROWS_HIGH * CELL / 2, label, va="center")
+    _bare(axes, (-0.48, CELLS_WIDE * CELL + 1.1), (lift - 0.02, 4 * down + 0.02))
+    return figure
+
+
+def _draw_substack(axes: Axes, boxes, x: float, z: float) -> None:
+    """A substack whose own origin is at (x, z) in m, with its border."""
+    for package, left, lower in boxes:
+        width, height = PACKAGES[package] * CELL
+        corner, colour = (x + left * CELL, z + lower * CELL), package_colour(package)
+        axes.add_patch(Rectangle(corner, width, height, fc=colour, ec="white", lw=0.8))
+        bright = np.dot(colour, (0.299, 0.587, 0.114)) > 0.55
+        look = {"ha": "center", "va": "center_baseline", "color": INK if bright else "white"}
+        middle = corner[0] + width / 2, corner[1] + height / 2
+        axes.text(*middle, str(package), fontsize=8, **look)
+    _draw_border(axes, boxes, x, z)
+
+
+def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
+    """Lines between cells of which one belongs to the substack and the other does not."""
+    inside = np.zeros((COLUMNS[-1][0] + 2, ROWS_HIGH + 2), dtype=bool)
+    for package, left, lower in boxes:
+        width, height = PACKAGES[package]
+        inside[left + 1 : left + width + 1, lower + 1 : lower + height + 1] = True
+    style = {"color": INK, "lw": 1.8, "solid_capstyle": "projecting"}
+    for column, row in np.argwhere(inside[1:] != inside[:-1]):
+        across, up = x + column * CELL, z + row * CELL
+        axes.plot([across, across], [up - CELL, up], **style)
+    for column, row in np.argwhere(inside[:, 1:] != inside[:, :-1]):
+        across, up = x + column * CELL, z + row * CELL
+        axes.plot([across - CELL, across], [up, up], **style)
+
+
+def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> None:
+    axes.set(xlim=xlim, ylim=zlim, aspect="equal")
+    axes.axis("off")
+
+
+@styled
+def fig02_containers(
+    images: Sequence[np.ndarray], unloaded: Sequence[int], columns: int = 8
+) -> Figure:
+    """Fig. 2: pictures of the containers of a vector environment in a grid.
+
+    Args:
+        images: of equal shape (height, width, 3) uint8, as ``render`` of a vector
+            environment returns them, in the order in which they are drawn.
+        unloaded: items unloaded from each container, written below its picture.
+        columns: pictures in a line.
+    """
+    images = _crop(np.stack(images))
+    lines = -(-len(images) // columns)
+    _, height, width, _ = images.shape
+    cell = 8 / columns  # inches
+    figure, grid = plt.subplots(
+        lines,
+        columns,
+        figsize=(8, lines * (cell * height / width + 0.12)),
+        squeeze=False,
+    )
+    for axes in grid.flat:
+        axes.axis("off")
+    for axes, image, count in zip(grid.flat, images, unloaded):
+        axes.imshow(image, interpolation="antialiased")
+        axes.text(0.5, 0.0, count, transform=axes.transAxes, ha="center", va="top", fontsize=6,
+                  color="#555555")  # fmt: skip
+    return figure
+
+
+def _crop(images: np.ndarray) -> np.ndarray:
+    """Cut away the margin that is white in all pictures."""
+    drawn = (images < 255).any(axis=(0, 3))
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+@styled
+def side_views(positions: np.ndarray, views: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
+    """Centres of items seen from the side, one picture above the other, to scale.
+
+    Args:
+        positions: (n, 3) float, centres in m.
+        views: title → groups; these are meaning → item numbers, see ``unload.load.COLOURS``.
+            Of two groups that share an item the later one is drawn.
+
+    Raises:
+        ValueError: a group's name is not in ``unload.load.COLOURS``.
+    """
+    length, _, height = task.CONTAINER
+    figure, panels = plt.subplots(
+        len(views), 1, figsize=(7, 2.3 * len(views) + 0.6), sharex=True, squeeze=False
+    )
+    for axes, (title, groups) in zip(panels[:, 0], views.items()):
+        draw_items(axes, positions[:, [0, 2]], groups)
+        axes.set(xlim=(0, length), ylim=(0, height), ylabel="z (m)", title=title, aspect="equal")
+    panels[-1, 0].set_xlabel("x (m), entrance on the right")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return figure
+
+
+def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray], **style) -> None:
+    """Draw items as dots in the colours of their groups' meanings, which label them.
+
+    Args:
+        axes: where to draw.
+        points: (n, 2) float, where the items are on ``axes``.
+        groups: meaning → item numbers.
+        **style: of the dots, such as ``ms``.
+
+    Raises:
+        ValueError: a group's name is not in ``unload.load.COLOURS``.
+    """
+    for meaning, items in groups.items():
+        checks.one_of("a group's name", meaning, COLOURS)
+        look = {"ms": 4, "mew": 0.3, "mec": "0.55", "color": COLOURS[meaning]} | style
+        axes.plot(*points[np.asarray(items, dtype=int)].T, "o", label=meaning, **look)
+
+
+@styled
+def wall_view(
+    load: Load,
+    wall: int,
+    groups: Mapping[str, np.ndarray],
+    present: np.ndarray | None = None,
+) -> Figure:
+    """A wall of a load as it is seen from the entrance, to scale.
+
+    Args:
+        load: the boxes.
+        wall: its number.
+        groups: meaning → item numbers, as in ``side_views``; items in no group are "unseen".
+        present: (n,) bool, which boxes to draw; all if None.
+
+    Raises:
+        ValueError: a group's name is not in ``unload.load.COLOURS``.
+    """
+    groups = {"unseen": np.arange(len(load)), **groups}
+    colours = [COLOURS["unseen"]] * len(load)
+    for meaning, items in groups.items():
+        checks.one_of("a group's name", meaning, COLOURS)
+        for item in items:
+            colours[item] = COLOURS[meaning]
+    _, width, height = task.CONTAINER
+    figure, axes = plt.subplots(figsize=(4.68, 3.6))
+    in_wall = load.walls == wall if present is None else (load.walls == wall) & present
+    for item in np.flatnonzero(in_wall):
+        corner = load.positions[item] - load.sizes[item] / 2
+        axes.add_patch(
+            Rectangle(corner[1:], *load.sizes[item, 1:], fc=colours[item], ec="white", lw=0.8)
+        )
+    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
+    axes.set(title=f"wall {wall}", xticks=[0, 1, 2], yticks=[0, 1, 2])
+    axes.grid(False)
+    handles = [Patch(fc=COLOURS[meaning], label=meaning) for meaning in groups]
+    figure.legend(handles=handles, loc="outside upper center", ncols=len(groups))
+    return figure

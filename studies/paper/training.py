@@ -1,0 +1,252 @@
+"""The paper's training in the container (Sec. IV-B), for Figs. 11 and 12, and its policies.
+
+    python -m studies training
+
+The first plan, ``data/falls/FIRST_PLAN.md``, says why its grid has these cells and seeds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from studies.grid import Cell, Grid, read_grid, read_policies, train_grid
+from studies.results import COMMAND, JOBS, write_table
+from studies.statistics import end_msr
+from unload import task
+from unload.agent.checkpoint import RunFolder
+from unload.agent.config import TrainConfig
+from unload.agent.evaluation import Policy, evaluate
+from unload.agent.greedy import Greedy, save_policy
+from unload.env.container import ContainerEnv
+from unload.env.vector import ContainerVectorEnv
+from unload.support import checks, files
+
+B2048 = TrainConfig()
+CONFIG = replace(B2048, batch_size=256)
+
+
+def _both(name: str, config: TrainConfig, seeds: int, masked_seeds: int) -> dict[str, Cell]:
+    """A cell without the mask in training, and one with it."""
+    return {
+        f"{name}_no_mask": Cell(config, range(seeds)),
+        f"{name}_mask": Cell(replace(config, mask=True), range(masked_seeds)),
+    }
+
+
+# The paper's configuration read in four ways, and two changes that hold its runs up.
+PAPER_CELLS = {
+    **_both("paper", CONFIG, 10, 10),
+    **_both("paper_b2048", B2048, 8, 8),
+}
+PAPER = Grid(
+    "falls/paper",
+    f"{COMMAND} training",
+    PAPER_CELLS
+    | {
+        **_both("averaged", replace(CONFIG, ties="average"), 5, 10),
+        "averaged_b2048_mask": Cell(replace(B2048, mask=True, ties="average"), range(10)),
+        **_both("positions", replace(CONFIG, equalize=False), 5, 5),
+    },
+)
+DEFAULTS = "paper_b2048_no_mask"  # the cell of ``TrainConfig``'s defaults, of Figs. 11 and 12
+DEFAULT_SEEDS = range(4)  # of its runs that the figures show; the first is the paper's line
+EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
+ASK_EVERY = 25  # unloaded items between two questions for the favourite
+PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # policies that play elsewhere
+MOST_PICKS = 100_000  # of an episode that is to end by unloading
+OPTIONS = {
+    "--cells": {"nargs": "+", "choices": PAPER.cells},
+    "--picks": {"type": int, "help": "of a run, if not the paper's; the data go to data/reduced"},
+    **JOBS,
+}
+
+
+def training_data(
+    cells: Sequence[str] | None = None,
+    picks: int | None = None,
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    shipped: str | Path = files.SHIPPED,
+) -> None:
+    """Train the paper's configuration, see ``train_grid``, and write some of it by other names.
+
+    These are what the paper's plots read and, in the folder ``shipped``, the policies that play
+    elsewhere: ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
+    """
+    kept = train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs)
+    if picks is None and (cells is None or DEFAULTS in cells):
+        config = replace(PAPER.cells[DEFAULTS].config, seed=DEFAULT_SEEDS[0])
+        run = RunFolder(kept / DEFAULTS / f"seed_{config.seed}")
+        export_training(run.result(config).curve["wall_time"], folder)
+        for seed, name in PLAYERS.items():
+            policy = default_policies(folder)[seed]
+            save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
+
+
+def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
+    """Write the first run as TensorBoard exports it: ``Wall time``, ``Step`` and ``Value``.
+
+    ``loss_function_agent.csv`` has the loss, ``total_rew_function_agent.csv`` the rewards summed
+    over an episode of 500 picks, a mean over the environments; both as they are published.
+
+    Args:
+        wall_time: of each point of its curve, s since the epoch.
+        folder: of the data.
+    """
+    curve = default_curves(folder)[DEFAULT_SEEDS[0]].reset_index(drop=True)
+    for name, values in (
+        ("loss_function_agent", curve["loss"]),
+        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
+    ):
+        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
+        write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
+
+
+def paper_runs(folder: str | Path = files.DATA) -> list[tuple[str, int, pd.DataFrame]]:
+    """Cell, seed and curve of each published run of the paper's four cells."""
+    curves = read_grid(PAPER, folder, PAPER_CELLS)
+    groups = curves.groupby(["cell", "seed"], sort=False)
+    return [(cell, seed, curve) for (cell, seed), curve in groups]
+
+
+def default_curves(folder: str | Path = files.DATA) -> dict[int, pd.DataFrame]:
+    """The published curves of the paper's configuration that the figures show, by their seeds.
+
+    Each point is a mean over an episode of all environments; they are indexed by ``picks``.
+    """
+    curves = read_grid(PAPER, folder, [DEFAULTS])
+    return {
+        seed: curves[curves["seed"] == seed].set_index("picks", drop=False)
+        for seed in DEFAULT_SEEDS
+    }
+
+
+def default_policies(folder: str | Path = files.DATA) -> dict[int, Greedy]:
+    """The policies that these runs have learned, by their seeds."""
+    policies = read_policies(Path(folder) / f"{PAPER.name}.safetensors")
+    return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
+
+
+def while_training(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """How these runs began and ended, a row per seed.
+
+    Returns:
+        ``msr_start``, ``msr_end`` and ``msr_best``: the MSR while training over the first episode
+        of all environments, the last tenth of the picks, and the best episode.
+    """
+    rows = {}
+    for seed, curve in default_curves(folder).items():
+        msr = curve["success_rate"]
+        rows[seed] = {"msr_start": msr.iloc[0], "msr_end": end_msr(curve), "msr_best": msr.max()}
+    return pd.DataFrame(rows).T.rename_axis("seed")
+
+
+def in_fresh_containers(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """How the policies of these runs do in 50 fresh containers, a row per seed.
+
+    Returns:
+        ``msr_mask``, ``msr_no_mask``: the MSR with and without the mask, each with its standard
+        deviation over the containers; ``deadlocked_no_mask``: the share of picks in deadlocks
+        without the mask.
+    """
+    rows = {}
+    for seed, policy in default_policies(folder).items():
+        row = rows.setdefault(seed, {})
+        ready = Greedy(policy.network, equalize=False)  # the environment equalizes: it is faster
+        for name, mask in (("mask", True), ("no_mask", False)):
+            table = evaluate(ready, mask=mask, equalize=policy.equalize, **EVALUATION)
+            row[f"msr_{name}"] = table["success_rate"].mean()
+            row[f"msr_{name}_std"] = table["success_rate"].std()
+        row["deadlocked_no_mask"] = table["deadlocked"].mean()
+    return pd.DataFrame(rows).T.rename_axis("seed")
+
+
+def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
+    """Means of a learning curve over each complete episode of the 64 containers.
+
+    All containers are reset together, every 32,000 picks, and full ones, in which there is no
+    deadlock yet, are easier. Means over less than an episode therefore rise at every reset.
+
+    Args:
+        curve: of ``unload.train`` in 64 containers, with a ``log_interval`` that divides 500.
+
+    Returns:
+        One row per episode with the columns of ``curve``; ``picks``, ``wall_time`` and
+        ``epsilon`` are those at its end.
+
+    Raises:
+        ValueError: a point of the curve lies in two episodes.
+    """
+    length = task.NUM_ENVS * task.MAX_PICKS
+    episode = ((curve["picks"] - 1) // length).rename("episode")
+    groups = curve[curve["picks"] <= curve["picks"].max() // length * length].groupby(episode)
+    ends = groups[["picks", "wall_time", "epsilon"]].last()
+    if (ends["picks"] % length).any():
+        raise ValueError(
+            f"curve has points after {curve['picks'].iloc[0]:,} picks each; "
+            f"expected a divisor of the {length:,} picks of an episode"
+        )
+    return groups.mean().assign(**ends)
+
+
+def msr_by_pick(
+    policy: Policy, containers: int = task.NUM_ENVS, seed: int = 0, mask: bool = True
+) -> np.ndarray:
+    """The MSR at each pick of an episode, over containers that are filled together.
+
+    Args:
+        policy: see ``unload.policies``.
+        containers: how many.
+        seed: of the loads and of the policy's random numbers.
+        mask: whether the policy's masks exclude items that failed since the last success.
+
+    Returns:
+        (500,) float64, the share of the containers in which the pick succeeded.
+    """
+    envs = ContainerVectorEnv(checks.integer("containers", containers, 1))
+    rng = np.random.default_rng(seed)
+    observations, infos = envs.reset(seed=seed)
+    msr = np.empty(task.MAX_PICKS)
+    for pick in range(task.MAX_PICKS):
+        masks = infos["action_mask" if mask else "item_mask"]
+        observations, rewards, _, _, infos = envs.step(policy(observations, masks, rng))
+        msr[pick] = (rewards > 0).mean()
+    envs.close()
+    return msr
+
+
+def favourites(
+    policy: Policy, player: Policy, containers: int = 10, seed: int = 0, unloaded: int = 400
+) -> np.ndarray:
+    """Whether a policy's favourite item can be lifted in containers that a player unloads.
+
+    Args:
+        policy: is asked for its favourite, at the start and after every 25 unloaded items.
+        player: unloads the containers, with the mask; it may be the policy itself.
+        containers: how many.
+        seed: of the first load and of the random numbers.
+        unloaded: items that the player unloads from each container.
+
+    Returns:
+        (containers, unloaded / 25 + 1) bool.
+    """
+    checks.integer("containers", containers, 1)
+    env = ContainerEnv(physics="table", max_picks=MOST_PICKS)
+    rng = np.random.default_rng(seed)
+    found = []
+    for container in range(containers):
+        observation, info = env.reset(seed=seed + container)
+        asked: list[bool] = []
+        while len(asked) <= unloaded // ASK_EVERY:
+            if info["unloaded"] == len(asked) * ASK_EVERY:
+                favourite = policy(observation[None], info["item_mask"][None], rng)[0]
+                asked.append(bool(env.liftable()[favourite]))
+            action = player(observation[None], info["action_mask"][None], rng)[0]
+            observation, *_, info = env.step(int(action))
+        found.append(asked)
+    env.close()
+    return np.array(found)

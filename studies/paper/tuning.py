@@ -1,0 +1,282 @@
+"""The hyperparameter search of Sec. IV-A (Figs. 8–10): its grid, its data, what is measured of it.
+
+python -m studies tuning
+"""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from studies.grid import Cell, Grid, read_grid, train_grid
+from studies.results import COMMAND
+from unload import task
+from unload.agent.config import TrainConfig
+from unload.env.highest_item import GRID
+from unload.support import checks, files
+
+LEARNING_RATES = (1e-1, 1e-2, 1e-3)
+BATCH_SIZES = (64, 256, 1024, 2048)
+RUN_COUNT = 10  # of each configuration
+STEPS = 3000  # K, one pick in each of 64 environments and one update per step
+# What the paper's plots read of the search: its folder, the column, batch size, learning rate, run.
+SHOWN = (
+    ("with", "hitrate", 1024, 1e-1, 6),
+    ("with", "hitrate", 1024, 1e-2, 7),
+    ("with", "hitrate", 1024, 1e-3, 5),
+    ("with", "hitrate", 64, 1e-3, 9),
+    ("with", "hitrate", 256, 1e-3, 9),
+    ("with", "hitrate", 2048, 1e-3, 6),
+    ("with", "loss", 2048, 1e-3, 6),
+    ("without", "loss", 2048, 1e-3, 8),
+)
+
+SMOOTHING_STEPS = 25  # of the running means
+FINAL = 100  # steps at the end of a run that its final values are means of
+SOLVED = 0.99  # MSR
+REACHED = 0.9  # greedy MSR
+LEAST_GREEDY = 0.05  # share of the picks from which the greedy MSR can be told
+RESAMPLES = 500  # of the runs, for intervals
+LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
+
+
+def tuning_config(
+    batch_size: int, learning_rate: float, run: int = 0, equalize: bool = True, steps: int = STEPS,
+    **changes,
+) -> TrainConfig:  # fmt: skip
+    """One run in the hyperparameter-tuning environment (Sec. IV-A).
+
+    Args:
+        batch_size: b.
+        learning_rate: μ.
+        run: number of the run, its seed.
+        equalize: with the paper's feature engineering (FE) or without.
+        steps: K.
+        **changes: further fields of ``TrainConfig``.
+    """
+    checks.integer("steps", steps, 1)
+    return TrainConfig(
+        env="unload/HighestItem-v0",
+        picks=steps * task.NUM_ENVS,
+        batch_size=batch_size,
+        learning_rate=learning_rate,
+        seed=run,
+        equalize=equalize,
+        log_interval=1,
+        **changes,
+    )
+
+
+def tuning_cell(batch_size: int, learning_rate: float, equalize: bool) -> str:
+    """The name of a cell of the search, such as ``with_fe_b64/lr_0.1``."""
+    return f"{'with' if equalize else 'without'}_fe_b{batch_size}/lr_{learning_rate:g}"
+
+
+def tuning_grid(
+    learning_rates: Sequence[float] = LEARNING_RATES,
+    batch_sizes: Sequence[int] = BATCH_SIZES,
+    runs: int = RUN_COUNT,
+    equalize: Sequence[bool] = (True, False),
+    steps: int = STEPS,
+) -> Grid:
+    """The paper's search, or a smaller one.
+
+    The slow runs, of large batches, come first, so that no process is left with one of them at
+    the end.
+    """
+    cells = {
+        tuning_cell(batch_size, learning_rate, equalized): Cell(
+            tuning_config(batch_size, learning_rate, equalize=equalized, steps=steps),
+            range(checks.integer("runs", runs, 1)),
+        )
+        for batch_size in sorted(batch_sizes, reverse=True)
+        for equalized in equalize
+        for learning_rate in learning_rates
+    }
+    return Grid("tuning/tuning", f"{COMMAND} tuning", cells, policies=False)
+
+
+TUNING = tuning_grid()
+
+
+def tuning_data(
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+) -> None:
+    """Train the search, see ``train_grid``, and write what the paper's plots read of it."""
+    train_grid(TUNING, folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
+    export_tuning(folder)
+
+
+def export_tuning(folder: str | Path) -> None:
+    """Write the curves that the paper's plots read of the published search.
+
+    ``dummy_sim_{with,without}_hist_equal/{hitrate,loss}_curve_bz_<b>_lr_<μ>_agent_<run>.csv``: a
+    value per step and no header; the loss before the first update is ``nan``, which the plots
+    leave out.
+    """
+    for fe, kind, batch_size, rate, run in SHOWN:
+        cell = tuning_cell(batch_size, rate, fe == "with")
+        curves = read_grid(TUNING, folder, [cell])
+        name = f"{kind}_curve_bz_{batch_size}_lr_{rate:g}_agent_{run}.csv"
+        column = {"hitrate": "success_rate", "loss": "loss"}[kind]
+        values = curves.loc[curves["seed"] == run, column]
+        files.write_text(
+            Path(folder) / f"dummy_sim_{fe}_hist_equal" / name,
+            values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g"),
+        )
+
+
+def read_curves(
+    column: str,
+    batch_size: int,
+    learning_rate: float,
+    equalize: bool = True,
+    folder: str | Path = files.DATA,
+) -> dict[int, np.ndarray]:
+    """The curves of all runs of a configuration, by the number of the run.
+
+    Args:
+        column: ``"success_rate"`` or ``"loss"``.
+        batch_size: b.
+        learning_rate: μ.
+        equalize: with feature engineering or without.
+        folder: of the data.
+
+    Returns:
+        A value per training step, (steps,) float64, NaN where there is none yet.
+
+    Raises:
+        FileNotFoundError: the search has not been published.
+        ValueError: it has no such configuration.
+    """
+    curves = read_grid(TUNING, folder, [tuning_cell(batch_size, learning_rate, equalize)])
+    return {int(run): curve[column].to_numpy() for run, curve in curves.groupby("seed")}
+
+
+def running_mean(values: np.ndarray) -> np.ndarray:
+    """Means over 25 steps around each one, fewer at the ends; NaN does not count."""
+    return pd.Series(values).rolling(SMOOTHING_STEPS, min_periods=1, center=True).mean().to_numpy()
+
+
+def chance() -> float:
+    """MSR of random picks in the tuning environment: the expected share of highest items.
+
+    An item of a height is among the highest if none of the 127 others is higher.
+    """
+    heights, counts = np.unique(GRID[:, 2].round(6), return_counts=True)
+    share = counts / counts.sum()
+    return float((share * share.cumsum() ** (task.N_VISIBLE - 1)).sum())
+
+
+def greedy_msr(success_rate: np.ndarray) -> np.ndarray:
+    """The MSR that an agent's greedy picks had while it explored.
+
+    Of the picks at a step a share ε is random, and succeeds by chance. Therefore
+    MSR = (1 - ε) · greedy MSR + ε · chance, here solved for the greedy MSR with means over 25
+    steps. The fewer picks are greedy, the noisier it is: it may leave [0, 1].
+
+    Args:
+        success_rate: (..., steps) MSR while training at each step of a whole run of
+            ``tuning_config``.
+
+    Returns:
+        (..., steps), NaN where fewer than one pick in twenty is greedy.
+    """
+    steps = success_rate.shape[-1]
+    config = tuning_config(1, 1, 0, steps=steps)
+    epsilon = np.array([config.epsilon(step * task.NUM_ENVS) for step in range(steps)])
+    greedy = running_mean(1 - epsilon)
+    by_greedy = np.apply_along_axis(running_mean, -1, success_rate - epsilon * chance())
+    return np.where(greedy < LEAST_GREEDY, np.nan, by_greedy / np.maximum(greedy, LEAST_GREEDY))
+
+
+def reached_at(msr: np.ndarray) -> np.ndarray:
+    """The step from which on an MSR stays at 90 % or above.
+
+    Args:
+        msr: (..., steps), NaN where it is not known.
+
+    Returns:
+        (...) float64, NaN if it does not end there.
+    """
+    below = ~(msr[..., ::-1] >= REACHED)  # from the last step back; NaN counts as below
+    since = np.where(below.any(axis=-1), below.argmax(axis=-1), msr.shape[-1])
+    return np.where(since > 0, msr.shape[-1] - since, np.nan)
+
+
+def greedy_reached(curves: Iterable[np.ndarray]) -> dict[str, float]:
+    """When the mean greedy MSR of a configuration's runs reaches 90 %.
+
+    The mean, because at that time one run alone has too few greedy picks.
+
+    Args:
+        curves: (steps,) MSR while training of each run.
+
+    Returns:
+        ``step``, see ``reached_at``, and ``low`` and ``high``, its 95 % bootstrap interval over
+        the runs.
+    """
+    runs = greedy_msr(np.array(list(curves)))
+    rng = np.random.default_rng(0)
+    drawn = rng.integers(len(runs), size=(RESAMPLES, len(runs)))
+    steps = reached_at(runs[drawn].mean(axis=1))
+    low, high = np.nanpercentile(steps, [2.5, 97.5])
+    return {"step": float(reached_at(runs.mean(axis=0))), "low": low, "high": high}
+
+
+def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
+    """How a tuning run ended, and its loss on the way.
+
+    Args:
+        success_rate: (steps,) MSR at each step.
+        loss: (steps,) loss, NaN before the first update.
+
+    Returns:
+        ``final_msr``: mean over the last 100 steps. ``solved_at``: the first step from which
+        on the running mean of the MSR stays at 99 % or above, NaN if it does not end there.
+        ``loss_start``: the first loss; ``loss_dip`` and ``loss_peak``: where the running mean of
+        the loss begins and ends its largest rise; ``loss_end``: mean over the last 100 steps.
+    """
+    below = np.flatnonzero(running_mean(success_rate) < SOLVED)
+    solved_at = below[-1] + 1 if below.size else 0
+    known = np.isfinite(loss)
+    smooth = running_mean(loss)[known]
+    lowest = np.minimum.accumulate(smooth)
+    peak = np.argmax(smooth - lowest)
+    losses = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
+    return {
+        "final_msr": success_rate[-FINAL:].mean(),
+        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
+        **dict(zip(LOSSES, losses)),
+    }
+
+
+def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """One row per configuration of the published search: means over its runs of ``run_summary``.
+
+    Columns: ``equalize``, ``batch_size``, ``learning_rate``, ``runs``; ``final_msr`` and its
+    standard deviation; ``solved``, the number of runs that end at 99 % or above, and ``solved_at``
+    of these; and the four losses.
+    """
+    rows = []
+    for (cell, _), curve in read_grid(TUNING, folder).groupby(["cell", "seed"]):
+        config = TUNING.cells[cell].config
+        settings = {
+            name: getattr(config, name) for name in ("equalize", "batch_size", "learning_rate")
+        }
+        columns = (curve[name].to_numpy() for name in ("success_rate", "loss"))
+        rows.append(settings | run_summary(*columns))
+    return (
+        pd.DataFrame(rows)
+        .groupby(["equalize", "batch_size", "learning_rate"])
+        .agg(
+            runs=("final_msr", "size"),
+            final_msr=("final_msr", "mean"),
+            final_msr_std=("final_msr", "std"),
+            solved=("solved_at", "count"),
+            solved_at=("solved_at", "mean"),
+            **{name: (name, "mean") for name in LOSSES},
+        )
+        .reset_index()
+    )

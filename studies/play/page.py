@@ -1,0 +1,74 @@
+"""The page ``figures/train_it_yourself.html``: an agent that learns in the reader's browser.
+
+    python -m studies.play.page
+
+It is one file, which loads nothing, made of those in ``page/``. Read these in the order of
+``FILES``: the network, the container, what is measured and the training, which know nothing of
+the page and are the ones of this package in plain JavaScript; then the worker, in which the
+training runs, the page's state, the drawing, and the page. The numbers of the task are taken
+from the package.
+"""
+
+import json
+import re
+from pathlib import Path
+
+from unload import task
+from unload.env.equalization import TIE_TOLERANCE
+from unload.env.observation import POSITION_NOISE, SINK
+from unload.load import substacks
+from unload.support import files
+
+FOLDER = Path(__file__).with_name("page")
+PAGE = files.ROOT / "figures" / "train_it_yourself.html"
+MODULES = ("network", "container", "measures", "training", "worker", "state", "drawing", "page")
+
+
+def task_numbers() -> dict:
+    """The numbers of the task and of the loads, as ``container.mjs`` reads them; lengths in m."""
+    columns = [{"left": left, "variants": variants} for left, variants in substacks.COLUMNS]
+    return {
+        "container": task.CONTAINER.tolist(),
+        "min_items": task.MIN_ITEMS,
+        "max_items": task.MAX_ITEMS,
+        "n_visible": task.N_VISIBLE,
+        "viewpoint": task.VIEWPOINT.tolist(),
+        "distance_weights": task.DISTANCE_WEIGHTS.tolist(),
+        "max_picks": task.MAX_PICKS,
+        "num_envs": task.NUM_ENVS,
+        "position_noise": POSITION_NOISE,
+        "sink": SINK,
+        "tie_tolerance": TIE_TOLERANCE,
+        "cell": substacks.CELL,
+        "cells_wide": substacks.CELLS_WIDE,
+        "rows_high": substacks.ROWS_HIGH,
+        "rows": substacks.ROWS,
+        "walls": substacks.WALLS,
+        "packages": substacks.PACKAGES.tolist(),
+        "columns": columns,
+    }
+
+
+def assemble() -> str:
+    """The page as one file: ``page.html`` with the other files in the places that name them."""
+
+    def content(names: re.Match) -> str:
+        return "\n".join(map(_content, names[1].split()))
+
+    return re.sub(r"\{\{(.+?)\}\}", content, _content("page.html"))
+
+
+def _content(name: str) -> str:
+    """A file as it stands in the page; of a module without imports and exports, for all see all."""
+    if name == "task":
+        return json.dumps(task_numbers(), separators=(",", ":"))
+    text = (FOLDER / name).read_text().strip()
+    return re.sub(r"^import .*\n|^export ", "", text, flags=re.MULTILINE)
+
+
+def main() -> None:
+    files.write_text(PAGE, assemble())
+
+
+if __name__ == "__main__":
+    main()

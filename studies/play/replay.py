@@ -1,0 +1,109 @@
+"""An episode as a plotly figure with a play button and a slider, which needs no kernel."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import plotly.graph_objects as go
+
+from studies.play.episode import Episode
+from unload.load.view import COLOURS, View, layout, mesh, view
+
+STOPS = 24  # of the slider, at most
+EARLY, LATE = np.array((0.00, 0.30, 0.25)), np.array((0.70, 0.93, 0.85))  # what is unloaded
+PAUSE = 250  # ms between two stops while it plays
+
+
+def replay(episode: Episode, height: int = 520) -> View:
+    """Show an episode's picks at up to 24 stops.
+
+    The earlier an item is unloaded, the darker it is. Where plotly is not drawn, there is a
+    picture of the episode's middle.
+
+    Args:
+        episode: holds the load and the picks.
+        height: of the figure in pixels.
+    """
+    load, picks = episode.load, episode.picks
+    stops = np.unique(np.linspace(0, len(picks), STOPS + 1).round().astype(int)).tolist()
+    parts = [
+        np.array([pick.item for pick in picks[start:stop] if pick.success], int)
+        for start, stop in zip(stops, stops[1:])
+    ]
+    ever = [pick.item for pick in picks if pick.success]
+    rest = np.setdiff1d(np.arange(len(load)), np.array(ever, int))
+    traces = [mesh(load, rest, "not unloaded", COLOURS["unseen"], legend=True)]
+    names = {0: "unloaded first", len(parts) - 1: "unloaded last"}
+    for number, part in enumerate(parts):
+        colour = EARLY + number / max(1, len(parts) - 1) * (LATE - EARLY)
+        name = names.get(number, "unloaded")
+        traces.append(mesh(load, part, name, tuple(colour), legend=number in names))
+    traces.append(_last_failure(episode, stops[0]))
+    frames = [
+        go.Frame(
+            name=str(stop),
+            data=[
+                *({"type": "mesh3d", "visible": later >= now} for later in range(len(parts))),
+                _last_failure(episode, stop),
+            ],
+            traces=list(range(1, len(traces))),
+        )
+        for now, stop in enumerate(stops)
+    ]
+    middle = episode.moment(stops[len(stops) // 2])
+    still = view(load, middle.present, middle.groups(), height)
+    figure = View(traces, layout(height), frames, picture=still.picture)
+    labels = {str(stop): f"{stop} picks, {episode.unloaded(stop)} unloaded" for stop in stops}
+    figure.update_layout(_controls(labels))
+    return figure
+
+
+def _controls(labels: Mapping[str, str]) -> dict:
+    """A slider over the frames of a plotly figure, and play and pause left of it.
+
+    Args:
+        labels: name of each frame → what the slider says there.
+    """
+    at_once, slowly = (
+        {
+            "mode": "immediate",
+            "fromcurrent": True,
+            "frame": {"duration": pause, "redraw": True},
+            "transition": {"duration": 0},
+        }
+        for pause in (0, PAUSE)
+    )
+
+    def animate(label: str, frames: list | None, timing: dict) -> dict:
+        return {"label": label, "method": "animate", "args": [frames, timing]}
+
+    slider = {
+        "steps": [animate(label, [name], at_once) for name, label in labels.items()],
+        "x": 0.12,
+        "len": 0.86,
+        "y": 0.02,
+        "yanchor": "bottom",
+        "ticklen": 0,
+        "font": {"color": "rgba(0,0,0,0)"},  # of the labels below the slider: too many to read
+        "currentvalue": {"font": {"color": "black"}},
+    }
+    buttons = {
+        "type": "buttons",
+        "direction": "left",
+        "x": 0,
+        "xanchor": "left",
+        "y": 0.04,
+        "yanchor": "bottom",
+        "buttons": [animate("▶", None, slowly), animate("❚❚", [None], at_once)],
+    }
+    return {"sliders": [slider], "updatemenus": [buttons]}
+
+
+def _last_failure(episode: Episode, count: int) -> go.Mesh3d:
+    """The item of the last of ``count`` picks if it failed; hidden if not."""
+    pick = episode.picks[count - 1] if count else None
+    failed = pick is not None and not pick.success
+    items = np.array([pick.item if failed else 0])
+    # Without a seam it covers the same item of another colour.
+    trace = mesh(episode.load, items, "failed", COLOURS["failed"], legend=True, seam=0)
+    trace.visible = True if failed else "legendonly"
+    return trace

@@ -1,0 +1,153 @@
+"""Picking policies measured where the lift table reaches: the cards of some, and all compared.
+
+    python -m studies policies
+
+The file of a policy that comes with the package holds a card: how it was trained, and how it does;
+``print(unload.load_policy("recommended"))`` shows it. In the comparison, rules and learned policies
+unload the same containers: in the conditions of the training, with blurred positions, and with
+boxes of other sizes.
+"""
+
+from dataclasses import asdict, replace
+from functools import partial
+from hashlib import blake2b
+from pathlib import Path
+
+import pandas as pd
+from joblib import Parallel, delayed
+
+from studies.paper import training
+from studies.policies.variants import GRIDS, RECOMMENDED
+from studies.provenance import read_provenance
+from studies.results import COMMAND, measured, publish
+from unload import task
+from unload.agent import policies
+from unload.agent.config import TrainConfig
+from unload.agent.evaluation import Policy, evaluate
+from unload.agent.greedy import load_policy, save_policy, settings_of
+from unload.load.substacks import stack_load
+from unload.network.weights import weights_file
+from unload.support import checks, files
+
+# Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
+CARD_LOADS, CARD_SEED = 200, 5000
+SCALES = 1.0, 0.8, 1.2  # of the boxes
+_DEFAULT = training.PAPER.cells[training.DEFAULTS].config
+# By name: the grid whose run it is, and the run's configuration.
+ORIGINS: dict[str, tuple[str, TrainConfig]] = {
+    **{
+        name: (training.PAPER.name, replace(_DEFAULT, seed=seed))
+        for seed, name in training.PLAYERS.items()
+    },
+    "recommended": (GRIDS["recommended"].name, RECOMMENDED),
+}
+SIMPLE = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
+# Trainings of the paper's configuration end in two ways: one of each is compared.
+LEARNED = ("paper", "paper_seed_2", "recommended")
+# Who plays, by policy and mask: the rules with the mask only.
+PLAYERS = (
+    *((name, True) for name in SIMPLE),
+    *((name, mask) for name in LEARNED for mask in (True, False)),
+)
+LOADS, SEED = 100, 3000  # fresh containers for each policy and condition
+CONDITIONS = {
+    "500 picks": {},
+    "complete": {"max_picks": None},
+    "σ 0.5 cm": {"position_noise": 0.005},
+    "σ 2 cm": {"position_noise": 0.02},
+    "σ 5 cm": {"position_noise": 0.05},
+    "boxes × 0.8": {"stack": partial(stack_load, scale=0.8)},
+    "boxes × 1.2": {"stack": partial(stack_load, scale=1.2)},
+}
+
+
+def write_cards(folder: str | Path = files.SHIPPED) -> None:
+    """Measure the policies in ``folder/policies`` and write their cards into their files."""
+    for name, (grid, config) in ORIGINS.items():
+        path = Path(folder) / "policies" / f"{name}.safetensors"
+        policy = load_policy(path)
+        policy.card = {
+            "configuration": asdict(config),
+            "loads": "the paper's",
+            "picks": config.picks,
+            "fingerprint": read_provenance(files.DATA, grid)["fingerprint"],
+            **{loads_of(scale): measure(policy, scale) for scale in SCALES},
+        }
+        save_policy(policy, path)
+
+
+def loads_of(scale: float) -> str:
+    """What a card calls the measures on loads of boxes of a scale."""
+    return "on the paper's loads" if scale == 1 else f"on boxes × {scale:g}"
+
+
+def measure(policy: Policy, scale: float) -> dict[str, float]:
+    """How a policy does in fresh containers, each for 500 picks or until it is empty.
+
+    Args:
+        policy: see ``unload.policies``.
+        scale: of the boxes, see ``unload.stack_load``.
+
+    Returns:
+        ``msr``, ``misses`` and ``picks`` with the mask, and ``msr_no_mask``.
+    """
+    stack = partial(stack_load, scale=scale)
+    masked, free = (
+        evaluate(policy, CARD_LOADS, CARD_SEED, mask=mask, stack=stack) for mask in (True, False)
+    )
+    picks = (masked["unloaded"] / masked["success_rate"]).fillna(task.MAX_PICKS)
+    return {
+        "msr": round(masked["success_rate"].mean(), 5),
+        "misses": round((picks - masked["unloaded"]).sum()),
+        "picks": round(picks.sum()),
+        "msr_no_mask": round(free["success_rate"].mean(), 5),
+    }
+
+
+def comparison_data(folder: str | Path = files.DATA, n_jobs: int = -1) -> None:
+    """Let policies unload the same containers under each condition: ``policies/comparison.csv``.
+
+    One row per policy, condition and container, with the columns of ``compare``. The learned
+    policies are compared twice, with and without the mask.
+
+    Args:
+        folder: of the data.
+        n_jobs: processes, as in joblib.
+    """
+    checks.jobs("n_jobs", n_jobs)
+    found = {name: find_policy(name) for name in (*SIMPLE, *LEARNED)}
+    results = Parallel(n_jobs)(
+        delayed(measured)(partial(compare, name, found[name], mask, condition))
+        for condition in CONDITIONS
+        for name, mask in PLAYERS
+    )
+    tables = {"comparison": pd.concat([result.value for result in results])}
+    settings = {"policies": digests(), "loads": LOADS, "seed": SEED}
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    publish(place, "comparison", tables, command, settings, results)
+
+
+def compare(name: str, policy: Policy, mask: bool, condition: str) -> pd.DataFrame:
+    """The rows of ``evaluate`` for a policy under a condition.
+
+    Returns:
+        Its columns, and ``policy``, ``mask``, ``condition`` and ``load`` before them.
+    """
+    table = evaluate(policy, LOADS, SEED, mask=mask, **CONDITIONS[condition])
+    named = {"policy": name, "mask": mask, "condition": condition, "load": table.index}
+    return pd.concat([pd.DataFrame(named), table], axis=1)
+
+
+def find_policy(name: str) -> Policy:
+    """A rule, or a policy that ships, by its name."""
+    return SIMPLE[name] if name in SIMPLE else load_policy(name)
+
+
+def digests() -> dict[str, str]:
+    """A digest of each learned policy, of its file without the card."""
+    found = {}
+    for name in LEARNED:
+        policy = load_policy(name)
+        content = weights_file("policy", settings_of(policy), policy.network.state_dict())
+        found[name] = blake2b(content, digest_size=16).hexdigest()
+    return found

@@ -1,0 +1,103 @@
+"""Policies compared with every box simulated.
+
+    python -m studies policies
+
+In ``full`` physics all boxes are free to move. With ``after_pick="restore"`` they are put
+back after every pick; with ``"keep"`` they stay where the pick has left them. They drift,
+and a box on which nothing lies may be jammed between its neighbours.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from studies.policies.comparison import LEARNED, SIMPLE, digests, find_policy
+from studies.results import COMMAND, keep_all, publish
+from unload.agent.evaluation import Policy, success_rate
+from unload.env.container import ContainerEnv
+from unload.load.boxes import Load
+from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
+from unload.physics.bullet import SETTINGS
+from unload.physics.situation import Surroundings
+from unload.support import files
+
+EPISODES, PICKS = 10, 100  # of each policy; only the front walls of a load are simulated
+SEED = 2000  # of the loads; no other data uses it
+COLUMNS = ["policy", "after_pick", "episode", "success_rate", "free", "jammed"]
+# Who plays how; of the others, every decision with boxes restored would be the table's.
+PLAYED = (*((name, "keep") for name in (*SIMPLE, *LEARNED)), ("recommended", "restore"))
+
+
+def robustness_data(
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = 1
+) -> None:
+    """Let policies unload the same containers: ``policies/robustness.csv``.
+
+    One row per ``policy``, ``after_pick`` and ``episode``, with the columns of ``play``. An
+    episode takes minutes. Each one that is finished is kept, so that a run that was stopped
+    goes on.
+
+    Args:
+        folder: of the data.
+        runs_dir: where finished episodes are kept.
+        n_jobs: processes, as in joblib.
+    """
+    weights = digests()
+    seeds = np.random.SeedSequence(SEED).generate_state(EPISODES).tolist()
+    containers, jobs = [], []
+    for (name, after_pick), (episode, seed) in product(PLAYED, enumerate(seeds)):
+        containers.append({"policy": name, "after_pick": after_pick, "episode": episode})
+        size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS}
+        question = containers[-1] | size | {"weights": weights.get(name), "settings": SETTINGS}
+        jobs.append((question, partial(play, find_policy(name), after_pick, seed, PICKS)))
+    answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
+    rows = [one | answer.value for one, answer in zip(containers, answers)]
+    tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
+    settings = {"policies": weights, "episodes": EPISODES, "picks": PICKS, "seed": SEED}
+    settings["front walls"] = FRONT_WALLS
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    publish(place, "robustness", tables, command, settings, answers)
+
+
+def play(
+    policy: Policy,
+    after_pick: str,
+    seed: int,
+    picks: int,
+    stack: Callable[[np.random.Generator], Load] = lambda rng: front_walls(stack_load(rng)),
+) -> dict[str, float]:
+    """Let a policy unload one container, with the mask.
+
+    Args:
+        policy: see ``unload.policies``.
+        after_pick: ``"keep"`` or ``"restore"``, see ``FullPhysics``.
+        seed: of the load and of the policy's random numbers.
+        picks: how many, fewer than the load has items.
+        stack: makes the load, see ``ContainerEnv``; the front walls of one of the paper's loads.
+
+    Returns:
+        ``success_rate``; ``free`` and ``jammed``, the shares of picks at items on which nothing
+        rested in the neat load but what has been unloaded since, and of those that failed
+        nevertheless.
+    """
+    rng = np.random.default_rng([seed])
+    rewards, free = [], []
+    env = ContainerEnv("full", after_pick, max_picks=picks, stack=stack)
+    observation, info = env.reset(seed=seed)
+    around = Surroundings(env.physics.load, env.physics.present)
+    for _ in range(picks):
+        allowed = info["action_mask"]
+        action = int(policy(observation[np.newaxis], allowed[np.newaxis], rng)[0])
+        free.append(not around.on_top(int(env.visible[action])))
+        observation, reward, _, _, info = env.step(action)
+        rewards.append(reward)
+    env.close()
+    return {
+        "success_rate": success_rate(rewards),
+        "free": float(np.mean(free)),
+        "jammed": float(np.mean(free & (np.array(rewards) < 0))),
+    }

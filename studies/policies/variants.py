@@ -1,0 +1,163 @@
+"""The paper's outlook: other networks, rewards and settings, and the agent that never fails.
+
+    python -m studies variants
+
+Each is a grid. The first three differ from the paper's configuration in one thing, and in what
+makes them affordable: fewer picks and a smaller batch. Networks without a fused update are small,
+too, and so is the paper's beside them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from studies.changes import height_reward
+from studies.grid import Cell, Grid, read_measures, train_grid
+from studies.results import COMMAND, JOBS
+from studies.statistics import bootstrap_interval
+from studies.style import styled
+from unload.agent.config import TrainConfig
+from unload.agent.evaluation import evaluate
+from unload.agent.greedy import Greedy, load_policy, save_policy
+from unload.support import checks, files
+
+CONFIG = TrainConfig(picks=1_000_000, batch_size=256)
+SEEDS = range(3)
+SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32)
+LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
+SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
+RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False)
+APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", "without the mask")}
+
+
+def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
+    """MSR of a trained policy in fresh containers: ``msr_mask`` and ``msr_no_mask``."""
+    ready = Greedy(policy.network, equalize=False)  # the environment equalizes, which is faster
+    seen = {"equalize": config.equalize, "ties": config.ties}
+    return {
+        f"msr_{name}": evaluate(ready, mask=mask, **LOADS, **seen)["success_rate"].mean()
+        for name, mask in (("mask", True), ("no_mask", False))
+    }
+
+
+def _setting(field: str, value: float) -> dict[str, Cell]:
+    """The cell in which one setting is changed; its name says which."""
+    return {f"{field}_{value}": Cell(replace(CONFIG, **{field: value}), SEEDS)}
+
+
+_grid = partial(Grid, command=f"{COMMAND} variants", measure=judged)
+GRIDS = {
+    # Attention has fewer seeds, because to train and to judge it takes five times as long.
+    "networks": _grid(
+        "variants/networks",
+        cells={
+            name: Cell(replace(SMALL, network=name), range(2) if name == "attention" else SEEDS)
+            for name in ("peq", "two_layer", "stack", "attention")
+        },
+    ),
+    # The paper's outlook: failing at a higher item is less bad. What stays as it is, its control,
+    # is a cell of the settings.
+    "rewards": _grid(
+        "variants/rewards",
+        cells={
+            f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share))
+            for share in SHARES
+        },
+    ),
+    "settings": _grid(
+        "variants/settings",
+        cells={"unchanged": Cell(CONFIG, SEEDS)}
+        | _setting("n_features", 16)
+        | _setting("n_features", 256)
+        | _setting("learning_rate", 1e-4)
+        | _setting("learning_rate", 1e-2)
+        | _setting("batch_size", 64)
+        | _setting("batch_size", 2048)
+        | _setting("gradient_steps", 4),
+    ),
+    # The paper's configuration but for one thing, and shorter: positions, not ranks.
+    "recommended": _grid("variants/recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
+}
+OPTIONS = {"--grids": {"nargs": "+", "choices": GRIDS, "default": tuple(GRIDS)}, **JOBS}
+
+
+def variants_data(
+    grids: Sequence[str] = tuple(GRIDS),
+    folder: str | Path = files.DATA,
+    runs_dir: str | Path = files.RUNS,
+    n_jobs: int = -1,
+    shipped: str | Path = files.SHIPPED,
+) -> None:
+    """Train some grids, see ``train_grid``.
+
+    The recommended agent's first run also leaves ``policies/recommended.safetensors``.
+
+    Args:
+        grids: names in ``GRIDS``.
+        folder: of the data.
+        runs_dir: where the runs are kept.
+        n_jobs: processes, see ``run_sweep``.
+        shipped: folder of the policy.
+
+    Raises:
+        ValueError: an unknown grid.
+        RuntimeError: runs failed; the message says which and why.
+    """
+    for name in grids:
+        checks.one_of("grids", name, GRIDS)
+    for name in grids:
+        kept = train_grid(GRIDS[name], folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
+        if name == "recommended":
+            best = load_policy(kept / "positions/seed_0/policy.safetensors")
+            save_policy(best, Path(shipped) / "policies/recommended.safetensors")
+
+
+def read_variants(grid: str, folder: str | Path = files.DATA) -> pd.DataFrame:
+    """What the policies of a grid reach, see ``read_measures``; before rewards their control.
+
+    Args:
+        grid: a name in ``GRIDS``.
+        folder: of the data.
+
+    Raises:
+        ValueError: an unknown grid.
+        FileNotFoundError: it has not been published.
+    """
+    checks.one_of("grid", grid, GRIDS)
+    rows = read_measures(GRIDS[grid], folder)
+    if grid != "rewards":
+        return rows
+    settings = read_measures(GRIDS["settings"], folder)
+    return pd.concat([settings[settings["cell"] == "unchanged"], rows], ignore_index=True)
+
+
+@styled
+def variants_msr(grid: str, folder: str | Path = files.DATA) -> Figure:
+    """MSR of the policies of a grid: each seed pale, their mean strong, with its 95 % interval.
+
+    Arguments and errors as for ``read_variants``.
+    """
+    cells = dict(list(read_variants(grid, folder).groupby("cell", sort=False)))
+    figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
+    for row, cell in enumerate(cells.values()):
+        for place, (name, (colour, marker, label)) in enumerate(APPLIED.items()):
+            y = row + (0.15 if place else -0.15)
+            style = {"color": colour, "marker": marker, "linestyle": "none"}
+            axes.plot(cell[name], np.full(len(cell), y), **style, alpha=0.3, markersize=3)
+            low, high = bootstrap_interval(cell[name].to_numpy())
+            axes.plot([low, high], [y, y], color=colour, linewidth=1.2)
+            label = None if row else label
+            axes.plot(cell[name].mean(), y, **style, markersize=6, label=label)
+    axes.set_yticks(range(len(cells)), [name.replace("_", " ") for name in cells])
+    axes.set_ylim(len(cells) - 0.5, -0.5)
+    axes.set(xlabel="MSR of the trained policy on fresh loads", xlim=(0, 1.02))
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
+    return figure

@@ -1,0 +1,141 @@
+"""Provenance of results: command, settings, code, versions, machine and time, as JSON."""
+
+import os
+import platform
+import resource
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from unload.support import files
+
+PACKAGES = ("gymnasium", "joblib", "numba", "numpy", "pandas", "pybullet", "torch")
+
+
+def write_provenance(
+    folder: str | Path,
+    name: str,
+    command: str,
+    settings: dict,
+    reduced: bool,
+    record: dict,
+) -> None:
+    """Write ``folder/name.provenance.json``.
+
+    Args:
+        folder: folder of the data.
+        name: name of the data file or set, for example ``"observation"``.
+        command: what computes it again.
+        settings: configuration and seeds.
+        reduced: whether the run is smaller than the paper's.
+        record: what ``run_record`` or ``joined`` returned.
+    """
+    content = {"command": command, "reduced": reduced, "settings": settings, **record}
+    files.write_json(Path(folder) / f"{name}.provenance.json", content)
+
+
+def read_provenance(folder: str | Path, name: str) -> dict:
+    """Return the content of ``folder/name.provenance.json``.
+
+    Raises:
+        FileNotFoundError: the data has no provenance.
+        ValueError: the file is damaged.
+    """
+    return files.read_json(Path(folder) / f"{name}.provenance.json")
+
+
+def run_record(seconds: float) -> dict:
+    """Record of the process that has computed a result.
+
+    Args:
+        seconds: wall time.
+
+    Returns:
+        ``wall_time_s``, ``peak_memory_mib`` of the process so far, ``revision`` of the code,
+        ``versions`` of the packages, ``python`` and ``machine``.
+    """
+    return {
+        "wall_time_s": round(seconds, 1),
+        "peak_memory_mib": _peak_memory(),
+        "revision": revision(),
+        "versions": _versions(),
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {_cpu()}, {os.cpu_count()} cores",
+    }
+
+
+def joined(records: Iterable[dict]) -> dict:
+    """Return one record of several runs.
+
+    Their number, the sum of their wall times, the highest peak of memory; and of the rest the
+    one value that all share, or the list of those that occur.
+    """
+    records = list(records)
+    rest = {}
+    for name in ("revision", "versions", "python", "machine"):
+        values = []
+        for record in records:
+            if record[name] not in values:
+                values.append(record[name])
+        rest[name] = values[0] if len(values) == 1 else values
+    return {
+        "runs": len(records),
+        "wall_time_s": round(sum(record["wall_time_s"] for record in records), 1),
+        "peak_memory_mib": max(record["peak_memory_mib"] for record in records),
+        **rest,
+    }
+
+
+def _versions() -> dict[str, str]:
+    """The versions of ``PACKAGES``, by name, without those that are not installed."""
+    found = {}
+    for package in PACKAGES:
+        with suppress(PackageNotFoundError):
+            found[package] = version(package)
+    return found
+
+
+@cache
+def revision() -> str:
+    """The project's commit, with ``+`` if the package was changed since.
+
+    ``"unknown"`` where the package does not lie in the project's own repository: a copy of it
+    in another one must not report that one's commits.
+    """
+    root = files.ROOT
+    # A named repository, because git would otherwise take an enclosing one.
+    git = ["git", "--git-dir", str(root / ".git"), "--work-tree", str(root)]
+
+    def output(*arguments: str) -> str:
+        command = [*git, *arguments]
+        return subprocess.check_output(command, cwd=root, text=True, stderr=subprocess.DEVNULL)
+
+    try:
+        project = tomllib.loads((root / "pyproject.toml").read_text())["project"]["name"]
+        if project != "unload":
+            return "unknown"
+        commit = output("rev-parse", "--short=12", "HEAD").strip()
+        changed = output("status", "--porcelain", "unload")
+    except (OSError, KeyError, tomllib.TOMLDecodeError, subprocess.CalledProcessError):
+        return "unknown"
+    return commit + ("+" if changed else "")
+
+
+def _cpu() -> str:
+    """Name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line.split(": ", 1)[1] for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or "unknown processor"
+
+
+def _peak_memory() -> int:
+    """Highest memory use of this process so far, in MiB."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak // (2**20 if sys.platform == "darwin" else 2**10)

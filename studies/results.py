@@ -1,0 +1,153 @@
+"""One way to keep a result, to publish it, and to read it back.
+
+A result that took long is kept in ``runs/`` under the question that it answers; a published
+one is a table in ``data/`` with its provenance beside it.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+from joblib import Parallel, delayed
+from tqdm import tqdm
+
+from studies.provenance import joined, run_record, write_provenance
+from unload.support import checks, files
+
+COMMAND = "python -m studies"
+# The command-line option of every experiment that uses several processes.
+JOBS = {
+    "--jobs": {
+        "dest": "n_jobs", "type": int, "default": -1, "help": "processes; one per core if -1"
+    }
+}  # fmt: skip
+
+
+class Result(NamedTuple):
+    """A computed value and what ``run_record`` says of the computation."""
+
+    value: Any
+    record: dict
+
+
+def measured(compute: Callable[[], Any]) -> Result:
+    """Compute a value, with its ``run_record``."""
+    start = time.monotonic()
+    value = compute()
+    return Result(value, run_record(time.monotonic() - start))
+
+
+def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Result:
+    """The answer to a question, computed once and kept in ``folder``.
+
+    Args:
+        folder: of the answers, each a JSON file that is named by a digest of its question.
+        question: all that the answer depends on, as JSON can hold it: an answer to another
+            question is not taken.
+        compute: gives the answer, a value that JSON can hold.
+
+    Returns:
+        The answer and its record, the same whether it was kept or has just been computed.
+
+    Raises:
+        TypeError: JSON cannot hold the question or the answer.
+        ValueError: a kept file is damaged or lacks an entry; the message names it.
+    """
+    question = json.loads(json.dumps(question, sort_keys=True))
+    digest = blake2b(json.dumps(question).encode(), digest_size=8).hexdigest()
+    path = Path(folder) / f"{digest}.json"
+    stored = files.read_json(path) if path.exists() else {}
+    if stored.get("question") != question:
+        value, record = measured(compute)
+        content = {"question": question, "value": value, "record": record}
+        files.write_json(path, content, checked=True)
+        stored = files.read_json(path)
+    checks.entries(str(path), stored, ("value", "record"))
+    return Result(stored["value"], stored["record"])
+
+
+def keep_all(
+    folder: str | Path,
+    jobs: Sequence[tuple[dict, Callable[[], Any]]],
+    n_jobs: int,
+) -> list[Result]:
+    """``kept`` for several questions, each with what computes its answer, side by side.
+
+    Args:
+        folder: of the answers.
+        jobs: pairs of ``question`` and ``compute``.
+        n_jobs: processes, as in joblib.
+
+    Raises:
+        TypeError, ValueError: ``n_jobs`` is no number of processes.
+    """
+    checks.jobs("n_jobs", n_jobs)
+    answers = Parallel(n_jobs, return_as="generator")(
+        delayed(kept)(folder, question, compute) for question, compute in jobs
+    )
+    bar = {"total": len(jobs), "unit": "result", "ncols": 100}
+    return list(tqdm(answers, file=sys.stdout, **bar))
+
+
+def publish(
+    folder: str | Path,
+    name: str,
+    tables: Mapping[str, pd.DataFrame],
+    command: str,
+    settings: dict,
+    results: Iterable[Result],
+    fingerprint: str | None = None,
+    float_format: str = "%.6g",
+    reduced: bool = False,
+) -> None:
+    """Write tables of results and, last, their provenance.
+
+    Args:
+        folder: of ``<table>.csv`` and ``<name>.provenance.json``.
+        name: of the data.
+        tables: by name.
+        command: what computes them again.
+        settings: configuration and seeds.
+        results: of which they are made; their records are joined.
+        fingerprint: of the training that the results rest on, see ``training_fingerprint``;
+            None if they rest on none, or on one that is not known.
+        float_format: of the tables.
+        reduced: whether the run is smaller than the one that ``data/`` holds.
+    """
+    folder = Path(folder)
+    for table_name, table in tables.items():
+        write_table(folder / f"{table_name}.csv", table, float_format)
+    record = joined(result.record for result in results)
+    if fingerprint is not None:
+        record["fingerprint"] = fingerprint
+    write_provenance(folder, name, command, settings, reduced, record)
+
+
+def write_table(path: str | Path, table: pd.DataFrame, float_format: str = "%.6g") -> None:
+    """Write a table as CSV, without its index, in one atomic step."""
+    files.write_text(path, table.to_csv(index=False, float_format=float_format))
+
+
+def read_table(path: str | Path, command: str, columns: Sequence[str]) -> pd.DataFrame:
+    """A table that a command of this repository has made.
+
+    Args:
+        path: of the ``.csv`` file.
+        command: what makes it.
+        columns: that it must have.
+
+    Raises:
+        FileNotFoundError: it is missing; the message names the command.
+        ValueError: a column is missing.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise FileNotFoundError(f"{path} is missing; {command} makes it")
+    table = pd.read_csv(path)
+    checks.entries(str(path), dict(table), columns)
+    return table

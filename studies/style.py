@@ -1,0 +1,49 @@
+"""The look of the figures, and where they are kept."""
+
+import logging
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
+
+from studies.provenance import read_provenance
+from unload.support import files
+
+# It warns of the date in the fonts that come with Matplotlib, at each PDF.
+logging.getLogger("fontTools").setLevel(logging.ERROR)
+
+STYLE = Path(__file__).resolve().parent / "unload.mplstyle"
+# One colour, one meaning: what an agent sees or stores, or the rule that picks. Dashed or hollow
+# is without the mask. "shuffled" and "positions" never meet in a notebook.
+# The colours of boxes stand in ``unload.load.view``.
+COLOURS = {
+    "ranks": "C1", "positions": "C0", "shuffled": "C0", "averaged": "C3", "level": "C2",
+    "random": "C5", "highest": "C4", "nearest": "#8c564b",
+}  # fmt: skip
+
+
+def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Let a figure function draw in the repository's style."""
+
+    @wraps(draw)
+    def styled_draw(*args, **kwargs) -> Figure:
+        with plt.style.context(STYLE):
+            return draw(*args, **kwargs)
+
+    return styled_draw
+
+
+def save(figure: Figure, name: str, folder: Path = files.FIGURES) -> None:
+    """Write ``folder/name.png`` and ``.pdf``, the same bytes for the same figure."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with plt.style.context(STYLE):
+        figure.savefig(folder / f"{name}.png", metadata={"Software": None})
+        figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+
+
+def mark_reduced(figure: Figure, folder: str | Path, data: str) -> None:
+    """Say so in the figure if its data is of a smaller run than the paper's."""
+    if read_provenance(folder, data)["reduced"]:
+        figure.supxlabel("reduced run", fontsize=8, color="0.45")

@@ -1,0 +1,280 @@
+"""The fused update and choice against PyTorch."""
+
+import multiprocessing
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from torch.nn.functional import smooth_l1_loss
+
+from unload.agent.dqn import DQN
+from unload.fast import fused
+from unload.network.peq import PEQNetwork
+
+BATCH, ITEMS = 300, 128
+FOR_TWO_THREADS = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
+
+
+def random_batch(rng, size):
+    return {
+        "observations": rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32),
+        "actions": rng.integers(ITEMS, size=size),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), size),
+    }
+
+
+@pytest.fixture
+def batch(rng):
+    return random_batch(rng, BATCH)
+
+
+def network(n_features, seed=0):
+    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
+
+
+def reference(net, batch, beta=1.0):
+    """Loss and gradients by PyTorch in double precision."""
+    double = PEQNetwork(net.n_features).double()
+    double.load_state_dict({name: value.double() for name, value in net.state_dict().items()})
+    values = double(torch.from_numpy(batch["observations"]).double())
+    chosen = values.gather(1, torch.from_numpy(batch["actions"])[:, None]).squeeze(1)
+    loss = smooth_l1_loss(chosen, torch.from_numpy(batch["rewards"]).double(), beta=beta)
+    loss.backward()
+    return loss.item(), [parameter.grad for parameter in double.parameters()]
+
+
+def gradients(net, batch, *more):
+    """The gradients of all weights, one after the other, and the loss."""
+    return fused.start_gradients(fused.weights_of(net), *batch.values(), *more)()
+
+
+def check(net, batch, beta=1.0, tolerance=1e-5):
+    """Loss and gradients agree, the gradients relative to the largest of them."""
+    *found, loss = gradients(net, batch, beta)
+    expected_loss, expected = reference(net, batch, beta)
+    assert loss == pytest.approx(expected_loss, rel=1e-5)
+    flat = torch.cat([gradient.flatten() for gradient in expected]).numpy()
+    assert len(flat) == len(found)
+    assert np.abs(found - flat).max() < tolerance * min(np.abs(flat).max(), 1)
+
+
+@pytest.mark.parametrize("n_features", [1, 16, 37, 64, 65, 130])
+@pytest.mark.parametrize("beta", [0.3, 1.0])
+def test_gradients_are_those_of_pytorch(batch, n_features, beta):
+    check(network(n_features), batch, beta)
+
+
+@pytest.mark.parametrize("bias", [3.0, -3.0])
+@pytest.mark.parametrize("items", [5, 200])
+def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
+    batch = {
+        "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=BATCH),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
+    }
+    net = network(70)
+    with torch.no_grad():
+        net.extractor.bias[:] = bias
+        net.scorer.weight /= 10  # so that tanh does not saturate
+    check(net, batch)
+
+
+def test_arrays_that_are_not_contiguous_will_do(batch):
+    net = network(16)
+    expected = gradients(net, {name: array[::3].copy() for name, array in batch.items()})
+    found = gradients(net, {name: array[::3] for name, array in batch.items()})
+    assert found.tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("first", [3, 70])
+def test_a_near_tie_is_decided_as_in_double_precision(sign, first):
+    """Two items' values differ by less than single precision resolves, or not at all.
+
+    They are the highest (sign 1) or the lowest (-1) and stand at x = 0.3 and x = 0.6, so the
+    gradient of the weight of x tells which one was taken.
+    """
+    net = network(1)
+    with torch.no_grad():
+        net.extractor.weight[:] = torch.tensor([1.0, 1.0, 0.0])
+        net.extractor.bias[:] = 5
+        net.scorer.weight[:] = torch.tensor([0.0, 0.05, 0.05, 0.0])
+        net.scorer.bias[:] = 0
+    a, b = np.float32([0.3, 0.6])
+    for step in range(-3, 4):
+        observations = np.zeros((1, ITEMS, 3), np.float32)
+        observations[0, first] = a, b - a + step * np.float32(2.0**-25), 0
+        observations[0, 100] = b, 0, 0
+        batch = {
+            "observations": sign * observations,
+            "actions": np.zeros(1, np.int64),
+            "rewards": np.ones(1, np.float32),
+        }
+        check(net, batch, tolerance=1e-6)
+
+
+def test_a_dead_network_has_no_gradients_but_the_last_bias(batch):
+    net = network(16)
+    with torch.no_grad():
+        net.extractor.weight[:] = 0
+        net.extractor.bias[:] = 0
+    check(net, batch)
+
+
+def test_double_precision_decides_whether_a_feature_is_active():
+    """Its value is 2⁻²⁶ - 2⁻³⁶; single precision rounds the first part away."""
+    net = network(1)
+    with torch.no_grad():
+        net.extractor.weight[:] = torch.tensor([-1 - 2.0**-12, 2.0**-26, 0])
+        net.extractor.bias[:] = 1
+        net.scorer.weight[:] = torch.tensor([1.0, 1.0, 1.0, 0.0])  # the mean does not count
+    items = np.tile(np.array([1 - 2.0**-12 + 2.0**-24, 1, 0], np.float32), (1, 3, 1))
+    check(net, {"observations": items, "actions": np.array([0]), "rewards": np.ones(1, np.float32)})
+
+
+@pytest.fixture
+def two_threads():
+    before = torch.get_num_threads()
+    torch.set_num_threads(2)
+    yield
+    torch.set_num_threads(before)
+
+
+def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
+    submitted = []
+    submit = ThreadPoolExecutor.submit
+    monkeypatch.setattr(
+        ThreadPoolExecutor,
+        "submit",
+        lambda pool, *work: submitted.append(submit(pool, *work)) or submitted[-1],
+    )
+    net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
+    two = gradients(net, batch).tobytes()
+    assert len(submitted) == 1 and submitted[0].done()
+    torch.set_num_threads(1)
+    assert gradients(net, batch).tobytes() == two
+    assert gradients(net, batch).tobytes() == two  # and again
+    assert len(submitted) == 1  # no thread where one is asked for
+    torch.set_num_threads(2)
+    gradients(net, random_batch(rng, fused.CHUNK * fused.CHUNKS_PER_THREAD))
+    assert len(submitted) == 1  # and none for a batch that one thread has done as soon
+
+
+def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
+    net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
+    finish = fused.start_gradients(fused.weights_of(net), *batch.values())
+    everything = np.ones(batch["observations"].shape[:2], bool)
+    fused.best_actions(fused.weights_of(net), batch["observations"], everything)
+    assert np.array_equal(finish(), gradients(net, batch))
+
+
+def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
+    net, batch = network(8), random_batch(rng, FOR_TWO_THREADS)
+    here = gradients(net, batch)[-1]
+    fork = multiprocessing.get_context("fork")
+    answers = fork.SimpleQueue()
+    process = fork.Process(target=lambda: answers.put(gradients(net, batch)[-1]))
+    process.start()
+    process.join(60)
+    try:
+        assert not process.is_alive() and answers.get() == here
+    finally:
+        process.kill()
+
+
+def test_choice_is_that_of_the_network(batch, rng):
+    net = network(64)
+    allowed = rng.random((BATCH, ITEMS)) < 0.3
+    values = net(torch.from_numpy(batch["observations"]))
+    expected = values.masked_fill(torch.from_numpy(~allowed), -torch.inf).argmax(dim=1).numpy()
+    actions = fused.best_actions(fused.weights_of(net), batch["observations"], allowed)
+    with pytest.raises(FloatingPointError, match="row 0 has no allowed action"):
+        fused.best_actions(fused.weights_of(net), batch["observations"], np.zeros_like(allowed))
+    assert np.mean(actions == expected) > 0.99  # tanh may round two scores to one value
+    rows = np.arange(BATCH)
+    best = values.detach().numpy()
+    assert np.allclose(best[rows, actions], best[rows, expected], atol=1e-6)
+    assert allowed[rows, actions].all()
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3, "observations", "rewards"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_weights_and_inputs_that_are_not_finite_are_refused(batch, place, value):
+    net = network(16)
+    arrays = [parameter.detach().numpy() for parameter in net.parameters()]
+    (batch[place] if place in batch else arrays[place]).flat[0] = value
+    with pytest.raises(FloatingPointError, match="expected finite"):
+        gradients(net, batch)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("actions", np.full(BATCH, ITEMS), "actions holds 128; expected 0 to 127"),
+        ("actions", np.full(BATCH, -1), "actions holds -1"),
+        ("actions", np.zeros(BATCH, np.int32), "actions has shape .* dtype int32"),
+        ("rewards", np.zeros(BATCH), "targets has shape .* dtype float64"),
+        ("rewards", np.zeros(BATCH - 1, np.float32), "targets has shape"),
+        ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
+        ("observations", np.zeros((BATCH, 0, 3), np.float32), "observations has shape"),
+        ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
+    ],
+)
+def test_bad_batches_are_refused(batch, name, value, message):
+    with pytest.raises(ValueError, match=message):
+        gradients(network(4), batch | {name: value})
+
+
+class Subclass(PEQNetwork):
+    pass
+
+
+@pytest.mark.parametrize(
+    "other", [PEQNetwork(4).double(), Subclass(4), torch.nn.Linear(3, 1)], ids=type
+)
+def test_rule_of_where_it_applies(other):
+    assert fused.applies(network(4))
+    assert not fused.applies(other)
+    with pytest.raises(ValueError, match="fused_update is True"):
+        DQN(other, fused_update=True)
+
+
+def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
+    net, rows = network(16), rng.integers(BATCH, size=100)
+    expected = gradients(net, {name: array[rows] for name, array in batch.items()})
+    assert gradients(net, batch, 1.0, rows).tobytes() == expected.tobytes()
+
+
+@pytest.mark.parametrize(
+    "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.zeros((2, 2), int)]
+)
+def test_bad_rows_are_refused_by_name(batch, rows):
+    with pytest.raises(ValueError, match="rows"):
+        gradients(network(4), batch, 1.0, rows)
+
+
+@given(
+    shape=st.tuples(st.integers(1, 70), st.integers(1, 40)),  # batch, items
+    n_features=st.integers(1, 80),
+    scale=st.sampled_from([0.1, 1.0, 4.0]),  # of the weights
+    levels=st.sampled_from([2, 5, 1000]),  # of coordinates: few make ties
+    beta=st.floats(0.1, 2),
+    seed=st.integers(0, 2**31),
+)
+@settings(max_examples=60)
+def test_any_update_is_that_of_double_precision(shape, n_features, scale, levels, beta, seed):
+    size, items = shape
+    rng = np.random.default_rng(seed)
+    net = network(n_features, seed)
+    with torch.no_grad():
+        for parameter in net.parameters():
+            parameter *= scale
+    batch = {
+        "observations": (rng.integers(levels, size=(size, items, 3)) / levels).astype(np.float32),
+        "actions": rng.integers(items, size=size),
+        "rewards": rng.uniform(-1, 1, size).astype(np.float32),
+    }
+    check(net, batch, beta, tolerance=1e-4)

@@ -1,0 +1,87 @@
+"""Algorithm 1 compiled, against ``unload.equalize``."""
+
+import numpy as np
+import pytest
+
+from unload import equalize
+from unload.env.equalization import TIE_TOLERANCE
+from unload.fast.ranking import features, nearest_first, rank, remove, replace
+
+TOLERANCE = np.float32(TIE_TOLERANCE)
+
+
+@pytest.fixture(params=["distinct", "ties", "equal"])
+def items(request, rng) -> np.ndarray:
+    """(3, 128) float32, one item per column."""
+    values = rng.uniform(-1, 1, (3, 128)).astype(np.float32)
+    if request.param == "ties":
+        values = np.round(values, 1)
+    return np.zeros_like(values) if request.param == "equal" else values
+
+
+def ranks_of(values: np.ndarray) -> np.ndarray:
+    return np.argsort(np.argsort(values, axis=-1, kind="stable"), axis=-1)
+
+
+def test_ranks_are_those_of_a_stable_sort(items):
+    for values in items:
+        ranks = np.empty(128, np.int32)
+        rank(values, ranks)
+        assert (ranks == ranks_of(values)).all()
+
+
+def test_replaced_items_leave_the_ranks_of_a_stable_sort(items, rng):
+    values = items[0].copy()
+    ranks = ranks_of(values).astype(np.int32)
+    for _ in range(300):
+        row, value = int(rng.integers(128)), np.float32(rng.choice(items[1]))
+        wanted = np.append(np.delete(values, row), value)
+        replace(values, ranks, row, value)
+        assert (values == wanted).all() and (ranks == ranks_of(wanted)).all()
+
+
+@pytest.mark.parametrize("tolerance", [0.25, 0.2499, 0.0])
+def test_values_as_far_apart_as_the_tolerance_are_a_tie(tolerance):
+    values = np.tile(np.arange(128, dtype=np.float32) // 2 / 4, (3, 1))  # 0, 0, 0.25, 0.25, 0.5, …
+    observation = np.empty((128, 3), np.float32)
+    features(
+        values, ranks_of(values).astype(np.int32), True, True, np.float32(tolerance), observation
+    )
+    assert observation.tobytes() == equalize(values.T, "average", tolerance).tobytes()
+    assert (observation == 0).all() == (tolerance == 0.25)
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+def test_nearest_first_sorts_by_distance(items, rng, ties):
+    distances, flags = rng.random((2, 128)).round(2), rng.random((2, 128)) < 0.5
+    seen = np.stack([items.T, items.T[::-1]])
+    observations, rows = np.empty_like(seen), np.empty_like(flags)
+    nearest_first(distances, seen, flags, True, ties == "average", TOLERANCE, observations, rows)
+    for env in range(2):
+        order = np.argsort(distances[env], kind="stable")
+        assert observations[env].tobytes() == equalize(seen[env, order], ties).tobytes()
+        assert (rows[env] == flags[env, order]).all()
+
+
+def test_removed_items_leave_the_ranks_of_a_stable_sort(items, rng):
+    values = items[0].copy()
+    ranks = ranks_of(values).astype(np.int32)
+    for count in range(128, 0, -1):
+        row = int(rng.integers(count))
+        wanted = np.delete(values[:count], row)
+        remove(values[:count], ranks[:count], row)
+        assert (values[: count - 1] == wanted).all()
+        assert (ranks[: count - 1] == ranks_of(wanted)).all()
+
+
+@pytest.mark.parametrize("ties", ["noise", "average"])
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 64, 127, 128])
+def test_features_of_fewer_items_are_those_of_equalize(items, ties, count):
+    ranks = np.full((3, 128), 99, np.int32)
+    ranks[:, :count] = ranks_of(items[:, :count])
+    observation = np.empty((128, 3), np.float32)
+    present = np.arange(128) < count
+    features(items, ranks, True, ties == "average", TOLERANCE, observation, count)
+    assert observation.tobytes() == equalize(items.T, ties, present=present).tobytes()
+    features(items, ranks, False, ties == "average", TOLERANCE, observation, count)
+    assert (observation == np.where(present[:, None], items.T, -1)).all()

@@ -1,0 +1,66 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from studies.falls import measures
+from studies.falls.laboratory import CONFIG
+from unload import policies
+from unload.network.peq import PEQNetwork
+
+
+@pytest.fixture
+def network():
+    """Its score is z + y / 2."""
+    network = PEQNetwork(2)
+    with torch.no_grad():
+        network.extractor.weight.copy_(torch.tensor([[0, 0.5, 1], [0, 0, 0]]))
+        network.extractor.bias.copy_(torch.tensor([2.0, 0.0]))  # so that ReLU is open
+        network.scorer.weight.zero_()
+        network.scorer.weight[0, 0] = 1
+    return network
+
+
+@pytest.fixture
+def observations():
+    return np.random.default_rng(0).uniform(-1, 1, (40, 128, 3)).astype(np.float32)
+
+
+def test_slopes_are_those_of_the_score(network, observations):
+    assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
+
+
+def test_tilt_is_the_effect_of_place_at_equal_height(observations):
+    x, y, z = np.moveaxis(observations, -1, 0)
+    level = z > 0.3
+    assert measures.tilt(observations, level) == pytest.approx([0, 0], abs=0.03)
+    dug = z + 0.5 * y > 0.3
+    along_x, along_y = measures.tilt(observations, dug)
+    assert abs(along_x) < 0.03 and along_y > 0.15
+
+
+def test_mistakes_with_and_without_place(network, observations):
+    highest = observations[..., 2] == observations[..., 2].max(axis=1, keepdims=True)
+    wrong, without_place, height = measures.mistakes(network, observations, highest)
+    assert wrong > 0.3 and without_place == 0
+    assert 0.5 < height < 1
+
+
+def test_judging_without_place_makes_height_decide(network):
+    loads = {"episodes": 2, "seed": 5}
+    config = replace(CONFIG, mask=True)
+    assert measures.judged(network, config, (0, 1), loads=loads) == 1
+    assert measures.judged(network, config, loads=loads) < 1
+    assert measures.judged(network, config, seen=lambda o: o * [1, 0, 1], loads=loads) == 1
+
+
+def test_the_surface_is_level_where_the_highest_is_taken():
+    def prefers_a_side(observations, masks, rng):
+        score = observations[..., 2] - observations[..., 1]
+        return np.where(masks, score, -np.inf).argmax(axis=1)
+
+    places, level = measures.surface(policies.highest, picks=200, containers=2)
+    _, dug = measures.surface(prefers_a_side, picks=200, containers=2)
+    assert places[0] == pytest.approx(0.0125) and len(places) == 100
+    assert np.ptp(level) < 0.5 < dug[-1] - dug[0]

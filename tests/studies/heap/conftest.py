@@ -1,0 +1,71 @@
+"""Small heaps that are made at once: towers of upright cubes, and a real one."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from studies.heap.boxes import Heap
+from studies.heap.env import HeapEnv
+from studies.heap.generate import settled_heap
+from studies.heap.rake import Rake
+
+EDGE = 0.4  # m
+
+
+@pytest.fixture(scope="session")
+def cubes() -> Callable[..., Heap]:
+    """``cubes((x, y, level), ...)``: upright cubes of 0.4 m, level 0 on the floor."""
+
+    def build(*places: tuple[float, float, int]) -> Heap:
+        positions = np.array([(x, y, EDGE * (level + 0.5)) for x, y, level in places])
+        count = len(places)
+        turns = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
+        return Heap(positions, turns, np.full((count, 3), EDGE), np.zeros(count, int))
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def pile(cubes) -> Heap:
+    """Nine cubes in three rows and two levels, a few of them turned: a small heap."""
+    heap = cubes(
+        *((x, y, 0) for x in (4.5, 5.0) for y in (0.5, 1.0, 1.5)),
+        *((4.75, y, 1) for y in (0.5, 1.0, 1.5)),
+    )
+    turns = heap.orientations.copy()
+    turns[6:] = (0, 0, np.sin(0.2), np.cos(0.2))
+    return Heap(heap.positions, turns, heap.sizes, heap.packages)
+
+
+@pytest.fixture(scope="session")
+def real_heap() -> Heap:
+    """A heap of the generator, about 4 s."""
+    return settled_heap(np.random.default_rng(0))
+
+
+@pytest.fixture
+def make_rake() -> Iterator[Callable[..., Rake]]:
+    made = []
+
+    def make(physics: str = "coarse", **kwargs) -> Rake:
+        made.append(Rake(physics, **kwargs))
+        return made[-1]
+
+    yield make
+    for rake in made:
+        rake.close()
+
+
+@pytest.fixture
+def make_heap_env(pile) -> Iterator[Callable[..., HeapEnv]]:
+    """``make_heap_env(...)``: an environment of the small pile, closed after the test."""
+    made = []
+
+    def make(**kwargs) -> HeapEnv:
+        made.append(HeapEnv(**({"heaps": [pile], "physics": "coarse"} | kwargs)))
+        return made[-1]
+
+    yield make
+    for env in made:
+        env.close()

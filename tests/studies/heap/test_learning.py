@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+import torch
+
+from studies.heap.learning import (
+    Learned,
+    Picks,
+    batches,
+    fit,
+    holds_box,
+    load_networks,
+    mirrored,
+    save_networks,
+)
+from studies.heap.network import FateNetwork
+from studies.heap.observation import COLUMN, COLUMNS, ROWS
+
+BOXES = 6
+
+
+def made_up_picks(rng: np.random.Generator, count: int) -> Picks:
+    """Heaps in which a box brings as many as lie before it in its lane, and itself.
+
+    A box above 0.5 m makes one fall.
+    """
+    observations = np.zeros((count, ROWS, len(COLUMNS)), np.float32)
+    for name, high in (("behind", 1.0), ("y", 1.0), ("z", 1.0)):
+        observations[:, :BOXES, COLUMN[name]] = rng.uniform(0, high, (count, BOXES))
+    observations[:, :BOXES, COLUMN["extent_x"] : COLUMN["shortest"] + 1] = 0.4
+    actions = rng.integers(BOXES, size=count)
+    chosen = observations[np.arange(count), actions]
+    lane = np.abs(observations[:, :BOXES, 1] - chosen[:, None, 1]) < 0.4
+    before = observations[:, :BOXES, 0] < chosen[:, None, 0]
+    unloaded = 1 + (lane & before).sum(axis=1)
+    fates = np.zeros((count, ROWS), np.int8)
+    fates[:, :BOXES] = lane & before  # 1: unloaded; what falls is hidden
+    fates[np.arange(count), actions] = 1
+    return Picks(
+        observations,
+        actions,
+        unloaded.astype(np.float32),
+        (chosen[:, 2] > 0.5).astype(np.float32),
+        fates,
+    )
+
+
+@pytest.fixture(scope="module")
+def learned() -> tuple[FateNetwork, Picks]:
+    """A network of made-up picks, and others that it has not seen."""
+    rng = np.random.default_rng(0)
+    return fit(made_up_picks(rng, 3000), 0, steps=480), made_up_picks(rng, 500)
+
+
+def answers(network: FateNetwork, picks: Picks) -> tuple[np.ndarray, ...]:
+    boxes, falls, probability = Learned([network]).expected(picks.observations)
+    rows = np.arange(len(picks)), picks.actions
+    return boxes[rows], falls[rows], probability[rows]
+
+
+def test_it_learns_what_neighbours_do(learned):
+    network, unseen = learned
+    boxes, falls, probability = answers(network, unseen)
+    assert np.corrcoef(boxes, unseen.unloaded)[0, 1] > 0.8
+    assert ((probability > 0.5) == (unseen.falls > 0)).mean() > 0.9
+    assert np.corrcoef(falls, unseen.falls)[0, 1] > 0.8
+    assert boxes.mean() == pytest.approx(unseen.unloaded.mean(), rel=0.1)
+
+
+def test_the_same_seed_gives_the_same_bits():
+    picks = made_up_picks(np.random.default_rng(1), 300)
+    first, second, other = (fit(picks, seed, steps=2).state_dict() for seed in (0, 0, 1))
+    assert all(torch.equal(first[name], second[name]) for name in first)
+    assert not torch.equal(first["heads.weight"], other["heads.weight"])
+
+
+def test_each_pick_is_learned_from_equally_often_until_the_steps_are_done():
+    rows = [each.tolist() for each in batches(300, 4, torch.Generator().manual_seed(0))]
+    assert [len(each) for each in rows] == [128, 128, 44, 128]
+    assert sorted(sum(rows[:3], [])) == list(range(300))
+
+
+def test_mirrored_changes_the_side_only():
+    observations = torch.rand((2, 3, len(COLUMNS)))
+    mirror = mirrored(observations)
+    assert torch.equal(mirror[..., COLUMN["y"]], -observations[..., COLUMN["y"]])
+    assert torch.equal(mirrored(mirror), observations)
+
+
+def test_policy_weighs_falls(learned):
+    """Without λ it takes the box with most before it, with a large one none above 0.5 m."""
+    network, unseen = learned
+    masks = holds_box(torch.from_numpy(unseen.observations)).numpy()
+    heights = {}
+    for weight in (0.0, 50.0):
+        rows = Learned([network], weight)(unseen.observations, masks, np.random.default_rng(0))
+        heights[weight] = unseen.observations[np.arange(len(rows)), rows, COLUMN["z"]]
+    assert (heights[50.0] < 0.5).mean() > 0.95 > (heights[0.0] < 0.5).mean()
+
+
+def test_policy_picks_only_what_is_allowed(learned, rng):
+    network, unseen = learned
+    masks = np.zeros((len(unseen), ROWS), bool)
+    masks[:, 4] = True
+    assert (Learned([network])(unseen.observations, masks, rng) == 4).all()
+
+
+def test_policy_tells_the_fates_of_all_boxes_for_one_pick(learned):
+    """They are learned: those before it in its lane come along, and nothing visible falls."""
+    network, unseen = learned
+    policy = Learned([network, network])
+    chances = np.array([
+        policy.fates(unseen.observations[k], int(unseen.actions[k])) for k in range(100)
+    ])  # fmt: skip
+    assert chances.shape == (100, ROWS, 2) and (chances[:, BOXES:] == 0).all()
+    guessed, found = chances[:, :BOXES, 0] > 0.5, unseen.fates[:100, :BOXES] > 0
+    assert (guessed == found).mean() > 0.9 and chances[..., 1].max() < 0.1
+
+
+def test_several_networks_are_averaged(learned):
+    network, unseen = learned
+    other = FateNetwork(8, torch.Generator().manual_seed(1))
+    both = Learned([network, other]).expected(unseen.observations)
+    single = [Learned([each]).expected(unseen.observations) for each in (network, other)]
+    for together, first, second in zip(both, *single):
+        assert together == pytest.approx((first + second) / 2, abs=1e-5)
+
+
+def test_stored_networks_are_the_same(tmp_path, learned):
+    network, unseen = learned
+    several = [network, *(FateNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 1))]
+    save_networks(several, tmp_path / "networks.safetensors")
+    read = load_networks(tmp_path / "networks.safetensors")
+    assert [each.n_features for each in read] == [64, 8, 8]
+    before, after = (Learned(each).expected(unseen.observations) for each in (several, read))
+    assert np.array_equal(before, after)
+
+
+def test_damaged_networks_are_refused(tmp_path, rng):
+    """154 of 200 flipped bits, and weights that are not a number, were once loaded."""
+    path = tmp_path / "networks.safetensors"
+    save_networks([FateNetwork(8)], path)
+    whole = path.read_bytes()
+    for place in rng.choice(len(whole), 200, replace=False):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << int(rng.integers(8))
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="networks.safetensors"):
+            load_networks(path)
+    network = FateNetwork(8)
+    torch.nn.init.constant_(network.own.bias, float("nan"))
+    save_networks([network], path)
+    with pytest.raises(ValueError, match="holds no heap networks .*: a weight is not finite"):
+        load_networks(path)

@@ -1,0 +1,140 @@
+"""Policies compared on heaps, at reduced size."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+
+from studies.heap import table as study
+from studies.heap.env import HeapEnv
+from studies.heap.learning import save_networks
+from studies.heap.network import FateNetwork
+from studies.heap.recording import FULL, WEIGHTS
+from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan
+from studies.provenance import read_provenance
+from studies.statistics import bootstrap_interval
+from unload.support import files
+
+
+@pytest.fixture
+def episodes() -> pd.DataFrame:
+    """Two policies on four heaps; the learned one brings half a box more on each."""
+    rows = []
+    for number, boxes in enumerate((1.0, 2.0, 3.0, 2.0)):
+        for policy, more in (("best rule", 0.0), ("learned", 0.5)):
+            row = {"falls_weight": 1.0, "policy": policy, "heap": number}
+            rows.append(row | {"boxes": boxes + more, "falls": 0.5, "net": boxes + more - 0.5})
+    return pd.DataFrame(rows)
+
+
+def test_compared_gives_means_and_ratios_over_pairs(episodes):
+    table = compared(episodes).set_index("policy")
+    assert table.loc["best rule", "boxes"] == 2.0 and table.loc["learned", "boxes"] == 2.5
+    assert table.loc["best rule", ["boxes_ratio", "boxes_ratio_low"]].tolist() == [1.0, 1.0]
+    learned = table.loc["learned"]
+    assert learned["heaps"] == 4 and learned["boxes_ratio"] == 1.25
+    assert 1.1 < learned["boxes_ratio_low"] < 1.25 < learned["boxes_ratio_high"] < 1.6
+    assert learned["net_ratio"] == pytest.approx(2.0 / 1.5)
+    assert learned["boxes_low"] < 2.5 < learned["boxes_high"]
+    assert learned[["net_more", "net_more_low", "net_more_high"]].tolist() == [0.5, 0.5, 0.5]
+    assert learned[["boxes_more", "falls_more"]].tolist() == [0.5, 0.0]
+
+
+def test_pairs_make_the_interval_narrow():
+    reference = np.array([1.0, 5.0, 2.0, 8.0])
+    ratio, low, high = study.ratio_interval(1.3 * reference, reference)
+    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
+    assert np.isnan(study.ratio_interval(reference, -reference)).all()
+    assert np.isnan(study.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
+
+
+def test_bca_intervals_of_skewed_values_lean_to_the_long_side():
+    values = np.array([1.0, 1, 1, 1, 1, 2, 2, 3, 9, 20])
+    mean, low, high = study.mean_interval(values)
+    percentile = bootstrap_interval(values)
+    assert mean == 4.1 and low < mean < high
+    assert low > percentile[0] and high > percentile[1]
+    assert study.mean_interval([2.0, 2.0]) == (2.0, 2.0, 2.0)
+
+
+def test_the_family_holds_each_rule_once_and_none_without_weights():
+    rules = family()
+    assert all(rule and set(rule) <= set(FAMILY_COLUMNS) for rule in rules.values())
+    table = np.array([[rule.get(name, 0) for name in FAMILY_COLUMNS] for rule in rules.values()])
+    directions = table / np.linalg.norm(table, axis=1, keepdims=True)
+    assert len(np.unique(directions.round(9), axis=0)) == len(rules) == 136
+
+
+def test_the_best_rule_depends_on_the_weight_of_falls():
+    rules = pd.DataFrame(
+        {
+            "rule": ["bold", "lucky", "shy"],
+            "heaps": [20, 4, 20],
+            "boxes": [2.0, 5.0, 1.2],
+            "falls": [1.0, 0.0, 0.0],
+        }
+    )
+    assert best_rule(rules, 0.0) == "bold"
+    assert best_rule(rules, 1.0) == "shy"
+    cells = plan(rules, "networks")
+    assert len(cells) == len(study.RULES) + 2 * len(WEIGHTS) + 1
+    chosen = {cell.falls_weight: cell.player for cell in cells if cell.policy == "best rule"}
+    assert chosen[0.0] == {"rule": "bold"} and chosen[4.0] == {"rule": "shy"}
+    assert {cell.falls_weight for cell in cells if cell.policy in ("random", "oracle")} == {1.0}
+
+
+def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pile):
+    small = [pile, pile.only(np.arange(8))]
+    for name, value in {
+        "stored_heaps": lambda split: small,
+        "HeapEnv": lambda split, **given: HeapEnv(heaps=small, **given),
+        "MAX_PICKS": 1,
+        "PHYSICS": "near",
+        "RULE_PHYSICS": "near",
+        "WEIGHTS": (0.0, 1.0),
+        "KEPT": 1,
+        "RULES": {name: study.RULES[name] for name in ("random", "lowest", "highest")},
+    }.items():
+        monkeypatch.setattr(study, name, value)
+    some = dict(list(family().items())[:2])
+    monkeypatch.setattr(study, "family", lambda: some)
+    size = FULL._replace(test=2, first_rule_heaps=1, rule_heaps=2)
+    where = {"folder": tmp_path, "runs_dir": tmp_path}
+    with pytest.raises(FileNotFoundError, match="python -m studies heap makes it"):
+        study.compare(size, **where)
+    rules = study.choose_rules(size, **where)
+    assert rules["rule"].tolist() == ["lowest", "highest", *some]
+    assert sorted(set(rules["heaps"])) == [1, 2] and (rules["heaps"] == 2).sum() <= 2
+    networks = [FateNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 1)]
+    save_networks(networks, tmp_path / "heap" / "networks.safetensors")
+    table = study.compare(size, **where)
+    curve = [("best rule", 0.0), ("learned", 0.0), ("best rule", 1.0), ("learned", 1.0)]
+    played = [(row["policy"], row["falls_weight"]) for _, row in table.iterrows()]
+    others = [(name, 1.0) for name in ("random", "lowest", "highest", "oracle")]
+    assert sorted(played) == sorted(curve + others) and (table["heaps"] == 2).all()
+    by = table.set_index(["policy", "falls_weight"])
+    assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
+    assert read_provenance(tmp_path / "heap", "table")["reduced"]
+    stored = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
+    pd.testing.assert_frame_equal(study.compare(size, **where), table)
+    pd.testing.assert_frame_equal(study.read_heap_table(tmp_path), table, check_dtype=False)
+    again = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
+    assert again == stored
+    players = []
+
+    def made_up(player, split, number, physics):
+        players.append(player)
+        return {"boxes": 2.0 + number, "falls": 0.5}
+
+    monkeypatch.setattr(study, "_play", made_up)
+    table = study.compare(size, tmp_path, tmp_path / "made up")
+    assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
+    weights = [player["falls_weight"] for player in players if "networks" in player]
+    assert weights == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_data_of_heaps_are_those_that_are_read():
+    names = {path.name.split(".")[0] for path in (files.DATA / "heap").iterdir()}
+    assert names == {"networks", "rules", "episodes", "table"}
+    table = study.read_heap_table()
+    assert (table["heaps"] == FULL.test).all() and len(table) == 19

@@ -1,0 +1,92 @@
+"""The README's moving picture."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from studies.paper import animation
+from tests.agent.networks import lowest
+from unload import policies
+from unload.load import view
+from unload.load.substacks import front_walls, stack_load
+from unload.load.view import COLOURS
+from unload.support import files
+
+
+def small(rng):
+    """One wall of a load."""
+    return front_walls(stack_load(rng), 1)
+
+
+@pytest.fixture(scope="module")
+def episodes():
+    return {
+        "stuck": animation.record_episode(lowest, 3, stack=small),
+        "empty": animation.record_episode(policies.highest, 3, stack=small),
+    }
+
+
+def test_episode_ends_when_the_container_is_empty_or_the_agent_stuck(episodes):
+    stuck, empty = episodes["stuck"], episodes["empty"]
+    assert empty.unloaded.all() and sorted(empty.items) == list(range(len(empty.load)))
+    assert len(set(stuck.items)) == 1 and not stuck.unloaded.any()
+    assert len(stuck.items) == animation.STUCK
+    assert np.array_equal(stuck.load.positions, empty.load.positions)
+
+
+def test_frames_begin_slowly_and_show_the_end_twice():
+    counts = animation.picks_of_frames(900)
+    assert counts[:11] == list(range(11)) and counts[-2:] == [900, 900]
+    steps = np.diff(counts[:-2])
+    assert (np.diff(steps) >= 0).all() and steps.max() == animation.STEP
+    assert animation.picks_of_frames(2) == [0, 1, 2, 2]
+
+
+def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_path, monkeypatch):
+    texts, drawn = [], []
+    monkeypatch.setattr(animation, "_draw_half", _noting(animation._draw_half, texts))
+    monkeypatch.setattr(animation, "draw", lambda *all: drawn.append(all[1:]) or view.draw(*all))
+    first, second = tmp_path / "a.gif", tmp_path / "b.gif"
+    frames = animation.save_unloading(episodes, first)
+    picks, boxes = len(episodes["stuck"].items), len(episodes["empty"].load)
+    for said in (
+        f"deadlock: the same box fails, {picks} times",
+        f"0 of {boxes}",
+        f"{boxes} of {boxes}",
+        f"empty after {boxes} picks, 0 of them failed",
+    ):
+        assert said in texts
+    stuck, empty = ([len(low) for low, _, _ in drawn[half::2]] for half in (0, 1))
+    assert empty[0] == boxes and empty[-1] == 0
+    assert stuck[1] == boxes + 1, "the box that fails is drawn again, before all others"
+    animation.save_unloading(episodes, second)
+    assert first.read_bytes() == second.read_bytes()
+    with Image.open(first) as image:
+        assert image.n_frames == len(frames) == len(animation.picks_of_frames(picks))
+
+
+def _noting(draw_half, texts):
+    """``draw_half``, which also notes what it writes."""
+
+    def draw(half, *args):
+        draw_half(half, *args)
+        texts.extend(text.get_text() for text in half.texts)
+
+    return draw
+
+
+def test_picked_boxes_rise_in_the_colours_of_what_became_of_them(episodes):
+    empty, stuck = episodes["empty"], episodes["stuck"]
+    low, high, colours = animation._boxes(empty, 0, 1)
+    rising = (colours == COLOURS["liftable"]).all(axis=1)
+    item = empty.items[0]
+    assert rising.sum() == 1 and len(low) == len(empty.load)
+    middle = empty.load.positions[item] + (0, 0, animation.RISE)
+    assert (low[rising] + high[rising])[0] / 2 == pytest.approx(middle)
+    assert len(animation._boxes(empty, 1, 1)[0]) == len(empty.load) - 1
+    *_, colours = animation._boxes(stuck, 0, 1)
+    assert (colours[-1] == COLOURS["failed"]).all()
+
+
+def test_committed_picture_is_small_enough_for_a_readme():
+    assert (files.FIGURES / "unloading.gif").stat().st_size <= 2_000_000

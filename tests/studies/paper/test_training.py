@@ -1,0 +1,121 @@
+"""The paper's training in the container: its data, and how its policies are looked at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import grid
+from studies.grid import Cell, Grid, read_policies
+from studies.paper import training
+from studies.paper.training import PAPER
+from tests.agent.networks import lowest
+from unload import TrainConfig, evaluate, load_policy, policies
+from unload.support import files
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """A grid of four short runs that stands for the paper's."""
+    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
+    config = TrainConfig(picks=64 * 500, batch_size=64, n_features=4, log_interval=500)
+    cells = {training.DEFAULTS: Cell(config, range(4))}
+    small = Grid("falls/paper", "make it", cells)
+    monkeypatch.setattr(training, "PAPER", small)
+    return small
+
+
+def test_a_full_grid_leaves_what_the_papers_plots_and_others_read(small, tmp_path):
+    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
+    training.training_data(None, None, **folders, n_jobs=1)
+    curve = training.default_curves(tmp_path)[0]
+    for name in ("loss_function_agent", "total_rew_function_agent"):
+        table = pd.read_csv(tmp_path / f"{name}.csv")
+        assert list(table.columns) == ["Wall time", "Step", "Value"]
+        assert table["Step"].tolist() == curve["picks"].tolist()
+    reward = table["Value"] / 500
+    assert ((reward + 1) / 2).tolist() == pytest.approx(curve["success_rate"].tolist(), abs=1e-5)
+    trained = read_policies(tmp_path / "falls/paper.safetensors")
+    for seed, name in training.PLAYERS.items():
+        stored = load_policy(tmp_path / f"policies/{name}.safetensors").network.state_dict()
+        weights = trained[f"{training.DEFAULTS}/seed_{seed}"].network.state_dict()
+        assert all(stored[key].equal(weights[key]) for key in weights)
+
+
+def test_a_reduced_grid_leaves_published_data_alone(small, tmp_path):
+    training.training_data(None, 6400, tmp_path, tmp_path / "runs", n_jobs=1)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"reduced", "runs"}
+    assert len(training.default_curves(tmp_path / "reduced")) == 4
+
+
+def test_all_runs_of_the_papers_cells_are_published():
+    runs = training.paper_runs()
+    planned = [(name, seed) for name, cell in training.PAPER_CELLS.items() for seed in cell.seeds]
+    assert [(cell, seed) for cell, seed, _ in runs] == planned and len(runs) == 36
+    assert {curve["picks"].iloc[-1] for _, _, curve in runs} == {20_000_000}
+
+
+def test_committed_runs_are_what_the_published_grid_exports(tmp_path, monkeypatch):
+    names = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
+    committed = [pd.read_csv(files.DATA / name) for name in names]
+    curves = training.default_curves()
+    monkeypatch.setattr(training, "default_curves", lambda folder: curves)
+    training.export_training(committed[1]["Wall time"], tmp_path)
+    for name in names:
+        assert (tmp_path / name).read_bytes() == (files.DATA / name).read_bytes()
+
+
+def test_committed_policies_are_those_of_the_grid():
+    for seed, name in training.PLAYERS.items():
+        stored = load_policy(name).network.state_dict()
+        weights = training.default_policies()[seed].network.state_dict()
+        assert all(stored[key].equal(weights[key]) for key in weights)
+
+
+def test_runs_and_policies_are_summed_up(monkeypatch):
+    monkeypatch.setattr(training, "EVALUATION", {"episodes": 2, "seed": 1})
+    began = training.while_training()
+    assert began.index.tolist() == list(training.DEFAULT_SEEDS)
+    assert began["msr_end"].tolist() == pytest.approx([0.901, 0.950, 0.400, 0.372], abs=1e-3)
+    assert (began["msr_best"] >= began[["msr_start", "msr_end"]].max(axis=1)).all()
+    applied = training.in_fresh_containers()
+    alone = evaluate(training.default_policies()[2], 2, 1, mask=False)
+    assert applied.loc[2, "msr_no_mask"] == pytest.approx(alone["success_rate"].mean())
+    assert applied.loc[2, "deadlocked_no_mask"] == pytest.approx(alone["deadlocked"].mean())
+
+
+def test_the_default_cell_has_the_defaults():
+    assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
+
+
+def test_means_over_whole_episodes():
+    """Points of 10 of 500 steps; the last, incomplete episode is left out."""
+    picks = np.arange(1, 121) * 640
+    curve = pd.DataFrame({"picks": picks, "success_rate": np.arange(120.0)})
+    curve = curve.assign(wall_time=picks / 1000, epsilon=1 - picks / 1e6)
+    means = training.episode_means(curve)
+    assert means["picks"].tolist() == [32_000, 64_000]
+    assert means["success_rate"].tolist() == [24.5, 74.5]
+    assert means["epsilon"].tolist() == pytest.approx([0.968, 0.936])
+    with pytest.raises(ValueError, match="points after 1,920 picks each; expected a divisor"):
+        training.episode_means(curve.assign(picks=3 * picks))
+
+
+def test_random_picks_succeed_more_often_in_full_containers():
+    msr = training.msr_by_pick(policies.random, containers=32)
+    assert msr.shape == (500,)
+    assert 0.2 < msr[100:].mean() < 0.3 < msr[:20].mean() < 0.4
+    highest = training.msr_by_pick(policies.highest, containers=2, mask=False)
+    assert (highest == 1).all()
+    # Without the mask a failed item is picked for ever.
+    assert set(training.msr_by_pick(lowest, containers=1, mask=False)) == {0}
+    assert training.msr_by_pick(lowest, containers=1).any()
+
+
+def test_favourites_are_asked_for_while_a_player_unloads():
+    lifted = training.favourites(policies.highest, policies.random, containers=2, unloaded=60)
+    assert lifted.shape == (2, 3)
+    assert lifted.all()
+    assert not training.favourites(lowest, policies.highest, containers=1, unloaded=25).any()

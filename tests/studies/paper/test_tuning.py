@@ -1,0 +1,129 @@
+"""The paper's search: its data, what its plots read of it, and what is measured of it."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import grid
+from studies.grid import read_grid
+from studies.paper import tuning
+from studies.paper.tuning import tuning_grid
+from unload.env.vector import HighestItemVectorEnv
+from unload.support import files
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """A search of two batch sizes, two runs each, that stands for the paper's."""
+    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
+    small = tuning_grid([1e-2, 1e-3], [8, 16], runs=2, equalize=[True], steps=20)
+    monkeypatch.setattr(tuning, "TUNING", small)
+    monkeypatch.setattr(tuning, "SHOWN", (("with", "loss", 8, 1e-3, 1),))
+    return small
+
+
+def test_a_search_is_published_in_a_table_per_batch_size(small, tmp_path):
+    tuning.tuning_data(tmp_path, tmp_path / "runs", n_jobs=1)
+    names = {path.name for path in (tmp_path / "tuning").iterdir()}
+    tables = {f"with_fe_b{b}_{name}.csv" for b in (8, 16) for name in ("loss", "success_rate")}
+    assert names == tables | {"tuning.provenance.json"}
+    table = pd.read_csv(tmp_path / "tuning/with_fe_b8_success_rate.csv")
+    assert len(table) == 20 and len(table.columns) == 1 + 4
+    curves = tuning.read_curves("success_rate", 8, 1e-3, folder=tmp_path)
+    assert np.array_equal(curves[1], table["with_fe_b8/lr_0.001/seed_1"])
+    summary = tuning.tuning_summary(tmp_path).set_index(["batch_size", "learning_rate"])
+    assert summary["runs"].tolist() == [2] * 4
+    mean = np.mean([run.mean() for run in curves.values()])
+    assert summary.loc[(8, 1e-3), "final_msr"] == pytest.approx(mean)
+    shown = (tmp_path / "dummy_sim_with_hist_equal").iterdir()
+    (path,) = shown
+    assert path.name == "loss_curve_bz_8_lr_0.001_agent_1.csv"
+    lines = path.read_text().splitlines()
+    losses = tuning.read_curves("loss", 8, 1e-3, folder=tmp_path)[1]
+    assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
+
+
+def test_the_search_is_the_papers():
+    configs = list(tuning.TUNING.configs().values())
+    assert len(configs) == 3 * 4 * 10 * 2
+    assert {config.learning_rate for config in configs} == {1e-1, 1e-2, 1e-3}
+    assert {config.seed for config in configs} == set(range(10))
+    assert {config.picks for config in configs} == {3000 * 64}
+    assert {config.env for config in configs} == {"unload/HighestItem-v0"}
+    sizes = [config.batch_size for config in configs]
+    assert set(sizes) == {64, 256, 1024, 2048}
+    assert sizes == sorted(sizes, reverse=True), "slow runs come first"
+
+
+@pytest.mark.parametrize("equalize", [True, False])
+def test_cells_of_the_search_are_named_by_their_settings(equalize):
+    config = tuning.TUNING.cells[tuning.tuning_cell(1024, 0.1, equalize)].config
+    assert (config.batch_size, config.learning_rate, config.equalize) == (1024, 0.1, equalize)
+
+
+def test_committed_files_of_the_papers_plots_are_those_of_the_tables(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        tuning, "read_grid", lambda grid, folder, cells: read_grid(grid, files.DATA, cells)
+    )
+    tuning.export_tuning(tmp_path)
+    written = {path.relative_to(tmp_path) for path in tmp_path.glob("*/*.csv")}
+    assert written == {path.relative_to(files.DATA) for path in files.DATA.glob("dummy_sim_*/*")}
+    assert len(written) == 8
+    for path in written:
+        assert (tmp_path / path).read_bytes() == (files.DATA / path).read_bytes()
+
+
+def test_committed_search_has_all_runs():
+    curves = read_grid(tuning.TUNING)
+    assert (curves.groupby(["cell", "seed"])["picks"].agg(["size", "max"]) == [3000, 192_000]).all(
+        axis=None
+    )
+    assert len(curves) == 240 * 3000
+
+
+def test_summary_of_a_run():
+    msr = np.concatenate([np.linspace(0, 1, 500), np.ones(500)])
+    loss = np.interp(np.arange(1000), [0, 300, 600, 999], [0.9, 0.1, 0.4, 0.0])
+    loss[:10] = np.nan
+    summary = tuning.run_summary(msr, loss)
+    assert summary["final_msr"] == 1
+    assert 480 < summary["solved_at"] < 510
+    assert summary["loss_start"] == loss[10]
+    assert summary["loss_dip"] == pytest.approx(0.1, abs=0.02)
+    assert summary["loss_peak"] == pytest.approx(0.4, abs=0.02)
+    assert summary["loss_end"] < 0.1
+
+
+def test_summary_of_a_run_that_fails_or_solves_at_once():
+    failed = tuning.run_summary(np.zeros(200), np.ones(200))
+    assert np.isnan(failed["solved_at"])
+    assert tuning.run_summary(np.ones(200), np.ones(200))["solved_at"] == 0
+
+
+def test_chance_is_the_share_of_the_highest_items():
+    env = HighestItemVectorEnv()
+    env.reset(seed=0)
+    shares = []
+    for _ in range(100):
+        observations = env.step(np.zeros(64, int))[0]
+        heights = observations[..., 2]
+        shares.append((heights > heights.max(axis=1, keepdims=True) - 0.01).mean())
+    assert tuning.chance() == pytest.approx(np.mean(shares), abs=0.002)
+
+
+def test_greedy_msr_is_found_again_in_that_of_the_exploring_agent():
+    steps = 2000
+    greedy = np.linspace(0.2, 1, steps)
+    epsilon = np.maximum(0, 1 - np.arange(steps) / 1000)
+    mixed = (1 - epsilon) * greedy + epsilon * tuning.chance()
+    found = tuning.greedy_msr(np.array([mixed, mixed]))
+    assert np.isnan(found[:, :45]).all()
+    assert found[:, 60:] == pytest.approx(np.array([greedy, greedy])[:, 60:], abs=0.01)
+    reached = tuning.greedy_reached([mixed, mixed])
+    assert reached["step"] == pytest.approx(1750, abs=10)
+    assert reached["low"] == reached["high"] == reached["step"]
+
+
+def test_a_level_is_reached_where_the_msr_stays_above_it():
+    msr = np.array([[np.nan, 0.95, 0.5, 0.9, 1], [1, 1, 1, 1, 0.5], [1, 1, 1, 1, 1]])
+    assert np.array_equal(tuning.reached_at(msr), [3, np.nan, 0], equal_nan=True)

@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+from studies.play.episode import Episode, Pick, explain
+
+
+@pytest.fixture
+def episode(full_load):
+    return Episode(full_load, seed=3)
+
+
+def test_picks_are_those_of_the_environment(full_load, make_env):
+    episode = Episode(full_load, seed=3)
+    env = make_env().unwrapped
+    observation, info = env.reset(seed=3, options={"load": full_load})
+    for row in (0, 20, 20, 40, 60, 5):
+        assert np.array_equal(episode.observation, observation)
+        assert np.array_equal(episode.allowed(), info["action_mask"])
+        assert np.array_equal(episode.visible, env.visible)
+        deadlocked = info["action_mask"][row] == 0
+        observation, reward, _, _, info = env.step(row)
+        pick = episode.pick(int(episode.visible[row]))
+        assert (pick.item, pick.distance) == (info["item"], info["distance"])
+        assert (pick.success, pick.deadlocked) == (reward > 0, deadlocked)
+    assert episode.unloaded() == info["unloaded"] == episode.unloaded(6)
+
+
+def test_a_pick_names_what_rests_on_it(boxes):
+    tower = Episode(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0), (2.0, 0.2)))
+    assert [tower.pick(item).on_top for item in (3, 0, 2)] == [(), (1, 2), ()]
+    assert tower.pick(0).on_top == (1,)
+    assert tower.unloaded() == 2
+
+
+def test_a_moment_is_the_container_after_some_picks(episode):
+    moments = [episode.moment()]
+    for row in (3, 77, 50, 10, 100):
+        episode.pick(int(episode.visible[row]))
+        moments.append(episode.moment())
+    for count, then in enumerate(moments):
+        now = episode.moment(count)
+        assert np.array_equal(now.present, then.present)
+        assert np.array_equal(now.visible, then.visible)
+        assert np.array_equal(now.failed, then.failed)
+        assert now.pick == then.pick
+    assert np.array_equal(episode.visible, moments[-1].visible)
+    assert (~moments[-1].present).sum() == episode.unloaded()
+
+
+def test_failed_items_are_kept_until_the_next_success(boxes):
+    episode = Episode(boxes((1.0, 0.2), (1.0, 0.6), (2.0, 0.2)))
+    episode.pick(0)
+    assert episode.moment().failed.tolist() == [0]
+    assert episode.moment().groups()["failed"].tolist() == [0]
+    assert episode.pick(0).deadlocked
+    episode.pick(2)
+    assert episode.moment().failed.tolist() == []
+    assert "failed" not in episode.moment().groups()
+    assert not episode.pick(0).deadlocked
+
+
+def test_picks_can_be_taken_back(episode):
+    states = []
+    for row in (3, 60, 40, 0):
+        states.append((episode.observation.copy(), episode.allowed().copy(), episode.visible))
+        episode.pick(int(episode.visible[row]))
+    picks = episode.picks.copy()
+    episode.back_to(4)
+    assert episode.picks == picks
+    for count in (2, 0):
+        episode.back_to(count)
+        assert episode.picks == picks[:count]
+        now = episode.observation, episode.allowed(), episode.visible
+        assert all(np.array_equal(a, b) for a, b in zip(now, states[count]))
+    assert [episode.pick(pick.item) for pick in picks] == picks
+
+
+def test_what_can_be_lifted_is_lifted(episode):
+    liftable = episode.liftable()
+    assert 0 < len(liftable) < len(episode.visible)
+    for item in episode.visible:
+        success = episode.pick(int(item)).success
+        assert success == (item in liftable)
+        episode.back_to(0)
+    episode.pick(int(liftable[0]))
+    assert np.array_equal(episode.liftable(0), liftable)
+    assert liftable[0] not in episode.liftable()
+
+
+@pytest.mark.parametrize(
+    ("pick", "words"),
+    [
+        (Pick(7, 0.46, True, (), False), "Item 7 moved by 0.46 m, because nothing rests on it"),
+        (Pick(7, 0.24, True, (8,), False), "1 box rests on it, but tipped aside"),
+        (Pick(7, 0.009, False, (8, 9), False), "moved by 9 mm, because 2 boxes rest on it"),
+        (Pick(7, 0.0, False, (8,), True), "this is a deadlock"),
+    ],
+)
+def test_a_pick_is_explained(pick, words):
+    assert words in explain(pick)
+    assert ("failed" in explain(pick)) == (not pick.success)
+
+
+def test_a_pick_that_is_refused_changes_nothing(episode):
+    unseen = next(i for i in range(len(episode.load)) if i not in episode.visible)
+    with pytest.raises(ValueError, match=f"item is {unseen}; expected one of the visible"):
+        episode.pick(unseen)
+    assert episode.picks == []

@@ -1,0 +1,182 @@
+import re
+
+import numpy as np
+import pytest
+
+from studies.play.agent_view import AgentView
+from studies.play.canvas import ABSENT
+from studies.play.episode import Episode
+from studies.play.players import Run
+from studies.play.playground import SHOWN, Playground
+from studies.play.replay import replay
+from unload import stack_load
+from unload.load.view import PLOTLY_MIMETYPE
+
+WIDGET = "application/vnd.jupyter.widget-view+json"
+
+
+@pytest.fixture(scope="module")
+def stuck():
+    """The paper's agent without the mask, on a load where it gets stuck at pick 95."""
+    return Playground(seed=4, player="the paper's agent", mask=False, picks=120)
+
+
+@pytest.fixture
+def game():
+    return Playground(seed=4, picks=20)
+
+
+def click(playground, item) -> None:
+    """What the canvas sends when a box is clicked."""
+    playground.canvas._handle_custom_msg({"item": int(item)}, [])
+
+
+def score(playground) -> list[int]:
+    """Unloaded items and picks, as they are shown."""
+    return [int(number) for number in re.findall(r"<b>(\d+)</b>", playground.score.value)]
+
+
+def colour(playground, item) -> str | None:
+    number = playground.canvas.colours[item]
+    return None if number == ABSENT else SHOWN[number]
+
+
+def test_a_click_lifts_a_box_and_changes_the_score(game):
+    liftable = game.you.liftable()
+    blocked = np.setdiff1d(game.you.visible, liftable)
+    assert score(game) == [0, 0]
+    click(game, liftable[0])
+    assert score(game) == [1, 1]
+    assert colour(game, liftable[0]) is None
+    assert game.canvas.lift["item"] == liftable[0] and game.canvas.lift["distance"] > 0.2
+    click(game, blocked[0])
+    assert score(game) == [1, 2]
+    assert colour(game, blocked[0]) == "failed"
+    assert game.canvas.outlined == list(game.you.picks[-1].on_top) != []
+    assert "therefore the pick failed" in game.message.value
+
+
+def test_a_playground_opens_no_simulator(monkeypatch):
+    """Of 30 MiB each, which nobody would close: notebooks make one after the other."""
+    monkeypatch.setattr("unload.physics.local.World", None)
+    game = Playground(seed=4)
+    click(game, game.you.visible[0])
+    assert score(game)[1] == 1
+
+
+def test_undo_takes_picks_back_one_by_one(game):
+    before = bytes(game.canvas.colours)
+    assert game.undo.disabled
+    for item in game.you.visible[:2]:
+        click(game, item)
+    assert not game.undo.disabled
+    game.undo.click()
+    assert len(game.you.picks) == 1
+    game.undo.click()
+    game.undo.click()
+    assert score(game) == [0, 0] and bytes(game.canvas.colours) == before
+
+
+def test_what_is_not_visible_may_not_be_picked(game):
+    hidden = next(i for i in range(len(game.you.load)) if i not in game.you.visible)
+    click(game, hidden)
+    assert score(game) == [0, 0] and "not among the 128 nearest" in game.message.value
+
+
+def test_what_the_browser_sends_is_shown_as_text(game):
+    game.canvas._handle_custom_msg({"item": "<b>box</b>"}, [])
+    assert "Item &lt;b&gt;box&lt;/b&gt; is not" in game.message.value
+
+
+def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
+    load, run = stack_load(np.random.default_rng(4)), game.runs["random"]
+    alone, other = (Run("random", load, seed) for seed in (4, 0))
+    assert np.array_equal(alone.observation, game.you.observation)
+    assert not np.array_equal(alone.observed_positions(), other.observed_positions())
+    rows = [each.visible.tolist().index(each.choose()) for each in (alone, other)]
+    assert rows[0] != rows[1]
+    for each in (run, alone, other):
+        each.play_to(5)
+    assert run.picks == alone.picks != other.picks
+    assert np.array_equal(game.you.observation, Episode(load, 4).observation)
+    assert not np.array_equal(game.you.observation, Episode(load, 0).observation)
+
+
+def test_hints_are_what_can_be_lifted(game):
+    game.hints.value = True
+    liftable = game.you.liftable()
+    green = [i for i in range(len(game.you.load)) if colour(game, i) == "liftable"]
+    assert green == sorted(liftable)
+
+
+def test_all_players_have_as_many_picks_as_you(game):
+    for item in game.you.liftable()[:3]:
+        click(game, item)
+    standings = {name: (picks, unloaded) for name, picks, unloaded in game.standings()}
+    assert set(standings) == {"you", *game.runs}
+    assert {picks for picks, _ in standings.values()} == {3}
+    assert standings["highest"] == (3, 3)
+    assert all(name.split(",")[0].replace("'", "&#x27;") in game.board.value for name in standings)
+
+
+def test_a_player_is_watched_by_the_slider(game):
+    game.player.value = "highest"
+    run = game.runs["highest"]
+    for count in (5, 6, 2):
+        game.slider.value = count
+        assert score(game) == [run.unloaded(count), count]
+        shown = [colour(game, item) is not None for item in range(len(run.load))]
+        assert shown == run.moment(count).present.tolist()
+    click(game, run.moment(2).visible[0])
+    assert "choose the player" in game.message.value and not game.you.picks
+    game.player.value = "you"
+    assert score(game) == [0, 0]
+
+
+def test_play_moves_the_slider_in_the_browser(game):
+    assert (game.link.source, game.link.target) == ((game.play, "value"), (game.slider, "value"))
+    assert game.play.max == game.slider.max == 20
+
+
+def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
+    stuck.slider.value = 100
+    assert "this is a deadlock" in stuck.message.value
+    unloaded = score(stuck)[0]
+    assert "<td>without</td>" in stuck.board.value
+    stuck.mask.value = True
+    stuck.slider.value = 110
+    assert score(stuck)[0] == unloaded + 10
+    stuck.slider.value = 94
+    stuck.mask.value = False
+    stuck.slider.value = 110
+    assert score(stuck)[0] == unloaded
+
+
+def test_a_replay_stands_beside_the_widget(game):
+    bundle = game._repr_mimebundle_()
+    assert {WIDGET, PLOTLY_MIMETYPE, "image/png", "text/plain"} == set(bundle)
+    labels = [step["label"] for step in bundle[PLOTLY_MIMETYPE]["layout"]["sliders"][0]["steps"]]
+    assert labels[-1] == "20 picks, 20 unloaded"
+
+
+BAD_INPUT = {
+    "agent is 'random'; expected one of": lambda load: AgentView(agent="random"),
+    "picks is -1": lambda load: AgentView(picks=-1),
+    "load is 'load'; expected an unload.Load": lambda load: Episode("load"),
+    "count is 1; expected an integer >= 0 and <= 0": lambda load: Episode(load).back_to(1),
+    "player is 'chess'; expected one of 'random'": lambda load: Run("chess", load),
+    "mask is 1; expected True or False": lambda load: Run("random", load, mask=1),
+    "count is -1": lambda load: Run("random", load).play_to(-1),
+    "seed is -1": lambda load: Playground(seed=-1),
+    "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
+    "mask is None": lambda load: Playground(mask=None),
+    "picks is 0": lambda load: Playground(picks=0),
+    "height is 10": lambda load: replay(Episode(load), height=10),
+}
+
+
+@pytest.mark.parametrize("message", BAD_INPUT)
+def test_bad_input_is_refused(full_load, message):
+    """In all modules of this room; the message names the argument and its value."""
+    with pytest.raises((TypeError, ValueError), match=message):
+        BAD_INPUT[message](full_load)

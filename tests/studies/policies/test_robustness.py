@@ -1,0 +1,72 @@
+"""Policies with every box simulated."""
+
+from functools import partial
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies.policies import robustness
+from studies.provenance import read_provenance
+from tests.agent.networks import lowest
+from unload import policies
+from unload.agent.evaluation import evaluate
+from unload.load.boxes import Load
+from unload.load.substacks import front_walls, stack_load
+from unload.physics.bullet import World
+
+
+def two_walls(rng: np.random.Generator) -> Load:
+    return front_walls(stack_load(rng), 2)
+
+
+def piles(rng: np.random.Generator) -> Load:
+    """140 piles of two cubes each."""
+    x, y, z = np.meshgrid(0.5 * np.arange(14) + 0.25, 0.25 * np.arange(10) + 0.125, (0.1, 0.3))
+    positions = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    labels = np.zeros(len(positions), dtype=int)
+    return Load(positions, np.full((len(positions), 3), 0.2), labels, labels)
+
+
+def test_play_agrees_with_evaluate():
+    seed = np.random.SeedSequence(4).generate_state(1).tolist()[0]
+    row = robustness.play(policies.random, "keep", seed, 4, two_walls)
+    settings = {"physics": "full", "after_pick": "keep", "max_picks": 4, "stack": two_walls}
+    assert row["success_rate"] == evaluate(policies.random, 1, 4, **settings)["success_rate"][0]
+
+
+@pytest.mark.parametrize(
+    ("policy", "distance", "free", "jammed"),
+    [
+        (policies.highest, 0.4, 1.0, 0.0),
+        (policies.highest, 0.1, 1.0, 1.0),
+        (lowest, 0.1, 0.0, 0.0),
+        (lowest, 0.4, 0.0, 0.0),
+    ],
+)
+def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, free, jammed):
+    monkeypatch.setattr(World, "pull", lambda world, body: distance)
+    row = robustness.play(policy, "restore", 0, 20, piles)
+    assert row["free"] == free and row["jammed"] == jammed
+    assert row["success_rate"] == (distance > 0.2)
+
+
+def test_a_box_is_free_once_all_on_it_is_unloaded(monkeypatch):
+    monkeypatch.setattr(World, "pull", lambda world, body: 0.4)
+    assert robustness.play(policies.highest, "restore", 0, 200, piles)["free"] == 1
+
+
+def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(robustness, "PLAYED", (("highest", "keep"), ("highest", "restore")))
+    monkeypatch.setattr(robustness, "EPISODES", 2)
+    monkeypatch.setattr(robustness, "PICKS", 2)
+    small = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 1))
+    monkeypatch.setattr(robustness, "play", small)
+    robustness.robustness_data(tmp_path, tmp_path / "runs")
+    written = (tmp_path / "policies/robustness.csv").read_text()
+    table = pd.read_csv(tmp_path / "policies/robustness.csv")
+    assert table["after_pick"].tolist() == 2 * ["keep"] + 2 * ["restore"]
+    assert read_provenance(tmp_path / "policies", "robustness")["settings"]["episodes"] == 2
+    monkeypatch.setattr(robustness, "play", lambda *_: pytest.fail("played again"))
+    robustness.robustness_data(tmp_path, tmp_path / "runs")
+    assert (tmp_path / "policies/robustness.csv").read_text() == written

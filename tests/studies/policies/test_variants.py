@@ -1,0 +1,83 @@
+"""The grids of the outlook: their plans, and what they publish."""
+
+from dataclasses import asdict, replace
+
+import pytest
+
+from studies.fingerprint import training_fingerprint
+from studies.grid import read_measures
+from studies.policies import variants
+from studies.policies.variants import GRIDS, judged, read_variants, variants_data
+from studies.provenance import read_provenance
+from unload import TrainConfig, evaluate, load_policy
+from unload.support import files
+
+FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_data_hold_the_runs_of_the_plan(name):
+    rows = read_measures(GRIDS[name])
+    planned = list(GRIDS[name].configs())
+    assert [f"{cell}/seed_{seed}" for cell, seed in zip(rows["cell"], rows["seed"])] == planned
+    provenance = read_provenance(files.DATA, f"variants/{name}")
+    assert provenance["runs"] == provenance["planned"] == len(planned)
+    assert not provenance["reduced"]
+
+
+@pytest.mark.parametrize(
+    ("name", "varied"),
+    [
+        ("networks", {"network"}),
+        ("rewards", set()),
+        ("settings", {"learning_rate", "gradient_steps"}),
+        ("recommended", {"equalize"}),
+    ],
+)
+def test_each_cell_differs_from_the_paper_in_little(name, varied):
+    paper, changes = asdict(TrainConfig()), set()
+    for cell in GRIDS[name].cells.values():
+        config = asdict(cell.config)
+        assert {field for field in paper if paper[field] != config[field]} <= varied | FREE
+        changes.add((repr(cell.config), repr(cell.change)))
+    assert len(changes) == len(GRIDS[name].cells)
+
+
+def test_rewards_stand_beside_the_setting_that_changes_nothing():
+    rows = read_variants("rewards")
+    control = read_measures(GRIDS["settings"]).query("cell == 'unchanged'")
+    assert rows.head(3).to_dict("list") == control.to_dict("list")
+    assert rows["cell"].unique().tolist() == ["unchanged", *GRIDS["rewards"].cells]
+
+
+def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 3, "seed": 1000})
+    policy = load_policy("paper_seed_2")
+    expected = [
+        evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
+    ]
+    assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
+
+
+def test_the_recommended_policy_is_judged_as_the_data_say():
+    policy = load_policy("recommended")
+    first = read_measures(GRIDS["recommended"]).iloc[0]
+    assert judged(policy, variants.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
+
+
+def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
+    small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5)
+    for name in ("rewards", "recommended"):
+        cells = {
+            cell: one._replace(config=replace(small, equalize=one.config.equalize, picks=200))
+            for cell, one in GRIDS[name].cells.items()
+        }
+        monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 1, "seed": 1000})
+    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
+    variants_data(["rewards", "recommended"], n_jobs=1, **folders)
+    rows = read_measures(GRIDS["rewards"], tmp_path)
+    assert rows["cell"].nunique() == 3 and rows["msr_mask"].between(0, 1).all()
+    provenance = read_provenance(tmp_path, "variants/recommended")
+    assert provenance["fingerprint"] == training_fingerprint()
+    assert not load_policy(tmp_path / "policies/recommended.safetensors").equalize

@@ -1,0 +1,208 @@
+"""Changes of a training run."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from studies import changes
+from studies.falls.laboratory import CONFIG
+from unload import task
+from unload.agent.config import TrainConfig
+from unload.agent.training import Training, train_changed
+from unload.env.equalization import equalize
+from unload.load.substacks import stack_load
+
+SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
+
+
+def test_height_reward_shapes_what_is_learned_and_not_what_is_seen():
+    config = TrainConfig(picks=64 * 20, batch_size=64, equalize=False)
+    plain, shaped = Training(config), Training(config)
+    changes.height_reward(shaped, 0.4)
+    heights = plain.rollout.observations[..., 2].copy()
+    plain.step()
+    shaped.step()
+    rewards, learned = (run.replay.arrays["rewards"][:64] for run in (plain, shaped))
+    heights = heights[np.arange(64), plain.replay.arrays["actions"][:64]]
+    expected = rewards + 0.4 * (heights + 1) / 2 * (rewards < 0)
+    np.testing.assert_allclose(learned, expected, rtol=1e-6)
+    assert (rewards < 0).any() and (rewards > 0).any()
+    assert plain.curve.sums == shaped.curve.sums
+    for run in (plain, shaped):
+        run.rollout.close()
+
+
+def test_mirrored_places_keep_their_size_and_heights_are_untouched():
+    seen = equalize(np.random.default_rng(0).random((200, 128, 3)))
+    found = changes.mirror(seen.copy(), np.random.default_rng(1))
+    signs = found[:, :, :2] / seen[:, :, :2]
+    assert (found[..., 2] == seen[..., 2]).all()
+    assert (signs == signs[:, :1]).all()  # one sign per observation and axis
+    assert len(np.unique(signs[:, 0], axis=0)) == 4  # all combinations occur
+
+
+def run_of(change, steps=3, config=SMALL):
+    """A run with a change, and the observations that it has seen, as stored rows."""
+    run = Training(config)
+    change(run)
+    seen = []
+    for _ in range(steps):
+        seen.append(run.rollout.observations.copy())
+        run.step()
+    run.rollout.close()
+    return run, np.concatenate(seen)
+
+
+def note_what_is_asked(run):
+    """The observations of greedy choices, which all become that of the first item."""
+    asked = []
+    run.agent.learner.best_actions = lambda observations, allowed: (
+        asked.append(observations) or np.zeros(len(allowed), np.int64)
+    )
+    return asked
+
+
+def remembered(run):
+    """The observations in a run's replay memory."""
+    return run.replay.arrays["observations"][: len(run.replay)].copy()
+
+
+def test_only_what_is_stored_is_changed():
+    run, seen = run_of(changes.shuffled)
+    plain, same = run_of(lambda run: None)
+    stored = remembered(run)
+    assert (seen == same).all()  # exploring alone: the choices do not depend on the weights
+    assert (stored[..., 2] == seen[..., 2]).all()
+    assert (stored[..., 0] != seen[..., 0]).mean() > 0.9
+    assert (remembered(plain) == seen).all()
+
+
+def test_the_setting_shuffles_as_the_change_does():
+    changed, seen = run_of(changes.shuffled)
+    configured, _ = run_of(lambda run: None, config=replace(SMALL, shuffle_places=True))
+    assert (remembered(changed) == remembered(configured)).all()
+    assert (remembered(changed) != seen).any()
+
+
+def test_what_is_seen_is_changed_in_choosing_and_learning():
+    run = Training(SMALL)
+    asked = note_what_is_asked(run)
+    changes.see(run, changes.without)
+    run.step()
+    run.agent.choose(run.rollout.observations, run.rollout.allowed, 0.0, run.rng)
+    run.rollout.close()
+    assert (asked[-1][..., :2] == 0).all()
+    assert (asked[-1][..., 2] == run.rollout.observations[..., 2]).all()
+    assert (remembered(run)[..., :2] == 0).all()
+
+
+def test_ties_are_averaged_along_the_given_axes_alone():
+    seen = np.random.default_rng(0).choice([0.0, 0.3], (2, 128, 3))
+    found = changes.ranked(seen, averaged=(2,))
+    assert [len(np.unique(found[0, :, axis])) for axis in range(3)] == [128, 128, 2]
+
+
+def test_failures_are_replaced_by_successes_of_the_same_step():
+    run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
+    rewards = run.replay.arrays["rewards"][:256]
+    assert (rewards[:128] < 0).any()
+    assert (rewards[128:] > 0).all()
+    assert run.replay.total == 256
+
+
+def test_a_step_without_a_success_stores_the_step_before():
+    run = Training(SMALL)
+    added = []
+    run.replay.add = lambda **picks: added.append(picks)
+    changes.successes_only(run, start=0)
+    won = {"rewards": np.array([1.0, -1.0]), "actions": np.array([4, 5])}
+    lost = {"rewards": np.array([-1.0, -1.0]), "actions": np.array([6, 7])}
+    run.replay.add(**won)
+    run.replay.add(**lost)
+    run.rollout.close()
+    assert [list(picks["actions"]) for picks in added] == [[4, 4], [4, 4]]
+
+
+def test_a_teacher_chooses_by_height_and_its_preference():
+    run = Training(SMALL)
+    changes.taught(run, preference=0.5)
+    seen = np.array([[[0, 0, 0.5], [0, 1, 0.1], [1, 1, 0.2]]], np.float32)
+    best = run.agent.learner.best_actions
+    run.rollout.close()
+    assert best(seen, np.array([[True, True, True]])) == 2
+    assert best(seen, np.array([[True, True, False]])) == 1
+
+
+def test_choices_see_other_signs_than_the_memory_holds():
+    run = Training(SMALL)
+    asked = note_what_is_asked(run)
+    changes.untilted(run, axes=(1,))
+    seen = run.rollout.observations.copy()
+    run.agent.choose(seen, run.rollout.allowed, 0.0, run.rng)
+    run.step()
+    run.rollout.close()
+    signs = asked[0][..., 1] / seen[..., 1]
+    assert set(np.unique(signs)) == {-1, 1} and (signs == signs[:, :1]).all()
+    assert (asked[0][..., [0, 2]] == seen[..., [0, 2]]).all()
+    assert (remembered(run) == seen).all()
+
+
+def test_loads_are_dug_to_the_preferred_side():
+    (load,) = changes.dug_loads(0.4, count=1, seed=2)
+    plain = stack_load(np.random.default_rng(2))
+    assert len(plain) - changes.DEEPEST <= len(load) < len(plain)
+    near = load.positions[:, 0] > task.CONTAINER[0] / 2
+    side = load.positions[near, 1] > task.CONTAINER[1] / 2
+    assert side.mean() < 0.45  # more boxes are left on the other side
+
+
+def test_dug_loads_come_from_the_second_episode_on(monkeypatch):
+    (load,) = changes.dug_loads(0.4, count=1, seed=2)
+    monkeypatch.setattr(changes, "dug_loads", lambda preference: [load])
+    run = Training(replace(SMALL, max_picks=2))
+    changes.dug(run, 0.4)
+    counts = []
+    for _ in range(3):
+        counts.append(run.rollout.envs.unwrapped._containers.left.copy())
+        run.step()
+    run.rollout.close()
+    assert (counts[0] > len(load)).all() and (counts[2] == len(load)).all()
+
+
+def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
+    alone = Training(replace(SMALL, seed=SMALL.seed + 50))
+    run, _ = run_of(partial(changes.tandem, change=lambda run: None, seed=50), steps=4)
+    first = Training(SMALL).agent.state()
+    assert run.agent.choose.__self__ is not run.agent
+    active, weight = run.agent.choose.__self__.state(), "network.extractor.weight"
+    assert not np.array_equal(active[weight], alone.agent.state()[weight]), "it has learned"
+    assert not np.array_equal(run.agent.state()[weight], first[weight])
+    assert len(run.replay) == 256
+
+
+@pytest.mark.slow
+def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, monkeypatch):
+    """Otherwise the long runs would depend on where they were stopped."""
+    whole = train_changed(SMALL, tmp_path / "whole", changes.shuffled, progress=False)
+    steps = []
+
+    def stop(run):
+        changes.shuffled(run)
+        step = run.step
+
+        def step_or_stop():
+            if len(steps) == 60:
+                raise KeyboardInterrupt
+            steps.append(step())
+
+        run.step = step_or_stop
+
+    eager = replace(SMALL, checkpoint_interval=0)
+    with pytest.raises(KeyboardInterrupt):
+        train_changed(eager, tmp_path / "stopped", stop, progress=False)
+    assert (tmp_path / "stopped" / "checkpoint.npz").exists()
+    resumed = train_changed(SMALL, tmp_path / "stopped", changes.shuffled, progress=False)
+    columns = ["picks", "success_rate", "loss"]
+    assert resumed.curve[columns].equals(whole.curve[columns])

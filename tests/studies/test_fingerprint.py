@@ -1,0 +1,91 @@
+"""Results that rest on training are of today's training."""
+
+import pytest
+import torch
+
+from studies import fingerprint
+from studies.fingerprint import short_runs, training_fingerprint
+from studies.policies.variants import GRIDS
+from unload import PEQNetwork, TrainConfig
+from unload.network.variants import NETWORKS
+from unload.support import files
+
+# Folders and files of data/ that rest on no training of the container's agent.
+NOT_TRAINED = {"benchmarks", "heap", "lift_agreement", "obs_hist_equal", "policies"}
+
+
+def networks_of(name: str) -> set[str]:
+    """The networks that a result rests on."""
+    grid = GRIDS.get(name.removeprefix("variants/"))
+    return {cell.config.network for cell in grid.cells.values()} if grid else {"peq"}
+
+
+def test_data_is_of_todays_training():
+    suffix = ".provenance.json"
+    of_today = {}
+    for path in files.DATA.rglob(f"*{suffix}"):
+        name = path.relative_to(files.DATA).as_posix().removesuffix(suffix)
+        if name.split("/")[0] not in NOT_TRAINED:
+            wanted = training_fingerprint(networks_of(name))
+            of_today[name] = files.read_json(path).get("fingerprint") == wanted
+    differing = {name for name, same in of_today.items() if not same}
+    assert of_today
+    assert not differing, "made by code that trained otherwise: make it again"
+
+
+@pytest.fixture
+def changed(monkeypatch):
+    """``changed(owner, name, value)``: the fingerprint of one short run with this change."""
+    run = short_runs("peq")[1]
+    monkeypatch.setattr(fingerprint, "short_runs", lambda network: [run])
+
+    def compute(owner=None, name="", value=None):
+        fingerprint._curves.cache_clear()
+        with monkeypatch.context() as patch:
+            if owner is not None:
+                patch.setattr(owner, name, value)
+            return training_fingerprint()
+
+    yield compute
+    fingerprint._curves.cache_clear()
+
+
+def scaled_weights(factor: float):
+    """``PEQNetwork.reset_parameters``, with weights that are slightly different."""
+    original = PEQNetwork.reset_parameters
+
+    def reset(network, generator):
+        original(network, generator)
+        with torch.no_grad():
+            for weights in network.parameters():
+                weights *= factor
+
+    return reset
+
+
+def test_only_what_changes_training_changes_the_fingerprint(changed):
+    today = changed()
+    assert today == changed()
+    assert today == changed(PEQNetwork, "reset_parameters", scaled_weights(1 + 1e-7))
+    assert today != changed(PEQNetwork, "reset_parameters", scaled_weights(1.01))
+    epsilon = TrainConfig.epsilon
+    assert today != changed(TrainConfig, "epsilon", lambda self, picks: epsilon(self, picks + 64))
+    seeds = TrainConfig.seeds
+    assert today != changed(TrainConfig, "seeds", lambda self: seeds(self)[::-1])
+
+
+def test_each_network_has_its_fingerprint(monkeypatch):
+    with pytest.raises(ValueError, match="network is 'mlp'; expected one of 'peq'"):
+        training_fingerprint(["mlp"])
+    monkeypatch.setattr(fingerprint, "_curves", lambda network: f"curves of {network}")
+    single = {name: training_fingerprint([name]) for name in NETWORKS}
+    assert len(set(single.values())) == len(NETWORKS)
+    both = training_fingerprint(["stack", "peq", "stack"])
+    assert both == training_fingerprint(["peq", "stack"])
+    assert both not in single.values()
+    assert single["peq"] == training_fingerprint()
+
+
+@pytest.mark.parametrize("network", NETWORKS)
+def test_short_runs_are_of_their_network(network):
+    assert {config.network for config, _ in short_runs(network)} == {network}

@@ -1,0 +1,99 @@
+"""The command line, the files that it has made in ``data/``, and what the room refuses."""
+
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+
+from studies import __main__ as command
+from studies.falls.laboratory import laboratory_data
+from studies.grid import train_grid
+from studies.paper.loads import side_views, wall_view
+from studies.paper.training import PAPER
+from studies.paper.tuning import tuning_config
+from studies.policies import comparison
+from studies.policies.variants import variants_data, variants_msr
+from unload import stack_load
+from unload.support import files
+
+
+@pytest.fixture
+def called(monkeypatch):
+    """``called(*arguments)``: what the command line passes to the parts that it runs."""
+
+    def call(*arguments: str) -> list[tuple[str, dict]]:
+        calls = []
+
+        def make(name, **given):
+            calls.append((name, given))
+
+        for name, (summary, _, options) in command.PARTS.items():
+            monkeypatch.setitem(command.PARTS, name, (summary, partial(make, name), options))
+        monkeypatch.setattr(sys, "argv", ["reproduce", *arguments])
+        command.main()
+        return calls
+
+    return call
+
+
+def test_a_part_runs_at_full_size_by_default(called):
+    assert called("observation") == [("observation", {})]
+    for name in ("lifts", "tuning", "policies"):
+        assert called(name) == [(name, {"n_jobs": -1})]
+    assert called("training") == [("training", {"cells": None, "picks": None, "n_jobs": -1})]
+
+
+def test_options_reach_the_part(called):
+    given = called("training", "--picks", "64000", "--cells", "paper_mask", "--jobs", "2")
+    assert given == [("training", {"picks": 64000, "cells": ["paper_mask"], "n_jobs": 2})]
+
+
+def test_paper_makes_every_part(called):
+    calls = called("paper", "--jobs", "3")
+    assert [name for name, _ in calls] == list(command.PARTS) and len(calls) < 10
+    for name, given in calls:
+        assert given == ({} if name == "observation" else {"n_jobs": 3})
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["nonsense"], ["training", "--cells", "none"], ["observation", "--jobs", "1"]],
+)
+def test_unknown_arguments_are_refused(called, arguments, capsys):
+    with pytest.raises(SystemExit):
+        called(*arguments)
+    assert "error: " in capsys.readouterr().err
+
+
+def test_help_names_every_part(called, capsys):
+    with pytest.raises(SystemExit):
+        called("--help")
+    shown = capsys.readouterr().out
+    for name in (*command.PARTS, "paper"):
+        assert f"python -m studies {name} " in shown
+
+
+def test_no_committed_file_is_too_large():
+    sizes = [path.stat().st_size for path in files.DATA.rglob("*") if path.is_file()]
+    assert max(sizes) <= 1_000_000
+    assert sum(sizes) <= 25_000_000
+
+
+LOAD = stack_load(np.random.default_rng(0), walls=1)
+BAD_INPUT = {
+    "cells is 'nonsense'": lambda folder: laboratory_data(["nonsense"], folder=folder),
+    "cells is 'nothing'": lambda folder: train_grid(PAPER, ["nothing"], folder=folder),
+    "steps is 0": lambda _: tuning_config(8, 1e-3, steps=0),
+    "a group's name is 'seen'": lambda _: side_views(LOAD.positions, {"": {"seen": [0, 1]}}),
+    "a group's name is 'taken'": lambda _: wall_view(LOAD, 0, {"taken": [0, 1]}),
+    "n_jobs is 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
+    "grids is 'nothing'": lambda folder: variants_data(["nothing"], folder=folder),
+    "grid is 'nothing'": lambda folder: variants_msr("nothing", folder),
+}
+
+
+@pytest.mark.parametrize("message", BAD_INPUT)
+def test_bad_input_is_refused_by_name(message, tmp_path):
+    with pytest.raises(ValueError, match=message):
+        BAD_INPUT[message](tmp_path)

@@ -1,0 +1,167 @@
+"""Many runs side by side: what is kept, what is reported, and who does the work."""
+
+import os
+import time
+from dataclasses import replace
+from functools import partial
+
+import pandas as pd
+import pytest
+
+from studies import sweep
+from studies.paper.tuning import tuning_config
+from tests.agent.runs import CONTAINER, assert_same
+from unload.agent.config import TrainConfig
+from unload.agent.identity import unchanged
+from unload.agent.training import train
+from unload.load.substacks import stack_load
+from unload.support import files
+
+
+@pytest.fixture
+def configs():
+    """Two tiny runs."""
+    return {f"set/run_{run}": tuning_config(8, 1e-3, run, steps=4, n_features=4) for run in (0, 1)}
+
+
+def without_times(path):
+    return pd.read_csv(path).drop(columns="wall_time").to_csv()
+
+
+def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
+    report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    assert list(report.index) == list(configs)
+    assert (report["error"] == "").all()
+    assert report["seed"].tolist() == [0, 1]
+    assert capfd.readouterr() == ("", "")
+    for name, config in configs.items():
+        folder = tmp_path / "many" / name
+        assert report.loc[name, "folder"] == str(folder)
+        train(config, tmp_path / "alone" / name, progress=False)
+        assert without_times(folder / "curve.csv") == without_times(
+            tmp_path / "alone" / name / "curve.csv"
+        )
+        record = files.read_json(folder / "record.json")
+        assert '"digest"' in (folder / "record.json").read_text()
+        assert record["peak_memory_mib"] > 50 and 0 <= record["wall_time_s"] < 60
+        assert "256/256" in (folder / "log.txt").read_text()
+    written = sorted(tmp_path.glob("many/set/*/*"))
+    before = [path.stat().st_mtime_ns for path in written]
+    sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    assert [path.stat().st_mtime_ns for path in written] == before
+
+
+def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path):
+    config = replace(configs["set/run_0"], log_interval=2)
+    with pytest.raises(KeyboardInterrupt, match="stopped after 192 picks"):
+        sweep._run("run", config, tmp_path / "run", unchanged, {}, sweep=0)
+    sweep.run_sweep({"run": config}, tmp_path, n_jobs=1, progress=False)
+    assert (tmp_path / "run" / "policy.safetensors").exists()
+
+
+def test_own_loads_are_trained_on_with_one_file_of_lifts(tmp_path):
+    config, own = TrainConfig(**CONTAINER), {"stack": partial(stack_load, walls=10)}
+    report = sweep.run_sweep(
+        {"run": config}, tmp_path, 1, progress=False, lifts=tmp_path / "lifts.npz", **own
+    )
+    assert report["error"].tolist() == [""] and (tmp_path / "lifts.npz").exists()
+    train(config, tmp_path / "alone", progress=False, **own)
+    assert_same(tmp_path / "run", tmp_path / "alone")
+
+
+def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):
+    sweep.run_sweep(configs, tmp_path, n_jobs=1)
+    captured = capsys.readouterr()
+    assert "2/2" in captured.out
+    assert captured.err == ""
+
+
+def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "run_0").write_text("a file where the run's folder should be")
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert "run_0" in report["error"].iloc[0]
+    assert report["error"].iloc[1] == ""
+
+
+def test_an_error_in_own_code_is_traced_in_the_runs_log(tmp_path):
+    def leaning_stack(rng):
+        raise RuntimeError("it fell over")
+
+    config = TrainConfig(**CONTAINER)
+    report = sweep.run_sweep({"run": config}, tmp_path, 1, progress=False, stack=leaning_stack)
+    assert report["error"].item() == "RuntimeError: it fell over"
+    assert "in leaning_stack" in (tmp_path / "run" / "log.txt").read_text()
+
+
+def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
+    other = tuning_config(8, 1e-3, 0, steps=4, n_features=5)
+    train(other, tmp_path / "set" / "run_0", progress=False)
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
+    assert "n_features (5, not 4)" in report["error"].iloc[0]
+    assert report["error"].iloc[1] == ""
+
+
+@pytest.mark.slow
+def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
+    distributed = pytest.importorskip("distributed")
+    configs = {
+        f"run_{run}": tuning_config(8, 1e-3, run, steps=200, n_features=4) for run in range(4)
+    }
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    )
+    with cluster, distributed.Client(cluster) as client:
+        workers = set(client.run(os.getpid).values())
+        report = sweep.run_sweep(configs, tmp_path / "dask", backend="dask", progress=False)
+    assert capfd.readouterr().err == ""
+    assert (report["error"] == "").all()
+    sweep.run_sweep(configs, tmp_path / "loky", n_jobs=2, progress=False)
+    for name in configs:
+        curves = [
+            without_times(tmp_path / backend / name / "curve.csv") for backend in ("dask", "loky")
+        ]
+        assert curves[0] == curves[1]
+    used = {
+        files.read_json(tmp_path / "dask" / name / "record.json")["process"] for name in configs
+    }
+    assert used == workers
+    assert len(used) == 2
+
+
+def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(sweep, "WORKER_WAIT", 0.2)
+    message = "^2 runs wait for a worker of the Dask cluster .* has had none for 0.2 s; start one"
+    cluster = distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None)
+    with cluster, distributed.Client(cluster), pytest.raises(TimeoutError, match=message):
+        start = time.monotonic()
+        sweep.run_sweep(configs, tmp_path, backend="dask", progress=False)
+    assert time.monotonic() - start > 0.2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"configs": [1]}, r"configs is \[1\]; expected a dict"),
+        ({"configs": {"a": 1}}, r"configs\['a'\] is 1; expected an unload.TrainConfig"),
+        *(
+            ({"configs": {name: tuning_config(8, 1e-3, 0)}}, "configs has the name .*relative path")
+            for name in ("", ".", "/a", "../a", "a/", "a//b", 3)
+        ),
+        ({"folder": None}, "folder is None; expected a path"),
+        ({"changes": 3}, "changes is 3; expected a dict"),
+        ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
+        ({"stack": 3}, "stack is 3; expected a function from a Generator to a Load"),
+        ({"lifts": 3}, "lifts is 3; expected a path"),
+        ({"lifts": ""}, "lifts is ''; expected the name of a file"),
+        ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
+        ({"backend": "spark"}, "backend is 'spark'; expected one of 'loky', 'dask'"),
+        ({"backend": "dask"}, "first create a Dask Client"),
+    ],
+)
+def test_bad_arguments_are_refused_before_anything_runs(configs, tmp_path, arguments, message):
+    usual = {"configs": configs, "folder": tmp_path, "progress": False}
+    with pytest.raises((TypeError, ValueError), match=message):
+        sweep.run_sweep(**usual | arguments)
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,114 @@
+"""The fused twin of ``unload.agent.learner.PlainLearner``, and its Adam."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from unload.fast import fused
+from unload.network.peq import PEQNetwork
+from unload.support.compiled import compiled
+
+BETAS = 0.9, 0.999  # of Adam, PyTorch's defaults
+
+
+class FusedLearner:
+    """``PlainLearner`` for a network to which ``fused.applies``, with the same interface.
+
+    Its update reads the rows where they are, which saves copying them, and goes on in other
+    threads while the caller does something else. It takes tanh in double precision, where its
+    slope does not become 0 so soon, and the choice compares what stands before it, which never
+    ties.
+
+    Args:
+        network, learning_rate, beta: see ``PlainLearner``.
+    """
+
+    def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
+        self.weights, self.beta = fused.weights_of(network), beta
+        self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
+
+    def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+        return fused.best_actions(self.weights, observations, allowed)
+
+    def start(
+        self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
+    ) -> Callable[[], float]:
+        """See ``PlainLearner``; weights and arrays must stay as they are until the call."""
+        gradients = fused.start_gradients(
+            self.weights,
+            batch["observations"],
+            batch["actions"],
+            targets,
+            self.beta,
+            rows,
+        )
+
+        def finish() -> float:
+            total = gradients()
+            self.optimizer.step(total[:-1])
+            return float(total[-1])
+
+        return finish
+
+    def state(self) -> dict[str, np.ndarray]:
+        return self.optimizer.state()
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        self.optimizer.load_state(arrays)
+
+
+class Adam:
+    """The optimizer of some weights, which it changes where they are.
+
+    ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights of the
+    paper's network. This is its rule in one compiled pass; readers learn from the other one.
+
+    Args:
+        weights: (k,) float32 each.
+        learning_rate: the step size.
+        epsilon: is added to the root mean square of the gradients, by which a step is divided.
+    """
+
+    def __init__(
+        self, weights: Sequence[np.ndarray], learning_rate: float, epsilon: float = 1e-8
+    ) -> None:
+        self.weights = tuple(weights)
+        self.learning_rate, self.epsilon = learning_rate, epsilon
+        self.steps = 0
+        count = sum(map(len, self.weights))
+        # Running means of the gradients and of their squares.
+        self.moments = np.zeros((2, count))
+
+    def step(self, gradients: np.ndarray) -> None:
+        """Change all weights once.
+
+        Args:
+            gradients: float64, of all weights, one array after the other.
+        """
+        self.steps += 1
+        corrections = [1 - beta**self.steps for beta in BETAS]
+        settings = self.learning_rate, self.epsilon, *corrections
+        _step(self.weights, gradients, self.moments, *settings)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What ``load_state`` needs to go on from here."""
+        return {"steps": np.array(self.steps), "moments": self.moments.copy()}
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` returned."""
+        self.steps = int(arrays["steps"])
+        self.moments[:] = arrays["moments"]
+
+
+@compiled
+def _step(weights, gradients, moments, learning_rate, epsilon, correction, correction2):
+    mean, square = moments
+    i = 0
+    for part in weights:
+        for place in range(len(part)):
+            gradient = gradients[i]
+            mean[i] += (1 - BETAS[0]) * (gradient - mean[i])
+            square[i] += (1 - BETAS[1]) * (gradient * gradient - square[i])
+            size = np.sqrt(square[i] / correction2) + epsilon
+            part[place] -= learning_rate * (mean[i] / correction) / size
+            i += 1
