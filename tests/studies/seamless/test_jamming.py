@@ -1,0 +1,156 @@
+"""Jams in a training run, and another weight of z."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from studies.falls.laboratory import CONFIG
+from studies.seamless.jamming import jam, uniform, weigh
+from unload import task
+from unload.agent.training import Training, train_changed
+from unload.env.observation import nearest
+
+SMALL = replace(CONFIG, picks=64 * 500, log_interval=500, seed=3, mask=False)
+
+
+@pytest.fixture
+def random_run():
+    """A run whose picks are all random; its environments are closed at the end."""
+    runs = []
+
+    def make(change, **fields) -> Training:
+        runs.append(Training(replace(SMALL, epsilon_final=1.0, **fields), change=change))
+        return runs[-1]
+
+    yield make
+    for run in runs:
+        run.rollout.close()
+
+
+def attempts(run, actions) -> np.ndarray:
+    """How far the items in some rows would be lifted now, m."""
+    return run.rollout.envs.unwrapped._look_up(np.full(64, actions))[1]
+
+
+def test_uniform_numbers_are_uniform_and_independent():
+    drawn = uniform(7, np.arange(400)[:, None], np.arange(500))
+    assert 0 <= drawn.min() and drawn.max() < 1
+    assert np.histogram(drawn, 10, (0, 1))[0] == pytest.approx(20_000, rel=0.03)
+    for axis in (0, 1):  # neighbours along either counter
+        pair = np.corrcoef(
+            drawn.take(range(399), axis).ravel(), drawn.take(range(1, 400), axis).ravel()
+        )
+        assert abs(pair[0, 1]) < 0.01
+    assert (uniform(8, np.arange(9)) != uniform(7, np.arange(9))).all()
+
+
+def test_the_share_of_free_boxes_jams_and_no_other_lift_changes(random_run):
+    plain, jammed = random_run(lambda run: None), random_run(partial(jam, share=0.4))
+    without = np.stack([attempts(plain, row) for row in range(128)])
+    found = np.stack([attempts(jammed, row) for row in range(128)])
+    free = without >= task.LIFT_THRESHOLD
+    assert (found[~free] == without[~free]).all()
+    stuck = found[free] == 0
+    assert (found[free][~stuck] == without[free][~stuck]).all()
+    assert stuck.mean() == pytest.approx(0.4, abs=0.03)
+
+
+@pytest.mark.parametrize(("share", "start"), [(0.0, 0.264), (0.4, 0.158), (1.0, 0.0)])
+def test_random_picks_succeed_the_less_the_more_boxes_jam(random_run, share, start):
+    run = random_run(partial(jam, share=share))
+    while not run.rollout.finished:
+        run.step()
+    # A whole episode of 64 containers; without jams the rate falls faster, because more is dug.
+    assert run.curve.table()["success_rate"].iloc[0] == pytest.approx(start, abs=0.012)
+
+
+def test_a_jam_that_is_drawn_anew_ends_at_the_next_attempt(random_run):
+    run = random_run(partial(jam, share=0.5))
+    first = attempts(run, 0)
+    run.rollout.steps += 1
+    second = attempts(run, 0)
+    free = np.maximum(first, second) > 0
+    assert 0.2 < (first[free] != second[free]).mean() < 0.8
+
+
+def test_a_jam_until_the_next_success_lasts_through_failures(random_run):
+    run = random_run(partial(jam, share=0.5, lasts=1))
+    state = run.rollout.envs.unwrapped._containers
+    first = attempts(run, 0)
+    run.rollout.steps += 1
+    state.masks[:] = 0
+    assert (attempts(run, 0) == first).all()
+    state.unloaded[:] += 1
+    assert (attempts(run, 0) != first).any()
+
+
+def test_a_jam_lasts_for_some_successes(random_run):
+    """Redrawn after ten successes, at a moment of its own: after one, a tenth has been drawn."""
+    run = random_run(partial(jam, share=0.5, lasts=10))
+    state = run.rollout.envs.unwrapped._containers
+    first = np.stack([attempts(run, row) for row in range(128)])
+    changed = []
+    for _ in range(20):
+        state.unloaded[:] += 1
+        now = np.stack([attempts(run, row) for row in range(128)])
+        free = np.maximum(first, now) >= task.LIFT_THRESHOLD
+        changed.append((first[free] != now[free]).mean())
+    assert changed[0] == pytest.approx(0.1 * changed[-1], rel=0.35)
+    assert changed[4] == pytest.approx(0.5 * changed[-1], rel=0.25)
+    assert changed[-1] == pytest.approx(changed[9], rel=0.15)  # all of them are drawn again
+
+
+def test_a_masked_box_is_tried_again_and_its_mask_is_kept(random_run):
+    run = random_run(partial(jam, share=0.0))
+    state = run.rollout.envs.unwrapped._containers
+    before = attempts(run, 5)
+    state.masks[:, 5] = 0
+    state.failed[:, 5] = 0.123
+    assert (attempts(run, 5) == before).all()
+    assert (state.masks[:, 5] == 0).all()
+
+
+def test_a_stopped_run_goes_on_with_the_same_jams(tmp_path):
+    config = replace(SMALL, picks=64 * 200, log_interval=20, mask=True)
+    change = partial(jam, share=0.4, lasts=3)
+    whole = train_changed(config, tmp_path / "whole", change, progress=False)
+
+    def stop(point):
+        if point["picks"] == 64 * 100:
+            raise InterruptedError("in the middle")
+
+    with pytest.raises(InterruptedError):
+        train_changed(config, tmp_path / "stopped", change, progress=False, callback=stop)
+    resumed = train_changed(config, tmp_path / "stopped", change, progress=False)
+    columns = ["picks", "success_rate", "loss"]
+    assert resumed.curve[columns].equals(whole.curve[columns])
+
+
+def test_a_weight_changes_what_is_visible(random_run):
+    run = random_run(partial(weigh, z=1.0))
+    envs = run.rollout.envs.unwrapped
+    seen = envs._containers.seen[0]
+    load, present = envs._load(0)
+    positions = (seen[: len(load)] + 1) / 2 * task.CONTAINER
+    distances = (task.VIEWPOINT - positions) ** 2 @ [1, 0, 1]
+    expected = np.argsort(distances)[:128]
+    assert len(np.setdiff1d(envs.visible[0], expected)) <= 1  # float32 positions may tie
+    assert len(np.setdiff1d(envs.visible[0], nearest(positions))) > 5
+
+
+def test_the_papers_weight_changes_nothing(random_run):
+    plain, weighed = random_run(lambda run: None), random_run(partial(weigh, z=4.0))
+    assert (plain.rollout.observations == weighed.rollout.observations).all()
+    for run in (plain, weighed):
+        for _ in range(50):
+            run.step()
+    assert plain.curve.sums == weighed.curve.sums
+
+
+def test_random_picks_succeed_less_often_with_weight_one(random_run):
+    run = random_run(partial(weigh, z=1.0))
+    while not run.rollout.finished:
+        run.step()
+    assert run.curve.table()["success_rate"].iloc[0] == pytest.approx(0.18, abs=0.01)  # 0.264 with the paper's 4
