@@ -5,7 +5,7 @@ from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 
-from studies.falls import laboratory, long
+from studies.falls import fresh, laboratory, long
 from studies.lifts import agreement, table
 from studies.paper import observation, training, tuning
 from studies.policies import comparison, robustness, variants
@@ -42,6 +42,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
+    "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, fresh.OPTIONS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
 }  # fmt: skip

@@ -153,4 +153,6 @@ def test_random_picks_succeed_less_often_with_weight_one(random_run):
     run = random_run(partial(weigh, z=1.0))
     while not run.rollout.finished:
         run.step()
-    assert run.curve.table()["success_rate"].iloc[0] == pytest.approx(0.18, abs=0.01)  # 0.264 with the paper's 4
+    assert run.curve.table()["success_rate"].iloc[0] == pytest.approx(
+        0.18, abs=0.01
+    )  # 0.264 with the paper's 4
