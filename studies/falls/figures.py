@@ -5,14 +5,17 @@ from collections.abc import Mapping
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from studies.falls.fresh import ERRS, THRESHOLDS
 from studies.falls.laboratory import PREFERENCES, PUPILS
 from studies.paper.training import PAPER_CELLS
 from studies.statistics import PAPER_MSR, end_msr, t_interval
 from studies.style import COLOURS, styled
 from unload import task
 
+MOST_PREFERENCE = 1.5  # larger ones are drawn at the edge
 NAMES = {
     "ranks": "ranks",
     "shuffled": "places dealt anew",
@@ -166,3 +169,44 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     axes.set_yticks(range(len(names)), names.values())
     axes.grid(axis="y", visible=False)
     return figure
+
+
+@styled
+def phase(panels: Mapping[str, tuple[pd.DataFrame, bool]]) -> Figure:
+    """Networks by their preferences along x and y, coloured by whether they err.
+
+    Args:
+        panels: rows with ``slope_x``, ``slope_y``, ``slope_z`` and ``judged_as_is``, and whether
+            equal x share one rank, by the panel's title. The shaded region is where the rule of
+            ``fresh.predicted`` says that a network errs.
+    """
+    figure, all_axes = plt.subplots(
+        1, len(panels), figsize=(4.2 * len(panels), 3.8), sharex=True, sharey=True, squeeze=False
+    )
+    for axes, (title, (rows, averaged)) in zip(all_axes[0], panels.items()):
+        draw_phase(axes, rows, averaged)
+        axes.set_title(title)
+    all_axes[0, 0].set_ylabel("preference along y (across)")
+    all_axes[0, 0].legend(loc="upper right", fontsize=8)
+    return figure
+
+
+def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
+    """Draw the region in which networks err, and networks. Arguments as of ``phase``."""
+    along_x, along_y = THRESHOLDS
+    axes.axhspan(along_y, MOST_PREFERENCE, color="#f6d5c9", zorder=0)
+    if not averaged:
+        axes.fill_between([along_x, MOST_PREFERENCE], 0, along_y, color="#f6d5c9", zorder=0)
+    preferences = rows[["slope_x", "slope_y"]].abs().div(rows["slope_z"].abs(), axis=0)
+    preferences = preferences.clip(upper=0.98 * MOST_PREFERENCE)
+    errs = rows["judged_as_is"] < ERRS
+    for name, chosen, colour, marker in (
+        ("errs", errs, "C1", "o"), ("does not", ~errs, "C0", "o"),
+    ):  # fmt: skip
+        places = preferences[chosen]
+        axes.plot(
+            places["slope_x"], places["slope_y"], marker, color=colour, markersize=4, alpha=0.7,
+            markeredgewidth=0, label=f"{name}: {len(places)}",
+        )  # fmt: skip
+    axes.set(xlabel="preference along x (depth)", xlim=(0, MOST_PREFERENCE))
+    axes.set(ylim=(0, MOST_PREFERENCE))

@@ -127,6 +127,13 @@ CELLS: dict[str, Cell] = {
     "untilted": _cell(changes.untilted),
     "untilted_y": _cell(partial(changes.untilted, axes=(1,))),
 }
+# Who chooses and who watches in the cells of two networks; the row of a run is of the one that
+# watches, but for ``mean`` and ``end``, which are of the picks and so of the one that chooses.
+WATCHING = {
+    "watching_ranks": "ranks choose, ranks watch",
+    "watching_shuffled": "shuffled places choose, ranks watch",
+    "shuffled_watching_ranks": "ranks choose, shuffled places watch",
+}
 TRACED = ("ranks", "ranks_no_mask", "shuffled", "averaged", "positions")
 EVERY = 16_000  # picks between the points of a trace: half an episode of all containers
 JUDGED = [f"judged_{name}" for name in measures.BLANKED]
