@@ -10,6 +10,7 @@ from studies.lifts import agreement, table
 from studies.paper import observation, training, tuning
 from studies.policies import comparison, robustness, variants
 from studies.results import COMMAND, JOBS
+from studies.seamless import jam_tables
 from studies.seamless import training as seamless
 
 
@@ -43,6 +44,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
     "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, fresh.OPTIONS),
+    "jams": ("jams in seamless walls, every box simulated", jam_tables.jams_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
 }  # fmt: skip

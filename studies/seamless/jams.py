@@ -1,6 +1,6 @@
 """How many free boxes jam in a seamless wall: every box simulated, with PyBullet.
 
-    python -m studies seamless --jams
+    python -m studies jams
 
 A box is free if nothing rests on it; it jams if it is lifted by less than 0.2 m all the same. What
 a case varies stands in ``Case``, the cases in ``CASES``.
@@ -8,6 +8,7 @@ a case varies stands in ``Case``, the cases in ``CASES``.
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -219,7 +220,13 @@ def cases() -> Iterator[tuple[str, Case]]:
 
 def question(kind: str, case: Case) -> dict:
     """What an answer depends on, see ``results.kept``."""
-    return {"kind": kind, **asdict(case), "code": identity(asker(kind))}
+    return {"kind": kind, **asdict(case), "code": code_of(kind)}
+
+
+@cache  # it reads files
+def code_of(kind: str) -> str:
+    """The identity of what computes the rows of a case."""
+    return identity(asker(kind))
 
 
 def asker(kind: str) -> Callable[[Case], list[dict]]:

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from studies import changes
-from studies.falls import fresh, laboratory, measures
+from studies.falls import fresh, laboratory
 from studies.provenance import read_provenance
 from unload.agent.identity import unchanged
 from unload.agent.training import Training

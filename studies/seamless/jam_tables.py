@@ -1,0 +1,108 @@
+"""What is published of the jams: counts by case, by place, and how long a jam lasts."""
+
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from studies.results import COMMAND, keep_all, publish, read_table
+from studies.seamless import jams
+from studies.seamless.jams import Case
+from unload import task
+from unload.support import files
+
+PART = "jams"
+# Of a case, by its column; ``moment`` counts the boxes that were taken out before the lifts.
+COLUMNS = {
+    "walls": "walls", "load": "load", "friction": "friction", "gap": "gap", "spread": "spread",
+    "picks": "moment", "again": "again", "settle": "settle", "time_step": "time_step",
+    "iterations": "iterations", "maximal": "maximal",
+}  # fmt: skip
+PLACE = ["friction", "wall", "edge", "covered", "beside"]
+
+
+def jams_data(
+    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+) -> None:
+    """Lift the boxes of all cases; write three tables in ``seamless/``.
+
+    ``jams.csv`` has a row per case: its ``question``, the fields of ``jams.Case`` by ``COLUMNS``;
+    ``free``, the boxes lifted; ``jammed``, those that moved less than 0.2 m; ``median``, how far
+    they moved, in m. ``jam_places.csv`` counts the boxes of fresh seamless walls by place, see
+    ``jams.place``. ``jam_lasting.csv`` has a row per case and number of boxes ``out``: of the
+    ``boxes`` ``jammed_before`` how many jammed ``again_jammed``, and how many of the others
+    ``newly_jammed``.
+
+    Args:
+        folder: of the data.
+        runs_dir: where the lifts of each case are kept.
+        n_jobs: processes, as in joblib.
+    """
+    cases = list(jams.cases())
+    jobs = [(jams.question(kind, case), partial(jams.asker(kind), case)) for kind, case in cases]
+    results = keep_all(Path(runs_dir) / "seamless/jams", jobs, n_jobs)
+    counts, places, lasting = [], [], []
+    for (kind, case), result in zip(cases, results):
+        if kind == "lasting":
+            lasting += lasting_rows(case, result.value)
+            continue
+        counts.append(count_row(kind, case, result.value))
+        if kind == "fresh" and case.gap == 0:
+            places.append(pd.DataFrame(result.value).assign(friction=case.friction))
+    every = pd.concat(places)
+    groups = every.assign(jammed=every["distance"] < task.LIFT_THRESHOLD).groupby(PLACE)["jammed"]
+    tables = {
+        "jams": pd.DataFrame(counts),
+        "jam_places": groups.agg(free="size", jammed="sum").reset_index(),
+        "jam_lasting": pd.DataFrame(lasting),
+    }
+    settings = {"loads": len(jams.LOADS), "cases": len(cases)}
+    publish(Path(folder) / "seamless", "jams", tables, f"{COMMAND} {PART}", settings, results)
+
+
+def count_row(kind: str, case: Case, lifts: list[dict]) -> dict:
+    """The row of a case in ``jams.csv``."""
+    distances = np.array([each["distance"] for each in lifts])
+    fields = {column: asdict(case)[name] for name, column in COLUMNS.items()}
+    return {"question": kind, **fields} | {
+        "free": len(distances),
+        "jammed": int((distances < task.LIFT_THRESHOLD).sum()),
+        "median": np.median(distances),
+    }
+
+
+def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
+    """The rows of a case in ``jam_lasting.csv``."""
+    table = pd.DataFrame(lifts)
+    table["was"] = table["before"] < task.LIFT_THRESHOLD
+    table["is"] = table["distance"] < task.LIFT_THRESHOLD
+    rows = []
+    for out, group in table.groupby("out"):
+        rows.append({
+            "load": case.load, "friction": case.friction, "again": case.again, "out": out,
+            "boxes": len(group), "jammed_before": int(group["was"].sum()),
+            "again_jammed": int((group["was"] & group["is"]).sum()),
+            "newly_jammed": int((~group["was"] & group["is"]).sum()),
+        })  # fmt: skip
+    return rows
+
+
+def read_jams(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """A row per case, see ``jams_data``."""
+    columns = ["question", *COLUMNS.values(), "free", "jammed", "median"]
+    return read_table(Path(folder) / "seamless/jams.csv", f"{COMMAND} {PART}", columns)
+
+
+def read_places(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """Free and jammed boxes by where they stand, see ``jams_data``."""
+    columns = [*PLACE, "free", "jammed"]
+    return read_table(Path(folder) / "seamless/jam_places.csv", f"{COMMAND} {PART}", columns)
+
+
+def read_lasting(folder: str | Path = files.DATA) -> pd.DataFrame:
+    """How long jams last, see ``jams_data``."""
+    columns = ["load", "friction", "again", "out", "boxes"]
+    columns += ["jammed_before", "again_jammed", "newly_jammed"]
+    return read_table(Path(folder) / "seamless/jam_lasting.csv", f"{COMMAND} {PART}", columns)
