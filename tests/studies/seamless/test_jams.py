@@ -65,7 +65,9 @@ def test_a_box_that_is_lifted_again_at_once_moves_as_before(monkeypatch):
     monkeypatch.setattr(jams, "PERSISTENCE", (0, 1))
     rows = jams.persistence(Case(0, walls=1, friction=1.0))
     at_once = [row for row in rows if row["out"] == 0]
-    assert at_once and all(row["before"] == row["distance"] for row in at_once)
+    # The first lift of all finds the contacts as they settled, the others those of the poses.
+    assert [row["distance"] for row in at_once[1:]] == [row["before"] for row in at_once[1:]]
+    assert at_once[0]["distance"] == pytest.approx(at_once[0]["before"], abs=0.01)
     assert {row["out"] for row in rows} == {0, 1}
 
 
