@@ -21,6 +21,8 @@ N_VISIBLE = 128
 VIEWPOINT = np.array([7.0, 1.25, 2.5])
 # Sec. III-B, diagonal of W: y does not count, z counts more than x.
 DISTANCE_WEIGHTS = np.array([1.0, 0.0, 4.0])
+# What the rows of the observation hold on all axes once fewer items are left; our choice.
+PADDING = -1.0
 
 # Sec. III-C and appendix: one attempt to lift an item.
 PICK_FORCE = 20.0
