@@ -14,7 +14,7 @@ def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (example,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
     promised = re.findall(r"print\(.*\) +# (.*)", example)
-    exec(example, {})
+    exec(example, {"__name__": "__main__"})
     lines = capsys.readouterr().out.splitlines()
     printed = [line for line in lines if line and "pick/s" not in line]  # no progress bar
     assert printed == promised == ["136 True", "1.0", "1.0 128"]
