@@ -47,7 +47,7 @@ dist: $(VENV)/ready  ## build the package to install elsewhere: build/dist/*.whl
 
 book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: build/book/index.html
 	rm -rf build/book
-	$(BIN)/python -m sphinx -q -E -d build/doctrees -c notebooks/book . build/book
+	$(BIN)/python -m sphinx -q -W --keep-going -E -d build/doctrees -c notebooks/book . build/book
 	$(BIN)/python notebooks/book/links.py build/book
 
 browser: $(VENV)/ready-browser  ## use notebooks in JupyterLab and the page that trains in a browser without a window

@@ -12,6 +12,8 @@ import pytest
 import unload
 from unload.support import files
 
+ROOT = Path(__file__).resolve().parents[1]
+
 # Makes PyBullet's import fail as if it were not installed, and then uses the rest.
 WITHOUT_PYBULLET = """
 import sys
@@ -54,7 +56,7 @@ def run(code: str, folder: Path, path: Path) -> str:
 def installed(tmp_path) -> Path:
     """A folder outside the checkout with nothing but the package, built as ``make dist`` does."""
     for name in ("unload", "studies", "pyproject.toml", "README.md", "LICENSE", "Makefile"):
-        subprocess.run(["cp", "-r", files.ROOT / name, tmp_path], check=True)
+        subprocess.run(["cp", "-r", ROOT / name, tmp_path], check=True)
     # The environment is the one that runs this, and need not be made.
     make = ["make", "--silent", f"BIN={Path(sys.executable).parent}", "--old-file=.venv/ready"]
     subprocess.run([*make, "dist"], cwd=tmp_path, check=True)
@@ -67,7 +69,7 @@ def installed(tmp_path) -> Path:
 
 def contents(folder: Path) -> dict[str, bytes]:
     """What the files of a folder hold, without what was compiled from them."""
-    kept = (path for path in folder.rglob("*.*") if path.parent.name != "__pycache__")
+    kept = (path for path in folder.rglob("*.*") if "__pycache__" not in path.parts)
     paths = (path for path in kept if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
@@ -96,14 +98,14 @@ def test_the_checkout_is_found_from_anywhere(tmp_path):
 
 def test_an_import_takes_few_modules(tmp_path):
     code = "import sys, unload; print(len(sys.modules), *sys.modules)"
-    count, *names = run(code, tmp_path, files.ROOT).split()
+    count, *names = run(code, tmp_path, ROOT).split()
     assert int(count) < 700
     assert not {"torch", "numba", "pandas", "matplotlib", "plotly", "pybullet"} & set(names)
 
 
 def test_names_are_where_type_checkers_find_them():
     """What is listed, what is imported for type checkers, and what is imported when it is used."""
-    source = ast.parse((files.ROOT / "unload/__init__.py").read_text())
+    source = ast.parse((ROOT / "unload/__init__.py").read_text())
     (typed,) = (node for node in source.body if isinstance(node, ast.If))
     found = {}
     exec(compile(ast.Module(typed.body, []), "imports", "exec"), found)
@@ -116,6 +118,6 @@ def test_names_are_where_type_checkers_find_them():
 
 
 def test_there_is_one_version():
-    project = tomllib.loads((files.ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert unload.__version__ == project["version"]
-    assert f"version: {unload.__version__}" in (files.ROOT / "CITATION.cff").read_text()
+    assert f"version: {unload.__version__}" in (ROOT / "CITATION.cff").read_text()

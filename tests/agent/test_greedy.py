@@ -4,11 +4,12 @@ import torch
 
 from studies.provenance import VERSION
 from tests.agent.networks import HeightNetwork, peq, weights
-from unload import Greedy, PEQNetwork, equalize, load_policy, policies, save_policy, task
+from unload import Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
 from unload.agent.greedy import greedy_actions, settings_of
 from unload.agent.learner import highest_values
 from unload.network.variants import NETWORKS
 from unload.network.weights import write_weights
+from unload.task import PADDING
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def test_rows_without_an_item_have_no_part_in_the_choice(observations, name, rng
     masks = np.ones((len(observations), 25))
     full = Greedy(network, equalize=False)(observations, masks, rng)
     few = network(torch.from_numpy(observations[:, :4])).argmax(dim=1).numpy()
-    observations[:, 4:], masks[:, 4:] = task.PADDING, 0
+    observations[:, 4:], masks[:, 4:] = PADDING, 0
     assert (Greedy(network, equalize=False)(observations, masks, rng) == few).all()
     with_padding = highest_values(network, observations, masks.astype(bool))
     assert (with_padding != few).any() and (full != few).any()

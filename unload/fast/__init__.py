@@ -1,5 +1,5 @@
-"""The compiled twins of ``env`` and ``agent``: to skip at first reading.
+"""The compiled twins of the environments and the learner; skip this room at first reading.
 
-Read ``ranking`` (Alg. 1) and ``containers``, on which ``env`` steps many containers; then
-``learner``, ``fused`` and its loops in ``kernel``, with which ``agent`` learns.
+Read ``ranking`` and ``containers`` for the environments, ``learner``, ``fused`` and its loops in
+``kernel`` for the learner, in this order.
 """
