@@ -146,8 +146,11 @@ def test_no_imports_run_in_a_circle():
 
 
 def test_the_package_does_not_know_the_studies():
+    """Nor do its tests, except those of the whole house."""
     files = (ROOT / "unload").rglob("*.py")
     assert not [path for path in files if re.search(r"\bstudies\b", path.read_text())]
+    tests = [path for name in room_graph("unload") for path in (TESTS / name).rglob("*.py")]
+    assert not [path for path in tests if "studies" in {name.split(".")[0] for name in needs(path)}]
 
 
 @pytest.mark.parametrize("package", PACKAGES)
