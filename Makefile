@@ -16,12 +16,12 @@ test: $(VENV)/ready  ## run all tests, in two processes
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # Left out: tests marked slow; those that compile anew, kill runs or simulate every box, by name;
-# experiments, figures, notebooks and benchmarks.
-quick: $(VENV)/ready  ## run most tests of the rooms in a minute or so (the Makefile says what it leaves out)
+# studies and notebooks.
+quick: $(VENV)/ready  ## run most tests of the package in a minute or so (the Makefile says what it leaves out)
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow" -k "not (compiled or killed or full)" \
-	--ignore tests/studies --ignore tests/test_notebooks.py 
+	--ignore tests/studies --ignore tests/test_notebooks.py
 
-lint: $(VENV)/ready  ## check style and format, notebooks included, and the core's types
+lint: $(VENV)/ready  ## check style and format, notebooks included, and the package's types
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -47,7 +47,7 @@ dist: $(VENV)/ready  ## build the package to install elsewhere: build/dist/*.whl
 
 book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: build/book/index.html
 	rm -rf build/book
-	$(BIN)/python -m sphinx -q -E -d build/doctrees -c notebooks/book . build/book
+	$(BIN)/python -m sphinx -q -W --keep-going -E -d build/doctrees -c notebooks/book . build/book
 	$(BIN)/python notebooks/book/links.py build/book
 
 browser: $(VENV)/ready-browser  ## use notebooks in JupyterLab and the page that trains in a browser without a window
@@ -66,18 +66,9 @@ $(VENV)/ready: environment.txt pyproject.toml
 	     "but $(PYTHON) is $$($(PYTHON) --version). Try: make PYTHON=/path/to/python3.11"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r environment.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable . \
-	--config-settings editable_mode=compat
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --editable .
 	touch $@
 
-$(VENV)/ready-book: $(VENV)/ready
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[book]"
-	touch $@
-
-$(VENV)/ready-browser: $(VENV)/ready
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[browser]"
-	touch $@
-
-$(VENV)/ready-mutants: $(VENV)/ready
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[mutants]"
+$(VENV)/ready-%: $(VENV)/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c environment.txt --editable ".[$*]"
 	touch $@

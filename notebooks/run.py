@@ -115,13 +115,11 @@ def main() -> int:
     parser.add_argument("--measure", action="store_true", help="say how long each takes to read")
     options = parser.parse_args()
     logging.getLogger("papermill").setLevel(logging.ERROR)
-    chosen = [
-        path
-        for path in notebooks()
-        if not options.names or any(key(path).startswith(name) for name in options.names)
-    ]
-    if not chosen:
-        parser.error(f"no notebook starts with {options.names}")
+    for name in options.names:
+        if not any(key(path).startswith(name) for path in notebooks()):
+            parser.error(f"no notebook starts with {name!r}")
+    beginnings = tuple(options.names) or ""
+    chosen = [path for path in notebooks() if key(path).startswith(beginnings)]
     if options.measure:
         table = pd.DataFrame({key(path): measured(path) for path in chosen}).T
         table.loc["all"] = table.sum()

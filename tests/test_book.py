@@ -1,8 +1,12 @@
-"""The site's own code: how it reads notebooks, and its check of links."""
+"""The site's own code: how it reads notebooks and docstrings, and its check of links."""
+
+import re
+from pathlib import Path
 
 import nbformat
 import pytest
 
+import unload
 from notebooks.book import links, pages
 
 
@@ -40,6 +44,24 @@ def test_a_widget_gives_way_to_what_needs_no_kernel():
     alone, with_picture = read(widget, widget | {"image/png": "AA=="})
     assert alone["text/markdown"] == pages.NEEDS_KERNEL
     assert set(with_picture) == {"text/plain", "image/png"}
+
+
+def test_the_reference_has_each_public_name():
+    text = (Path(pages.__file__).parent / "reference.md").read_text()
+    described = re.findall(
+        r"auto(?:class|function|module):: unload\.(?:agent\.)?(\w+)$", text, re.M
+    )
+    assert sorted([*described, "__version__"]) == sorted(unload.__all__)
+
+
+def test_docstrings_are_shown_as_they_are_meant():
+    lines = ["## Rewards", ":ivar seed: * of loads, and more.", ":param a, b: two, once"]
+    pages.as_restructured_text(None, "class", "X", None, {}, lines)
+    assert lines == [
+        "**Rewards**\n",
+        ":ivar seed: \\* of loads, and more.",
+        ":param a,b: two, once",
+    ]
 
 
 def test_links_that_lead_nowhere_are_found(tmp_path):

@@ -13,7 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
-OWN = {"benchmarks", "notebooks", "tests", "unload"}
+OWN = {"notebooks", "studies", "tests", "unload"}
 # Extras for one command each, pinned in pyproject.toml.
 ON_DEMAND = ("book", "browser", "mutants")
 # Named, but imported by no statement, and what for.
@@ -91,7 +91,7 @@ def test_what_is_imported_is_named():
     extras = PROJECT["optional-dependencies"]
     optional = {*extras["pybullet"], *extras["sb3"]} - {"sb3-contrib"}
     assert distributions("unload") == set(PROJECT["dependencies"]) | optional
-    others = distributions("tests") | distributions("benchmarks") | distributions("notebooks")
-    others -= on_demand()
-    assert others <= set(pinned())
+    others = distributions("studies") - on_demand()
+    assert set(extras["studies"]) <= others
+    others |= (distributions("tests") | distributions("notebooks")) - on_demand()
     assert distributions("unload") | others | set(RUN_ONLY) == set(pinned())

@@ -12,36 +12,41 @@ import pytest
 import unload
 from unload.support import files
 
-USE_ALL = """
-import numpy as np
-import unload
-from studies.heap.env import HeapEnv
-from unload.physics.table import LIFTS_FILE, shared_table
+ROOT = Path(__file__).resolve().parents[1]
 
-assert unload.__file__.startswith(FOLDER) and str(LIFTS_FILE).startswith(FOLDER)
-assert len(shared_table()) > 10_000
-print(unload.load_policy("recommended").card["version"])
-with_heap = HeapEnv(physics="coarse")
-observation, info = with_heap.reset(seed=0)
-print(with_heap.step(0)[1] >= 0)
-"""
-# Makes an import fail as if the library were not installed.
-BLOCKED = """
+# Makes PyBullet's import fail as if it were not installed, and then uses the rest.
+WITHOUT_PYBULLET = """
 import sys
 
 class Blocked:
     def find_spec(self, name, path=None, target=None):
-        if name in NAMES:
+        if name == "pybullet":
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, Blocked())
+
+import unload
+from unload.physics.table import LIFTS_FILE, shared_table
+
+assert unload.__file__.startswith(FOLDER) and str(LIFTS_FILE).startswith(FOLDER)
+assert len(shared_table()) > 10_000
+table = unload.evaluate(unload.policies.highest, episodes=2)
+assert table["success_rate"].eq(1).all() and "torch" not in sys.modules
+assert unload.evaluate(unload.load_policy("recommended"), episodes=2)["success_rate"].eq(1).all()
+assert unload.picking_order(unload.read_load())["unloaded"].all()
+config = unload.TrainConfig(picks=1280, batch_size=64, equalize=False)
+unload.train(config, "run", progress=False)
+try:
+    unload.evaluate(unload.policies.highest, episodes=1, physics="local", max_picks=1)
+except ModuleNotFoundError as error:
+    print(error)
 """
 
 
-def run(code: str, folder: Path, *options: str, **environ: str) -> str:
-    """What code prints in a new process in ``folder``, which sees no other ``unload``."""
-    environ = {**os.environ, "PYTHONPATH": str(folder), **environ}
-    command = [sys.executable, "-W", "error::UserWarning", *options, "-c", code]
+def run(code: str, folder: Path, path: Path) -> str:
+    """What code prints in a new process in ``folder``, which finds packages in ``path`` first."""
+    environ = {**os.environ, "PYTHONPATH": str(path)}
+    command = [sys.executable, "-W", "error::UserWarning", "-c", code]
     done = subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -50,8 +55,8 @@ def run(code: str, folder: Path, *options: str, **environ: str) -> str:
 @pytest.fixture
 def installed(tmp_path) -> Path:
     """A folder outside the checkout with nothing but the package, built as ``make dist`` does."""
-    for name in ("unload", "pyproject.toml", "README.md", "LICENSE", "Makefile"):
-        subprocess.run(["cp", "-r", files.ROOT / name, tmp_path], check=True)
+    for name in ("unload", "studies", "pyproject.toml", "README.md", "LICENSE", "Makefile"):
+        subprocess.run(["cp", "-r", ROOT / name, tmp_path], check=True)
     # The environment is the one that runs this, and need not be made.
     make = ["make", "--silent", f"BIN={Path(sys.executable).parent}", "--old-file=.venv/ready"]
     subprocess.run([*make, "dist"], cwd=tmp_path, check=True)
@@ -62,56 +67,45 @@ def installed(tmp_path) -> Path:
     return target
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    """What the files of a folder hold, without what was compiled from them."""
+    kept = (path for path in folder.rglob("*.*") if "__pycache__" not in path.parts)
+    paths = (path for path in kept if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
 @pytest.mark.slow
-def test_a_wheel_is_whole(installed):
-    code = f"FOLDER = {str(installed)!r}{USE_ALL}"
-    assert run(code, installed).splitlines() == [unload.__version__, "True"]
-    shipped = {path.relative_to(files.SHIPPED) for path in files.SHIPPED.rglob("*.*")}
-    assert shipped == {
-        path.relative_to(installed / "unload/data")
-        for path in (installed / "unload/data").rglob("*.*")
-    }
-    assert sum(path.stat().st_size for path in files.SHIPPED.rglob("*.*")) < 800_000
+def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_path):
+    """Without PyBullet all works but what is simulated; what is computed lies where one works."""
+    before = contents(installed)
+    folders = {name.partition("/")[0] for name in before}
+    assert folders == {"unload", f"unload-{unload.__version__}.dist-info"}
+    shipped = {f"unload/data/{name}": value for name, value in contents(files.SHIPPED).items()}
+    assert shipped.items() <= before.items() and sum(map(len, shipped.values())) < 500_000
+    work = tmp_path / "work"
+    work.mkdir()
+    printed = run(f"FOLDER = {str(installed)!r}{WITHOUT_PYBULLET}", work, installed)
+    assert "pip install 'unload[pybullet]'" in printed
+    assert contents(installed) == before
+    assert [path.name for path in work.iterdir()] == ["run"]
 
 
-WITHOUT_PYBULLET = """
-import gymnasium
-import numpy as np
-import unload
-
-table = unload.evaluate(unload.policies.highest, episodes=2)
-assert table["success_rate"].eq(1).all() and "torch" not in sys.modules
-assert unload.evaluate(unload.load_policy("recommended"), episodes=2)["success_rate"].eq(1).all()
-config = unload.TrainConfig(picks=1280, batch_size=64, equalize=False)
-unload.train(config, "run", progress=False)
-for make in (
-    lambda: gymnasium.make("unload/Heap-v0"),
-    lambda: unload.evaluate(unload.policies.highest, episodes=1, physics="local", max_picks=1),
-):
-    try:
-        make()
-    except ModuleNotFoundError as error:
-        print(error)
-"""
-
-
-def test_only_what_is_simulated_needs_pybullet(tmp_path):
-    """And only what is learned needs PyTorch."""
-    code = "NAMES = ('pybullet',)" + BLOCKED + WITHOUT_PYBULLET
-    printed = run(code, tmp_path, PYTHONPATH=str(files.ROOT)).splitlines()
-    assert len(printed) == 2 and all("pip install 'unload[pybullet]'" in line for line in printed)
+def test_the_checkout_is_found_from_anywhere(tmp_path):
+    """Notebooks, which run in their own folder, import the studies and are read by the tests."""
+    code = "import notebooks.run, studies.heap, gymnasium; gymnasium.spec('unload/Heap-v0')"
+    run(code, tmp_path, tmp_path)
 
 
 def test_an_import_takes_few_modules(tmp_path):
     code = "import sys, unload; print(len(sys.modules), *sys.modules)"
-    count, *names = run(code, tmp_path, PYTHONPATH=str(files.ROOT)).split()
+    count, *names = run(code, tmp_path, ROOT).split()
     assert int(count) < 700
     assert not {"torch", "numba", "pandas", "matplotlib", "plotly", "pybullet"} & set(names)
 
 
 def test_names_are_where_type_checkers_find_them():
     """What is listed, what is imported for type checkers, and what is imported when it is used."""
-    source = ast.parse((files.ROOT / "unload/__init__.py").read_text())
+    source = ast.parse((ROOT / "unload/__init__.py").read_text())
     (typed,) = (node for node in source.body if isinstance(node, ast.If))
     found = {}
     exec(compile(ast.Module(typed.body, []), "imports", "exec"), found)
@@ -124,6 +118,6 @@ def test_names_are_where_type_checkers_find_them():
 
 
 def test_there_is_one_version():
-    project = tomllib.loads((files.ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert unload.__version__ == project["version"]
-    assert f"version: {unload.__version__}" in (files.ROOT / "CITATION.cff").read_text()
+    assert f"version: {unload.__version__}" in (ROOT / "CITATION.cff").read_text()

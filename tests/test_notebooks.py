@@ -1,4 +1,4 @@
-"""Every notebook: its form, its parameters, and that it runs from end to end."""
+"""Every notebook: its form, its parameters and its outputs; and what runs them."""
 
 import json
 import re
@@ -85,6 +85,18 @@ def test_a_wrong_answer_stops_every_solution():
 def test_reduced_parameters_belong_to_notebooks():
     tables = tomllib.loads((run.HERE / "reduced.toml").read_text())
     assert set(tables) <= {run.key(path) for path in NOTEBOOKS}
+
+
+def test_the_environment_finds_the_studies_and_no_cell_helps_it():
+    for path in NOTEBOOKS:
+        assert not any("sys.path" in text(cell) for cell in cells(path, "code")), path
+
+
+def test_a_name_that_no_notebook_has_is_refused(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["run.py", "nope", "00"])
+    with pytest.raises(SystemExit, match="2"):
+        run.main()
+    assert "no notebook starts with 'nope'" in capsys.readouterr().err
 
 
 def test_unknown_parameter_is_refused(tmp_path):

@@ -1,4 +1,7 @@
-"""The shape of the package: the order of its rooms, and where each library is imported."""
+"""The shape of the house: the order of its rooms, where each library is imported, what is tested.
+
+``unload`` is the package that one installs; ``studies`` stands beside it and uses it.
+"""
 
 import ast
 import re
@@ -6,42 +9,54 @@ import sys
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-PACKAGE = ROOT / "unload"
-TESTS = ROOT / "tests"
-README = (ROOT / "README.md").read_text()
+import pytest
 
-# The files and folders of unload/ that may import a library; "" stands for all.
+ROOT = Path(__file__).resolve().parent.parent
+TESTS = ROOT / "tests"
+PACKAGES = ("unload", "studies")
+
+# The files and folders that may import a library. ``studies/speed/`` may import all: it compares.
 LIBRARIES = {
-    "PIL": ("load/view.py", "reproduce/paper/animation.py"),
-    "anywidget": ("play/canvas.py",),
-    "gymnasium": ("__init__.py", "env/", "agent/", "heap/", "reproduce/"),
-    "ipywidgets": ("play/",),
-    "joblib": ("agent/sweep.py", "reproduce/"),
-    "llvmlite": ("agent/fast/kernel.py", "support/compiled.py"),
-    "matplotlib": ("load/view.py", "heap/study/", "reproduce/"),
-    "numba": ("support/compiled.py", "agent/fast/kernel.py"),
-    "numpy": ("",),
-    "pandas": ("load/packing_list.py", "agent/", "heap/study/", "reproduce/"),
-    "plotly": ("load/view.py", "play/replay.py"),
-    "pybullet": ("physics/bullet.py",),
-    "safetensors": ("network/weights.py",),
-    "scipy": ("heap/", "reproduce/"),
-    "stable_baselines3": ("env/sb3.py",),
-    "torch": ("network/", "agent/", "heap/", "reproduce/"),
-    "tqdm": ("agent/", "reproduce/"),
-    "traitlets": ("play/canvas.py",),
-}
-# Modules that have no test file of their own, and the file in tests/ that covers them.
+    "PIL": ("unload/load/", "studies/paper/"),
+    "anywidget": ("studies/play/",),
+    "gymnasium": (
+        "unload/__init__.py", "unload/env/", "unload/agent/", "studies/heap/", "studies/lifts/",
+        "studies/paper/",
+    ),
+    "ipywidgets": ("studies/play/",),
+    "joblib": ("studies/results.py", "studies/sweep.py", "studies/policies/"),
+    "llvmlite": ("unload/fast/kernel.py", "unload/support/compiled.py"),
+    "matplotlib": (
+        "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", "studies/lifts/",
+        "studies/paper/", "studies/policies/",
+    ),
+    "numba": ("unload/fast/kernel.py", "unload/support/compiled.py"),
+    "numpy": ("unload/", "studies/"),
+    "pandas": ("unload/load/packing_list.py", "unload/agent/", "studies/"),
+    "plotly": ("unload/load/view.py", "studies/play/replay.py"),
+    "pybullet": ("unload/physics/bullet.py",),
+    "safetensors": ("unload/network/weights.py",),
+    "scipy": ("studies/heap/", "studies/statistics.py"),
+    "stable_baselines3": ("unload/env/sb3.py",),
+    "torch": (
+        "unload/network/", "unload/fast/", "unload/agent/", "studies/grid.py", "studies/sweep.py",
+        "studies/falls/", "studies/heap/",
+    ),
+    "tqdm": (
+        "unload/agent/training.py", "studies/results.py", "studies/sweep.py", "studies/lifts/",
+    ),
+    "traitlets": ("studies/play/",),
+}  # fmt: skip
+# Modules of the package that have no test file of their own, and the file that covers them.
 COVERED_BY = {
     "__main__.py": "agent/test_order.py",
-    "agent/fast/kernel.py": "agent/fast/test_fused.py",  # its loops
-    "reproduce/falls/figures.py": "reproduce/test_figures.py",
-    "reproduce/lifts/figures.py": "reproduce/test_figures.py",
-    "reproduce/paper/figures.py": "reproduce/test_figures.py",
-    "reproduce/paper/diagrams.py": "reproduce/test_figures.py",
-    "reproduce/policies/speed.py": "reproduce/policies/test_figures.py",
-    "reproduce/style.py": "reproduce/test_figures.py",
+    "agent/identity.py": "studies/test_changes.py",  # of what experiments change in a run
+    "fast/kernel.py": "fast/test_fused.py",  # its loops
+}
+# Modules of the studies that no test imports, and why.
+UNTESTED = {
+    "studies.speed.mutants": "counts what the tests notice, in an hour",
+    "studies.speed.training": "minutes; `make bench` runs it",
 }
 
 
@@ -51,7 +66,11 @@ def module_name(path: Path) -> str:
     return ".".join(parts).removesuffix(".__init__")
 
 
-MODULES = {module_name(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+MODULES = {
+    module_name(path): path
+    for package in PACKAGES
+    for path in sorted((ROOT / package).rglob("*.py"))
+}
 
 
 @cache
@@ -68,25 +87,26 @@ def imported(path: Path) -> list[str]:
 
 
 def needs(path: Path) -> set[str]:
-    """The package's modules that a file imports, without itself."""
-    ours = (name for name in imported(path) if name.split(".")[0] == "unload")
+    """The modules of both packages that a file imports, without itself."""
+    ours = (name for name in imported(path) if name.split(".")[0] in PACKAGES)
     modules = {name if name in MODULES else name.rpartition(".")[0] for name in ours}
-    return modules - {module_name(path)}
+    return modules - ({module_name(path)} if path in MODULES.values() else set())
 
 
 def libraries(path: Path) -> set[str]:
     """The libraries of others that a file imports."""
-    return {name.split(".")[0] for name in imported(path)} - sys.stdlib_module_names - {"unload"}
+    return {name.split(".")[0] for name in imported(path)} - sys.stdlib_module_names - {*PACKAGES}
+
+
+def has_code(path: Path) -> bool:
+    """Whether a file defines more than constants."""
+    kinds = {type(node) for node in ast.walk(ast.parse(path.read_text()))}
+    return bool(kinds & {ast.FunctionDef, ast.ClassDef})
 
 
 def room(module: str) -> str:
-    """The file or folder of unload/ that holds a module; "" for unload itself.
-
-    The study of heaps counts with ``reproduce``, so that ``heap/`` can be removed as one folder.
-    """
-    if module.startswith("studies.heap"):
-        return "reproduce"
-    return ".".join(module.split(".")[1:2]).removeprefix("__main__")  # which is unload's own, too
+    """The file or folder of a package that holds a module; "" for the package itself."""
+    return ".".join(module.split(".")[1:2]).removeprefix("__main__")
 
 
 def levels(graph: dict[str, set[str]]) -> list[list[str]]:
@@ -101,74 +121,74 @@ def levels(graph: dict[str, set[str]]) -> list[list[str]]:
     return sorted_levels
 
 
-def room_graph() -> dict[str, set[str]]:
-    """The rooms that each room imports."""
-    graph = {room(module): set() for module in MODULES if room(module)}
-    for module, path in MODULES.items():
+def room_graph(package: str) -> dict[str, set[str]]:
+    """The rooms of a package that each of its rooms imports."""
+    inside = {name: path for name, path in MODULES.items() if name.split(".")[0] == package}
+    graph = {room(module): set() for module in inside if room(module)}
+    for module, path in inside.items():
         if room(module):
-            graph[room(module)] |= {room(needed) for needed in needs(path)} - {room(module)}
+            graph[room(module)] |= {room(name) for name in needs(path) & inside.keys()}
+            graph[room(module)] -= {room(module)}
     return graph
 
 
 def test_rooms_are_in_the_order_that_the_readme_gives():
-    ordered = levels(room_graph())
-    assert len(ordered) <= 7
+    ordered = levels(room_graph("unload"))
     sentence = " < ".join(", ".join(f"`{name}`" for name in level) for level in ordered)
-    assert f"run one way: {sentence}" in README.replace("\n", " "), sentence
+    readme = (ROOT / "README.md").read_text().replace("\n", " ")
+    assert f"run one way: {sentence}." in readme, sentence
+    assert len(room_graph("unload")) <= 8
 
 
-def test_no_module_imports_itself_through_others():
+def test_no_imports_run_in_a_circle():
+    levels(room_graph("studies"))
     levels({module: needs(path) for module, path in MODULES.items()})
 
 
-def test_only_the_top_imports_the_top():
-    graph = room_graph()
-    users = {name: {user for user, needed in graph.items() if name in needed} for name in graph}
-    assert not users["reproduce"]
-    assert users.get("heap", set()) <= {"reproduce"}
-    assert not users["play"]
-    of_reproduce = [path for path in MODULES.values() if "reproduce" in path.parts]
-    assert not any(name.startswith("studies.heap") for path in of_reproduce for name in needs(path))
-    imported_first = {room(module) for module in needs(PACKAGE / "__init__.py")}
-    assert not imported_first & {"reproduce", "heap", "play"}
+def test_the_package_does_not_know_the_studies():
+    """Nor do its tests, except those of the whole house."""
+    files = (ROOT / "unload").rglob("*.py")
+    assert not [path for path in files if re.search(r"\bstudies\b", path.read_text())]
+    tests = [path for name in room_graph("unload") for path in (TESTS / name).rglob("*.py")]
+    assert not [path for path in tests if "studies" in {name.split(".")[0] for name in needs(path)}]
 
 
-def test_the_package_has_few_rooms():
-    others = {"__init__.py", "__main__.py", "__pycache__", "data", "py.typed"}
-    assert len({path.name for path in PACKAGE.iterdir()} - others) <= 10
-
-
-def test_each_room_names_its_files():
-    """Its ``__init__.py`` holds a docstring, which gives the order to read them in, and no code."""
-    for path in PACKAGE.rglob("*/__init__.py"):
-        tree = ast.parse(path.read_text())
-        assert len(tree.body) == 1 and ast.get_docstring(tree), f"{path} is not a docstring"
+@pytest.mark.parametrize("package", PACKAGES)
+def test_each_room_names_its_files(package):
+    """Its ``__init__.py`` gives the order to read them in, and holds no code, ``unload`` aside."""
+    folders = {path.parent for path in (ROOT / package).rglob("*.py")}
+    if package == "unload":
+        folders.remove(ROOT / package)
+    for folder in folders:
+        tree = ast.parse((folder / "__init__.py").read_text())
         named = set(re.findall(r"``(\w+)``", ast.get_docstring(tree)))
-        files = {each.stem for each in path.parent.glob("*.py")} - {"__init__"}
-        assert files <= named, f"{path} does not name {sorted(files - named)}"
-
-
-def test_the_reference_describes_each_module():
-    for page in (ROOT / "notebooks/book/reference").glob("*.md"):
-        if page.stem == "index":
-            continue
-        described = re.findall(r"automodule:: (\S+)", page.read_text())
-        folder = PACKAGE / page.stem
-        there = {module_name(path) for path in folder.glob("*.py")} - {f"unload.{page.stem}"}
-        assert set(described) == there and len(described) == len(there), page.name
+        there = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+        assert there <= named, f"{folder} does not name {sorted(there - named)}"
+        known = there | {"unload"} | {*room_graph(package)}
+        assert named <= known, f"{folder} names {sorted(named - known)}"
+        registers = folder.name == "heap"
+        assert len(tree.body) == (3 if registers else 1), f"{folder} has code"
 
 
 def test_the_way_to_contribute_has_a_row_for_each_room():
     lines = (ROOT / "CONTRIBUTING.md").read_text().splitlines()
-    rows = [line.split("`")[1] for line in lines if line.startswith("| `unload/")]
-    rooms = [name for level in levels(room_graph()) for name in level]
-    assert [row.strip("/").removeprefix("unload/").removesuffix(".py") for row in rows] == rooms
+    rows = [line.split("`")[1] for line in lines if line.startswith("| `")]
+    in_order = [name for level in levels(room_graph("unload")) for name in level]
+    of_unload = [row for row in rows if row.startswith("unload/")]
+    assert [row.removeprefix("unload/").rstrip("/").removesuffix(".py") for row in of_unload] == (
+        in_order
+    )
+    folders = {path.parent for path in (ROOT / "studies").glob("*/*.py")}
+    of_studies = [row for row in rows if row.startswith("studies/") and row != "studies/"]
+    assert sorted(of_studies) == sorted(f"studies/{folder.name}/" for folder in folders)
 
 
 def test_each_library_is_imported_in_its_places_only():
     used = set()
     for path in MODULES.values():
-        place = path.relative_to(PACKAGE).as_posix()
+        place = path.relative_to(ROOT).as_posix()
+        if place.startswith("studies/speed/"):
+            continue
         for library in libraries(path):
             allowed = [start for start in LIBRARIES[library] if place.startswith(start)]
             assert allowed, f"{place} imports {library}; expected in {LIBRARIES[library]}"
@@ -176,17 +196,26 @@ def test_each_library_is_imported_in_its_places_only():
     assert used == {(library, start) for library, starts in LIBRARIES.items() for start in starts}
 
 
-def test_each_module_with_code_has_its_test_file():
+def test_each_module_of_the_package_has_its_test_file():
     """A module of constants has nothing to test; the package's own is in test_installed.py."""
+    package = ROOT / "unload"
     tests = {path.relative_to(TESTS).as_posix() for path in TESTS.glob("*/**/test_*.py")}
     covering = {}
-    for path in set(MODULES.values()) - {PACKAGE / "__init__.py"}:
-        kinds = {type(node) for node in ast.walk(ast.parse(path.read_text()))}
-        if kinds & {ast.FunctionDef, ast.ClassDef}:
-            place = path.relative_to(PACKAGE)
+    for path in {*package.rglob("*.py")} - {package / "__init__.py"}:
+        if has_code(path):
+            place = path.relative_to(package)
             mirror = (place.parent / f"test_{place.stem.strip('_')}.py").as_posix()
-            name = place.as_posix()
-            covering[name] = mirror if mirror in tests else COVERED_BY.get(name)
+            covering[place.as_posix()] = mirror if mirror in tests else COVERED_BY.get(str(place))
     assert not [module for module, test in covering.items() if test not in tests]
     assert set(COVERED_BY) <= {m for m, test in covering.items() if test == COVERED_BY.get(m)}
-    assert tests == set(covering.values()), "each test file has its module"
+    mirrors = {test for test in tests if not test.startswith("studies/")}
+    assert mirrors <= set(covering.values()), "each test file has its module"
+
+
+def test_each_module_of_the_studies_is_imported_by_a_test():
+    tests = [*(TESTS / "studies").rglob("*.py")]
+    tested = set().union(*(needs(path) for path in tests))
+    wanted = {name for name, path in MODULES.items() if "studies" in name and has_code(path)}
+    assert wanted - tested == set(UNTESTED)
+    folders = {path.parent.relative_to(TESTS) for path in tests}
+    assert all((ROOT / folder).is_dir() for folder in folders)

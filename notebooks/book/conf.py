@@ -1,4 +1,4 @@
-"""Settings of Sphinx for ``make book``: README, notebooks, solutions and docstrings as one site.
+"""Settings of Sphinx for ``make book``: README, notebooks, solutions and public names as one site.
 
 The source folder is the root of the repository, so that a link between the README, notebooks and
 figures leads to the same place in the site as in the files. Nothing is executed: the site shows
@@ -20,7 +20,7 @@ author = "The unload authors"
 # What becomes a page. README.md is the first one, and index.html leads to it.
 root_doc = "README"
 include_patterns = ["*.md", "notebooks/**.md", "notebooks/**.ipynb", "data/**.md"]
-exclude_patterns = [".*", "**/.*", "benchmarks", "build", "runs", "tests", "unload"]
+exclude_patterns = [".*", "**/.*", "build", "runs", "studies", "tests", "unload"]
 
 autodoc_default_options = {"members": True, "member-order": "bysource"}
 autodoc_inherit_docstrings = False
@@ -49,7 +49,8 @@ mathjax_path = "mathjax/tex-chtml.js"
 
 def setup(app):
     """Connect the functions of pages.py; Sphinx calls this."""
-    app.connect("autodoc-process-docstring", pages.mark_headings)
+    app.connect("autodoc-process-docstring", pages.as_restructured_text)
+    app.connect("source-read", pages.add_help)
     app.connect("source-read", pages.add_contents)
     app.connect("doctree-read", pages.resolve_folders)
     app.connect("html-page-context", pages.add_plotly)

@@ -1,6 +1,9 @@
 """What the site needs beyond Sphinx's settings: contents, interactive views, scripts."""
 
+import re
 import shutil
+import subprocess
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -39,11 +42,29 @@ def read_notebook(text: str) -> nbformat.NotebookNode:
     return notebook
 
 
-def mark_headings(app, what: str, name: str, thing, options, lines: list[str]) -> None:
-    """Show the headings of an environment's docstring, which are Markdown as Gymnasium's are."""
+def as_restructured_text(app, what: str, name: str, thing, options, lines: list[str]) -> None:
+    """Show what in docstrings has another meaning in Sphinx's language.
+
+    Headings of an environment are Markdown, as Gymnasium's are. The star of a field begins no
+    list, and the first of two names is no type.
+    """
     for number, line in enumerate(lines):
         if line.startswith("## "):
-            lines[number] = f"**{line.removeprefix('## ')}**\n"
+            line = f"**{line.removeprefix('## ')}**\n"
+        elif field := re.match(r":(ivar|param) [^:]+:", line):
+            line = field[0].replace(", ", ",") + re.sub(r"^ \* ", r" \* ", line[field.end() :])
+        lines[number] = line
+
+
+def add_help(app, name: str, source: list[str]) -> None:
+    """Put what a command says of itself in the place of each comment ``% help: module``."""
+
+    def said(comment: re.Match) -> str:
+        command = [sys.executable, "-m", comment[1], "--help"]
+        text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        return f"```text\n{text.strip()}\n```"
+
+    source[0] = re.sub(r"^% help: (\S+)$", said, source[0], flags=re.MULTILINE)
 
 
 def add_contents(app, name: str, source: list[str]) -> None:
@@ -54,11 +75,9 @@ def add_contents(app, name: str, source: list[str]) -> None:
     captions = {
         "notebooks": "Notebooks",
         "notebooks/solutions": "Solutions",
-        "notebooks/book/reference": "Reference",
+        "notebooks/book": "Reference",
     }
-    for page in sorted(
-        app.env.found_docs - {name}, key=lambda page: (not page.endswith("index"), page)
-    ):
+    for page in sorted(app.env.found_docs - {name}):
         folder = page.rpartition("/")[0]
         parts[captions.get(folder, "More")].append(f"/{page}")
     for caption, pages in parts.items():

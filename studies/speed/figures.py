@@ -1,4 +1,4 @@
-"""How fast the parts are, mostly drawn from what ``benchmarks/run.py`` measured."""
+"""How fast the parts are, mostly drawn from what ``studies.speed.run`` measured."""
 
 from pathlib import Path
 

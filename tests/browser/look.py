@@ -114,8 +114,9 @@ def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
         yield f"{name}: cells {left} have not been run"
     for output in page.evaluate(OUTPUTS):
         if output["output_type"] == "error" or output.get("name") == "stderr":
-            text = output.get("evalue") or output.get("text")
-            yield f"{name}: cell {output['number']} says {str(text)[:300]!r}"
+            text = str(output.get("evalue") or output.get("text"))
+            if not text.startswith("compiling "):  # said once, after a fresh installation
+                yield f"{name}: cell {output['number']} says {text[:300]!r}"
     yield from typeset(page, name)
     yield from drawn(page, name, pictures)
     if name == PLAYGROUND and theme == "Light":
