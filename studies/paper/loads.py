@@ -1,4 +1,4 @@
-"""Loads: their substacks (Fig. 3), containers side by side (Fig. 2), and one from two sides."""
+"""Loads: substacks (Fig. 3), containers side by side (Fig. 2), items from the side, a wall."""
 
 from collections.abc import Mapping, Sequence
 
@@ -131,31 +131,6 @@ def _crop(images: np.ndarray) -> np.ndarray:
     return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
-@styled
-def side_views(positions: np.ndarray, views: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
-    """Centres of items seen from the side, one picture above the other, to scale.
-
-    Args:
-        positions: (n, 3) float, centres in m.
-        views: title → groups; these are meaning → item numbers, see ``unload.load.COLOURS``.
-            Of two groups that share an item the later one is drawn.
-
-    Raises:
-        ValueError: a group's name is not in ``unload.load.COLOURS``.
-    """
-    length, _, height = task.CONTAINER
-    figure, panels = plt.subplots(
-        len(views), 1, figsize=(7, 2.3 * len(views) + 0.6), sharex=True, squeeze=False
-    )
-    for axes, (title, groups) in zip(panels[:, 0], views.items()):
-        draw_items(axes, positions[:, [0, 2]], groups)
-        axes.set(xlim=(0, length), ylim=(0, height), ylabel="z (m)", title=title, aspect="equal")
-    panels[-1, 0].set_xlabel("x (m), entrance on the right")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-    return figure
-
-
 def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray], **style) -> None:
     """Draw items as dots in the colours of their groups' meanings, which label them.
 
@@ -186,7 +161,7 @@ def wall_view(
     Args:
         load: the boxes.
         wall: its number.
-        groups: meaning → item numbers, as in ``side_views``; items in no group are "unseen".
+        groups: meaning → item numbers, as in ``draw_items``; items in no group are "unseen".
         present: (n,) bool, which boxes to draw; all if None.
 
     Raises:
