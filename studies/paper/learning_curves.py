@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from studies.paper.training import PAPER, default_curves, episode_means
-from studies.paper.tuning import REACHED, greedy_msr, running_mean
+from studies.paper.tuning import running_mean
 from studies.style import COLOURS, mark_reduced, styled
 from unload import task
 from unload.support import files
@@ -19,25 +19,6 @@ from unload.support import files
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
 SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too
 FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
-
-
-@styled
-def draw_greedy(axes: Axes, curves: Mapping[str, Curves]) -> None:
-    """Draw the mean greedy MSR of each configuration's runs, with a band of one standard error.
-
-    Args:
-        axes: where.
-        curves: MSR while training of all runs, by the configuration's name.
-    """
-    for (name, runs), colour in zip(curves.items(), _colours(curves)):
-        greedy = greedy_msr(np.array(list(runs.values())))
-        mean, error = greedy.mean(axis=0), greedy.std(axis=0, ddof=1) / len(greedy) ** 0.5
-        steps = np.arange(len(mean))
-        axes.plot(steps, mean, color=colour, label=name)
-        axes.fill_between(steps, mean - error, mean + error, color=colour, alpha=0.25, linewidth=0)
-    axes.axhline(REACHED, color="0.4", linestyle=":", linewidth=0.8)
-    axes.set(xlabel="step $k$", ylim=(0, 1.1))
-    axes.legend(loc="lower right", fontsize=8)
 
 
 @styled
@@ -50,7 +31,7 @@ def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
         label: of the vertical axis, an MSR unless it says "loss".
     """
     figure, axes = plt.subplots()
-    for (name, (runs, shown)), colour in zip(curves.items(), _colours(curves)):
+    for (name, (runs, shown)), colour in zip(curves.items(), colours_of(curves)):
         label_of_run = f"{name}, run {shown}" if len(runs) > 1 else name
         for run, values in runs.items():
             smooth = running_mean(values)
@@ -67,8 +48,8 @@ def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
     return figure
 
 
-def _colours(names: Collection[str]) -> list:
-    """Of what the agents see; else a scale from dark to light, for the values of a setting."""
+def colours_of(names: Collection[str]) -> list:
+    """A colour a name: of what an agent sees, else from a scale for the values of a setting."""
     scale = plt.get_cmap("viridis")(np.linspace(0, 0.85, len(names)))
     return [FE_COLOURS.get(name, colour) for name, colour in zip(names, scale)]
 

@@ -12,25 +12,10 @@ import gymnasium
 import numpy as np
 import pandas as pd
 
+from studies import statistics
+from studies.paper import tuning as search
 from studies.paper.training import paper_runs
-from studies.paper.tuning import (
-    BATCH_SIZES,
-    RUN_COUNT,
-    STEPS,
-    greedy_reached,
-    read_curves,
-    running_mean,
-    tuning_summary,
-)
 from studies.paper.visible_items import BINS
-from studies.statistics import (
-    PAPER_MSR,
-    WINDOW_PICKS,
-    cell_table,
-    t_interval,
-    welch_interval,
-    windows,
-)
 from unload import task
 from unload.agent import policies
 from unload.agent.config import TrainConfig
@@ -45,6 +30,7 @@ from unload.support import checks
 CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
 CONTAINERS = 40  # full ones, whose free items and whose bars of Fig. 5 are counted
 FIG5_AXIS = 70  # where the paper's axis ends, in steps of 10
+MEASURES = ("success_rate", "loss")
 SETTLED = 200  # tuning steps after which the noise of the loss is measured
 READINGS = {  # of the paper's training: cell → column
     "paper_no_mask": "without the mask, b = 256",
@@ -92,7 +78,7 @@ def constants() -> pd.DataFrame:
         ("discount factor γ", "III-E", 0, config.gamma),
         ("inputs of the extractor, of the scorer", "III-G", (3, 4 * n), inputs),
         ("β of the loss", "III-G", 1, config.beta),
-        ("tuning: runs, steps K", "IV-A", (10, 3000), (RUN_COUNT, STEPS)),
+        ("tuning: runs, steps K", "IV-A", (10, 3000), (search.RUN_COUNT, search.STEPS)),
         ("training steps K", "IV-B", 20_000_000, config.picks),
         ("learning rate μ", "IV-B", 1e-3, config.learning_rate),
         ("batch size b", "IV-B", 2048, config.batch_size),
@@ -112,58 +98,46 @@ def measured(loads: int, episodes: int, seed: int) -> pd.DataFrame:
         seed: of the loads and of these containers.
     """
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
-    counts = np.array(
-        [len(substacks.stack_load(rng)) for _ in range(checks.integer("loads", loads, 1))]
-    )
+    drawn = range(checks.integer("loads", loads, 1))
+    counts = np.array([len(substacks.stack_load(rng)) for _ in drawn])
     low, high = task.MIN_ITEMS, task.MAX_ITEMS
     items = f"{counts.mean():.0f} ± {counts.std():.0f} ({counts.min()}–{counts.max()})"
+    fits = low <= counts.min() and counts.max() <= high
+
     ranks = equalize(np.array([0.10, 0.12, 0.11, 0.20, 0.19, 0.18, 0.30])[:, None])[:, 0]
-    tab_i = np.array([-1.00, -0.33, -0.66, 0.66, 0.33, 0.00, 1.00])  # the paper cuts 2/3 to 0.66
+    given = np.array([-1.00, -0.33, -0.66, 0.66, 0.33, 0.00, 1.00])  # the paper cuts 2/3 to 0.66
+    same = np.abs(ranks - given).max() < 0.01
+    given, ranks = (" ".join(f"{value:.2f}" for value in values) for values in (given, ranks))
     one, two = lifted_distance(1), lifted_distance(2)
+
     full = full_containers(CONTAINERS)
     free, visible = full["free"].mean(), full["visible"].mean()
-    bars = [f"{bar.mean():.0f} ({bar.min()}–{bar.max()})" for bar in (full["bar"], full["bar_1"])]
-    msr = {
-        rule: evaluate(getattr(policies, rule), episodes, seed, mask=False)["success_rate"]
-        for rule in ("random", "highest", "nearest")
-    }
-    chance = msr["random"].mean()
-    return table(
-        [
-            (
-                "items in a full container", "III-A", f"{low}–{high}", items,
-                low <= counts.min() and counts.max() <= high,
-            ),
-            ("Tab. I", "III-F", _digits(tab_i), _digits(ranks), np.abs(ranks - tab_i).max() < 0.01),
-            ("lift of one box", "appendix", "0.46 m", f"{one:.3f} m", abs(one - 0.46) < 0.005),
-            (
-                "lift of two boxes", "appendix", "9 mm", f"{1000 * two:.1f} mm",
-                abs(two - 0.009) < 0.0005,
-            ),
-            (
-                "tallest bar, visible items", "Fig. 5", f"needs an axis to {FIG5_AXIS}",
-                f"{bars[0]}; with weight 1 for z {bars[1]}", full["bar"].max() > FIG5_AXIS - 10,
-            ),
-            (
-                "items with nothing on top", "IV-B", "about 20 %", f"{free:.1%}",
-                abs(free - 0.2) < CHANCE_ERROR,
-            ),
-            ("visible items that can be lifted, at the start", "—", "—", f"{visible:.1%}", None),
-            (
-                "MSR of random picks", "abstract, IV-B", "20 %",
-                f"{chance:.1%} ± {msr['random'].std():.1%}", abs(chance - 0.2) < CHANCE_ERROR,
-            ),
-            (
-                "MSR of an optimal policy", "IV-B", "100 %",
-                f"highest item: {msr['highest'].mean():.1%}", (msr["highest"] == 1).all(),
-            ),
-            ("MSR of the nearest item", "—", "—", f"{msr['nearest'].mean():.1%}", None),
-        ]
-    )  # fmt: skip
-
-
-def _digits(values: np.ndarray) -> str:
-    return " ".join(f"{value:.2f}" for value in values)
+    bar, bar_1 = (
+        f"{bar.mean():.0f} ({bar.min()}–{bar.max()})" for _, bar in full.iloc[:, 2:].items()
+    )
+    tall = full["bar"].max() > FIG5_AXIS - 10
+    random, highest, nearest = (
+        evaluate(rule, episodes, seed, mask=False)["success_rate"]
+        for rule in (policies.random, policies.highest, policies.nearest)
+    )
+    chance = f"{random.mean():.1%} ± {random.std():.1%}"
+    optimal = f"highest item: {highest.mean():.1%}"
+    free_near, chance_near = (abs(each - 0.2) < CHANCE_ERROR for each in (free, random.mean()))
+    two_near = abs(two - 0.009) < 0.0005
+    rows = [
+        ("items in a full container", "III-A", f"{low}–{high}", items, fits),
+        ("Tab. I", "III-F", given, ranks, same),
+        ("lift of one box", "appendix", "0.46 m", f"{one:.3f} m", abs(one - 0.46) < 0.005),
+        ("lift of two boxes", "appendix", "9 mm", f"{1000 * two:.1f} mm", two_near),
+        ("tallest bar", "Fig. 5", f"needs an axis to {FIG5_AXIS}", f"{bar} items", tall),
+        ("… with weight 1 for z", "—", "—", f"{bar_1} items", None),
+        ("items with nothing on top", "IV-B", "about 20 %", f"{free:.1%}", free_near),
+        ("visible items that can be lifted, at the start", "—", "—", f"{visible:.1%}", None),
+        ("MSR of random picks", "abstract, IV-B", "20 %", chance, chance_near),
+        ("MSR of an optimal policy", "IV-B", "100 %", optimal, (highest == 1).all()),
+        ("MSR of the nearest item", "—", "—", f"{nearest.mean():.1%}", None),
+    ]
+    return table(rows)
 
 
 def lifted_distance(stack: int) -> float:
@@ -204,7 +178,7 @@ def full_containers(count: int) -> pd.DataFrame:
 
 def tuning() -> pd.DataFrame:
     """The tuning environment: learning rates, batch sizes, feature engineering."""
-    summary = tuning_summary().set_index(["equalize", "batch_size", "learning_rate"])
+    summary = search.tuning_summary().set_index(["equalize", "batch_size", "learning_rate"])
     rows = []
     for rate, claim in ((0.1, "mostly unsuccessful"), (0.01, "the same"), (0.001, "successful")):
         runs = summary.loc[True, 1024, rate]
@@ -214,23 +188,20 @@ def tuning() -> pd.DataFrame:
         rows.append((f"tuning, b = 1024, μ = {rate:g}", "IV-A, Fig. 8", claim, here, agrees))
 
     steps, noise = {}, {}  # by batch size and feature engineering
-    for key in [(size, True) for size in BATCH_SIZES] + [(2048, False)]:
-        steps[key] = greedy_reached(read_curves("success_rate", key[0], 1e-3, key[1]).values())
-        noise[key] = loss_noise(read_curves("loss", key[0], 1e-3, key[1]))
-    with_fe, without_fe = (2048, True), (2048, False)
-    spreads = [t_interval(noise[size, True]) for size in BATCH_SIZES]
-    noises = ", ".join(f"{noise[size, True].mean():.4f}" for size in BATCH_SIZES)
-    reached = ", ".join(_steps(steps[size, True]) for size in BATCH_SIZES)
+    for key in [(size, True) for size in search.BATCH_SIZES] + [(2048, False)]:
+        msr, loss = (search.read_curves(name, key[0], 1e-3, key[1]) for name in MEASURES)
+        steps[key], noise[key] = search.greedy_reached(msr.values()), loss_noise(loss)
+    sizes = [(size, True) for size in search.BATCH_SIZES]
+    spreads = [statistics.t_interval(noise[size]) for size in sizes]
+    calmer = all(larger[1] < smaller[0] for smaller, larger in pairwise(spreads))
+    faster = steps[2048, True]["high"] < steps[64, True]["low"]
+    noises = "noise of the loss " + ", ".join(f"{noise[size].mean():.4f}" for size in sizes)
+    reached = "from steps " + ", ".join(_steps(steps[size]) for size in sizes) + " on"
+    batches = ", ".join(map(str, search.BATCH_SIZES))
     rows += [
-        (
-            f"… less noisy with larger b = {', '.join(map(str, BATCH_SIZES))}", "IV-A", "yes",
-            f"noise of the loss {noises}", all(b[1] < a[0] for a, b in pairwise(spreads)),
-        ),
-        (
-            "… faster with larger b", "IV-A, Fig. 9", "yes", f"from steps {reached} on",
-            steps[with_fe]["high"] < steps[64, True]["low"],
-        ),
-    ]  # fmt: skip
+        (f"… less noisy with larger b = {batches}", "IV-A", "yes", noises, calmer),
+        ("… faster with larger b", "IV-A, Fig. 9", "yes", reached, faster),
+    ]
 
     for equalized, label in ((True, "with FE"), (False, "without FE")):
         loss = summary.loc[equalized, 2048, 0.001]
@@ -238,23 +209,18 @@ def tuning() -> pd.DataFrame:
         here += f", {loss.loss_end:.3f} at the end"
         agrees = loss.loss_start > loss.loss_dip < loss.loss_peak > loss.loss_end
         rows.append((f"tuning, loss {label}", "IV-A, Fig. 10", "falls, rises, falls", here, agrees))
-    low, high = welch_interval(noise[with_fe], noise[without_fe])
-    calmer = f"noise {noise[with_fe].mean():.4f} with FE, {noise[without_fe].mean():.4f} without "
-    calmer += f"(difference {low:+.4f} to {high:+.4f})"
-    return table(
-        [
-            *rows,
-            (
-                "… shorter with FE", "IV-A", "significantly",
-                f"from step {_steps(steps[with_fe])} on; without, {_steps(steps[without_fe])}",
-                steps[with_fe]["high"] < steps[without_fe]["low"],
-            ),
-            (
-                "… more stable with FE", "IV-A", "yes", calmer,
-                "not shown" if low <= 0 <= high else high < 0,
-            ),
-        ]
-    )  # fmt: skip
+    with_fe, without_fe = (2048, True), (2048, False)
+    shorter = f"from step {_steps(steps[with_fe])} on; without, {_steps(steps[without_fe])}"
+    significantly = steps[with_fe]["high"] < steps[without_fe]["low"]
+    low, high = statistics.welch_interval(noise[with_fe], noise[without_fe])
+    stabler = f"noise {noise[with_fe].mean():.4f} with FE, {noise[without_fe].mean():.4f} without "
+    stabler += f"(difference {low:+.4f} to {high:+.4f})"
+    shown = "not shown" if low <= 0 <= high else high < 0
+    rows += [
+        ("… shorter with FE", "IV-A", "significantly", shorter, significantly),
+        ("… more stable with FE", "IV-A", "yes", stabler, shown),
+    ]
+    return table(rows)
 
 
 def _steps(reached: dict[str, float]) -> str:
@@ -263,7 +229,9 @@ def _steps(reached: dict[str, float]) -> str:
 
 def loss_noise(losses: dict[int, np.ndarray]) -> np.ndarray:
     """Return the standard deviation of the loss around its running mean, of each tuning run."""
-    return np.array([np.nanstd((loss - running_mean(loss))[SETTLED:]) for loss in losses.values()])
+    return np.array(
+        [np.nanstd((loss - search.running_mean(loss))[SETTLED:]) for loss in losses.values()]
+    )
 
 
 def training() -> pd.DataFrame:
@@ -273,37 +241,10 @@ def training() -> pd.DataFrame:
         ``where`` and ``paper``, and a column for each of ``READINGS``: ours, and whether it agrees.
     """
     runs = paper_runs()
-    steps = task.NUM_ENVS * np.arange(1, STEPS + 1)
-    tuned = np.mean(
-        [
-            decrease(pd.Series(running_mean(loss), steps).dropna())
-            for loss in read_curves("loss", 2048, 1e-3).values()
-        ]
-    )
-    columns = {}
-    for cell in cell_table(runs).itertuples():
-        curves = [curve for name, _, curve in runs if name == cell.cell]
-        start = np.mean([curve["success_rate"].iloc[0] for curve in curves])
-        slopes = [_training_decrease(curve) for curve in curves]
-        holds, half = bool(cell.low <= PAPER_MSR <= cell.high), cell.runs / 2
-        columns[READINGS[cell.cell]] = [
-            (f"{start:.1%} ({2 * start - 1:.2f})", abs(start - 0.15) < CHANCE_ERROR),
-            (
-                f"{cell.mean:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
-                f"({2 * cell.mean - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's",
-                holds if cell.both >= half or not holds else "in part",  # the plan's question 1
-            ),
-            (f"{cell.steady} of {cell.runs} runs", cell.steady >= half),
-            (
-                f"slower in {cell.slower}, noisier in {cell.noisier} of {cell.runs} runs",
-                min(cell.slower, cell.noisier) >= half,
-            ),
-            (f"{cell.fig11} of {cell.runs} runs", cell.fig11 >= half),
-            (
-                f"{np.mean(slopes):.3f} per million picks, {tuned:.2f} in tuning",
-                max(slopes) < tuned,
-            ),
-        ]  # fmt: skip
+    picks = task.NUM_ENVS * np.arange(1, search.STEPS + 1)
+    losses = search.read_curves("loss", 2048, 1e-3).values()
+    tuned = [pd.Series(search.running_mean(loss), picks).dropna() for loss in losses]
+    tuned = np.mean([decrease(loss) for loss in tuned])
     given = [
         ("MSR (mean reward) at the start, first episodes", "IV-B, Fig. 12", "15 % (-0.7)"),
         ("MSR (mean reward) at the end", "abstract, IV-B, V, Fig. 12", "60 % (around 0.2)"),
@@ -313,14 +254,28 @@ def training() -> pd.DataFrame:
         ("… its decrease slower than in tuning", "IV-B", "much lower slope"),
     ]
     frame = pd.DataFrame(given, columns=["number", "where", "paper"]).set_index("number")
-    for reading, cells in columns.items():
-        frame[reading] = [f"{here}: {word(agrees)}" for here, agrees in cells]
+    for cell in statistics.cell_table(runs).itertuples():
+        curves = [curve for name, _, curve in runs if name == cell.cell]
+        start = np.mean([curve["success_rate"].iloc[0] for curve in curves])
+        holds, half = bool(cell.low <= statistics.PAPER_MSR <= cell.high), cell.runs / 2
+        reproduced = holds if cell.both >= half or not holds else "in part"  # its question 1
+        end = f"{cell.mean:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
+        end += f"({2 * cell.mean - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's"
+        later = f"slower in {cell.slower}, noisier in {cell.noisier} of {cell.runs} runs"
+        losses = [statistics.windows(curve)["loss"].dropna() for curve in curves]
+        ends_at = statistics.WINDOW_PICKS  # windows are numbered from 0
+        slopes = [decrease(loss.set_axis(ends_at * (loss.index + 1))) for loss in losses]
+        slower = f"{np.mean(slopes):.3f} per million picks, {tuned:.2f} in tuning"
+        here = [
+            (f"{start:.1%} ({2 * start - 1:.2f})", abs(start - 0.15) < CHANCE_ERROR),
+            (end, reproduced),
+            (f"{cell.steady} of {cell.runs} runs", cell.steady >= half),
+            (later, min(cell.slower, cell.noisier) >= half),
+            (f"{cell.fig11} of {cell.runs} runs", cell.fig11 >= half),
+            (slower, max(slopes) < tuned),
+        ]
+        frame[READINGS[cell.cell]] = [f"{text}: {word(agrees)}" for text, agrees in here]
     return frame
-
-
-def _training_decrease(curve: pd.DataFrame) -> float:
-    loss = windows(curve)["loss"].dropna()
-    return decrease(loss.set_axis(WINDOW_PICKS * (loss.index + 1)))
 
 
 def decrease(loss: pd.Series) -> float:

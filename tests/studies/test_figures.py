@@ -51,9 +51,6 @@ FROM_DATA = {
 # The others, with what they are given here.
 FIGURES = FROM_DATA | {
     "fig01_mdp": diagrams.fig01_mdp,
-    "fig02_containers": lambda: loads.fig02_containers(
-        np.arange(3 * 48).reshape(3, 4, 4, 3).astype(np.uint8), [1, 2, 3]
-    ),
     "fig03_substacks": loads.fig03_substacks,
     "fig07_network": diagrams.fig07_network,
     "wall_view": lambda: loads.wall_view(LOAD, 11, {"visible": VISIBLE}),
@@ -103,13 +100,6 @@ def test_curves_are_running_means_and_the_papers_run_is_strong():
         assert np.array_equal(line.get_ydata(), running_mean(run))
     labels = [text.get_text() for text in figure.axes[0].get_legend().texts]
     assert labels == ["a, run 3", "with FE"]
-
-
-def test_greedy_curves_are_means_over_the_runs():
-    _, axes = plt.subplots()
-    runs = {run: np.full(100, value) for run, value in enumerate((0.25, 0.75))}
-    learning_curves.draw_greedy(axes, {"a": runs})
-    assert axes.lines[0].get_ydata()[70:] == pytest.approx(0.5)
 
 
 def test_a_learning_curve_is_drawn_over_whole_episodes():

@@ -1,27 +1,11 @@
-"""Fig. 2, and a wall from the entrance."""
+"""A wall seen from the entrance."""
 
 import numpy as np
 import pytest
 
-from studies.paper.loads import fig02_containers, wall_view
+from studies.paper.loads import wall_view
 from unload.load.substacks import front_walls, stack_load
 from unload.load.view import COLOURS
-
-
-@pytest.fixture
-def images(rng):
-    """Three pictures with a white margin of two lines and one column."""
-    pictures = np.full((3, 8, 10, 3), 255, np.uint8)
-    pictures[:, 2:, 1:] = rng.integers(255, size=(3, 6, 9, 3))
-    return pictures
-
-
-def test_pictures_are_cropped_and_in_order(images):
-    figure = fig02_containers(images, [7, 8, 9], columns=2)
-    assert len(figure.axes) == 4
-    shown = [axes.images[0].get_array() for axes in figure.axes if axes.images]
-    assert np.array_equal(shown, images[:, 2:, 1:])
-    assert [axes.texts[0].get_text() for axes in figure.axes[:3]] == ["7", "8", "9"]
 
 
 @pytest.fixture

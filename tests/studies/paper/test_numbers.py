@@ -38,7 +38,7 @@ def test_what_is_measured_agrees_where_it_should(monkeypatch):
     random = evaluate(policies.random, 2, 5, mask=False)["success_rate"]
     assert table.loc["MSR of random picks", "here"].startswith(f"{random.mean():.1%} ± ")
     assert table.loc["MSR of an optimal policy", "here"] == "highest item: 100.0%"
-    assert table["agrees"].tolist() == ["yes"] * 4 + ["no", "no", "", "no", "yes", ""]
+    assert table["agrees"].tolist() == ["yes"] * 4 + ["no", "", "no", "", "no", "yes", ""]
     # Values instead of ranks do not agree.
     monkeypatch.setattr(numbers, "equalize", lambda values: values)
     assert numbers.measured(1, 1, 5).loc["Tab. I", "agrees"] == "no"

@@ -42,13 +42,6 @@ def test_a_full_grid_leaves_what_the_papers_plots_and_others_read(small, tmp_pat
         assert all(stored[key].equal(weights[key]) for key in weights)
 
 
-def test_a_reduced_grid_leaves_published_data_alone(small, tmp_path):
-    training.training_data(None, 6400, tmp_path, tmp_path / "runs", n_jobs=1)
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"reduced", "runs"}
-    assert len(training.default_curves(tmp_path / "reduced")) == 4
-
-
 def test_all_runs_of_the_papers_cells_are_published():
     runs = training.paper_runs()
     planned = [(name, seed) for name, cell in training.PAPER_CELLS.items() for seed in cell.seeds]
