@@ -103,7 +103,7 @@ def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray],
         **style: of the dots, such as ``ms``.
 
     Raises:
-        ValueError: a group's name is not in ``unload.load.COLOURS``.
+        ValueError: a group's name is not in ``unload.load.view.COLOURS``.
     """
     for meaning, items in groups.items():
         checks.one_of("a group's name", meaning, COLOURS)
@@ -127,7 +127,7 @@ def wall_view(
         present: (n,) bool, which boxes to draw; all if None.
 
     Raises:
-        ValueError: a group's name is not in ``unload.load.COLOURS``.
+        ValueError: a group's name is not in ``unload.load.view.COLOURS``.
     """
     groups = {"unseen": np.arange(len(load)), **groups}
     for meaning in groups:

@@ -245,6 +245,7 @@ def training() -> pd.DataFrame:
     losses = search.read_curves("loss", 2048, 1e-3).values()
     tuned = [pd.Series(search.running_mean(loss), picks).dropna() for loss in losses]
     tuned = np.mean([decrease(loss) for loss in tuned])
+
     given = [
         ("MSR (mean reward) at the start, first episodes", "IV-B, Fig. 12", "15 % (-0.7)"),
         ("MSR (mean reward) at the end", "abstract, IV-B, V, Fig. 12", "60 % (around 0.2)"),
@@ -254,11 +255,12 @@ def training() -> pd.DataFrame:
         ("… its decrease slower than in tuning", "IV-B", "much lower slope"),
     ]
     frame = pd.DataFrame(given, columns=["number", "where", "paper"]).set_index("number")
+
     for cell in statistics.cell_table(runs).itertuples():
         curves = [curve for name, _, curve in runs if name == cell.cell]
         start = np.mean([curve["success_rate"].iloc[0] for curve in curves])
         holds, half = bool(cell.low <= statistics.PAPER_MSR <= cell.high), cell.runs / 2
-        reproduced = holds if cell.both >= half or not holds else "in part"  # its question 1
+        reproduced = holds if cell.both >= half or not holds else "in part"  # the plan's rule
         end = f"{cell.mean:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
         end += f"({2 * cell.mean - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's"
         later = f"slower in {cell.slower}, noisier in {cell.noisier} of {cell.runs} runs"
