@@ -6,8 +6,8 @@ from importlib import import_module
 from importlib.util import find_spec
 
 from studies.falls import fresh, laboratory, long
-from studies.lifts import agreement, table
-from studies.paper import observation, training, tuning
+from studies.lifts import agreement, lift_table
+from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, robustness, variants
 from studies.results import COMMAND, JOBS
 from studies.seamless import jam_tables
@@ -16,7 +16,7 @@ from studies.seamless import training as seamless
 
 def lifts(n_jobs: int) -> None:
     """Make the lift table, and ask the physics that it stands for about the same lifts."""
-    table.lift_data()
+    lift_table.lift_data()
     agreement.agreement_data(n_jobs=n_jobs)
 
 
@@ -35,7 +35,7 @@ def heap(n_jobs: int) -> None:
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
-    "observation": ("Figs. 4–6", observation.observation_data, {}),
+    "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
     "variants": ("other networks, rewards and settings", variants.variants_data, variants.OPTIONS),

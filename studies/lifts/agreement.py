@@ -30,7 +30,6 @@ from unload.load.substacks import WALLS
 from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
-from unload.physics.situation import Surroundings
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
 from unload.support import files
 
@@ -58,21 +57,14 @@ UNLOADED_BY = {
 
 
 class State(NamedTuple):
-    """A container on its way to be unloaded.
-
-    Attributes:
-        policy, seed, picks: how it got there, see ``container_states``.
-        load: what it was filled with.
-        present: (n,) bool, the items that are left.
-        visible: (128,) int64, the items that can be picked.
-    """
+    """A container on its way to be unloaded: how it got there, and what it holds."""
 
     policy: str
     seed: int
     picks: int
     load: Load
-    present: np.ndarray
-    visible: np.ndarray
+    present: np.ndarray  # (n,) bool, the items that are left
+    visible: np.ndarray  # (128,) int64, the items that can be picked
 
 
 def agreement_data(
@@ -116,14 +108,9 @@ def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
         ``policy``, ``seed`` and ``picks`` name the state of the container; ``item`` is the
         box lifted, ``on_top`` the number of boxes on it; lifts with equal ``situation``
         are the same to ``local``; ``table``, ``local`` and ``full`` are how far the box moved
-        in m, NaN where ``full`` was not asked.
-
-        Of ``full``: ``asked_full`` says why it was asked, "drawn", "buried" or "close", and is
-        empty where it was not; ``walls`` is how many item walls it simulated, 0 for none, 5 for
-        the item's own and two on each side, 12 for the whole container.
-
-    Raises:
-        FileNotFoundError: there is no such file.
+        in m, NaN where ``full`` was not asked. ``asked_full`` says why it was, "drawn", "buried"
+        or "close", and is empty where it was not; ``walls`` is how many item walls it simulated:
+        5 for the item's own and two on each side, 12 for the whole container.
     """
     frame = read_table(Path(folder) / f"{NAME}.csv", f"{COMMAND} lifts", COLUMNS)
     return frame.fillna({"asked_full": ""})
@@ -162,15 +149,10 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
     for name, (lifts, other) in groups.items():
         differ = len(disagreements(lifts, "local", other))
         low, high = share_interval(differ, len(lifts))
-        rows[name] = {
-            "lifts": len(lifts),
-            "states": lifts.groupby(["seed", "picks"]).ngroups,
-            "situations": lifts["situation"].nunique(),
-            "differ": differ,
-            "low": low,
-            "high": high,
-        }
-    return pd.DataFrame(rows.values(), index=rows)
+        states = lifts.groupby(["seed", "picks"]).ngroups
+        rows[name] = len(lifts), states, lifts["situation"].nunique(), differ, low, high
+    columns = ["lifts", "states", "situations", "differ", "low", "high"]
+    return pd.DataFrame(rows.values(), index=rows, columns=columns)
 
 
 def table_digest() -> str:
@@ -213,32 +195,22 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[State], pd.DataFrame]:
                 physics.reset(state.load)
                 for item in np.flatnonzero(~state.present):
                     physics.remove(item)
-            named = {"state": len(states), "policy": state.policy, "seed": state.seed}
+            named = {name: getattr(state, name) for name in ("policy", "seed", "picks")}
+            named["state"] = len(states)
             surroundings = both["local"].surroundings
-            for item in choose_items(state, surroundings, rng):
-                situation = surroundings.situation(item)
-                row = {
-                    "picks": state.picks,
-                    "item": item,
-                    "on_top": situation.on_top,
-                    "situation": numbers.setdefault(situation.key, len(numbers)),
-                }
-                rows.append(named | row | {name: way.lift(item) for name, way in both.items()})
+            on_top = [len(surroundings.on_top(item)) for item in state.visible]
+            kinds = np.minimum(on_top, len(WANTED) - 1)
+            for kind, wanted in enumerate(WANTED):
+                items = state.visible[kinds == kind]
+                for item in rng.choice(items, min(wanted, len(items)), replace=False).tolist():
+                    situation = surroundings.situation(item)
+                    number = numbers.setdefault(situation.key, len(numbers))
+                    row = {"item": item, "on_top": situation.on_top, "situation": number}
+                    rows.append(named | row | {name: way.lift(item) for name, way in both.items()})
             states.append(state)
     for physics in both.values():
         physics.close()
     return states, pd.DataFrame(rows)
-
-
-def choose_items(state: State, surroundings: Surroundings, rng: np.random.Generator) -> list[int]:
-    """Some visible items, as many of each kind as ``WANTED`` says or as there are."""
-    on_top = [len(surroundings.on_top(item)) for item in state.visible]
-    kinds = np.minimum(on_top, len(WANTED) - 1)
-    chosen = []
-    for kind, wanted in enumerate(WANTED):
-        items = state.visible[kinds == kind]
-        chosen += rng.choice(items, min(wanted, len(items)), replace=False).tolist()
-    return chosen
 
 
 def choose_for_full(
@@ -279,15 +251,10 @@ def boxes_left(state: State, wall: int, walls: int) -> tuple[Load, np.ndarray]:
 
 
 def fresh_job(state: State, item: int, walls: int) -> tuple[dict, Callable[[], float]]:
-    """Question and computation of one lift in a fresh world, for ``results.keep_all``.
+    """Question and computation of one lift in a fresh world of some walls, for ``keep_all``.
 
     In a world that has seen other lifts, the answer depends on them (by a millimetre or so),
     and so on the order in which the items are lifted.
-
-    Args:
-        state: of the container.
-        item: to lift.
-        walls: how many are simulated, the item's own in the middle.
     """
     left, items = boxes_left(state, state.load.walls[item], walls)
     box = int(np.searchsorted(items, item))

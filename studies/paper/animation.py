@@ -29,19 +29,12 @@ LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "fai
 
 
 class Episode(NamedTuple):
-    """What an agent picked in one container, until it was empty or the agent was stuck.
-
-    Attributes:
-        load: the items.
-        positions: (n, 3) float64, where the agent saw them, m.
-        items: (picks,) int64, the item of each pick.
-        unloaded: (picks,) bool, whether it was unloaded.
-    """
+    """What an agent picked in one container, until it was empty or the agent was stuck."""
 
     load: Load
-    positions: np.ndarray
-    items: np.ndarray
-    unloaded: np.ndarray
+    positions: np.ndarray  # (n, 3) float64, where the agent saw the items, m
+    items: np.ndarray  # (picks,) int64, the item of each pick
+    unloaded: np.ndarray  # (picks,) bool, whether it was unloaded
 
 
 def record_episode(policy: Policy, seed: int, **env_kwargs) -> Episode:
@@ -117,8 +110,8 @@ def _palette(frames: list[Image.Image]) -> Image.Image:
 def _frame(episodes: Mapping[str, Episode], before: int, now: int) -> Image.Image:
     """All agents after ``now`` picks; those after the first ``before`` are marked."""
     figure = Figure((WIDTH * len(episodes), HEIGHT), dpi=100, layout="none")
-    for half, (title, episode) in zip(figure.subfigures(1, len(episodes), squeeze=False)[0],
-                                      episodes.items()):  # fmt: skip
+    halves = figure.subfigures(1, len(episodes), squeeze=False)[0]
+    for half, (title, episode) in zip(halves, episodes.items()):
         _draw_half(half, title, episode, before, now)
     handles = [Patch(color=COLOURS[meaning], label=text) for meaning, text in LEGEND.items()]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles))

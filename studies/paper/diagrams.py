@@ -45,7 +45,10 @@ def fig01_mdp() -> Figure:
     upper, lower = 25.5, 3  # lower edges of the blocks
     for blocks, low in ((AGENT, upper), (ENVIRONMENT, lower)):
         for x, (title, text) in zip(COLUMNS, blocks):
-            _block(axes, x, low, title, text)
+            _rounded(axes, x, low, WIDTH, HEIGHT, fc="white", ec=INK, lw=1)
+            style = {"ha": "center", "va": "center"}
+            axes.text(x + WIDTH / 2, low + 4.2, title, fontweight="bold", fontsize=9, **style)
+            axes.text(x + WIDTH / 2, low + 1.9, text, fontsize=7.5, color="#555555", **style)
     middle, below = upper + HEIGHT / 2, lower + HEIGHT / 2
     for left, right in zip(COLUMNS, COLUMNS[1:]):
         _path(axes, [(left + WIDTH, middle), (right, middle)])
@@ -125,16 +128,11 @@ def fig07_network(n_features: int = 64) -> Figure:
     return figure
 
 
-def _rounded(axes: Axes, x: float, y: float, width: float, height: float, **look) -> None:
-    shape = "round,pad=0,rounding_size=0.8"
+def _rounded(
+    axes: Axes, x: float, y: float, width: float, height: float, size: float = 0.8, **look
+) -> None:
+    shape = f"round,pad=0,rounding_size={size}"
     axes.add_patch(FancyBboxPatch((x, y), width, height, shape, **look))
-
-
-def _block(axes: Axes, x: float, y: float, title: str, text: str) -> None:
-    _rounded(axes, x, y, WIDTH, HEIGHT, fc="white", ec=INK, lw=1)
-    middle = x + WIDTH / 2
-    axes.text(middle, y + 4.2, title, ha="center", va="center", fontweight="bold", fontsize=9)
-    axes.text(middle, y + 1.9, text, ha="center", va="center", fontsize=7.5, color="#555555")
 
 
 def _forward_pass() -> tuple[np.ndarray, ...]:
@@ -150,15 +148,12 @@ def _forward_pass() -> tuple[np.ndarray, ...]:
 
 def _tensor(axes: Axes, left: float, shades: np.ndarray, width: float, colour: str) -> None:
     """A matrix, one row per item, whose cells are shaded from pale to ``colour``."""
+    rows, columns = shades.shape
+    x, z = left + width * np.arange(columns + 1), TOP - CELL_HEIGHT * np.arange(rows + 1)
     shade = LinearSegmentedColormap.from_list("shade", ["#f4f4f4", colour])
-    for row, cells in enumerate(shades):
-        for column, value in enumerate(cells):
-            corner = (left + column * width, TOP - (row + 1) * CELL_HEIGHT)
-            axes.add_patch(
-                Rectangle(corner, width, CELL_HEIGHT, fc=shade(value), ec="white", lw=0.8)
-            )
-    height, total = len(shades) * CELL_HEIGHT, shades.shape[1] * width
-    axes.add_patch(Rectangle((left, TOP - height), total, height, fill=False, ec=INK, lw=0.8))
+    axes.pcolormesh(x, z, shades, cmap=shade, vmin=0, vmax=1, edgecolors="white", lw=0.8)
+    border = Rectangle((left, z[-1]), x[-1] - left, TOP - z[-1], fill=False, ec=INK, lw=0.8)
+    axes.add_patch(border)
 
 
 def _label(axes: Axes, centre: float, name: str, shape: str, lift: float = 0.2) -> None:
@@ -170,12 +165,9 @@ def _label(axes: Axes, centre: float, name: str, shape: str, lift: float = 0.2) 
 def _operation(
     axes: Axes, left: float, middle: float, name: str, width: float = 2.5, height: float = 2.4
 ) -> None:
-    axes.add_patch(
-        FancyBboxPatch(
-            (left + 0.12, middle - height / 2 + 0.12), width - 0.24, height - 0.24,
-            boxstyle="round,pad=0.12", fc="#e8f0f7", ec=BLUE, lw=1.1,
-        )
-    )  # fmt: skip
+    _rounded(
+        axes, left, middle - height / 2, width, height, size=0.12, fc="#e8f0f7", ec=BLUE, lw=1.1
+    )
     axes.text(left + width / 2, middle, name, ha="center", va="center", size=10)
 
 

@@ -1,6 +1,6 @@
-"""Loads: their substacks (Fig. 3), containers side by side (Fig. 2), and one from two sides."""
+"""Loads: their substacks (Fig. 3), items as dots, and a wall seen from the entrance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -93,69 +93,6 @@ def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> N
     axes.axis("off")
 
 
-@styled
-def fig02_containers(
-    images: Sequence[np.ndarray], unloaded: Sequence[int], columns: int = 8
-) -> Figure:
-    """Fig. 2: pictures of the containers of a vector environment in a grid.
-
-    Args:
-        images: of equal shape (height, width, 3) uint8, as ``render`` of a vector
-            environment returns them, in the order in which they are drawn.
-        unloaded: items unloaded from each container, written below its picture.
-        columns: pictures in a line.
-    """
-    images = _crop(np.stack(images))
-    lines = -(-len(images) // columns)
-    _, height, width, _ = images.shape
-    cell = 8 / columns  # inches
-    figure, grid = plt.subplots(
-        lines,
-        columns,
-        figsize=(8, lines * (cell * height / width + 0.12)),
-        squeeze=False,
-    )
-    for axes in grid.flat:
-        axes.axis("off")
-    for axes, image, count in zip(grid.flat, images, unloaded):
-        axes.imshow(image, interpolation="antialiased")
-        axes.text(0.5, 0.0, count, transform=axes.transAxes, ha="center", va="top", fontsize=6,
-                  color="#555555")  # fmt: skip
-    return figure
-
-
-def _crop(images: np.ndarray) -> np.ndarray:
-    """Cut away the margin that is white in all pictures."""
-    drawn = (images < 255).any(axis=(0, 3))
-    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
-    return images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-
-
-@styled
-def side_views(positions: np.ndarray, views: Mapping[str, Mapping[str, np.ndarray]]) -> Figure:
-    """Centres of items seen from the side, one picture above the other, to scale.
-
-    Args:
-        positions: (n, 3) float, centres in m.
-        views: title → groups; these are meaning → item numbers, see ``unload.load.COLOURS``.
-            Of two groups that share an item the later one is drawn.
-
-    Raises:
-        ValueError: a group's name is not in ``unload.load.COLOURS``.
-    """
-    length, _, height = task.CONTAINER
-    figure, panels = plt.subplots(
-        len(views), 1, figsize=(7, 2.3 * len(views) + 0.6), sharex=True, squeeze=False
-    )
-    for axes, (title, groups) in zip(panels[:, 0], views.items()):
-        draw_items(axes, positions[:, [0, 2]], groups)
-        axes.set(xlim=(0, length), ylim=(0, height), ylabel="z (m)", title=title, aspect="equal")
-    panels[-1, 0].set_xlabel("x (m), entrance on the right")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-    return figure
-
-
 def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray], **style) -> None:
     """Draw items as dots in the colours of their groups' meanings, which label them.
 
@@ -166,7 +103,7 @@ def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray],
         **style: of the dots, such as ``ms``.
 
     Raises:
-        ValueError: a group's name is not in ``unload.load.COLOURS``.
+        ValueError: a group's name is not in ``unload.load.view.COLOURS``.
     """
     for meaning, items in groups.items():
         checks.one_of("a group's name", meaning, COLOURS)
@@ -186,26 +123,23 @@ def wall_view(
     Args:
         load: the boxes.
         wall: its number.
-        groups: meaning → item numbers, as in ``side_views``; items in no group are "unseen".
+        groups: meaning → item numbers, as in ``draw_items``; items in no group are "unseen".
         present: (n,) bool, which boxes to draw; all if None.
 
     Raises:
-        ValueError: a group's name is not in ``unload.load.COLOURS``.
+        ValueError: a group's name is not in ``unload.load.view.COLOURS``.
     """
     groups = {"unseen": np.arange(len(load)), **groups}
-    colours = [COLOURS["unseen"]] * len(load)
-    for meaning, items in groups.items():
+    for meaning in groups:
         checks.one_of("a group's name", meaning, COLOURS)
-        for item in items:
-            colours[item] = COLOURS[meaning]
-    _, width, height = task.CONTAINER
-    figure, axes = plt.subplots(figsize=(4.68, 3.6))
+    meaning_of = {item: meaning for meaning, items in groups.items() for item in items}
     in_wall = load.walls == wall if present is None else (load.walls == wall) & present
+    figure, axes = plt.subplots(figsize=(4.68, 3.6))
     for item in np.flatnonzero(in_wall):
-        corner = load.positions[item] - load.sizes[item] / 2
-        axes.add_patch(
-            Rectangle(corner[1:], *load.sizes[item, 1:], fc=colours[item], ec="white", lw=0.8)
-        )
+        _, width, height = load.sizes[item]
+        corner, colour = load.positions[item] - load.sizes[item] / 2, COLOURS[meaning_of[item]]
+        axes.add_patch(Rectangle(corner[1:], width, height, fc=colour, ec="white", lw=0.8))
+    _, width, height = task.CONTAINER
     axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
     axes.set(title=f"wall {wall}", xticks=[0, 1, 2], yticks=[0, 1, 2])
     axes.grid(False)

@@ -9,20 +9,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from studies.grid import Cell, Grid, read_grid, read_policies, train_grid
 from studies.results import COMMAND, JOBS, write_table
-from studies.statistics import end_msr
 from unload import task
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
-from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import Greedy, save_policy
-from unload.env.container import ContainerEnv
-from unload.env.vector import ContainerVectorEnv
-from unload.support import checks, files
+from unload.support import files
 
 B2048 = TrainConfig()
 CONFIG = replace(B2048, batch_size=256)
@@ -53,10 +48,7 @@ PAPER = Grid(
 )
 DEFAULTS = "paper_b2048_no_mask"  # the cell of ``TrainConfig``'s defaults, of Figs. 11 and 12
 DEFAULT_SEEDS = range(4)  # of its runs that the figures show; the first is the paper's line
-EVALUATION = {"episodes": 50, "seed": 1000}  # fresh containers for the trained policies
-ASK_EVERY = 25  # unloaded items between two questions for the favourite
 PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # policies that play elsewhere
-MOST_PICKS = 100_000  # of an episode that is to end by unloading
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": PAPER.cells},
     "--picks": {"type": int, "help": "of a run, if not the paper's; the data go to data/reduced"},
@@ -131,40 +123,6 @@ def default_policies(folder: str | Path = files.DATA) -> dict[int, Greedy]:
     return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
 
 
-def while_training(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """How these runs began and ended, a row per seed.
-
-    Returns:
-        ``msr_start``, ``msr_end`` and ``msr_best``: the MSR while training over the first episode
-        of all environments, the last tenth of the picks, and the best episode.
-    """
-    rows = {}
-    for seed, curve in default_curves(folder).items():
-        msr = curve["success_rate"]
-        rows[seed] = {"msr_start": msr.iloc[0], "msr_end": end_msr(curve), "msr_best": msr.max()}
-    return pd.DataFrame(rows).T.rename_axis("seed")
-
-
-def in_fresh_containers(folder: str | Path = files.DATA) -> pd.DataFrame:
-    """How the policies of these runs do in 50 fresh containers, a row per seed.
-
-    Returns:
-        ``msr_mask``, ``msr_no_mask``: the MSR with and without the mask, each with its standard
-        deviation over the containers; ``deadlocked_no_mask``: the share of picks in deadlocks
-        without the mask.
-    """
-    rows = {}
-    for seed, policy in default_policies(folder).items():
-        row = rows.setdefault(seed, {})
-        ready = Greedy(policy.network, equalize=False)  # the environment equalizes: it is faster
-        for name, mask in (("mask", True), ("no_mask", False)):
-            table = evaluate(ready, mask=mask, equalize=policy.equalize, **EVALUATION)
-            row[f"msr_{name}"] = table["success_rate"].mean()
-            row[f"msr_{name}_std"] = table["success_rate"].std()
-        row["deadlocked_no_mask"] = table["deadlocked"].mean()
-    return pd.DataFrame(rows).T.rename_axis("seed")
-
-
 def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
     """Means of a learning curve over each complete episode of the 64 containers.
 
@@ -191,62 +149,3 @@ def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
             f"expected a divisor of the {length:,} picks of an episode"
         )
     return groups.mean().assign(**ends)
-
-
-def msr_by_pick(
-    policy: Policy, containers: int = task.NUM_ENVS, seed: int = 0, mask: bool = True
-) -> np.ndarray:
-    """The MSR at each pick of an episode, over containers that are filled together.
-
-    Args:
-        policy: see ``unload.policies``.
-        containers: how many.
-        seed: of the loads and of the policy's random numbers.
-        mask: whether the policy's masks exclude items that failed since the last success.
-
-    Returns:
-        (500,) float64, the share of the containers in which the pick succeeded.
-    """
-    envs = ContainerVectorEnv(checks.integer("containers", containers, 1))
-    rng = np.random.default_rng(seed)
-    observations, infos = envs.reset(seed=seed)
-    msr = np.empty(task.MAX_PICKS)
-    for pick in range(task.MAX_PICKS):
-        masks = infos["action_mask" if mask else "item_mask"]
-        observations, rewards, _, _, infos = envs.step(policy(observations, masks, rng))
-        msr[pick] = (rewards > 0).mean()
-    envs.close()
-    return msr
-
-
-def favourites(
-    policy: Policy, player: Policy, containers: int = 10, seed: int = 0, unloaded: int = 400
-) -> np.ndarray:
-    """Whether a policy's favourite item can be lifted in containers that a player unloads.
-
-    Args:
-        policy: is asked for its favourite, at the start and after every 25 unloaded items.
-        player: unloads the containers, with the mask; it may be the policy itself.
-        containers: how many.
-        seed: of the first load and of the random numbers.
-        unloaded: items that the player unloads from each container.
-
-    Returns:
-        (containers, unloaded / 25 + 1) bool.
-    """
-    checks.integer("containers", containers, 1)
-    env = ContainerEnv(physics="table", max_picks=MOST_PICKS)
-    rng = np.random.default_rng(seed)
-    found = []
-    for container in range(containers):
-        observation, info = env.reset(seed=seed + container)
-        asked: list[bool] = []
-        while len(asked) <= unloaded // ASK_EVERY:
-            if info["unloaded"] == len(asked) * ASK_EVERY:
-                favourite = policy(observation[None], info["item_mask"][None], rng)[0]
-                asked.append(bool(env.liftable()[favourite]))
-            action = player(observation[None], info["action_mask"][None], rng)[0]
-            observation, *_, info = env.step(int(action))
-        found.append(asked)
-    env.close()
-    return np.array(found)

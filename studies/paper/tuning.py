@@ -38,7 +38,7 @@ SOLVED = 0.99  # MSR
 REACHED = 0.9  # greedy MSR
 LEAST_GREEDY = 0.05  # share of the picks from which the greedy MSR can be told
 RESAMPLES = 500  # of the runs, for intervals
-LOSSES = ("loss_start", "loss_dip", "loss_peak", "loss_end")
+SEARCHED = ("equalize", "batch_size", "learning_rate")
 
 
 def tuning_config(
@@ -138,9 +138,7 @@ def read_curves(
 
     Args:
         column: ``"success_rate"`` or ``"loss"``.
-        batch_size: b.
-        learning_rate: μ.
-        equalize: with feature engineering or without.
+        batch_size, learning_rate, equalize: the configuration, see ``tuning_config``.
         folder: of the data.
 
     Returns:
@@ -233,50 +231,38 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
         loss: (steps,) loss, NaN before the first update.
 
     Returns:
-        ``final_msr``: mean over the last 100 steps. ``solved_at``: the first step from which
-        on the running mean of the MSR stays at 99 % or above, NaN if it does not end there.
-        ``loss_start``: the first loss; ``loss_dip`` and ``loss_peak``: where the running mean of
-        the loss begins and ends its largest rise; ``loss_end``: mean over the last 100 steps.
+        ``final_msr``: mean over the last 100 steps. ``solved``: whether the running mean of the
+        MSR ends at 99 % or above. ``loss_start``: the first loss; ``loss_dip`` and ``loss_peak``:
+        where the running mean of the loss begins and ends its largest rise; ``loss_end``: mean
+        over the last 100 steps.
     """
-    below = np.flatnonzero(running_mean(success_rate) < SOLVED)
-    solved_at = below[-1] + 1 if below.size else 0
     known = np.isfinite(loss)
     smooth = running_mean(loss)[known]
     lowest = np.minimum.accumulate(smooth)
     peak = np.argmax(smooth - lowest)
-    losses = loss[known][0], lowest[peak], smooth[peak], loss[known][-FINAL:].mean()
     return {
         "final_msr": success_rate[-FINAL:].mean(),
-        "solved_at": solved_at if solved_at < len(success_rate) else np.nan,
-        **dict(zip(LOSSES, losses)),
+        "solved": running_mean(success_rate)[-1] >= SOLVED,
+        "loss_start": loss[known][0],
+        "loss_dip": lowest[peak],
+        "loss_peak": smooth[peak],
+        "loss_end": loss[known][-FINAL:].mean(),
     }
 
 
 def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
     """One row per configuration of the published search: means over its runs of ``run_summary``.
 
-    Columns: ``equalize``, ``batch_size``, ``learning_rate``, ``runs``; ``final_msr`` and its
-    standard deviation; ``solved``, the number of runs that end at 99 % or above, and ``solved_at``
-    of these; and the four losses.
+    Columns: ``equalize``, ``batch_size``, ``learning_rate``; the means, but of ``solved`` the
+    number of runs; ``final_msr_std``, a standard deviation; and ``runs``.
     """
     rows = []
     for (cell, _), curve in read_grid(TUNING, folder).groupby(["cell", "seed"]):
         config = TUNING.cells[cell].config
-        settings = {
-            name: getattr(config, name) for name in ("equalize", "batch_size", "learning_rate")
-        }
-        columns = (curve[name].to_numpy() for name in ("success_rate", "loss"))
-        rows.append(settings | run_summary(*columns))
-    return (
-        pd.DataFrame(rows)
-        .groupby(["equalize", "batch_size", "learning_rate"])
-        .agg(
-            runs=("final_msr", "size"),
-            final_msr=("final_msr", "mean"),
-            final_msr_std=("final_msr", "std"),
-            solved=("solved_at", "count"),
-            solved_at=("solved_at", "mean"),
-            **{name: (name, "mean") for name in LOSSES},
-        )
-        .reset_index()
+        settings = {name: getattr(config, name) for name in SEARCHED}
+        rows.append(settings | run_summary(*curve[["success_rate", "loss"]].to_numpy().T))
+    groups = pd.DataFrame(rows).groupby(list(SEARCHED))
+    summary = groups.mean().assign(
+        solved=groups["solved"].sum(), final_msr_std=groups["final_msr"].std(), runs=groups.size()
     )
+    return summary.reset_index()

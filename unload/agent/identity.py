@@ -75,7 +75,7 @@ def identity(value: Any) -> Any:
 
 
 def _package(value: Any) -> str:
-    return value.__module__.partition(".")[0]
+    return (value.__module__ or "").partition(".")[0]
 
 
 def _absorb(value: Any, package: str, digest, seen: set[str]) -> None:

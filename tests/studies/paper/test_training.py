@@ -1,4 +1,4 @@
-"""The paper's training in the container: its data, and how its policies are looked at."""
+"""The paper's training in the container: its data."""
 
 from dataclasses import replace
 
@@ -10,8 +10,7 @@ from studies import grid
 from studies.grid import Cell, Grid, read_policies
 from studies.paper import training
 from studies.paper.training import PAPER
-from tests.agent.networks import lowest
-from unload import TrainConfig, evaluate, load_policy, policies
+from unload import TrainConfig, load_policy
 from unload.support import files
 
 
@@ -43,13 +42,6 @@ def test_a_full_grid_leaves_what_the_papers_plots_and_others_read(small, tmp_pat
         assert all(stored[key].equal(weights[key]) for key in weights)
 
 
-def test_a_reduced_grid_leaves_published_data_alone(small, tmp_path):
-    training.training_data(None, 6400, tmp_path, tmp_path / "runs", n_jobs=1)
-    names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"reduced", "runs"}
-    assert len(training.default_curves(tmp_path / "reduced")) == 4
-
-
 def test_all_runs_of_the_papers_cells_are_published():
     runs = training.paper_runs()
     planned = [(name, seed) for name, cell in training.PAPER_CELLS.items() for seed in cell.seeds]
@@ -74,18 +66,6 @@ def test_committed_policies_are_those_of_the_grid():
         assert all(stored[key].equal(weights[key]) for key in weights)
 
 
-def test_runs_and_policies_are_summed_up(monkeypatch):
-    monkeypatch.setattr(training, "EVALUATION", {"episodes": 2, "seed": 1})
-    began = training.while_training()
-    assert began.index.tolist() == list(training.DEFAULT_SEEDS)
-    assert began["msr_end"].tolist() == pytest.approx([0.901, 0.950, 0.400, 0.372], abs=1e-3)
-    assert (began["msr_best"] >= began[["msr_start", "msr_end"]].max(axis=1)).all()
-    applied = training.in_fresh_containers()
-    alone = evaluate(training.default_policies()[2], 2, 1, mask=False)
-    assert applied.loc[2, "msr_no_mask"] == pytest.approx(alone["success_rate"].mean())
-    assert applied.loc[2, "deadlocked_no_mask"] == pytest.approx(alone["deadlocked"].mean())
-
-
 def test_the_default_cell_has_the_defaults():
     assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
 
@@ -101,21 +81,3 @@ def test_means_over_whole_episodes():
     assert means["epsilon"].tolist() == pytest.approx([0.968, 0.936])
     with pytest.raises(ValueError, match="points after 1,920 picks each; expected a divisor"):
         training.episode_means(curve.assign(picks=3 * picks))
-
-
-def test_random_picks_succeed_more_often_in_full_containers():
-    msr = training.msr_by_pick(policies.random, containers=32)
-    assert msr.shape == (500,)
-    assert 0.2 < msr[100:].mean() < 0.3 < msr[:20].mean() < 0.4
-    highest = training.msr_by_pick(policies.highest, containers=2, mask=False)
-    assert (highest == 1).all()
-    # Without the mask a failed item is picked for ever.
-    assert set(training.msr_by_pick(lowest, containers=1, mask=False)) == {0}
-    assert training.msr_by_pick(lowest, containers=1).any()
-
-
-def test_favourites_are_asked_for_while_a_player_unloads():
-    lifted = training.favourites(policies.highest, policies.random, containers=2, unloaded=60)
-    assert lifted.shape == (2, 3)
-    assert lifted.all()
-    assert not training.favourites(lowest, policies.highest, containers=1, unloaded=25).any()

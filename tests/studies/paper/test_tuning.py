@@ -43,24 +43,6 @@ def test_a_search_is_published_in_a_table_per_batch_size(small, tmp_path):
     assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
 
 
-def test_the_search_is_the_papers():
-    configs = list(tuning.TUNING.configs().values())
-    assert len(configs) == 3 * 4 * 10 * 2
-    assert {config.learning_rate for config in configs} == {1e-1, 1e-2, 1e-3}
-    assert {config.seed for config in configs} == set(range(10))
-    assert {config.picks for config in configs} == {3000 * 64}
-    assert {config.env for config in configs} == {"unload/HighestItem-v0"}
-    sizes = [config.batch_size for config in configs]
-    assert set(sizes) == {64, 256, 1024, 2048}
-    assert sizes == sorted(sizes, reverse=True), "slow runs come first"
-
-
-@pytest.mark.parametrize("equalize", [True, False])
-def test_cells_of_the_search_are_named_by_their_settings(equalize):
-    config = tuning.TUNING.cells[tuning.tuning_cell(1024, 0.1, equalize)].config
-    assert (config.batch_size, config.learning_rate, config.equalize) == (1024, 0.1, equalize)
-
-
 def test_committed_files_of_the_papers_plots_are_those_of_the_tables(tmp_path, monkeypatch):
     monkeypatch.setattr(
         tuning, "read_grid", lambda grid, folder, cells: read_grid(grid, files.DATA, cells)
@@ -79,6 +61,8 @@ def test_committed_search_has_all_runs():
         axis=None
     )
     assert len(curves) == 240 * 3000
+    sizes = [config.batch_size for config in tuning.TUNING.configs().values()]
+    assert sizes == sorted(sizes, reverse=True), "slow runs come first"
 
 
 def test_summary_of_a_run():
@@ -86,18 +70,12 @@ def test_summary_of_a_run():
     loss = np.interp(np.arange(1000), [0, 300, 600, 999], [0.9, 0.1, 0.4, 0.0])
     loss[:10] = np.nan
     summary = tuning.run_summary(msr, loss)
-    assert summary["final_msr"] == 1
-    assert 480 < summary["solved_at"] < 510
+    assert summary["final_msr"] == 1 and summary["solved"]
+    assert not tuning.run_summary(0.98 * msr, loss)["solved"]
     assert summary["loss_start"] == loss[10]
     assert summary["loss_dip"] == pytest.approx(0.1, abs=0.02)
     assert summary["loss_peak"] == pytest.approx(0.4, abs=0.02)
     assert summary["loss_end"] < 0.1
-
-
-def test_summary_of_a_run_that_fails_or_solves_at_once():
-    failed = tuning.run_summary(np.zeros(200), np.ones(200))
-    assert np.isnan(failed["solved_at"])
-    assert tuning.run_summary(np.ones(200), np.ones(200))["solved_at"] == 0
 
 
 def test_chance_is_the_share_of_the_highest_items():

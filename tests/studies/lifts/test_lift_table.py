@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studies.lifts import table as lifts
+from studies.lifts import lift_table as lifts
 from studies.provenance import read_provenance
 from unload import policies, task
 from unload.physics.table import LiftTable

@@ -29,12 +29,7 @@ RANDOM_SHARE = 40  # times as many episodes of random picks
 
 
 def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = files.RUNS) -> None:
-    """Write ``lifts.npz``, see ``unload.physics.table.LiftTable``.
-
-    Args:
-        folder: of the table.
-        runs_dir: where the table is kept, not to be computed again.
-    """
+    """Write ``folder/lifts.npz``, see ``LiftTable``; ``runs_dir`` keeps what has been computed."""
     settings = {
         "episodes of 64 containers per taste": EPISODES,
         "of random picks": RANDOM_SHARE * EPISODES,

@@ -1,0 +1,115 @@
+"""Learning curves: of many runs over steps (Figs. 8–10) or picks (Figs. 11 and 12), or of one."""
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
+
+from studies.paper.training import PAPER, default_curves, episode_means
+from studies.paper.tuning import running_mean
+from studies.style import COLOURS, mark_reduced, styled
+from unload import task
+from unload.support import files
+
+Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
+SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too
+FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
+
+
+@styled
+def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
+    """Running means over 25 steps of all runs, one of each configuration as a strong line.
+
+    Args:
+        curves: by name: the curves of all runs, and the number of the strong one, which stands
+            in the legend if there are others.
+        label: of the vertical axis, an MSR unless it says "loss".
+    """
+    figure, axes = plt.subplots()
+    for (name, (runs, shown)), colour in zip(curves.items(), colours_of(curves)):
+        label_of_run = f"{name}, run {shown}" if len(runs) > 1 else name
+        for run, values in runs.items():
+            smooth = running_mean(values)
+            if run == shown:
+                axes.plot(smooth, color=colour, label=label_of_run, zorder=3)
+            else:
+                axes.plot(smooth, color=colour, linewidth=0.5, alpha=0.4)
+    steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
+    axes.set(xlabel="step $k$", ylabel=label, xlim=(0, steps))
+    axes.set(ylim=(0, 0.6) if "loss" in label else (0, 1.02))
+    others = any(len(runs) > 1 for runs, _ in curves.values())
+    note = "thin: the other runs of the same configuration" if others else None
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, title=note, title_fontsize=8)
+    return figure
+
+
+def colours_of(names: Collection[str]) -> list:
+    """A colour a name: of what an agent sees, else from a scale for the values of a setting."""
+    scale = plt.get_cmap("viridis")(np.linspace(0, 0.85, len(names)))
+    return [FE_COLOURS.get(name, colour) for name, colour in zip(names, scale)]
+
+
+@styled
+def fig11_loss(folder: str | Path = files.DATA) -> Figure:
+    """Training loss over picks (Fig. 11), one line per seed; the first one is strong.
+
+    Args:
+        folder: of the curves that ``python -m studies training`` writes.
+
+    Raises:
+        FileNotFoundError: there are none.
+    """
+    losses = {seed: curve["loss"] for seed, curve in default_curves(folder).items()}
+    return _over_picks(losses, r"loss $\ell$", (0, 0.6), folder)
+
+
+@styled
+def fig12_reward(folder: str | Path = files.DATA) -> Figure:
+    """Mean reward per pick of the 64 environments over picks (Fig. 12).
+
+    Each point is a mean over an episode of all environments. Arguments, lines and errors as in
+    ``fig11_loss``.
+    """
+    rewards = {
+        seed: 2 * curve["success_rate"] - 1 for seed, curve in default_curves(folder).items()
+    }
+    return _over_picks(rewards, r"$r_\mathrm{mean}$", (-1, 1), folder)
+
+
+def draw_learning_curve(
+    axes: Axes, curve: pd.DataFrame, name: str, color: str = COLOURS["ranks"]
+) -> None:
+    """Draw the MSR while training: pale at each point of the curve, strong over whole episodes.
+
+    Args:
+        axes: where.
+        curve: of ``unload.train``, see ``episode_means``.
+        name: in the legend.
+        color: of both lines.
+    """
+    axes.plot(curve["picks"], curve["success_rate"], color=color, linewidth=0.7, alpha=0.45)
+    episodes = episode_means(curve)
+    middle = episodes["picks"] - task.NUM_ENVS * task.MAX_PICKS / 2
+    axes.plot(middle, episodes["success_rate"], "o-", color=color, markersize=3.5, label=name)
+    axes.set(xlabel="picks", ylabel="MSR while training", ylim=(0, 1.02), xlim=(0, None))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+
+
+def _over_picks(
+    curves: dict[int, pd.Series], label: str, limits: tuple[float, float], folder: str | Path
+) -> Figure:
+    figure, axes = plt.subplots()
+    for number, (seed, values) in enumerate(curves.items()):
+        style = {"linewidth": 0.8, "alpha": 0.8} if number else {"zorder": 3}
+        axes.plot(values, color=SEED_COLOURS[number], label=f"seed {seed}", **style)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
+    end = max(values.index[-1] for values in curves.values())
+    axes.set(xlabel="step $k$ (picks)", ylabel=label, ylim=limits, xlim=(0, end))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+    mark_reduced(figure, folder, PAPER.name)
+    return figure

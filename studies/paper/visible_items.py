@@ -1,0 +1,90 @@
+"""The visible items' positions, before and after equalization (Figs. 4–6).
+
+python -m studies observation
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import gymnasium
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from studies.results import COMMAND, measured, publish, read_table
+from studies.style import styled
+from unload.env import observation
+from unload.env.equalization import equalize
+from unload.support import files
+
+FOLDER = "obs_hist_equal"  # of the paper's own plots
+SEED = 0  # of the load
+# Fig. 5: the paper's histogram. The edges lie just outside [-1, 1].
+BINS = np.linspace(-1.001, 1.001, 111)
+
+
+def observation_data(folder: str | Path = files.DATA) -> None:
+    """Write ``obs_hist_equal/{all_items,Observation,Equalized_Observation}.csv``.
+
+    Columns ``x`` and ``y``: scaled x and z of all items, of the 128 observed ones, and of the
+    observed ones after equalization.
+    """
+    result = measured(_positions)
+    tables = {
+        name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
+        for name, positions in result.value.items()
+    }
+    place, command = Path(folder) / FOLDER, f"{COMMAND} observation"
+    settings = {"seed": SEED}
+    publish(place, "observation", tables, command, settings, [result], float_format="%.6f")
+
+
+def _positions() -> dict[str, np.ndarray]:
+    """Scaled positions, (items, 3), by the name of the file."""
+    env = gymnasium.make("unload/Container-v0").unwrapped
+    observed, _ = env.reset(seed=SEED)
+    everything = observation.scale(env.observed_positions())
+    env.close()
+    return {
+        "all_items": everything,
+        "Observation": observed,
+        "Equalized_Observation": equalize(observed),
+    }
+
+
+def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
+    """Points of one of the paper's scatter plots.
+
+    Args:
+        name: ``"all_items"``, ``"Observation"`` or ``"Equalized_Observation"``.
+        folder: holds ``obs_hist_equal/name.csv``, columns ``x`` and ``y``.
+
+    Returns:
+        (n, 2) float64, x and z of each item, scaled to [-1, 1].
+
+    Raises:
+        FileNotFoundError: the file is missing; the message names the command that makes it.
+        ValueError: the file has other columns.
+    """
+    path = Path(folder) / FOLDER / f"{name}.csv"
+    return read_table(path, f"{COMMAND} observation", ["x", "y"])[["x", "y"]].to_numpy()
+
+
+@styled
+def scaled_side_view(groups: Mapping[str, tuple[np.ndarray, tuple]], symbol: str) -> Figure:
+    """Items from the side, in scaled coordinates (Figs. 4 and 6).
+
+    Args:
+        groups: name → (n, 2) points and their colour; the later ones are drawn above.
+        symbol: of a position, in LaTeX.
+    """
+    figure, axes = plt.subplots(figsize=(4.6, 4.8))
+    for name, (points, colour) in groups.items():
+        axes.plot(*points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=colour, label=name)
+    ticks = np.arange(-1, 1.1, 0.5)
+    axes.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), xticks=ticks, yticks=ticks, aspect="equal")
+    axes.set_xlabel(rf"${symbol}_{{0,i,\mathrm{{x}}}}$")
+    axes.set_ylabel(rf"${symbol}_{{0,i,\mathrm{{z}}}}$")
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=3, borderaxespad=0.4)
+    return figure
