@@ -28,7 +28,7 @@ LIBRARIES = {
     "llvmlite": ("unload/fast/kernel.py", "unload/support/compiled.py"),
     "matplotlib": (
         "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", "studies/lifts/",
-        "studies/paper/", "studies/policies/",
+        "studies/paper/", "studies/policies/", "studies/seamless/",
     ),
     "numba": ("unload/fast/kernel.py", "unload/support/compiled.py"),
     "numpy": ("unload/", "studies/"),

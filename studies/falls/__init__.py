@@ -1,5 +1,6 @@
-"""Why runs fall: the laboratory, the long runs, and what holds a run up.
+"""Why runs fall: the laboratory, the long runs, and what keeps a run from falling.
 
 Read ``measures`` (of a network and of what its policy leaves), ``laboratory`` (a run takes two
-seconds), ``long`` (the paper's length, and all published policies judged) and ``figures``.
+seconds), ``fresh`` (its third plan), ``long`` (the paper's length, and all published policies
+judged) and ``figures``.
 """

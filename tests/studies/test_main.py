@@ -30,7 +30,7 @@ def called(monkeypatch):
 
         for name, (summary, _, options) in command.PARTS.items():
             monkeypatch.setitem(command.PARTS, name, (summary, partial(make, name), options))
-        monkeypatch.setattr(sys, "argv", ["reproduce", *arguments])
+        monkeypatch.setattr(sys, "argv", ["studies", *arguments])
         command.main()
         return calls
 
@@ -51,7 +51,7 @@ def test_options_reach_the_part(called):
 
 def test_paper_makes_every_part(called):
     calls = called("paper", "--jobs", "3")
-    assert [name for name, _ in calls] == list(command.PARTS) and len(calls) < 10
+    assert [name for name, _ in calls] == list(command.PARTS)
     for name, given in calls:
         assert given == ({} if name == "observation" else {"n_jobs": 3})
 
