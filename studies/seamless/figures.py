@@ -75,7 +75,7 @@ def _panels(panels: Mapping[str, Panel], value) -> tuple[Figure, np.ndarray]:
         for name, colour in zip(panel, ("C1", "C0")):
             for number, run in enumerate(panel[name]):
                 draw_run(axes, run["picks"], value(run), colour, MASK_LINES[name], not number, name)
-        axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7))
+        axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7), xticks=np.arange(5) * 5e6)
         axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2)
@@ -122,7 +122,7 @@ def draw_start_and_end(groups: Mapping[str, tuple[pd.DataFrame, dict]]) -> Figur
     )
     for share in (0, 0.2, 0.4, 0.6):
         axes.annotate(
-            f"j = {share:g}", (100 * CHANCE * (1 - share), 100 * (1 - share)), (6, -3),
+            f"j = {share:g}", (100 * CHANCE * (1 - share), 100 * (1 - share)), (-38, 2),
             textcoords="offset points", fontsize=8, color="0.4",
         )  # fmt: skip
     for name, (rows, look) in groups.items():
