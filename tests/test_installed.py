@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import unload
+from studies import paths
 from unload.support import files
 
 USE_ALL = """
@@ -51,7 +52,7 @@ def run(code: str, folder: Path, *options: str, **environ: str) -> str:
 def installed(tmp_path) -> Path:
     """A folder outside the checkout with nothing but the package, built as ``make dist`` does."""
     for name in ("unload", "pyproject.toml", "README.md", "LICENSE", "Makefile"):
-        subprocess.run(["cp", "-r", files.ROOT / name, tmp_path], check=True)
+        subprocess.run(["cp", "-r", paths.ROOT / name, tmp_path], check=True)
     # The environment is the one that runs this, and need not be made.
     make = ["make", "--silent", f"BIN={Path(sys.executable).parent}", "--old-file=.venv/ready"]
     subprocess.run([*make, "dist"], cwd=tmp_path, check=True)
@@ -98,20 +99,20 @@ for make in (
 def test_only_what_is_simulated_needs_pybullet(tmp_path):
     """And only what is learned needs PyTorch."""
     code = "NAMES = ('pybullet',)" + BLOCKED + WITHOUT_PYBULLET
-    printed = run(code, tmp_path, PYTHONPATH=str(files.ROOT)).splitlines()
+    printed = run(code, tmp_path, PYTHONPATH=str(paths.ROOT)).splitlines()
     assert len(printed) == 2 and all("pip install 'unload[pybullet]'" in line for line in printed)
 
 
 def test_an_import_takes_few_modules(tmp_path):
     code = "import sys, unload; print(len(sys.modules), *sys.modules)"
-    count, *names = run(code, tmp_path, PYTHONPATH=str(files.ROOT)).split()
+    count, *names = run(code, tmp_path, PYTHONPATH=str(paths.ROOT)).split()
     assert int(count) < 700
     assert not {"torch", "numba", "pandas", "matplotlib", "plotly", "pybullet"} & set(names)
 
 
 def test_names_are_where_type_checkers_find_them():
     """What is listed, what is imported for type checkers, and what is imported when it is used."""
-    source = ast.parse((files.ROOT / "unload/__init__.py").read_text())
+    source = ast.parse((paths.ROOT / "unload/__init__.py").read_text())
     (typed,) = (node for node in source.body if isinstance(node, ast.If))
     found = {}
     exec(compile(ast.Module(typed.body, []), "imports", "exec"), found)
@@ -124,6 +125,6 @@ def test_names_are_where_type_checkers_find_them():
 
 
 def test_there_is_one_version():
-    project = tomllib.loads((files.ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((paths.ROOT / "pyproject.toml").read_text())["project"]
     assert unload.__version__ == project["version"]
-    assert f"version: {unload.__version__}" in (files.ROOT / "CITATION.cff").read_text()
+    assert f"version: {unload.__version__}" in (paths.ROOT / "CITATION.cff").read_text()

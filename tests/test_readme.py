@@ -2,12 +2,12 @@
 
 import re
 
+from studies import paths
 from studies.falls.long import read_published
 from studies.paper.training import paper_runs
 from studies.statistics import cell_table, end_msr, fell
-from unload.support import files
 
-README = (files.ROOT / "README.md").read_text()
+README = (paths.ROOT / "README.md").read_text()
 
 
 def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
@@ -23,22 +23,22 @@ def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
 def test_links_lead_to_files():
     links = re.findall(r"\]\(([^)]+)\)", README)
     assert len(links) > 10
-    assert all((files.ROOT / link).exists() for link in links)
+    assert all((paths.ROOT / link).exists() for link in links)
 
 
 def test_commands_are_those_of_the_makefile():
-    targets = set(re.findall(r"^([a-z]+):", (files.ROOT / "Makefile").read_text(), re.MULTILINE))
-    text = README + (files.ROOT / "CONTRIBUTING.md").read_text()
+    targets = set(re.findall(r"^([a-z]+):", (paths.ROOT / "Makefile").read_text(), re.MULTILINE))
+    text = README + (paths.ROOT / "CONTRIBUTING.md").read_text()
     named = set(re.findall(r"(?:^|`)make ([a-z]+)", text, re.MULTILINE))
     assert {"figures", "test", "lint", "quick"} <= named <= targets
 
 
 def test_the_way_to_contribute_names_files_that_exist():
-    text = (files.ROOT / "CONTRIBUTING.md").read_text()
-    paths = re.findall(r"`([a-z_/]+/[\w.]+(?:\.py|\.toml|/))`", text)
-    assert len(paths) > 10
-    places = (files.ROOT, files.ROOT / "unload")
-    assert not [path for path in paths if not any((place / path).exists() for place in places)]
+    text = (paths.ROOT / "CONTRIBUTING.md").read_text()
+    named = re.findall(r"`([a-z_/]+/[\w.]+(?:\.py|\.toml|/))`", text)
+    assert len(named) > 10
+    places = (paths.ROOT, paths.ROOT / "unload")
+    assert not [path for path in named if not any((place / path).exists() for place in places)]
 
 
 def test_the_result_is_that_of_the_data():

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
+from studies import paths
 from studies.paper.training import PAPER, default_curves, episode_means
 from studies.paper.tuning import REACHED, greedy_msr, read_curves, running_mean
 from studies.style import COLOURS, mark_reduced, styled
 from unload import task
 from unload.load.view import COLOURS as BOX_COLOURS
-from unload.support import files
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
 SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too
@@ -23,7 +23,7 @@ FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
 
 
 @styled
-def fig08_learning_rate(folder: str | Path = files.DATA) -> Figure:
+def fig08_learning_rate(folder: str | Path = paths.DATA) -> Figure:
     """MSR while training over steps for three learning rates, batch size 1024 (Fig. 8).
 
     The strong lines are the runs that the paper shows; the thin ones are all others.
@@ -44,7 +44,7 @@ def fig08_learning_rate(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def fig09_batch_size(folder: str | Path = files.DATA) -> Figure:
+def fig09_batch_size(folder: str | Path = paths.DATA) -> Figure:
     """MSR while training over steps for four batch sizes, learning rate 10⁻³ (Fig. 9).
 
     Arguments, lines and errors as in ``fig08_learning_rate``.
@@ -57,7 +57,7 @@ def fig09_batch_size(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def fig10_loss(folder: str | Path = files.DATA) -> Figure:
+def fig10_loss(folder: str | Path = paths.DATA) -> Figure:
     """Loss over training steps with and without feature engineering, b = 2048 (Fig. 10).
 
     Arguments, lines and errors as in ``fig08_learning_rate``.
@@ -70,7 +70,7 @@ def fig10_loss(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def greedy_curves(folder: str | Path = files.DATA) -> Figure:
+def greedy_curves(folder: str | Path = paths.DATA) -> Figure:
     """Greedy MSR by learning rate, batch size and feature engineering: the runs of Figs. 8–10.
 
     Each line is the mean over all runs of a configuration, its band one standard error.
@@ -154,7 +154,7 @@ def _over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
 
 
 @styled
-def fig11_loss(folder: str | Path = files.DATA) -> Figure:
+def fig11_loss(folder: str | Path = paths.DATA) -> Figure:
     """Training loss over picks (Fig. 11), one line per seed; the first one is strong.
 
     Args:
@@ -168,7 +168,7 @@ def fig11_loss(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def fig12_reward(folder: str | Path = files.DATA) -> Figure:
+def fig12_reward(folder: str | Path = paths.DATA) -> Figure:
     """Mean reward per pick of the 64 environments over picks (Fig. 12).
 
     Each point is a mean over an episode of all environments. Arguments, lines and errors as in

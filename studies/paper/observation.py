@@ -12,6 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from studies import paths
 from studies.paper.loads import draw_items
 from studies.results import COMMAND, measured, publish, read_table
 from studies.style import COLOURS as SEEN_COLOURS
@@ -20,7 +21,6 @@ from unload import task
 from unload.env import observation
 from unload.env.equalization import equalize
 from unload.load.view import COLOURS
-from unload.support import files
 
 FOLDER = "obs_hist_equal"  # of the paper's own plots
 SEED = 0  # of the load
@@ -30,7 +30,7 @@ EQUALIZED = SEEN_COLOURS["ranks"]
 BINS = np.linspace(-1.001, 1.001, 111)
 
 
-def observation_data(folder: str | Path = files.DATA) -> None:
+def observation_data(folder: str | Path = paths.DATA) -> None:
     """Write ``obs_hist_equal/{all_items,Observation,Equalized_Observation}.csv``.
 
     Columns ``x`` and ``y``: scaled x and z of all items, of the 128 observed ones, and of the
@@ -59,7 +59,7 @@ def _positions() -> dict[str, np.ndarray]:
     }
 
 
-def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
+def read_points(name: str, folder: str | Path = paths.DATA) -> np.ndarray:
     """Points of one of the paper's scatter plots.
 
     Args:
@@ -78,7 +78,7 @@ def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
 
 
 @styled
-def fig04_observation(folder: str | Path = files.DATA) -> Figure:
+def fig04_observation(folder: str | Path = paths.DATA) -> Figure:
     """Fig. 4: side view of all items of a fresh container, and of the observed ones."""
     groups = {
         "all items": (read_points("all_items", folder), COLOURS["unseen"]),
@@ -88,7 +88,7 @@ def fig04_observation(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
+def fig05_histogram(folder: str | Path = paths.DATA) -> Figure:
     """Fig. 5: histogram of the visible items' x, before and after equalization."""
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
     for name, colour, label in (
@@ -110,7 +110,7 @@ def fig05_histogram(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def fig06_equalized(folder: str | Path = files.DATA) -> Figure:
+def fig06_equalized(folder: str | Path = paths.DATA) -> Figure:
     """Fig. 6: side view of the visible items after equalization."""
     points = read_points("Equalized_Observation", folder)
     return _side_view({"equalized observation": (points, EQUALIZED)}, r"\tilde{p}'")

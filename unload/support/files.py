@@ -1,4 +1,4 @@
-"""Files that are either whole or absent, their digests, locked folders, and the repository's.
+"""Files that are either whole or absent, their digests, and locked folders.
 
 Errors name the file: a damaged one is a ValueError whatever the decoder raises, one that
 cannot be written an OSError.
@@ -21,11 +21,7 @@ from uuid import uuid4
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT / "data"  # what the figures are drawn from
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
-FIGURES = ROOT / "figures"
-RUNS = ROOT / "runs"  # training runs, not kept in the repository
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from studies import paths
 from studies.paper import animation
 from tests.agent.networks import lowest
 from unload import policies
 from unload.load import view
 from unload.load.substacks import front_walls, stack_load
 from unload.load.view import COLOURS
-from unload.support import files
 
 
 def small(rng):
@@ -89,4 +89,4 @@ def test_picked_boxes_rise_in_the_colours_of_what_became_of_them(episodes):
 
 
 def test_committed_picture_is_small_enough_for_a_readme():
-    assert (files.FIGURES / "unloading.gif").stat().st_size <= 2_000_000
+    assert (paths.FIGURES / "unloading.gif").stat().st_size <= 2_000_000

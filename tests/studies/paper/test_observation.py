@@ -3,12 +3,12 @@
 import numpy as np
 import pandas as pd
 
+from studies import paths
 from studies.paper import observation
 from studies.provenance import read_provenance
 from unload.env.observation import distance, nearest
 from unload.load.substacks import stack_load
 from unload.load.view import COLOURS
-from unload.support import files
 
 NAMES = ("all_items", "Observation", "Equalized_Observation")
 
@@ -32,7 +32,7 @@ def test_committed_data_is_written_again_byte_for_byte(tmp_path):
     for name in NAMES:
         again, committed = (
             (folder / f"obs_hist_equal/{name}.csv").read_bytes()
-            for folder in (tmp_path, files.DATA)
+            for folder in (tmp_path, paths.DATA)
         )
         assert again == committed
 
