@@ -18,6 +18,7 @@ GRAVITY = 9.81
 
 # Sec. III-B: only the items nearest to the viewpoint are observed.
 N_VISIBLE = 128
+PADDING = -1.0  # in the rows without an item: a corner of the container, where no centre can lie
 VIEWPOINT = np.array([7.0, 1.25, 2.5])
 # Sec. III-B, diagonal of W: y does not count, z counts more than x.
 DISTANCE_WEIGHTS = np.array([1.0, 0.0, 4.0])

@@ -7,9 +7,9 @@ from tests.agent.networks import HeightNetwork, peq, weights
 from unload import Greedy, PEQNetwork, equalize, load_policy, policies, save_policy
 from unload.agent.greedy import greedy_actions, settings_of
 from unload.agent.learner import highest_values
-from unload.env.observation import PADDING
 from unload.network.variants import NETWORKS
 from unload.network.weights import write_weights
+from unload.task import PADDING
 
 
 @pytest.fixture

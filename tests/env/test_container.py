@@ -193,7 +193,7 @@ def test_a_container_is_unloaded_to_the_last_item(small_env, kwargs):
             assert (after == equalize(seen, container.ties, present=held)).all()
         else:
             assert (after == seen).all()
-        assert (after[left:] == observation.PADDING).all() and env.observation_space.contains(after)
+        assert (after[left:] == task.PADDING).all() and env.observation_space.contains(after)
     assert info["unloaded"] == 135 and info["item"] >= 0
     with pytest.raises(ResetNeeded, match="the episode is finished"):
         container.step(0)

@@ -146,7 +146,7 @@ class PickingEnv(EpisodeEnv):
 
         Equalized if asked for, and padded.
         """
-        seen = np.full((task.N_VISIBLE, 3), observation.PADDING, np.float32)
+        seen = np.full((task.N_VISIBLE, 3), task.PADDING, np.float32)
         seen[: len(positions)] = observation.scaled(positions)
         if not self.equalize:
             return seen

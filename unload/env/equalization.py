@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from unload.env.observation import PADDING
+from unload import task
 from unload.support import checks
 
 TIES = ("noise", "average")
@@ -32,7 +32,7 @@ def equalize(
             differ by at most ``tolerance`` share the mean of their ranks.
         tolerance: for ``ties="average"``, in the unit of ``positions``.
         present: (..., items) bool, the rows that hold an item; all if None. The others do
-            not count among the N items and get ``observation.PADDING``, -1.
+            not count among the N items and get ``task.PADDING``, -1.
 
     Returns:
         Same shape, float32 in [-1, 1].
@@ -62,7 +62,7 @@ def equalize(
     ranks = np.empty(positions.shape)
     np.put_along_axis(ranks, order, sorted_ranks, axis=-2)
     even = (2 * ranks - last) / np.maximum(last, 1)
-    return (even if present is None else np.where(present, even, PADDING)).astype(np.float32)
+    return (even if present is None else np.where(present, even, task.PADDING)).astype(np.float32)
 
 
 def _shared_ranks(ordered: np.ndarray, tolerance: float) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The agent's observation: the items nearest to the entrance, scaled (Sec. III-B).
 
 The last items of a container fill the first rows of the observation only. The rows after
-them hold ``PADDING`` on all three axes: the corner of the container, where no item's centre
+them hold ``task.PADDING`` on all three axes: the corner of the container, where no item's centre
 can lie.
 """
 
@@ -10,7 +10,6 @@ import numpy as np
 from unload import task
 from unload.support import checks
 
-PADDING = -1.0
 # Drift of the boxes of a settled full simulation, measured in notebook 04: how far they
 # spread around the places they were put at, and how far they sink on average (m).
 POSITION_NOISE = 0.0005
@@ -87,4 +86,4 @@ def holds_item(observations: np.ndarray) -> np.ndarray:
     Returns:
         (..., items) bool.
     """
-    return (np.asarray(observations) != PADDING).any(axis=-1)
+    return (np.asarray(observations) != task.PADDING).any(axis=-1)

@@ -1,4 +1,5 @@
-"""The compiled twin of the learner.
+"""The compiled twins of the environments and the learner; skip this room at first reading.
 
-Read ``learner``, ``fused``, and its loops in ``kernel``, in this order.
+Read ``ranking`` and ``containers`` for the environments, ``learner``, ``fused`` and its loops in
+``kernel`` for the learner, in this order.
 """

@@ -10,7 +10,6 @@ first ones of the arrays.
 import numpy as np
 
 from unload import task
-from unload.env.observation import PADDING
 from unload.support.compiled import compiled
 
 # The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
@@ -96,7 +95,7 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
     axes, rows = values.shape
     twice, levels = np.empty(items, np.int32), LEVELS[items]
     if items < rows:
-        observation[items:] = PADDING
+        observation[items:] = task.PADDING
     for axis in range(axes):
         if not equalize:
             for i in range(items):
