@@ -25,7 +25,7 @@ from studies.heap.table import (
 )
 from studies.style import COLOURS as RULE_COLOURS
 from studies.style import mark_reduced, styled
-from unload.load.view import COLOURS, CORNERS, EYE, SEAM, project
+from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
 MEANINGS = {

@@ -15,7 +15,7 @@ from studies.paper.training import PAPER, default_curves, episode_means
 from studies.paper.tuning import REACHED, greedy_msr, read_curves, running_mean
 from studies.style import COLOURS, mark_reduced, styled
 from unload import task
-from unload.load.view import COLOURS as BOX_COLOURS
+from unload.load.picture import COLOURS as BOX_COLOURS
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
 SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too

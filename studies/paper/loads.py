@@ -11,6 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 from studies.style import styled
 from unload import task
 from unload.load.boxes import Load
+from unload.load.picture import COLOURS
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
@@ -22,7 +23,6 @@ from unload.load.substacks import (
     ROWS_HIGH,
     package_colour,
 )
-from unload.load.view import COLOURS
 from unload.support import checks
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
@@ -97,11 +97,11 @@ def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> N
 def fig02_containers(
     images: Sequence[np.ndarray], unloaded: Sequence[int], columns: int = 8
 ) -> Figure:
-    """Fig. 2: pictures of the containers of a vector environment in a grid.
+    """Fig. 2: pictures of containers side by side in a grid.
 
     Args:
-        images: of equal shape (height, width, 3) uint8, as ``render`` of a vector
-            environment returns them, in the order in which they are drawn.
+        images: of equal shape (height, width, 3) uint8, as ``render`` returns them, in the
+            order in which they are drawn.
         unloaded: items unloaded from each container, written below its picture.
         columns: pictures in a line.
     """

@@ -20,7 +20,7 @@ from studies.style import styled
 from unload import task
 from unload.env import observation
 from unload.env.equalization import equalize
-from unload.load.view import COLOURS
+from unload.load.picture import COLOURS
 
 FOLDER = "obs_hist_equal"  # of the paper's own plots
 SEED = 0  # of the load

@@ -11,8 +11,8 @@ from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
+from unload.load.picture import snapshot
 from unload.load.substacks import build_load
-from unload.load.view import snapshot
 
 ENV_ID = "unload/Container-v0"
 
@@ -283,9 +283,9 @@ def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
     tower = boxes((1.2, 0.2), (1.2, 0.6 + 2 * CONTACT_TOLERANCE))
     with pytest.raises(TypeError, match="what stack returned is 'boxes'; expected an unload.Load"):
         make(stack=lambda rng: "boxes").reset(seed=0)
-    with pytest.raises(ValueError, match="what stack returned has 1 floating boxes: .* 0.4002 m"):
+    with pytest.raises(ValueError, match=r"floats in what stack returned, .* 0.4002 m"):
         make(stack=lambda rng: tower).reset(seed=0)
-    with pytest.raises(ValueError, match="load has 1 floating boxes"):
+    with pytest.raises(ValueError, match="floats in load"):
         make().reset(options={"load": tower})
 
 

@@ -24,7 +24,7 @@ from studies.policies.variants import GRIDS, variants_msr
 from studies.speed.figures import speed_ratios
 from unload import stack_load, task
 from unload.env.observation import nearest
-from unload.load.view import COLOURS
+from unload.load.picture import COLOURS
 
 LOAD = stack_load(np.random.default_rng(0))
 VISIBLE = nearest(LOAD.positions)

@@ -7,8 +7,8 @@ from studies import paths
 from studies.paper import observation
 from studies.provenance import read_provenance
 from unload.env.observation import distance, nearest
+from unload.load.picture import COLOURS
 from unload.load.substacks import stack_load
-from unload.load.view import COLOURS
 
 NAMES = ("all_items", "Observation", "Equalized_Observation")
 
