@@ -255,6 +255,16 @@ def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
         assert not (folder / "lock").stat().st_mode & 0o111  # a file of text, not a program
 
 
+def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
+    """After a while, and then goes on when the folder is free."""
+    monkeypatch.setattr(files, "PATIENCE", 0.1)
+    with hold(tmp_path, "time.sleep(1)") as owner, files.locked(tmp_path, wait=True):
+        assert owner.poll() is not None or owner.wait(timeout=10) == 0
+        assert caplog.messages == [
+            f"waiting for process {owner.pid} on {caplog.messages[0].split(' on ')[1]}"
+        ]
+
+
 def test_a_killed_process_holds_no_lock(tmp_path):
     with hold(tmp_path, "time.sleep(600)") as owner:
         owner.kill()

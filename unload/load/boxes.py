@@ -103,8 +103,8 @@ class Load:
         thin = np.flatnonzero(sizes.min(axis=1) < SMALLEST_EDGE)
         if thin.size:
             raise BoxError(thin, f"edges of {sizes[thin[0]]} m; expected >= {SMALLEST_EDGE} m")
-        outside = (low < -OVERLAP) | (high > task.CONTAINER + OVERLAP)
-        outside = np.flatnonzero(outside.any(axis=1))
+        beyond = (low < -OVERLAP) | (high > task.CONTAINER + OVERLAP)
+        outside = np.flatnonzero(beyond.any(axis=1))
         if outside.size:
             place = f"from {low[outside[0]]} to {high[outside[0]]} m"
             inside = f"inside the container, [0 0 0] to {task.CONTAINER} m"

@@ -111,7 +111,8 @@ def view(
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
         items = _items("order", order, len(load))[:FIRST_PICKS]
-        groups = {f"pick {number}": [item] for number, item in enumerate(items.tolist(), 1)}
+        picks = range(1, len(items) + 1)
+        groups = {f"pick {number}": items[number - 1 : number] for number in picks}
         of_item, names = _grouped(present, groups, PICK_COLOURS)
         names = {name.replace("unseen", "picked later"): names[name] for name in names}
     elif groups is None:

@@ -14,12 +14,14 @@ from collections.abc import Callable
 from functools import cache, partial
 from hashlib import blake2b
 from pathlib import Path
+from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
 from numba.core import event
 
+CONFIG: Any = numba.config  # whose names type checkers do not see
 LOGGER = logging.getLogger(__name__)
 PACKAGE = Path(__file__).resolve().parents[1]
 # All that compiled functions are defined in, or take constants from.
@@ -44,11 +46,11 @@ def compiled(function: Callable | None = None, **options) -> Callable:
     if place is None:
         return numba.njit(**options)(function)
     # numba reads this setting when it is told to cache a function; it is the user's again after.
-    before, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(place)
+    before, CONFIG.CACHE_DIR = CONFIG.CACHE_DIR, str(place)
     try:
         return numba.njit(cache=True, **options)(function)
     finally:
-        numba.config.CACHE_DIR = before
+        CONFIG.CACHE_DIR = before
 
 
 @cache
@@ -58,7 +60,7 @@ def folder() -> Path | None:
     They are ``NUMBA_CACHE_DIR`` if it is set, the package's ``__pycache__``, and the user's cache.
     """
     user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for place in (numba.config.CACHE_DIR, PACKAGE / "__pycache__", Path(user, "unload")):
+    for place in (CONFIG.CACHE_DIR, PACKAGE / "__pycache__", Path(user, "unload")):
         if not place:
             continue
         found = Path(place, f"compiled-{digest(PACKAGE)}")

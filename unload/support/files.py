@@ -7,8 +7,10 @@ cannot be written an OSError.
 import errno
 import fcntl
 import json
+import logging
 import os
 import socket
+import time
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -21,6 +23,8 @@ from uuid import uuid4
 
 import numpy as np
 
+LOGGER = logging.getLogger(__name__)
+PATIENCE = 5.0  # s
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 
 
@@ -167,7 +171,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
 
     Args:
         folder: to be locked.
-        wait: until whoever holds the lock gives it back.
+        wait: until whoever holds the lock gives it back; after five seconds, say who does.
 
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock; not if
@@ -181,18 +185,31 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     with open(folder / "lock", "a+b", buffering=0, opener=_open_no_link) as file:
         if os.fstat(file.fileno()).st_nlink > 1:
             raise OSError(errno.EMLINK, "has several names; expected a file of its own", file.name)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError as error:
+        patience = time.monotonic() + (PATIENCE if wait else 0)
+        while not _taken(file):
+            if time.monotonic() < patience:
+                time.sleep(0.05)
+                continue
             file.seek(0)
             owner = file.read().decode().strip() or "another process"
-            raise RuntimeError(
-                f"{folder} is in use by {owner}; wait, or take another folder"
-            ) from error
+            if not wait:
+                raise RuntimeError(f"{folder} is in use by {owner}; wait, or take another folder")
+            LOGGER.warning("waiting for %s, which uses %s", owner, folder)
+            fcntl.flock(file, fcntl.LOCK_EX)
+            break
         started = datetime.now().astimezone().isoformat(timespec="seconds")
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
         yield
+
+
+def _taken(file: BinaryIO) -> bool:
+    """Take the lock of a file, unless another process holds it."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _open_no_link(path: str, flags: int) -> int:
