@@ -201,6 +201,8 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         """
         self._check_open()
         options = check_options(options, self.options)
+
+        # One seed or None for each environment; None lets a generator go on that there is.
         if seed is None:
             seeds: Sequence[int | None] = [None] * self.num_envs
         elif isinstance(seed, Sequence):
@@ -232,12 +234,15 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
                 f"actions holds {actions.min()} to {actions.max()}; "
                 f"expected 0 to {task.N_VISIBLE - 1}"
             )
+
         with AllOrReset(self):
             rewards = self._pick(actions)
             self._picks += 1
             terminations = self._emptied()
             truncations = self._picks == self.max_picks
             observations, infos = self._look(), self._infos() | self._pick_infos()
+
+            # Autoreset in the same step: what is returned belongs to the next episode.
             ended = terminations | truncations
             if ended.any():
                 observations, infos = self._begin_next(ended, observations, infos)

@@ -143,9 +143,12 @@ class ContainerEnv(PickingEnv):
     def step(self, action: int):
         """Pick the item in row ``action`` of the observation."""
         self._check_running()
+        # A row without a box is a failed pick that asks no physics.
         item = int(self.visible[self._row(action)])
         distance = self.physics.lift(item) if item >= 0 else 0.0
         success = distance >= task.LIFT_THRESHOLD
+
+        # A lift that succeeds makes all failed rows worth another try.
         with AllOrReset(self):
             self._picks += 1
             if success:
@@ -156,6 +159,7 @@ class ContainerEnv(PickingEnv):
                 self._failed[item] = True
             if success or not self.physics.exact:
                 self._look()
+
             terminated, truncated = self._ends()
             if terminated or truncated:
                 self._state = "finished"

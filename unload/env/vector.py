@@ -173,11 +173,14 @@ class HighestItemVectorEnv(PickingVectorEnv):
         self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
 
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+        # The draws are those of the single environment, one generator after the other.
         shape = len(rngs), task.N_VISIBLE
         places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
         for number, rng in enumerate(rngs):
             places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
             offsets[number] = drift(task.N_VISIBLE, self.position_noise, rng)
+
+        # The rest is done for all environments at once.
         positions = (places + offsets).reshape(-1, 3)
         observations, highest = np.empty((*shape, 3), np.float32), np.empty(shape, bool)
         nearest_first(

@@ -93,11 +93,13 @@ def _place_columns(path: Path, table: pd.DataFrame) -> tuple[str, ...]:
     Raises:
         ValueError: a column is missing, given twice or spelled otherwise, or it has both.
     """
+    # A name that differs in case or space alone would silently count as another column.
     known = {"id", *CENTRE, *CORNER, *SIZES}
     for column in table.columns:
         name = column.strip().lower().partition(".")[0]  # pandas calls a second one "x.1"
         if name in known and column not in known:
             raise ValueError(f"{path} has the column {column!r}; expected {name!r}, and once")
+
     corners, centres = (set(names) & set(table.columns) for names in (CORNER, CENTRE))
     if corners and centres:
         raise ValueError(

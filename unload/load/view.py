@@ -229,6 +229,7 @@ def layout(height: int) -> go.Layout:
         f"{axis}axis": {"title": {"text": f"{axis} (m)"}, "range": [0, length], "nticks": 8}
         for axis, length in zip("xyz", task.CONTAINER)
     }
+    # plotly measures the camera from the middle of the scene.
     middle = task.CONTAINER / 2
     return go.Layout(
         height=height,

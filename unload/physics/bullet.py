@@ -173,6 +173,7 @@ class World:
             useMaximalCoordinates=self._maximal,
             physicsClientId=self._client,
         )
+        # Friction and damping are stated, because PyBullet's own differ between kinds of bodies.
         pybullet.changeDynamics(
             body,
             -1,

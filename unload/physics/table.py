@@ -250,11 +250,7 @@ class TablePhysics(LocalPhysics):
             raise TypeError(f"table is {table!r}; expected a LiftTable or None")
 
     def simulate(self, situation: Situation) -> float:
-        """Look a lift up, or simulate and remember it; return the distance in m.
-
-        Raises:
-            RuntimeError: the physics is closed.
-        """
+        """Look a lift up, or simulate and remember it; return the distance in m."""
         self._check_open()
         if situation.on_top == 0:
             return FREE_LIFT
