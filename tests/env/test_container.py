@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from functools import partial
 
 import gymnasium
@@ -6,6 +8,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
+from studies import paths
 from tests.env.comparing import FailingStack, assert_same, state_of
 from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
@@ -300,3 +303,10 @@ def test_a_reset_whose_stack_fails_needs_another_one(number):
         env.step(0)
     assert_same(env.reset(seed=0), other.reset(seed=0))
     assert_same(env.step(3), other.step(3))
+
+
+def test_an_environment_that_draws_nothing_imports_nothing_that_draws():
+    """They take as long to import as all the rest."""
+    code = "import sys, unload; unload.ContainerEnv; print(*sys.modules)"
+    names = subprocess.check_output([sys.executable, "-c", code], cwd=paths.ROOT, text=True).split()
+    assert not {"PIL", "matplotlib", "pandas", "plotly", "torch"} & set(names)
