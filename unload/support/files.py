@@ -1,7 +1,7 @@
 """Files that are either whole or absent, their digests, and locked folders.
 
-Errors name the file: a damaged one is a ValueError whatever the decoder raises, one that
-cannot be written an OSError.
+Errors name the file: a damaged or changed one is a ValueError whatever the decoder raises, a
+missing one a FileNotFoundError, one that cannot be written an OSError.
 """
 
 import errno
@@ -34,9 +34,6 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
     Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
     processes may write one file: the last to finish wins. A killed writer leaves its partial
     file behind, which nothing reads and git ignores.
-
-    Raises:
-        OSError: the disk is full or the folder cannot be written to; the error names ``path``.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -113,12 +110,7 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file is damaged or not of this kind.
-    """
+    """Read an ``.npz`` file of plain arrays."""
     try:
         # NumPy leaves a damaged file open that it has opened itself.
         with open(path, "rb") as file:
@@ -138,22 +130,13 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
 
 
 def digest(path: str | Path) -> str:
-    """Digest of a file's bytes: BLAKE2b, 32 hexadecimal digits.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-    """
+    """Digest of a file's bytes: BLAKE2b, 32 hexadecimal digits."""
     with open(path, "rb") as file:
         return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
 
 
 def check_digest(path: str | Path, wanted: str) -> None:
-    """Raise ValueError unless a file's bytes have the digest that was stored elsewhere.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file has been changed or damaged since.
-    """
+    """Raise ValueError unless a file's bytes have the digest that was stored elsewhere."""
     _check_equal(path, wanted, digest(path))
 
 
@@ -185,6 +168,8 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     with open(folder / "lock", "a+b", buffering=0, opener=_open_no_link) as file:
         if os.fstat(file.fileno()).st_nlink > 1:
             raise OSError(errno.EMLINK, "has several names; expected a file of its own", file.name)
+
+        # Others hold such a lock for moments; who does so for longer may have been stopped.
         patience = time.monotonic() + (PATIENCE if wait else 0)
         while not _taken(file):
             if time.monotonic() < patience:
