@@ -17,6 +17,7 @@ from typing import NamedTuple
 import pandas as pd
 import torch
 
+from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.provenance import joined, read_provenance, write_provenance
 from studies.results import COMMAND, read_table, write_table
@@ -78,8 +79,8 @@ def train_grid(
     grid: Grid,
     cells: Sequence[str] | None = None,
     picks: int | None = None,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
 ) -> Path:
     """Train the runs of a grid that are not finished, and publish all that are.
@@ -196,7 +197,7 @@ def write_measures(place: Path, rows: Mapping[str, dict[str, float]]) -> None:
 
 
 def read_grid(
-    grid: Grid, folder: str | Path = files.DATA, cells: Iterable[str] | None = None
+    grid: Grid, folder: str | Path = paths.DATA, cells: Iterable[str] | None = None
 ) -> pd.DataFrame:
     """The published curves of a grid, in the order of its cells.
 
@@ -234,7 +235,7 @@ def _read_column(grid: Grid, place: Path, cells: list[str], column: str) -> pd.D
     return pd.concat(parts, ignore_index=True)
 
 
-def read_measures(grid: Grid, folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_measures(grid: Grid, folder: str | Path = paths.DATA) -> pd.DataFrame:
     """What a grid's ``measure`` has returned, a row per run: ``cell``, ``seed`` and its entries.
 
     Raises:

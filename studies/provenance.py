@@ -12,6 +12,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from studies import paths
 from unload.support import files
 
 PACKAGES = ("gymnasium", "joblib", "numba", "numpy", "pandas", "pybullet", "torch")
@@ -107,7 +108,7 @@ def revision() -> str:
     ``"unknown"`` where the package does not lie in the project's own repository: a copy of it
     in another one must not report that one's commits.
     """
-    root = files.ROOT
+    root = paths.ROOT
     # A named repository, because git would otherwise take an enclosing one.
     git = ["git", "--git-dir", str(root / ".git"), "--work-tree", str(root)]
 

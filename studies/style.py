@@ -8,8 +8,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
+from studies import paths
 from studies.provenance import read_provenance
-from unload.support import files
 
 # It warns of the date in the fonts that come with Matplotlib, at each PDF.
 logging.getLogger("fontTools").setLevel(logging.ERROR)
@@ -17,7 +17,7 @@ logging.getLogger("fontTools").setLevel(logging.ERROR)
 STYLE = Path(__file__).resolve().parent / "unload.mplstyle"
 # One colour, one meaning: what an agent sees or stores, or the rule that picks. Dashed or hollow
 # is without the mask. "shuffled" and "positions" never meet in a notebook.
-# The colours of boxes stand in ``unload.load.view``.
+# The colours of boxes stand in ``unload.load.picture``.
 COLOURS = {
     "ranks": "C1", "positions": "C0", "shuffled": "C0", "averaged": "C3", "level": "C2",
     "random": "C5", "highest": "C4", "nearest": "#8c564b",
@@ -35,7 +35,7 @@ def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     return styled_draw
 
 
-def save(figure: Figure, name: str, folder: Path = files.FIGURES) -> None:
+def save(figure: Figure, name: str, folder: Path = paths.FIGURES) -> None:
     """Write ``folder/name.png`` and ``.pdf``, the same bytes for the same figure."""
     folder.mkdir(parents=True, exist_ok=True)
     with plt.style.context(STYLE):

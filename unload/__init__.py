@@ -10,6 +10,7 @@ import gymnasium
 
 from unload.task import VERSION as __version__
 
+# ruff: noqa: F401
 if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.agent import policies
     from unload.agent.config import TrainConfig
@@ -53,31 +54,7 @@ _PLACES = {
     "train": "agent.training",
     "view": "load.view",
 }
-__all__ = [
-    "DQN",
-    "AttentionNetwork",
-    "ContainerEnv",
-    "EquivariantStack",
-    "Greedy",
-    "HighestItemEnv",
-    "Load",
-    "PEQNetwork",
-    "TrainConfig",
-    "TwoLayerScorer",
-    "__version__",
-    "build_load",
-    "equalize",
-    "evaluate",
-    "load_policy",
-    "picking_order",
-    "policies",
-    "read_load",
-    "save_policy",
-    "stack_load",
-    "success_rate",
-    "train",
-    "view",
-]
+__all__ = ["__version__", *_PLACES]
 
 
 def __getattr__(name: str) -> object:

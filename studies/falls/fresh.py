@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 import torch
 
-from studies import changes
+from studies import changes, paths
 from studies.falls import measures
 from studies.falls.laboratory import (
     AVERAGED,
@@ -32,7 +32,6 @@ from studies.statistics import end_msr
 from unload.agent.config import TrainConfig
 from unload.agent.identity import identity, unchanged
 from unload.agent.training import Training
-from unload.support import files
 
 FIRST_SEED, SEEDS, FEW_SEEDS = 3000, 20, 10
 THRESHOLDS = 0.22, 0.42  # preferences along x and y above which a network errs
@@ -117,7 +116,7 @@ def run_cell(cell: str, seed: int) -> dict:
 
 
 def fresh_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
     """Train the cells; write ``falls/fresh.csv``, a row per run.
 
@@ -147,7 +146,7 @@ def fresh_data(
     publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")
 
 
-def read_fresh(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_fresh(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """A row per run, see ``fresh_data``."""
     return read_table(Path(folder) / "falls/fresh.csv", f"{COMMAND} fresh", COLUMNS)
 

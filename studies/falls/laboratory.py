@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from studies import changes
+from studies import changes, paths
 from studies.falls import measures
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
@@ -23,7 +23,7 @@ from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
 from unload.agent.identity import identity, unchanged
 from unload.agent.training import Training
-from unload.support import checks, files
+from unload.support import checks
 
 # The mask is on by default.
 CONFIG = TrainConfig(
@@ -214,8 +214,8 @@ def run_cell(cell: str, seed: int) -> dict:
 def laboratory_data(
     cells: Sequence[str] = tuple(CELLS),
     seeds: int | None = None,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
 ) -> None:
     """Train the laboratory's cells; write ``falls/laboratory.csv`` and ``falls/trace.csv``.
@@ -263,12 +263,12 @@ def laboratory_data(
     publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 
-def read_laboratory(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_laboratory(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """A row per run of the laboratory, see ``laboratory_data``."""
     return read_table(Path(folder) / "falls/laboratory.csv", f"{COMMAND} laboratory", COLUMNS)
 
 
-def read_trace(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_trace(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """A row per point of a traced run, see ``point``."""
     columns = ["cell", "seed", *POINT]
     return read_table(Path(folder) / "falls/trace.csv", f"{COMMAND} laboratory", columns)

@@ -14,7 +14,7 @@ from pathlib import Path
 import pandas as pd
 import torch
 
-from studies import changes
+from studies import changes, paths
 from studies.falls import measures
 from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
@@ -23,7 +23,6 @@ from studies.paper.training import PAPER
 from studies.results import COMMAND, JOBS, keep_all, publish, read_table
 from unload.agent.config import TrainConfig
 from unload.network.peq import PEQNetwork
-from unload.support import files
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
 NO_MASK, B2048 = replace(CONFIG, mask=False), TrainConfig(mask=True)
@@ -64,7 +63,7 @@ def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
 
 
 def trace_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
     """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``.
 
@@ -95,14 +94,14 @@ def _trace(config: TrainConfig) -> list[dict[str, float]]:
     return points
 
 
-def read_long_trace(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_long_trace(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """The points of the traced long runs."""
     path = Path(folder) / "falls/long_trace.csv"
     return read_table(path, f"{COMMAND} falls", ["seed", *POINT])
 
 
 def published_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
     """Judge each published policy in fresh containers: ``falls/published.csv``.
 
@@ -141,6 +140,6 @@ def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     return row
 
 
-def read_published(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_published(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """The table of ``published_data``."""
     return read_table(Path(folder) / "falls/published.csv", f"{COMMAND} falls", COLUMNS)

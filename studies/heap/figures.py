@@ -10,6 +10,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from studies import paths
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.policies import RULES
 from studies.heap.rake import Outcome
@@ -24,8 +25,7 @@ from studies.heap.table import (
 )
 from studies.style import COLOURS as RULE_COLOURS
 from studies.style import mark_reduced, styled
-from unload.load.view import COLOURS, CORNERS, EYE, SEAM, project
-from unload.support import files
+from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
 MEANINGS = {
@@ -170,7 +170,7 @@ def expected_fates(
 
 
 @styled
-def policies(folder: str | Path = files.DATA) -> Figure:
+def policies(folder: str | Path = paths.DATA) -> Figure:
     """Boxes, falls and their balance for each policy at λ = 1, with 95 % intervals.
 
     Args:
@@ -195,7 +195,7 @@ def policies(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def throughput_falls(folder: str | Path = files.DATA) -> Figure:
+def throughput_falls(folder: str | Path = paths.DATA) -> Figure:
     """Boxes and falls per pick on unseen heaps: a point for each rule, a curve over λ for others.
 
     Args:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from studies import paths
 from studies.heap.boxes import DOOR, REAR, WIDTH, Heap, package_sizes
 from studies.heap.rake import PHYSICS, add_walls
 from unload import task
@@ -154,7 +155,7 @@ def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:
     files.write_arrays(path, arrays)
 
 
-def read_heaps(split: str, path: str | Path = files.DATA / "heap" / "heaps.npz") -> list[Heap]:
+def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz") -> list[Heap]:
     """The stored heaps of a split, ``"train"`` or ``"test"``.
 
     Raises:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from studies import paths
 from studies.heap import generate, observation, rake
 from studies.heap.boxes import Heap, package_sizes
 from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
@@ -52,8 +53,8 @@ FULL = Size()
 
 def make_heaps(
     size: Size = FULL,
-    folder: str | Path = files.DATA / NAME,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA / NAME,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = 1,
 ) -> None:
     """Make the heaps of both splits; write ``heaps.npz`` and its provenance.
@@ -89,8 +90,8 @@ def _heap_lists(seed: int, number: int) -> dict[str, list]:
 
 def make_networks(
     size: Size = FULL,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = 1,
 ) -> None:
     """Record and learn in both rounds; write ``heap/networks.safetensors`` and its provenance."""

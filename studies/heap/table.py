@@ -19,6 +19,7 @@ import pandas as pd
 import torch
 from scipy import stats
 
+from studies import paths
 from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from studies.heap.learning import Learned, load_networks
 from studies.heap.policies import RULES, TRIED_AGAIN, Oracle, best, linear, play
@@ -85,8 +86,8 @@ def candidates() -> dict[str, Callable]:
 
 def choose_rules(
     size: Size = FULL,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = 1,
 ) -> pd.DataFrame:
     """Let the rules play training heaps, and the best of them more; write ``heap/rules.csv``.
@@ -213,8 +214,8 @@ def plan(rules: pd.DataFrame, networks: str | Path) -> list[Cell]:
 
 def compare(
     size: Size = FULL,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = 1,
 ) -> pd.DataFrame:
     """Let all policies play the unseen heaps; write ``heap/{episodes,table}.csv``.
@@ -324,7 +325,7 @@ def _bca(samples: tuple[np.ndarray, ...], statistic: Callable) -> tuple[float, f
     return float(interval.low), float(interval.high)
 
 
-def read_heap_table(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """``heap/table.csv``, see ``compared``.
 
     Raises:

@@ -21,6 +21,7 @@ import gymnasium
 import numpy as np
 import pandas as pd
 
+from studies import paths
 from studies.results import COMMAND, keep_all, measured, publish, read_table
 from studies.statistics import share_interval
 from unload import task
@@ -31,7 +32,6 @@ from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
-from unload.support import files
 
 NAME = "lift_agreement"
 NEAR_WALLS = 5  # the item's own wall and two on each side
@@ -68,7 +68,7 @@ class State(NamedTuple):
 
 
 def agreement_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = 1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> None:
     """Compare lifts; write ``folder/lift_agreement.csv`` and its provenance.
 
@@ -101,7 +101,7 @@ def agreement_data(
     publish(folder, NAME, tables, command, settings, [collected, *answers], float_format="%.6f")
 
 
-def read_agreement(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_agreement(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """The table that ``agreement_data`` wrote, one row per lift.
 
     Returns:

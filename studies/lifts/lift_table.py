@@ -17,6 +17,7 @@ import gymnasium
 import numpy as np
 from tqdm import tqdm
 
+from studies import paths
 from studies.results import COMMAND, kept, publish
 from unload import task
 from unload.agent import policies
@@ -28,7 +29,7 @@ EPISODES, SEED = 12, 0  # of 64 containers, for each policy
 RANDOM_SHARE = 40  # times as many episodes of random picks
 
 
-def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = files.RUNS) -> None:
+def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = paths.RUNS) -> None:
     """Write ``folder/lifts.npz``, see ``LiftTable``; ``runs_dir`` keeps what has been computed."""
     settings = {
         "episodes of 64 containers per taste": EPISODES,

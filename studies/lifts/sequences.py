@@ -10,7 +10,7 @@ from matplotlib.patches import Patch, Polygon
 
 from studies.style import styled
 from unload import task
-from unload.load.view import COLOURS
+from unload.load.picture import COLOURS
 
 
 @styled

@@ -15,7 +15,7 @@ from unload.agent.evaluation import Policy
 from unload.env import observation
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
-from unload.load.view import COLOURS, back_to_front, corners, draw, pixels
+from unload.load.picture import COLOURS, back_to_front, corners, draw, pixels
 from unload.support import checks, files
 
 WIDTH, HEIGHT = 4.4, 4.4  # of one agent's half, in inches at 100 pixels each

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
+from studies import paths
 from studies.paper.training import PAPER, default_curves, episode_means
 from studies.paper.tuning import running_mean
 from studies.style import COLOURS, mark_reduced, styled
 from unload import task
-from unload.support import files
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
 SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too
@@ -55,7 +55,7 @@ def colours_of(names: Collection[str]) -> list:
 
 
 @styled
-def fig11_loss(folder: str | Path = files.DATA) -> Figure:
+def fig11_loss(folder: str | Path = paths.DATA) -> Figure:
     """Training loss over picks (Fig. 11), one line per seed; the first one is strong.
 
     Args:
@@ -69,7 +69,7 @@ def fig11_loss(folder: str | Path = files.DATA) -> Figure:
 
 
 @styled
-def fig12_reward(folder: str | Path = files.DATA) -> Figure:
+def fig12_reward(folder: str | Path = paths.DATA) -> Figure:
     """Mean reward per pick of the 64 environments over picks (Fig. 12).
 
     Each point is a mean over an episode of all environments. Arguments, lines and errors as in

@@ -11,6 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 from studies.style import styled
 from unload import task
 from unload.load.boxes import Load
+from unload.load.picture import COLOURS
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
@@ -22,7 +23,6 @@ from unload.load.substacks import (
     ROWS_HIGH,
     package_colour,
 )
-from unload.load.view import COLOURS
 from unload.support import checks
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
@@ -103,7 +103,7 @@ def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray],
         **style: of the dots, such as ``ms``.
 
     Raises:
-        ValueError: a group's name is not in ``unload.load.view.COLOURS``.
+        ValueError: a group's name is not in ``unload.load.picture.COLOURS``.
     """
     for meaning, items in groups.items():
         checks.one_of("a group's name", meaning, COLOURS)
@@ -127,7 +127,7 @@ def wall_view(
         present: (n,) bool, which boxes to draw; all if None.
 
     Raises:
-        ValueError: a group's name is not in ``unload.load.view.COLOURS``.
+        ValueError: a group's name is not in ``unload.load.picture.COLOURS``.
     """
     groups = {"unseen": np.arange(len(load)), **groups}
     for meaning in groups:

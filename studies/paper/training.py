@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from studies import paths
 from studies.grid import Cell, Grid, read_grid, read_policies, train_grid
 from studies.results import COMMAND, JOBS, write_table
 from unload import task
@@ -59,8 +60,8 @@ OPTIONS = {
 def training_data(
     cells: Sequence[str] | None = None,
     picks: int | None = None,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
     shipped: str | Path = files.SHIPPED,
 ) -> None:
@@ -98,14 +99,14 @@ def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
         write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
 
 
-def paper_runs(folder: str | Path = files.DATA) -> list[tuple[str, int, pd.DataFrame]]:
+def paper_runs(folder: str | Path = paths.DATA) -> list[tuple[str, int, pd.DataFrame]]:
     """Cell, seed and curve of each published run of the paper's four cells."""
     curves = read_grid(PAPER, folder, PAPER_CELLS)
     groups = curves.groupby(["cell", "seed"], sort=False)
     return [(cell, seed, curve) for (cell, seed), curve in groups]
 
 
-def default_curves(folder: str | Path = files.DATA) -> dict[int, pd.DataFrame]:
+def default_curves(folder: str | Path = paths.DATA) -> dict[int, pd.DataFrame]:
     """The published curves of the paper's configuration that the figures show, by their seeds.
 
     Each point is a mean over an episode of all environments; they are indexed by ``picks``.
@@ -117,7 +118,7 @@ def default_curves(folder: str | Path = files.DATA) -> dict[int, pd.DataFrame]:
     }
 
 
-def default_policies(folder: str | Path = files.DATA) -> dict[int, Greedy]:
+def default_policies(folder: str | Path = paths.DATA) -> dict[int, Greedy]:
     """The policies that these runs have learned, by their seeds."""
     policies = read_policies(Path(folder) / f"{PAPER.name}.safetensors")
     return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}

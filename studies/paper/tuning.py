@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from studies import paths
 from studies.grid import Cell, Grid, read_grid, train_grid
 from studies.results import COMMAND
 from unload import task
@@ -101,7 +102,7 @@ TUNING = tuning_grid()
 
 
 def tuning_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
     """Train the search, see ``train_grid``, and write what the paper's plots read of it."""
     train_grid(TUNING, folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
@@ -132,7 +133,7 @@ def read_curves(
     batch_size: int,
     learning_rate: float,
     equalize: bool = True,
-    folder: str | Path = files.DATA,
+    folder: str | Path = paths.DATA,
 ) -> dict[int, np.ndarray]:
     """The curves of all runs of a configuration, by the number of the run.
 
@@ -250,7 +251,7 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
     }
 
 
-def tuning_summary(folder: str | Path = files.DATA) -> pd.DataFrame:
+def tuning_summary(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """One row per configuration of the published search: means over its runs of ``run_summary``.
 
     Columns: ``equalize``, ``batch_size``, ``learning_rate``; the means, but of ``solved`` the

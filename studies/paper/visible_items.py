@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from studies import paths
 from studies.results import COMMAND, measured, publish, read_table
 from studies.style import styled
 from unload.env import observation
 from unload.env.equalization import equalize
-from unload.support import files
 
 FOLDER = "obs_hist_equal"  # of the paper's own plots
 SEED = 0  # of the load
@@ -24,7 +24,7 @@ SEED = 0  # of the load
 BINS = np.linspace(-1.001, 1.001, 111)
 
 
-def observation_data(folder: str | Path = files.DATA) -> None:
+def observation_data(folder: str | Path = paths.DATA) -> None:
     """Write ``obs_hist_equal/{all_items,Observation,Equalized_Observation}.csv``.
 
     Columns ``x`` and ``y``: scaled x and z of all items, of the 128 observed ones, and of the
@@ -53,7 +53,7 @@ def _positions() -> dict[str, np.ndarray]:
     }
 
 
-def read_points(name: str, folder: str | Path = files.DATA) -> np.ndarray:
+def read_points(name: str, folder: str | Path = paths.DATA) -> np.ndarray:
     """Points of one of the paper's scatter plots.
 
     Args:

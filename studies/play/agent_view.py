@@ -10,8 +10,9 @@ from studies.play.players import AGENTS, Run, policy_of
 from unload.agent.greedy import Greedy, greedy_actions
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import POSITION_NOISE, drift, scaled
+from unload.load.picture import COLOURS
 from unload.load.substacks import stack_load
-from unload.load.view import COLOURS, view
+from unload.load.view import view
 from unload.support import checks
 
 HEIGHT = 2  # column of the ranks along z

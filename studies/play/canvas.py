@@ -16,7 +16,7 @@ import traitlets
 
 from unload import task
 from unload.load.boxes import Load
-from unload.load.view import TARGET
+from unload.load.picture import TARGET
 
 ABSENT = 255  # colour number of a box that is not drawn
 Colour = tuple[float, float, float]

@@ -13,6 +13,7 @@ import json
 import re
 from pathlib import Path
 
+from studies import paths
 from unload import task
 from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import POSITION_NOISE, SINK
@@ -20,7 +21,7 @@ from unload.load import substacks
 from unload.support import files
 
 FOLDER = Path(__file__).with_name("page")
-PAGE = files.ROOT / "figures" / "train_it_yourself.html"
+PAGE = paths.ROOT / "figures" / "train_it_yourself.html"
 MODULES = ("network", "container", "measures", "training", "worker", "state", "drawing", "page")
 
 

@@ -10,8 +10,8 @@ from studies.play.episode import Episode, Moment, explain
 from studies.play.players import PLAYERS, Run
 from studies.play.replay import replay
 from unload import task
+from unload.load.picture import COLOURS
 from unload.load.substacks import stack_load
-from unload.load.view import COLOURS
 from unload.support import checks
 
 YOU = "you"

@@ -16,6 +16,7 @@ from pathlib import Path
 import pandas as pd
 from joblib import Parallel, delayed
 
+from studies import paths
 from studies.paper import training
 from studies.policies.variants import GRIDS, RECOMMENDED
 from studies.provenance import read_provenance
@@ -70,7 +71,7 @@ def write_cards(folder: str | Path = files.SHIPPED) -> None:
             "configuration": asdict(config),
             "loads": "the paper's",
             "picks": config.picks,
-            "fingerprint": read_provenance(files.DATA, grid)["fingerprint"],
+            "fingerprint": read_provenance(paths.DATA, grid)["fingerprint"],
             **{loads_of(scale): measure(policy, scale) for scale in SCALES},
         }
         save_policy(policy, path)
@@ -104,7 +105,7 @@ def measure(policy: Policy, scale: float) -> dict[str, float]:
     }
 
 
-def comparison_data(folder: str | Path = files.DATA, n_jobs: int = -1) -> None:
+def comparison_data(folder: str | Path = paths.DATA, n_jobs: int = -1) -> None:
     """Let policies unload the same containers under each condition: ``policies/comparison.csv``.
 
     One row per policy, condition and container, with the columns of ``compare``. The learned

@@ -13,11 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from studies import paths
 from studies.policies.comparison import PLAYERS
 from studies.results import COMMAND, read_table
 from studies.statistics import bootstrap_interval
 from studies.style import COLOURS, styled
-from unload.support import files
 
 # Conditions from left to right and top to bottom; those of ``comparison`` and, with every box
 # simulated, those of ``robustness``.
@@ -33,7 +33,7 @@ SEEN = {"paper": "ranks", "paper_seed_2": "ranks", "recommended": "positions"}
 NOT_PLAYED = "–"  # with every box simulated: without the mask, and restored by most policies
 
 
-def read_comparison(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_comparison(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """Every container that a policy has unloaded.
 
     Args:
@@ -56,7 +56,7 @@ def read_comparison(folder: str | Path = files.DATA) -> pd.DataFrame:
 
 
 @styled
-def comparison_msr(folder: str | Path = files.DATA) -> Figure:
+def comparison_msr(folder: str | Path = paths.DATA) -> Figure:
     """MSR of every policy: a panel for each condition, dots with 95 % intervals.
 
     Hollow dots are played without the mask.

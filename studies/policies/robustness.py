@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from studies import paths
 from studies.policies.comparison import LEARNED, SIMPLE, digests, find_policy
 from studies.results import COMMAND, keep_all, publish
 from unload.agent.evaluation import Policy, success_rate
@@ -23,7 +24,6 @@ from unload.load.boxes import Load
 from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
 from unload.physics.bullet import SETTINGS
 from unload.physics.situation import Surroundings
-from unload.support import files
 
 EPISODES, PICKS = 10, 100  # of each policy; only the front walls of a load are simulated
 SEED = 2000  # of the loads; no other data uses it
@@ -33,7 +33,7 @@ PLAYED = (*((name, "keep") for name in (*SIMPLE, *LEARNED)), ("recommended", "re
 
 
 def robustness_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = 1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> None:
     """Let policies unload the same containers: ``policies/robustness.csv``.
 

@@ -18,6 +18,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
+from studies import paths
 from studies.changes import height_reward
 from studies.grid import Cell, Grid, read_measures, train_grid
 from studies.results import COMMAND, JOBS
@@ -90,8 +91,8 @@ OPTIONS = {"--grids": {"nargs": "+", "choices": GRIDS, "default": tuple(GRIDS)},
 
 def variants_data(
     grids: Sequence[str] = tuple(GRIDS),
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
     shipped: str | Path = files.SHIPPED,
 ) -> None:
@@ -119,7 +120,7 @@ def variants_data(
             save_policy(best, Path(shipped) / "policies/recommended.safetensors")
 
 
-def read_variants(grid: str, folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_variants(grid: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
     """What the policies of a grid reach, see ``read_measures``; before rewards their control.
 
     Args:
@@ -139,7 +140,7 @@ def read_variants(grid: str, folder: str | Path = files.DATA) -> pd.DataFrame:
 
 
 @styled
-def variants_msr(grid: str, folder: str | Path = files.DATA) -> Figure:
+def variants_msr(grid: str, folder: str | Path = paths.DATA) -> Figure:
     """MSR of the policies of a grid: each seed pale, their mean strong, with its 95 % interval.
 
     Arguments and errors as for ``read_variants``.

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from studies import paths
 from studies.results import COMMAND, keep_all, publish, read_table
 from studies.seamless import jams
 from studies.seamless.jams import Case
 from unload import task
-from unload.support import files
 
 PART = "jams"
 # Of a case, by its column; ``moment`` counts the boxes that were taken out before the lifts.
@@ -24,7 +24,7 @@ PLACE = ["friction", "wall", "edge", "covered", "beside"]
 
 
 def jams_data(
-    folder: str | Path = files.DATA, runs_dir: str | Path = files.RUNS, n_jobs: int = -1
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
     """Lift the boxes of all cases; write three tables in ``seamless/``.
 
@@ -89,19 +89,19 @@ def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
     return rows
 
 
-def read_jams(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_jams(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """A row per case, see ``jams_data``."""
     columns = ["question", *COLUMNS.values(), "free", "jammed", "median"]
     return read_table(Path(folder) / "seamless/jams.csv", f"{COMMAND} {PART}", columns)
 
 
-def read_places(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_places(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """Free and jammed boxes by where they stand, see ``jams_data``."""
     columns = [*PLACE, "free", "jammed"]
     return read_table(Path(folder) / "seamless/jam_places.csv", f"{COMMAND} {PART}", columns)
 
 
-def read_lasting(folder: str | Path = files.DATA) -> pd.DataFrame:
+def read_lasting(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """How long jams last, see ``jams_data``."""
     columns = ["load", "friction", "again", "out", "boxes"]
     columns += ["jammed_before", "again_jammed", "newly_jammed"]

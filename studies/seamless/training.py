@@ -10,13 +10,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from studies import changes
+from studies import changes, paths
 from studies.grid import Cell, Grid, train_grid
 from studies.results import COMMAND, JOBS
 from studies.seamless.jamming import jam, weigh
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training
-from unload.support import files
 
 SHARE = 0.4  # j; the paper's start of 15 % and end of 60 % need about so much
 FIRST_SEED = 40
@@ -73,8 +72,8 @@ OPTIONS = {
 def seamless_data(
     cells: Sequence[str] | None = None,
     picks: int | None = None,
-    folder: str | Path = files.DATA,
-    runs_dir: str | Path = files.RUNS,
+    folder: str | Path = paths.DATA,
+    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
 ) -> None:
     """Train the cells, see ``train_grid``."""

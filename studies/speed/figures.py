@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from studies import paths
 from studies.results import read_table
 from studies.style import styled
-from unload.support import files
 
-FOLDER = files.DATA / "benchmarks"
+FOLDER = paths.DATA / "benchmarks"
 COLUMNS = ["what", "how", "value", "unit", "ratio"]
 
 

@@ -191,7 +191,7 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
             stack=lambda rng: own_load(rng, "continuous sizes"),
         )  # fmt: skip
         assert len(LiftTable.load(lifts)) == len(table) > 10
-        monkeypatch.setattr("unload.physics.local.lift", None)
+        monkeypatch.setattr("unload.env.vector.ContainerVectorEnv._lift", None)
     assert_same(tmp_path / "first", tmp_path / "second")
 
 

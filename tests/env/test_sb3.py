@@ -69,14 +69,6 @@ def test_options_hold_for_the_next_reset(rng):
     envs.close()
 
 
-def test_pictures_are_those_of_the_environments():
-    envs = ContainerVecEnv(2, render_mode="rgb_array")
-    envs.reset()
-    assert [image.shape for image in envs.get_images()] == [(480, 640, 3)] * 2
-    assert not np.array_equal(*envs.get_images())
-    envs.close()
-
-
 def test_what_single_environments_only_can_do_is_refused(adapter):
     for name in ("a", "liftable"):
         with pytest.raises(NotImplementedError, match=f"{name} is not of each environment"):

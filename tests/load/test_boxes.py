@@ -1,5 +1,6 @@
 """A load: which boxes it accepts, and what it keeps of them."""
 
+import pickle
 from dataclasses import FrozenInstanceError
 
 import numpy as np
@@ -15,9 +16,9 @@ from unload.load.boxes import (
     BESIDE,
     CONTACT_TOLERANCE,
     SMALLEST_EDGE,
+    BoxError,
     Load,
     contacts,
-    overlapping,
     slabs,
 )
 
@@ -60,11 +61,19 @@ def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
         ({"positions": np.zeros((0, 3))}, ValueError, "positions is empty"),
         ({"positions": np.zeros((1, 2))}, ValueError, r"positions has shape \(1, 2\)"),
         ({"positions": [[np.nan, 1, 1]]}, ValueError, "positions holds nan"),
-        ({"positions": [[6.6, 1.25, 0.5]]}, ValueError, "box 0 reaches from"),
-        ({"positions": [[3.5, 1.25, 0.4]]}, ValueError, "box 0 reaches from"),
+        (
+            {"positions": [[6.6, 1.25, 0.5]]},
+            ValueError,
+            r"box \[0\]: reaches from .* m; expected",
+        ),
+        (
+            {"positions": [[3.5, 1.25, 0.4]]},
+            ValueError,
+            r"box \[0\]: reaches from .* m; expected",
+        ),
         ({"sizes": np.ones((2, 3))}, ValueError, r"sizes has shape \(2, 3\); expected \(1, 3\)"),
         ({"sizes": [[1, -1, 1]]}, ValueError, "expected >= 0.002 m"),
-        ({"sizes": [[0.0009, 1, 1]]}, ValueError, "sizes of box 0 are .* >= 0.002 m"),
+        ({"sizes": [[0.0009, 1, 1]]}, ValueError, r"box \[0\]: edges of .* >= 0.002 m"),
         ({"sizes": [[1, np.inf, 1]]}, ValueError, "sizes holds inf"),
         ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
         ({"packages": [-1]}, ValueError, "packages holds -1"),
@@ -82,7 +91,7 @@ def test_the_box_that_sticks_out_is_named():
     little, label = 5e-7, np.zeros(3, int)
     positions = np.array([[0.5 - little, 0.5, 0.5], [6.5 + little, 0.5, 0.5], [3.5, 1.25, 0.5]])
     sizes = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 3.0, 1.0]])
-    with pytest.raises(ValueError, match="^box 2 reaches from"):
+    with pytest.raises(ValueError, match=r"^box \[2\]: reaches from"):
         Load(positions, sizes, label, label)
     sizes[2, 1] = 1
     assert len(Load(positions, sizes, label, label)) == 3
@@ -126,7 +135,7 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
         other_low[axis] = max(other_high[axis] - 0.3, 0)
     if other_high[axis] - other_low[axis] < SMALLEST_EDGE:
         other_low, other_high = low[first], high[first]  # no room beside it: the same place
-    with pytest.raises(ValueError, match=r"boxes .* overlap by .* m; expected at most 1e-06"):
+    with pytest.raises(ValueError, match=r"boxes .*: overlap by .* m; expected at most 1e-06"):
         load_of(np.vstack([low, other_low]), np.vstack([high, other_high]))
 
 
@@ -145,10 +154,12 @@ def test_boxes_touch_up_to_the_tolerance(gap, touches):
     assert found.of(BESIDE, 0).tolist() == ([1] if touches else [])
 
 
-def test_overlapping_names_the_two_in_their_order():
+def test_the_two_that_overlap_are_named_in_their_order():
     low = np.array([[0, 0, 0], [0, 0.5, 0], [0, 2, 0]])
-    for order, pair in (([0, 1, 2], [0, 1]), ([1, 2, 0], [0, 2]), ([0, 2], [])):
-        assert overlapping(low[order], low[order] + (1, 1, 0.4)) == pair
+    for order, pair in (([0, 1, 2], [0, 1]), ([1, 2, 0], [0, 2])):
+        with pytest.raises(BoxError, match="overlap by 0.4 m") as error:
+            contacts(low[order], low[order] + (1, 1, 0.4))
+        assert pickle.loads(pickle.dumps(error.value)).boxes == pair
 
 
 def test_crossed_boxes_have_more_contacts_than_expected():

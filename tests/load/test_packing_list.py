@@ -62,20 +62,29 @@ def test_a_load_that_is_written_is_read_again(written, rng):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (["a,0,0,0,1,1,1", "b,0,0.5,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'b'\): boxes"),
+        (
+            ["a,0,0,0,1,1,1", "b,0,0.5,0,1,1,1"],
+            r"row 1 \(id 'a'\), row 2 \(id 'b'\): overlap by",
+        ),
         (
             ["a,0,0,0,1,1,1", "b,0,0,1.001,1,1,1"],
-            r": row 2 \(id 'b'\): a box that floats.* z_min '1.001'",
+            r": row 2 \(id 'b'\): floats in load, its lower face at 1.001 m; .* z_min '1.001'",
         ),
-        (["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"], r"'b'\): not in the container; .* x_min '6.5'"),
-        (["a,0,0,0,1,1,1", "b,1,0,-0.1,1,1,1"], r": row 2 \(id 'b'\): not in the container"),
+        (
+            ["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"],
+            r"'b'\): reaches from .* x_min '6.5'",
+        ),
+        (["a,0,0,0,1,1,1", "b,1,0,-0.1,1,1,1"], r": row 2 \(id 'b'\): reaches from"),
         (["a,0,0,0,1,1,1", "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
         (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z ''"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
-        ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r"'a'\): a short edge; .* size_z '0.001'"),
-        (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\): a short edge"),
-        ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: not in the container"),
+        (
+            [f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"],
+            r"'a'\): edges of .* m; .* size_z '0.001'",
+        ),
+        (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\): edges of"),
+        ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: reaches from"),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with x, y, z or"),
         (["a,0,0,0,1,1,1,5,5"], "has more cells in a row than names"),
     ],

@@ -21,8 +21,6 @@ BRIDGE = ((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))
     [
         ("restore", 0, True),
         ("restore", 2, True),
-        ("restore_failure", 0, True),
-        ("restore_failure", 2, False),
         ("keep", 0, False),
         ("keep", 2, False),
     ],
@@ -53,7 +51,7 @@ def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(make, small_load)
     assert (physics.positions() == settled).all()
 
 
-@pytest.mark.parametrize("after_pick", ["restore", "restore_failure", "keep"])
+@pytest.mark.parametrize("after_pick", ["restore", "keep"])
 def test_an_interrupted_lift_moves_no_box(make, boxes, after_pick, monkeypatch):
     load = boxes(*BRIDGE)
     physics, pull = make("full", load, after_pick=after_pick), World.pull

@@ -1,6 +1,9 @@
 """Local physics with a memory."""
 
+import errno
 import json
+import os
+from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -206,15 +209,27 @@ def test_a_saved_table_finds_the_same(table, tmp_path):
     assert len(read) == 51 and read.find(situation(50)) == 0.05
 
 
-def test_tables_exchange_their_lifts_by_a_file(table, tmp_path):
-    path, other = tmp_path / "new" / "lifts.npz", LiftTable()
+def free_box(number: int) -> Situation:
+    """One of many different boxes that nothing touches."""
+    return Situation(np.array([[0, 0, 0, 400_000, 400_000, number]], np.int32), 1, None, ())
+
+
+def true_table(numbers: Iterable[int]) -> LiftTable:
+    """A table of free boxes, which PyBullet lifts as far."""
+    table = LiftTable()
+    for number in numbers:
+        table.add(free_box(300_000 + number), FREE_LIFT)
+    return table
+
+
+def test_tables_exchange_their_lifts_by_a_file(tmp_path):
+    path, table, other = tmp_path / "new" / "lifts.npz", true_table(range(50)), true_table([99])
     table.exchange(path)
-    other.add(situation(99), 0.099)
     other.exchange(path)
-    assert len(other) == 51 and other.find(situation(7)) == 0.007
+    assert len(other) == 51 and other.find(free_box(300_007)) == FREE_LIFT
     assert entries_of(LiftTable.load(path)) == entries_of(other)
     table.exchange(path)
-    assert entries_of(table) == entries_of(other)
+    assert entries_of(table) == entries_of(other) and table.samples.keys() == other.samples.keys()
     before = path.stat().st_mtime_ns
     table.exchange(path)
     assert path.stat().st_mtime_ns == before  # it lacks nothing
@@ -222,61 +237,113 @@ def test_tables_exchange_their_lifts_by_a_file(table, tmp_path):
 
 def exchange_some(path: Path, first: int) -> None:
     """Fill a table with ten lifts in ten turns; run in a process of its own."""
-    table = LiftTable()
-    for number in range(first, first + 10):
-        table.add(situation(number), number / 1000)
-        table.exchange(path)
+    for last in range(first, first + 10):
+        true_table(range(first, last + 1)).exchange(path)
 
 
 def test_processes_that_share_a_file_lose_no_lift(tmp_path):
     path = tmp_path / "lifts.npz"
     with ProcessPoolExecutor(3, get_context("spawn")) as pool:
         list(pool.map(exchange_some, [path] * 3, (0, 10, 20)))
-    stored = LiftTable.load(path)
-    assert all(stored.find(situation(number)) == number / 1000 for number in range(30))
+    assert entries_of(LiftTable.load(path)) == entries_of(true_table(range(30)))
 
 
-def test_an_exchange_that_is_refused_changes_nothing(table, tmp_path):
-    other = {"digests": np.ones(1, np.uint64), "micrometres": np.ones(1, np.int32)}
-    files.write_arrays(tmp_path / "lifts.npz", other | {"settings": settings_of(friction=0.7)})
-    before = (tmp_path / "lifts.npz").read_bytes()
-    with pytest.raises(ValueError, match="lifts.npz is of another physics"):
-        table.exchange(tmp_path / "lifts.npz")
-    assert len(table) == 50 and (tmp_path / "lifts.npz").read_bytes() == before
+def test_a_link_to_a_shared_file_stays_one(tmp_path):
+    shared, link = tmp_path / "shared" / "lifts.npz", tmp_path / "lifts.npz"
+    link.symlink_to(shared)
+    true_table([1]).exchange(link)
+    true_table([2]).exchange(shared)
+    true_table([3]).exchange(link)
+    assert link.is_symlink() and len(LiftTable.load(shared)) == 3
 
 
-def test_a_damaged_file_is_refused(tmp_path):
-    (tmp_path / "damaged.npz").write_bytes(b"no zip file")
-    with pytest.raises(ValueError, match="damaged.npz"):
-        LiftTable.load(tmp_path / "damaged.npz")
+def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatch, caplog):
+    def full(path, arrays):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    table, path = true_table([1]), tmp_path / "lifts.npz"
+    true_table([2]).exchange(path)
+    monkeypatch.setattr(files, "write_arrays", full)
+    table.exchange(path)
+    assert len(table) == 2 and len(LiftTable.load(path)) == 1
+    assert "lifts are kept in memory only" in caplog.text and str(path) in caplog.text
+    monkeypatch.undo()
+    table.exchange(path)
+    assert len(LiftTable.load(path)) == 2
+
+
+# --- files that are refused ---------------------------------------------------------
+
+
+def changed(path: Path, **changes: np.ndarray | None) -> None:
+    """Change arrays of a file, or take them out; its digest is right."""
+    arrays = files.read_arrays(path) | changes
+    arrays = {name: array for name, array in arrays.items() if array is not None}
+    arrays.pop("digest", None)
+    digest = unload.physics.table._digest_of_file(arrays)
+    files.write_arrays(path, arrays | {"digest": digest})
+
+
+def check_refused(path: Path, message: str) -> None:
+    """An exchange is refused, and changes neither the table nor the file."""
+    table, before = true_table([7]), path.read_bytes() if path.is_file() else None
+    with pytest.raises(ValueError, match=message):
+        table.exchange(path)
+    assert entries_of(table) == entries_of(true_table([7]))
+    assert before is None or path.read_bytes() == before
+
+
+def test_files_that_are_no_lift_table_are_refused_and_stay(tmp_path):
+    for content in (b"no zip file", b""):
+        (tmp_path / "other.npz").write_bytes(content)
+        check_refused(tmp_path / "other.npz", "other.npz is not a readable .npz file")
+    files.write_arrays(tmp_path / "other.npz", {"weights": np.zeros(3)})
+    check_refused(tmp_path / "other.npz", r"other.npz holds \['weights'\]; expected a lift table")
+    os.mkfifo(tmp_path / "pipe.npz")
+    check_refused(tmp_path / "pipe.npz", "pipe.npz is no file; expected a lift table")
+    (tmp_path / "config.json").write_text("{}")
+    check_refused(tmp_path / "config.json", "config.json is no name of a lift table; .* in .npz")
+    check_refused(tmp_path / "new.json", "new.json is no name of a lift table")
     with pytest.raises(FileNotFoundError):
         LiftTable.load(tmp_path / "missing.npz")
 
 
-def settings_of(**changes) -> np.ndarray:
-    return np.array(json.dumps(SETTINGS | changes))
+def test_a_table_of_another_physics_or_without_an_array_is_refused(tmp_path):
+    path = tmp_path / "lifts.npz"
+    for changes, message in (
+        (
+            {"settings": np.array(json.dumps(SETTINGS | {"friction": 0.7}))},
+            "another physics, .*0.7",
+        ),
+        ({"settings": np.zeros(2)}, "another physics"),
+        ({"samples": None}, r"holds \['digest', .*\]; expected a lift table"),
+    ):
+        true_table([1]).save(path)
+        changed(path, **changes)
+        check_refused(path, f"lifts.npz .*{message}")
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"digests": None}, r"holds \['micrometres', 'settings'\]; expected a lift table"),
-        ({"settings": settings_of(friction=0.7)}, "is of another physics, .*0.7.*; expected"),
-        ({"settings": np.zeros(2)}, "is of another physics"),
-        ({"digests": np.ones(2)}, "arrays that do not fit; expected a lift table"),
-        ({"micrometres": np.ones(2)}, "arrays that do not fit"),
-        ({"micrometres": np.ones(1, np.int32)}, "arrays that do not fit"),
-    ],
-)
-def test_other_files_are_refused_by_name(changes, message, tmp_path):
-    good = {
-        "digests": np.array([1, 2], np.uint64),
-        "micrometres": np.array([5, 6], np.int32),
-        "settings": settings_of(),
-    }
-    arrays = {name: array for name, array in (good | changes).items() if array is not None}
-    files.write_arrays(tmp_path / "good.npz", good)
-    assert len(LiftTable.load(tmp_path / "good.npz")) == 2
-    files.write_arrays(tmp_path / "other.npz", arrays)
-    with pytest.raises(ValueError, match=f"other.npz .*{message}"):
-        LiftTable.load(tmp_path / "other.npz")
+def test_a_table_of_lies_is_refused(tmp_path, known):
+    """One whose digest does not fit, and one that PyBullet contradicts."""
+    path, true = tmp_path / "lifts.npz", LiftTable()
+    for situation, distance in known:
+        true.add(situation, distance)
+    true.exchange(path)
+    true.check(path)
+    arrays = files.read_arrays(path)
+    lies = np.full_like(arrays["micrometres"], 400_000)
+    files.write_arrays(path, arrays | {"micrometres": lies})
+    check_refused(path, "lifts.npz was changed or damaged")
+    changed(path, micrometres=lies)
+    check_refused(path, "lifts.npz says that a box moves by 0.4 m, PyBullet that it")
+
+
+def test_without_pybullet_a_table_is_taken_as_it_is(tmp_path, monkeypatch, table):
+    def missing(world):
+        raise ModuleNotFoundError("pybullet")
+
+    table.save(tmp_path / "lifts.npz")
+    monkeypatch.setattr(World, "__init__", missing)
+    other = LiftTable()
+    other.exchange(tmp_path / "lifts.npz")
+    assert entries_of(other) == entries_of(table)

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies import style
+from studies import paths, style
 from studies.falls import figures as falls
 from studies.falls.laboratory import read_laboratory, read_trace
 from studies.falls.long import read_long_trace
@@ -24,8 +24,7 @@ from studies.policies.variants import GRIDS, variants_msr
 from studies.speed.figures import speed_ratios
 from unload import stack_load, task
 from unload.env.observation import nearest
-from unload.load.view import COLOURS
-from unload.support import files
+from unload.load.picture import COLOURS
 
 LOAD = stack_load(np.random.default_rng(0))
 VISIBLE = nearest(LOAD.positions)
@@ -39,12 +38,12 @@ FROM_DATA = {
     "fig12_reward": learning_curves.fig12_reward,
     **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
     "comparison": policies.comparison_msr,
-    "why_60": lambda folder=files.DATA: falls.four_cells(read_grid(PAPER, folder)),
-    "why_runs_fall": lambda folder=files.DATA: falls.loop(
+    "why_60": lambda folder=paths.DATA: falls.four_cells(read_grid(PAPER, folder)),
+    "why_runs_fall": lambda folder=paths.DATA: falls.loop(
         read_trace(folder), read_laboratory(folder)
     ),
-    "a_fall": lambda folder=files.DATA: falls.fall(read_long_trace(folder).head(40)),
-    "what_holds_runs": lambda folder=files.DATA: falls.ends(
+    "a_fall": lambda folder=paths.DATA: falls.fall(read_long_trace(folder).head(40)),
+    "what_holds_runs": lambda folder=paths.DATA: falls.ends(
         read_laboratory(folder), {"ranks": "ranks", "shuffled": "places dealt anew"}
     ),
 }
@@ -125,9 +124,9 @@ def test_the_colour_of_the_chosen_box_says_whether_it_was_lifted():
 
 def test_the_published_figures_are_those_that_notebooks_save():
     saved = set()
-    for path in (files.ROOT / "notebooks").rglob("*.ipynb"):
+    for path in (paths.ROOT / "notebooks").rglob("*.ipynb"):
         for cell in json.loads(path.read_text())["cells"]:
             if cell["cell_type"] == "code":
                 saved |= set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", "".join(cell["source"])))
-    assert {path.stem for path in files.FIGURES.glob("*.png")} == saved
+    assert {path.stem for path in paths.FIGURES.glob("*.png")} == saved
     assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in saved}

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from studies import fingerprint
+from studies import fingerprint, paths
 from studies.fingerprint import short_runs, training_fingerprint
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork, TrainConfig
@@ -23,8 +23,8 @@ def networks_of(name: str) -> set[str]:
 def test_data_is_of_todays_training():
     suffix = ".provenance.json"
     of_today = {}
-    for path in files.DATA.rglob(f"*{suffix}"):
-        name = path.relative_to(files.DATA).as_posix().removesuffix(suffix)
+    for path in paths.DATA.rglob(f"*{suffix}"):
+        name = path.relative_to(paths.DATA).as_posix().removesuffix(suffix)
         if name.split("/")[0] not in NOT_TRAINED:
             wanted = training_fingerprint(networks_of(name))
             of_today[name] = files.read_json(path).get("fingerprint") == wanted

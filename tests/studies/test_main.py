@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from studies import __main__ as command
+from studies import paths
 from studies.falls.laboratory import laboratory_data
 from studies.grid import train_grid
 from studies.paper.loads import draw_items, wall_view
@@ -15,7 +16,6 @@ from studies.paper.tuning import tuning_config
 from studies.policies import comparison
 from studies.policies.variants import variants_data, variants_msr
 from unload import stack_load
-from unload.support import files
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_help_names_every_part(called, capsys):
 
 
 def test_no_committed_file_is_too_large():
-    sizes = [path.stat().st_size for path in files.DATA.rglob("*") if path.is_file()]
+    sizes = [path.stat().st_size for path in paths.DATA.rglob("*") if path.is_file()]
     assert max(sizes) <= 1_000_000
     assert sum(sizes) <= 25_000_000
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from unload.support import files, provenance
+from studies import paths
+from unload.support import provenance
 
 
 def test_written_and_read(tmp_path):
@@ -66,7 +67,7 @@ def copy(tmp_path) -> Path:
     """A folder with the part of the package that finds the revision, and no repository."""
     package = tmp_path / "copy" / "unload"
     shutil.copytree(
-        files.ROOT / "unload" / "support", package / "support",
+        paths.ROOT / "unload" / "support", package / "support",
         ignore=shutil.ignore_patterns("__pycache__"),
     )  # fmt: skip
     (package / "__init__.py").touch()
@@ -74,7 +75,7 @@ def copy(tmp_path) -> Path:
 
 
 def test_the_projects_own_commit_is_its_revision(copy):
-    shutil.copy(files.ROOT / "pyproject.toml", copy)
+    shutil.copy(paths.ROOT / "pyproject.toml", copy)
     own = commit(copy)
     (copy / "README.md").write_text("not part of the package")
     (copy / ".gitignore").write_text("__pycache__\n")

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from studies import paths
 from studies.falls.laboratory import CONFIG
 from studies.falls.long import LONG
 from studies.paper.training import PAPER
@@ -11,14 +12,13 @@ from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
 from studies.provenance import read_provenance
 from unload import TrainConfig
-from unload.support import files
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_settings_of_a_published_grid_are_its_configurations(name):
-    settings = read_provenance(files.DATA, name)["settings"]
+    settings = read_provenance(paths.DATA, name)["settings"]
     planned = {
         cell: replace(plan.config, seed=plan.seeds[0])
         for cell, plan in PUBLISHED[name].cells.items()
@@ -27,5 +27,5 @@ def test_the_settings_of_a_published_grid_are_its_configurations(name):
 
 
 def test_the_settings_of_the_laboratory_are_its_configuration():
-    settings = read_provenance(files.DATA, "falls/laboratory")["settings"]
+    settings = read_provenance(paths.DATA, "falls/laboratory")["settings"]
     assert TrainConfig(**settings["config"]) == CONFIG

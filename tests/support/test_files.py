@@ -12,6 +12,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
+from studies import paths
 from unload.support import files
 
 # Other processes import the module alone: the package takes seconds.
@@ -72,7 +73,7 @@ def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tm
     assert killed.returncode == 9
     (leftover,) = set(tmp_path.iterdir()) - {path}
     assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", leftover.name)
-    assert "*.partial" in (files.ROOT / ".gitignore").read_text().splitlines()
+    assert "*.partial" in (paths.ROOT / ".gitignore").read_text().splitlines()
     files.write_text(path, "new")
     assert path.read_text() == "new" and leftover.read_bytes() == b"half of the n"
 
@@ -252,6 +253,16 @@ def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
         owner.communicate("")  # it leaves the block
     with files.locked(folder):
         assert not (folder / "lock").stat().st_mode & 0o111  # a file of text, not a program
+
+
+def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
+    """After a while, and then goes on when the folder is free."""
+    monkeypatch.setattr(files, "PATIENCE", 0.1)
+    with hold(tmp_path, "time.sleep(1)") as owner, files.locked(tmp_path, wait=True):
+        assert owner.poll() is not None or owner.wait(timeout=10) == 0
+        assert caplog.messages == [
+            f"waiting for process {owner.pid} on {caplog.messages[0].split(' on ')[1]}"
+        ]
 
 
 def test_a_killed_process_holds_no_lock(tmp_path):

@@ -25,27 +25,11 @@ from gymnasium.vector.utils import batch_space
 from unload import task
 from unload.env import observation
 from unload.env.equalization import TIE_TOLERANCE, TIES, equalize
+from unload.env.observation import MOST_NOISE
 from unload.load.boxes import Load, check_stacked
 from unload.support import checks
 
 MOST_ENVS = 2**16  # several GB
-
-
-def check_settings(
-    equalize: bool, ties: str, max_picks: int, position_noise: float
-) -> tuple[bool, str, int, float]:
-    """Return the settings that all environments have, as Python's own types.
-
-    Raises:
-        TypeError, ValueError: one of them is not as ``ContainerEnv`` describes it.
-    """
-    checks.one_of("ties", ties, TIES)
-    return (
-        checks.boolean("equalize", equalize),
-        ties,
-        checks.integer("max_picks", max_picks, 1, sys.maxsize),
-        checks.real("position_noise", position_noise, 0, observation.MOST_NOISE),
-    )
 
 
 def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Load]:
@@ -109,17 +93,15 @@ class EpisodeEnv(gymnasium.Env):
             raise ResetNeeded("the episode is finished; call reset first")
 
 
-class PickingEnv(EpisodeEnv):
-    """Base of environments whose action picks one of the 128 visible items.
-
-    Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
-    episode's end. What changes the episode stands in ``AllOrReset``.
+class Picking:
+    """What single environments and arrays of them have in common: settings and spaces.
 
     Attributes:
         options: names of the options that ``reset`` takes.
     """
 
     options: tuple[str, ...] = ()
+    metadata: dict[str, Any] = {"render_modes": []}
 
     def __init__(
         self,
@@ -129,13 +111,29 @@ class PickingEnv(EpisodeEnv):
         position_noise: float = observation.POSITION_NOISE,
         render_mode: str | None = None,
     ) -> None:
-        checked = check_settings(equalize, ties, max_picks, position_noise)
-        self.equalize, self.ties, self.max_picks, self.position_noise = checked
+        checks.one_of("ties", ties, TIES)
         checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        self.equalize, self.ties = checks.boolean("equalize", equalize), ties
+        self.max_picks = checks.integer("max_picks", max_picks, 1, sys.maxsize)
+        self.position_noise = checks.real("position_noise", position_noise, 0, MOST_NOISE)
         self.render_mode = render_mode
-        self.observation_space = gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32)
-        self.action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
         self._state = "not started"
+        self._set_spaces(
+            gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32),
+            gymnasium.spaces.Discrete(task.N_VISIBLE),
+        )
+
+    def _set_spaces(self, observations: gymnasium.Space, actions: gymnasium.Space) -> None:
+        """Take the spaces of one environment."""
+        self.observation_space, self.action_space = observations, actions
+
+
+class PickingEnv(Picking, EpisodeEnv):
+    """Base of environments whose action picks one of the 128 visible items.
+
+    Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
+    episode's end. What changes the episode stands in ``AllOrReset``.
+    """
 
     def close(self) -> None:
         """Free what the environment holds; may be called again."""
@@ -159,15 +157,14 @@ class PickingEnv(EpisodeEnv):
         return checks.integer("action", action, 0, task.N_VISIBLE - 1)
 
 
-class PickingVectorEnv(gymnasium.vector.VectorEnv):
+class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
     """Base of environments in which each action picks one of 128 visible items.
 
     Args:
         num_envs: number of environments.
-        equalize, ties, max_picks, position_noise, render_mode: as for the single environment.
+        **settings: equalize, ties, max_picks and position_noise, as for the single environment.
 
     Attributes:
-        options: names of the options that ``reset`` takes.
         autoreset_mode: in the same step. TorchRL reads it here, Gymnasium in ``metadata``.
 
     Raises:
@@ -177,34 +174,21 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
-    options: tuple[str, ...] = ()
     autoreset_mode = AutoresetMode.SAME_STEP
     metadata = {"render_modes": [], "autoreset_mode": autoreset_mode}
 
-    def __init__(
-        self,
-        num_envs: int = task.NUM_ENVS,
-        equalize: bool = False,
-        ties: str = "noise",
-        max_picks: int = task.MAX_PICKS,
-        position_noise: float = observation.POSITION_NOISE,
-        render_mode: str | None = None,
-    ) -> None:
+    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
-        checked = check_settings(equalize, ties, max_picks, position_noise)
-        self.equalize, self.ties, self.max_picks, self.position_noise = checked
-        checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        self.render_mode = render_mode
-        shape = (task.N_VISIBLE, 3)
-        self.single_observation_space = gymnasium.spaces.Box(-1, 1, shape, np.float32)
-        self.single_action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._features = (self.equalize, ties == "average", np.float32(TIE_TOLERANCE))
-        self._state = "not started"
+        super().__init__(**settings)
+        self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self._rngs: list[np.random.Generator] = []
         self._starts = [""] * self.num_envs  # the generators' states before each episode's reset
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
+
+    def _set_spaces(self, observations: gymnasium.Space, actions: gymnasium.Space) -> None:
+        self.single_observation_space, self.single_action_space = observations, actions
+        self.observation_space = batch_space(observations, self.num_envs)
+        self.action_space = batch_space(actions, self.num_envs)
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict | None = None):
         """Start an episode in every environment.
@@ -217,6 +201,8 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         """
         self._check_open()
         options = check_options(options, self.options)
+
+        # One seed or None for each environment; None lets a generator go on that there is.
         if seed is None:
             seeds: Sequence[int | None] = [None] * self.num_envs
         elif isinstance(seed, Sequence):
@@ -248,12 +234,15 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
                 f"actions holds {actions.min()} to {actions.max()}; "
                 f"expected 0 to {task.N_VISIBLE - 1}"
             )
+
         with AllOrReset(self):
             rewards = self._pick(actions)
             self._picks += 1
             terminations = self._emptied()
             truncations = self._picks == self.max_picks
             observations, infos = self._look(), self._infos() | self._pick_infos()
+
+            # Autoreset in the same step: what is returned belongs to the next episode.
             ended = terminations | truncations
             if ended.any():
                 observations, infos = self._begin_next(ended, observations, infos)
@@ -270,10 +259,14 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
         """
         envs = np.flatnonzero(ended)
         self._begin(envs, [self._rngs[env] for env in envs])
+
+        # The infos are the reset's where an episode has begun, and the pick's elsewhere.
         infos: dict[str, Any] = _flagged(self._infos(), np.ones(self.num_envs, bool))
         if not ended.all():  # a reset has no infos about a pick
             picks = {name: each for name, each in last_infos.items() if name not in infos}
             infos |= _flagged(_masked(picks, ~ended), ~ended)
+
+        # What the last pick of an episode showed goes aside, as Gymnasium wants it.
         final = np.full(self.num_envs, None)
         for env in envs:
             final[env] = last[env]
@@ -314,11 +307,6 @@ class PickingVectorEnv(gymnasium.vector.VectorEnv):
                 self._starts[env] = json.dumps(rng.bit_generator.state)
             self._picks[envs] = 0
             self._fill(envs, rngs, **options)
-
-    def render(self) -> tuple[np.ndarray, ...] | None:
-        """None: there is nothing to draw."""
-        self._check_started()
-        return None
 
     def _check_open(self) -> None:
         if self.closed:

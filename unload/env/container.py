@@ -10,7 +10,6 @@ from unload.env.base import AllOrReset, PickingEnv, check_options
 from unload.env.observation import POSITION_NOISE
 from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
-from unload.load.view import snapshot
 from unload.physics.base import Physics
 from unload.physics.full import AFTER_PICK, FullPhysics
 from unload.physics.local import LocalPhysics
@@ -81,7 +80,7 @@ class ContainerEnv(PickingEnv):
             ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered). ``"table"``
             answers without a simulation if nothing rests on the chosen box, which then moves by
             0.463053 m, and if three boxes or more do: it moves by 0 m.
-        after_pick: for ``physics="full"``: ``"restore"``, ``"restore_failure"`` or ``"keep"``.
+        after_pick: for ``physics="full"``: ``"restore"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
@@ -129,8 +128,10 @@ class ContainerEnv(PickingEnv):
         options = check_options(options, self.options)
         super().reset(seed=seed)
         with AllOrReset(self):
-            load = options["load"] if "load" in options else self.stack(self.np_random)
-            check_stacked(load, "what stack returned")
+            load = options.get("load")
+            if load is None:
+                load = self.stack(self.np_random)
+                check_stacked(load, "what stack returned")
             self._blur = observation.drift(len(load), self.position_noise, self.np_random)
             self.physics.reset(load)
             self._failed = np.zeros(len(load), dtype=bool)
@@ -142,9 +143,12 @@ class ContainerEnv(PickingEnv):
     def step(self, action: int):
         """Pick the item in row ``action`` of the observation."""
         self._check_running()
+        # A row without a box is a failed pick that asks no physics.
         item = int(self.visible[self._row(action)])
         distance = self.physics.lift(item) if item >= 0 else 0.0
         success = distance >= task.LIFT_THRESHOLD
+
+        # A lift that succeeds makes all failed rows worth another try.
         with AllOrReset(self):
             self._picks += 1
             if success:
@@ -155,6 +159,7 @@ class ContainerEnv(PickingEnv):
                 self._failed[item] = True
             if success or not self.physics.exact:
                 self._look()
+
             terminated, truncated = self._ends()
             if terminated or truncated:
                 self._state = "finished"
@@ -184,6 +189,8 @@ class ContainerEnv(PickingEnv):
         self._check_started()
         if self.render_mode is None:
             return None
+        from unload.load.picture import snapshot  # here, because few look and Matplotlib is slow
+
         return snapshot(self.physics.load, self.physics.present, self.physics.positions())
 
     def close(self) -> None:

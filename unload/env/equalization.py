@@ -50,17 +50,22 @@ def equalize(
             f"positions has shape {positions.shape}; expected (..., items, axes), items >= 2"
         )
     checks.finite_array("positions", positions, (None,) * positions.ndim)
+
+    # Rows without an item come after all others, and the last rank is that of the last item.
     last = positions.shape[-2] - 1
     if present is not None:
         present = checks.flag_array("present", present, positions.shape[:-1])[..., np.newaxis]
         positions = np.where(present, positions, np.inf)  # sorted behind the items
         last = present.sum(axis=-2, keepdims=True) - 1
+
+    # Sorting twice would give ranks, too; writing 0, 1, 2 … into the sorted places is faster.
     order = np.argsort(positions, axis=-2, kind="stable")
     sorted_ranks = np.arange(positions.shape[-2], dtype=np.float64)[:, None]
     if ties == "average":
         sorted_ranks = _shared_ranks(np.take_along_axis(positions, order, axis=-2), tolerance)
     ranks = np.empty(positions.shape)
     np.put_along_axis(ranks, order, sorted_ranks, axis=-2)
+
     even = (2 * ranks - last) / np.maximum(last, 1)
     return (even if present is None else np.where(present, even, task.PADDING)).astype(np.float32)
 

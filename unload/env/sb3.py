@@ -68,10 +68,6 @@ class ContainerVecEnv(VecEnv):
     def close(self) -> None:
         self.envs.close()
 
-    def get_images(self) -> list[np.ndarray]:
-        """The picture of each environment; none without a render mode."""
-        return list(self.envs.render() or ())
-
     def get_attr(self, attr_name: str, indices=None) -> list:
         """What all environments have in common."""
         return [getattr(self.envs, attr_name) for _ in self._get_indices(indices)]

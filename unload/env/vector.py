@@ -13,7 +13,6 @@ from unload.fast import containers
 from unload.fast.ranking import nearest_first
 from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
-from unload.load.view import snapshot
 from unload.physics.situation import Surroundings
 from unload.physics.table import LiftTable, TablePhysics, shared_table
 from unload.support import checks
@@ -35,7 +34,6 @@ class ContainerVectorEnv(PickingVectorEnv):
             without.
     """
 
-    metadata = PickingVectorEnv.metadata | {"render_modes": ["rgb_array"], "render_fps": 4}
     options = ("load",)
 
     def __init__(
@@ -51,7 +49,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.stack = stack
         self._physics = TablePhysics(shared_table())
         self._containers = containers.allocate(self.num_envs, 0, 0)
-        self._packages: dict[int, np.ndarray] = {}  # of each container, if there are pictures
 
     def close_extras(self, **kwargs) -> None:
         """Free the simulator."""
@@ -76,14 +73,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._check_started()
         return self._containers.masks.astype(bool)
 
-    def render(self) -> tuple[np.ndarray, ...] | None:
-        """(480, 640, 3) uint8 of each container for ``render_mode="rgb_array"``, else None."""
-        self._check_started()
-        if self.render_mode is None:
-            return None
-        loads = map(self._load, range(self.num_envs))
-        return tuple(snapshot(load, present, load.positions) for load, present in loads)
-
     def liftable(self) -> np.ndarray:
         """(num_envs, 128) bool, which rows of the observations can be unloaded now."""
         self._check_started()
@@ -95,8 +84,10 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = self.stack(rng) if load is None else load
-            check_stacked(chosen, "what stack returned")
+            chosen = load
+            if load is None:
+                chosen = self.stack(rng)
+                check_stacked(chosen, "what stack returned")
             self._put(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
@@ -104,6 +95,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)
+
+        # Lifts follow where the boxes are put, observations where they are seen.
         positions = load.positions + blur
         state.geometry[env, :count, :3] = load.positions
         state.geometry[env, :count, 3:] = load.sizes
@@ -115,8 +108,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.seen[env, :count] = scaled(positions)
         state.by_distance[env, :count] = observation.nearest(positions, count)
         containers.start(state, env, *self._features)
-        if self.render_mode is not None:
-            self._packages[env] = load.packages
 
     def _make_room(self, items: int, links: int) -> None:
         """Let the arrays hold loads of so many items and contacts."""
@@ -153,8 +144,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         """
         count = np.flatnonzero(self._containers.present[env])[-1] + 1
         boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-        packages = self._packages.get(env, labels)[:count]
-        load = Load(boxes[:, :3], boxes[:, 3:], packages, labels)
+        load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
         return load, self._containers.present[env, :count]
 
     def _emptied(self) -> np.ndarray:
@@ -183,11 +173,14 @@ class HighestItemVectorEnv(PickingVectorEnv):
         self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
 
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+        # The draws are those of the single environment, one generator after the other.
         shape = len(rngs), task.N_VISIBLE
         places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
         for number, rng in enumerate(rngs):
             places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
             offsets[number] = drift(task.N_VISIBLE, self.position_noise, rng)
+
+        # The rest is done for all environments at once.
         positions = (places + offsets).reshape(-1, 3)
         observations, highest = np.empty((*shape, 3), np.float32), np.empty(shape, bool)
         nearest_first(

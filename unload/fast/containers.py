@@ -119,13 +119,18 @@ def look_up(containers, actions, digests, micrometres):
         if items[env] < 0:
             distances[env] = 0
             continue
+
+        # What failed before fails again, as long as nothing has been taken away.
         if containers.masks[env, row] == 0:
             distances[env] = containers.failed[env, row]
             continue
+
+        # Free boxes and those under three others need no table, see TablePhysics.
         dynamic = movers(containers, env, items[env], members)
         if dynamic == 1 or dynamic > HELD_DOWN:
             distances[env] = FREE_LIFT if dynamic == 1 else 0.0
             continue
+
         digest = situation_digest(containers, env, members, dynamic)
         slot = slot_of(digests, digest)
         known = digests[slot] != EMPTY
@@ -144,6 +149,8 @@ def pick(containers, actions, distances, equalize, average, tolerance):
             containers.masks[env, row] = 0
             containers.failed[env, row] = distances[env]
             continue
+
+        # The item leaves its row, and the later ones move up.
         rewards[env] = 1
         visible = containers.visible[env]
         containers.present[env, visible[row]] = False
@@ -152,6 +159,8 @@ def pick(containers, actions, distances, equalize, average, tolerance):
         rows = min(containers.left[env], N_VISIBLE)
         for i in range(row, N_VISIBLE - 1):
             visible[i] = visible[i + 1]
+
+        # The last row goes to the nearest item that has not been seen yet, if there is one.
         if rows == N_VISIBLE:
             item = containers.by_distance[env, containers.unloaded[env] + N_VISIBLE - 1]
             visible[N_VISIBLE - 1] = item
@@ -165,6 +174,8 @@ def pick(containers, actions, distances, equalize, average, tolerance):
             for axis in range(3):
                 values, ranks = containers.values[env, axis], containers.ranks[env, axis]
                 remove(values[: rows + 1], ranks[: rows + 1], row)
+
+        # After a success no row counts as failed.
         show(containers, env, rows, equalize, average, tolerance)
     return rewards
 
@@ -202,6 +213,7 @@ def situation_digest(containers, env, members, dynamic):
     """
     starts, links = containers.starts[env], containers.links[env]
     present, geometry, item = containers.present[env], containers.geometry[env], members[0]
+    # The key's order: the item, what rests on it, and what these touch besides, each sorted.
     for end in range(1, dynamic):  # sorts them; numba's sort takes a second more to compile
         _insert(members, 1, end, members[end])
     count = dynamic
@@ -211,12 +223,16 @@ def situation_digest(containers, env, members, dynamic):
             for link in range(starts[kind, box], starts[kind, box + 1]):
                 if present[links[link]] and not _holds(members, count, links[link]):
                     count = _insert(members, dynamic, count, links[link])
+
+    # The floor and the side walls count where a box that can move touches them.
     on_floor = geometry[item, 2] - geometry[item, 5] / 2 <= CONTACT_TOLERANCE
     lowest, highest = np.inf, -np.inf
     for mover in range(dynamic):
         y, width = geometry[members[mover], 1], geometry[members[mover], 4]
         lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
     at_left, at_right = lowest <= CONTACT_TOLERANCE, highest >= CONTAINER_WIDTH - CONTACT_TOLERANCE
+
+    # Word for word as digest_of reads Situation.key, without writing the key down.
     digest = np.uint64(2 + on_floor + at_left + at_right + 6 * count)  # words of the key
     digest = absorb(digest, np.int32(dynamic))
     digest = absorb(digest, np.int32(on_floor))

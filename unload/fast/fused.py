@@ -103,12 +103,16 @@ def start_gradients(
                 f"{name} has shape {array.shape} and dtype {array.dtype}; "
                 f"expected {shape if array.size else '(batch,)'} {np.dtype(dtype)}"
             )
+
+    # Compiled code reads and writes wherever it is told to, therefore all is checked before.
     _check_range("rows", rows, count)
     _check_range("actions", actions[rows], items)
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
     work = (np.zeros(1, np.int64), *batch, np.float32(beta), *weights, partial)
+
+    # The caller's own thread takes part when it calls finish, and the others begin now.
     threads = min(torch.get_num_threads(), len(partial) // CHUNKS_PER_THREAD)
     others = [_helpers(os.getpid()).submit(add_chunks, *work) for _ in range(1, threads)]
 
@@ -116,6 +120,7 @@ def start_gradients(
         add_chunks(*work)
         for other in others:
             other.result()
+
         total = sum_chunks(partial) / rows.size
         if not np.isfinite(total).all():
             raise FloatingPointError(

@@ -114,17 +114,22 @@ def add_chunks(
 
     Several threads may call this with the same ``counter``, and share the chunks.
     """
+    # A sample's inputs lie in one row; x holds the one that is read, in fours of items.
     n, items = len(bias), observations.shape[1]
     samples = observations.reshape(len(observations), 3 * items)
     x = np.empty(-(-items // 4) * 12, np.float32)  # one sample's inputs, filled up to fours
     fours = x.reshape(-1, 12)  # the same, four items in each row
     numbers = np.arange(4 * len(fours)).astype(np.int32).reshape(-1, 4)
+
+    # A key is a value whose lowest bits are the item's number, so that to sort keys sorts items.
     bits = 0  # of an item's number
     while numbers.size > 1 << bits:
         bits += 1
     mask = np.int32((1 << bits) - 1)
     # The relative error of a key: three roundings of the value, and the bits that it lacks.
     precision = np.float32(2.0**-21 + 2.0 ** (bits - 23))
+
+    # Each thread takes the next chunk until none is left, and knows the one after it in advance.
     blocks = _blocks(weight, bias, score)
     picked, wanted = np.empty(CHUNK, np.int64), np.empty(CHUNK, np.float32)
     chunk = next_number(counter)
@@ -136,6 +141,8 @@ def add_chunks(
         largest = _largest(samples, chosen)
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
+
+        # Forward and backward for one sample at a time: nothing of it is kept for later.
         sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias[0]  # NaN if not finite
         for number, row in enumerate(chosen):
             later = coming[number] if number < len(coming) else row
@@ -145,6 +152,8 @@ def add_chunks(
                 _reduce_items(fours, numbers, items, mask, samples, later, blocks[b])
                 _find_extremes(x, items, mask, blocks[b])
                 logit += _forward(x, picked[number], items, blocks[b])
+
+            # Smooth L1 of the error, and its slope by the value before tanh.
             value = np.tanh(logit)
             error = value - wanted[number]
             if abs(error) < beta:
@@ -156,6 +165,8 @@ def add_chunks(
             sum_losses += loss
             for b in range(len(blocks)):
                 _backward(np.float32(slope), blocks[b])
+
+        # From blocks to the order of the weights.
         for f in range(n):
             block, place = blocks[f // BLOCK], f % BLOCK
             for axis in range(3):
@@ -410,6 +421,7 @@ def _forward(inputs, item, items, block):
     long_vectors()
     x, y, z = inputs[3 * item], inputs[3 * item + 1], inputs[3 * item + 2]
     share = ONE / np.float32(items)
+    # Inputs of the chosen item; and of the mean, whose sums become means.
     for f in range(BLOCK):
         own = np.float64(block[WX + f]) * x + np.float64(block[WY + f]) * y
         own += np.float64(block[WZ + f]) * z + block[BIAS + f]
@@ -418,6 +430,8 @@ def _forward(inputs, item, items, block):
         block[MEAN + BLOCK + f] *= share
         block[MEAN + 2 * BLOCK + f] *= share
         block[MEAN + 3 * BLOCK + f] *= share
+
+    # All four features, and what each adds to the value.
     for f in range(BLOCK):
         part = _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
         block[PARTS + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
@@ -471,12 +485,15 @@ def best_items(observations, allowed, weight, bias, score, actions):
         for i in range(len(scores)):
             for axis in range(3):
                 x[axis, i] = observations[sample, i, axis]
+
+        # Feature by feature, so that the items of each go side by side in vectors.
         scores[:] = 0
         for f in range(len(bias)):
             a, b, c, d, s = weight[f, 0], weight[f, 1], weight[f, 2], bias[f], score[f]
             for i in range(len(scores)):
                 value = _value(a, b, c, d, x[0, i], x[1, i], x[2, i])
                 scores[i] = fma(s, ZERO if value < ZERO else value, scores[i])
+
         best = -np.inf
         for i in range(len(scores)):
             if not allowed[sample, i]:

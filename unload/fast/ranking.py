@@ -96,6 +96,8 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
     twice, levels = np.empty(items, np.int32), LEVELS[items]
     if items < rows:
         observation[items:] = task.PADDING
+
+    # A tie is a run of neighbours on one axis, so each axis is equalized by itself.
     for axis in range(axes):
         if not equalize:
             for i in range(items):

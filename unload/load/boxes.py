@@ -4,6 +4,7 @@ Overlaps and contacts are those of axis-aligned boxes, given by their lower and 
 ``low`` and ``high``, (n, 3) float64 in m.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -39,6 +40,22 @@ class Contacts(NamedTuple):
         return self.boxes[self.starts[kind, box] : self.starts[kind, box + 1]]
 
 
+class BoxError(ValueError):
+    """Boxes that no load can hold.
+
+    Attributes:
+        boxes: their numbers.
+        problem: what is wrong, of the first one in numbers, and what was expected.
+    """
+
+    def __init__(self, boxes: Sequence[int] | np.ndarray, problem: str) -> None:
+        super().__init__(boxes, problem)
+        self.boxes, self.problem = [int(box) for box in boxes], problem
+
+    def __str__(self) -> str:
+        return f"{'box' if len(self.boxes) == 1 else 'boxes'} {self.boxes}: {self.problem}"
+
+
 @dataclass(frozen=True, repr=False, eq=False)  # arrays have no single truth value
 class Load:
     """The boxes of one container, before anything is unloaded.
@@ -53,8 +70,9 @@ class Load:
 
     Raises:
         TypeError: a field's dtype is not numeric.
-        ValueError: a field's shape or a value is wrong, a box sticks out of the
-            container, two boxes overlap by more than 1 µm, or an id is given twice.
+        ValueError: a field's shape or a value is wrong, or an id is given twice.
+        BoxError: a ValueError, too: an edge is too short, a box sticks out of the container, or
+            two boxes overlap by more than 1 µm.
     """
 
     positions: np.ndarray
@@ -70,11 +88,6 @@ class Load:
         if count == 0:
             raise ValueError("positions is empty; expected at least one box")
         sizes = checks.finite_array("sizes", self.sizes, (count, 3))
-        if sizes.min() < SMALLEST_EDGE:
-            item = int(sizes.min(axis=1).argmin())
-            raise ValueError(
-                f"sizes of box {item} are {sizes[item]}; expected >= {SMALLEST_EDGE} m"
-            )
         labels = {}
         for name in ("packages", "walls"):
             labels[name] = checks.integer_array(name, getattr(self, name), (count,))
@@ -84,9 +97,21 @@ class Load:
             labels["ids"] = np.array(self.ids, dtype=str)
             if labels["ids"].shape != (count,) or len(np.unique(labels["ids"])) < count:
                 raise ValueError(f"ids is {self.ids!r}; expected {count} different names")
+
+        # Where there are no thin boxes and none outside, contacts finds those that overlap.
         low, high = positions - sizes / 2, positions + sizes / 2
-        _check_inside(low, high)
+        thin = np.flatnonzero(sizes.min(axis=1) < SMALLEST_EDGE)
+        if thin.size:
+            raise BoxError(thin, f"edges of {sizes[thin[0]]} m; expected >= {SMALLEST_EDGE} m")
+        beyond = (low < -OVERLAP) | (high > task.CONTAINER + OVERLAP)
+        outside = np.flatnonzero(beyond.any(axis=1))
+        if outside.size:
+            place = f"from {low[outside[0]]} to {high[outside[0]]} m"
+            inside = f"inside the container, [0 0 0] to {task.CONTAINER} m"
+            raise BoxError(outside, f"reaches {place}; expected it {inside}")
         touching = contacts(low, high)
+
+        # Nobody may change the arrays later, because contacts would no longer be theirs.
         fields = {"positions": positions, "sizes": sizes, **labels}
         for array in (*fields.values(), *touching):
             array.setflags(write=False)
@@ -98,22 +123,6 @@ class Load:
 
     def __repr__(self) -> str:
         return f"Load({len(self)} items in {len(np.unique(self.walls))} walls)"
-
-
-def outside(low: np.ndarray, high: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
-    """(n,) bool, which boxes stick out of the container."""
-    return np.any((low < -tolerance) | (high > task.CONTAINER + tolerance), axis=1)
-
-
-def _check_inside(low: np.ndarray, high: np.ndarray) -> None:
-    found = outside(low, high)
-    if not found.any():
-        return
-    item = int(np.argmax(found))
-    raise ValueError(
-        f"box {item} reaches from {low[item]} to {high[item]} m; "
-        f"expected it inside the container, [0 0 0] to {task.CONTAINER}"
-    )
 
 
 def check_load(load: object, name: str = "load") -> None:
@@ -129,16 +138,16 @@ def check_stacked(load: Load, name: str = "load") -> None:
 
     Raises:
         TypeError: it is no ``Load``.
-        ValueError: a box floats.
+        BoxError: boxes float.
     """
     check_load(load, name)
     low = load.positions - load.sizes / 2
     aloft = np.flatnonzero(floating(low, load.contacts))
     if aloft.size:
-        raise ValueError(
-            f"{name} has {aloft.size} floating boxes: the lower face of box {aloft[0]} is at "
-            f"{low[aloft[0], 2]:.6g} m; expected it, within {CONTACT_TOLERANCE} m, on the floor or "
-            "on another box"
+        raise BoxError(
+            aloft,
+            f"floats in {name}, its lower face at {low[aloft[0], 2]:.6g} m; expected it, within "
+            f"{CONTACT_TOLERANCE} m, on the floor or on another box",
         )
 
 
@@ -173,34 +182,20 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
         low, high: (n, 3) float64, corners in m.
 
     Raises:
-        ValueError: two boxes overlap.
+        BoxError: two boxes overlap.
     """
-    found, *pair = _found(low, high)
+    groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
+    left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
+    found, *pair = _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
-        raise ValueError(
-            f"boxes {min(pair)} and {max(pair)} overlap by {shared:.2g} m; "
-            f"expected at most {OVERLAP}"
-        )
+        raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected at most {OVERLAP}")
     return Contacts(*_lists(found, len(low)))
 
 
 def floating(low: np.ndarray, touching: Contacts) -> np.ndarray:
     """(n,) bool, which boxes stand neither on the floor nor on another box."""
     return (np.diff(touching.starts[BELOW]) == 0) & (low[:, 2] > CONTACT_TOLERANCE)
-
-
-def overlapping(low: np.ndarray, high: np.ndarray) -> list[int]:
-    """Two boxes that overlap, in increasing order; empty if none do."""
-    _, *pair = _found(low, high)
-    return sorted(pair) if pair[0] != pair[1] else []
-
-
-def _found(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, int, int]:
-    """What ``_find`` returns."""
-    groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
-    left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
-    return _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
 
 
 @compiled
@@ -217,6 +212,8 @@ def _find(low, high, order, ends):
     # One array each: what is read next is near what was read last.
     x0, y0, z0 = _columns(low, order)
     x1, y1, z1 = _columns(high, order)
+    # Boxes of different slabs share no depth. Within a slab, a sweep from left to right compares a
+    # box with those only that begin before it ends.
     for end in ends:
         for i in range(start, end):
             if count + 2 * (end - i) > len(found):
@@ -233,11 +230,15 @@ def _find(low, high, order, ends):
                 along = min(x1[i], x1[j]) - max(x0[i], x0[j])
                 if min(across, upwards, along) > OVERLAP:
                     return found[:count], order[i], order[j]
+
+                # They touch if they share depth, and besides either width or height.
                 if max(across, upwards) <= CONTACT_TOLERANCE or along <= CONTACT_TOLERANCE:
                     continue
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
                 if across > CONTACT_TOLERANCE:
                     one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
+
+                # Each pair is written down twice, because each box has a list of its own.
                 found[count, 0], found[count, 1], found[count, 2] = one, order[i], order[j]
                 count += 1
                 found[count, 0], found[count, 1], found[count, 2] = other, order[j], order[i]

@@ -1,21 +1,13 @@
 """Packing lists: the boxes of a load in a CSV file."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pandas as pd
 
-from unload import task
-from unload.load.boxes import (
-    OVERLAP,
-    SMALLEST_EDGE,
-    Load,
-    floating,
-    outside,
-    overlapping,
-    slabs,
-)
+from unload.load.boxes import OVERLAP, BoxError, Load, check_stacked, slabs
 from unload.support import checks, files
 
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
@@ -65,34 +57,33 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
     place = _place_columns(path, table)
     ids = table["id"] if "id" in table.columns else pd.Series(range(1, len(table) + 1))
     ids = ids.astype(str).to_numpy()
-
     cells = table[[*place, *SIZES]]
+
+    def refuse(items: Sequence[int] | np.ndarray, problem: str) -> NoReturn:
+        named = ", ".join(f"row {item + 1} (id {str(ids[item])!r})" for item in items[:5])
+        more = f" and {len(items) - 5} more" if len(items) > 5 else ""
+        first = ", ".join(f"{name} {cell!r}" for name, cell in cells.iloc[items[0]].items())
+        raise ValueError(f"{path}: {named}{more}: {problem} (the first has {first})")
+
+    # What concerns cells is refused here, what concerns boxes by the load.
     numbers = cells.apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
+    repeated = np.flatnonzero(pd.Series(ids).duplicated(keep=False))
+    if repeated.size:
+        refuse(repeated, "the same id; expected one for each box")
+    unreadable = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
+    if unreadable.size:
+        refuse(unreadable, "a cell that is no number; expected lengths in m")
 
-    def refuse(items: Iterable[int], problem: str) -> None:
-        items = list(items)
-        if items:
-            named = ", ".join(f"row {item + 1} (id {str(ids[item])!r})" for item in items[:5])
-            more = f" and {len(items) - 5} more" if len(items) > 5 else ""
-            first = ", ".join(f"{name} {cell!r}" for name, cell in cells.iloc[items[0]].items())
-            raise ValueError(f"{path}: {named}{more}: {problem}; the first has {first}")
-
+    # Boxes of one size are a package; those that share a stretch of depth are a wall.
     where, sizes = numbers[:, :3], numbers[:, 3:]
     positions = where if place is CENTRE else where + sizes / 2
-    low, high = positions - sizes / 2, positions + sizes / 2
-    repeated = pd.Series(ids).duplicated(keep=False)
-    refuse(np.flatnonzero(repeated), "the same id; expected one for each box")
-    no_number = ~np.isfinite(numbers).all(axis=1)
-    refuse(np.flatnonzero(no_number), "a cell that is no number; expected lengths in m")
-    thin = sizes.min(axis=1) < SMALLEST_EDGE
-    refuse(np.flatnonzero(thin), f"a short edge; expected {SMALLEST_EDGE} m or more")
-    inside = f"[0 0 0] to {task.CONTAINER}"
-    refuse(np.flatnonzero(outside(low, high)), f"not in the container; expected {inside} m")
-    refuse(overlapping(low, high), "boxes that overlap; expected disjoint ones")
     packages = np.unique(np.rint(sizes / OVERLAP), axis=0, return_inverse=True)[1].reshape(-1)
-    load = Load(positions, sizes, packages, slabs(low[:, 0] + OVERLAP, high[:, 0]), ids)
-    floats = floating(low, load.contacts)
-    refuse(np.flatnonzero(floats), "a box that floats; expected it on the floor or on another box")
+    walls = slabs(positions[:, 0] - sizes[:, 0] / 2 + OVERLAP, positions[:, 0] + sizes[:, 0] / 2)
+    try:
+        load = Load(positions, sizes, packages, walls, ids)
+        check_stacked(load)
+    except BoxError as error:
+        refuse(error.boxes, error.problem)
     return load
 
 
@@ -102,11 +93,13 @@ def _place_columns(path: Path, table: pd.DataFrame) -> tuple[str, ...]:
     Raises:
         ValueError: a column is missing, given twice or spelled otherwise, or it has both.
     """
+    # A name that differs in case or space alone would silently count as another column.
     known = {"id", *CENTRE, *CORNER, *SIZES}
     for column in table.columns:
         name = column.strip().lower().partition(".")[0]  # pandas calls a second one "x.1"
         if name in known and column not in known:
             raise ValueError(f"{path} has the column {column!r}; expected {name!r}, and once")
+
     corners, centres = (set(names) & set(table.columns) for names in (CORNER, CENTRE))
     if corners and centres:
         raise ValueError(

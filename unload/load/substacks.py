@@ -97,9 +97,6 @@ def wall_cells(variants: np.ndarray) -> np.ndarray:
 
     Returns:
         (n, 3) int64: package number, left edge and lower edge of each item in cells.
-
-    Raises:
-        TypeError, ValueError: see ``check_variants``.
     """
     variants = check_variants(variants)
     return _cells(variants[np.newaxis], *_row(len(COLUMNS)))[:, 1:]
@@ -151,10 +148,7 @@ def substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
     """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1.
 
     Args:
-        scale: of all edges of the boxes.
-
-    Raises:
-        TypeError, ValueError: ``scale`` is not a number from 0.5 to 1.5.
+        scale: of all edges of the boxes, 0.5 to 1.5.
     """
     cells = CELLS_WIDE / checks.real("scale", scale, *SCALES) + 1e-9  # the width; the height
     mids = int((cells - ENDS_CELLS) / MID_CELLS)
@@ -239,9 +233,6 @@ def front_walls(load: Load, count: int = FRONT_WALLS) -> Load:
     Of a load of the paper, all boxes that are seen during the first 100 picks are in the
     front 6 walls, whatever is picked: the nearest 228 are. With a seventh wall behind them,
     ``full`` physics is nearly twice as fast as with all.
-
-    Raises:
-        TypeError, ValueError: ``count`` is not a number of walls of the load.
     """
     walls = np.unique(load.walls)
     kept = load.walls >= walls[-checks.integer("count", count, 1, len(walls))]

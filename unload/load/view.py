@@ -1,41 +1,19 @@
-"""Views of a load: interactive in 3D with plotly, which works offline in JupyterLab, and still.
-
-A still picture stands where plotly is not drawn, and is what environments render. Its boxes are
-drawn from the back to the front, so that nearer ones cover farther ones.
-"""
+"""A load to turn and zoom in 3D, with plotly, which works offline in JupyterLab."""
 
 import base64
-import io
 import json
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
-from PIL import Image
 
 from unload import task
-from unload.load.boxes import OVERLAP, Load, check_load, slabs
+from unload.load.boxes import Load, check_load
+from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, TARGET, corners, still
 from unload.load.substacks import package_colour
 from unload.support import checks
 
-# One colour for each meaning, in every picture of a load: Okabe and Ito's colours, which the
-# colour-blind tell apart as well; pale for what does not matter.
-COLOURS: dict[str, tuple[float, float, float]] = {
-    "unseen": (0.86, 0.86, 0.84),
-    "visible": (0.34, 0.71, 0.91),
-    "liftable": (0.00, 0.62, 0.45),
-    "blocked": (0.84, 0.37, 0.00),
-    "tried": (0.94, 0.89, 0.26),
-    "failed": (0.80, 0.47, 0.65),
-    "on top of it": (0.00, 0.45, 0.70),  # of the chosen box
-    "cannot move": (0.74, 0.74, 0.72),
-}
 # The twelve triangles of a box's faces.
 TRIANGLES = np.array(
     [
@@ -43,7 +21,6 @@ TRIANGLES = np.array(
         (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3),
     ]
 )  # fmt: skip
-SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
 # Of groups whose names are not in COLOURS, in the order in which they are given.
 OTHER_COLOURS = ((0.58, 0.40, 0.74), (0.90, 0.62, 0.00), (0.55, 0.34, 0.16), (0.0, 0.0, 0.0))
 FIRST_PICKS = 10  # that a view of an order shows
@@ -56,18 +33,6 @@ LABEL = (
     "item %{customdata[0]}, package %{customdata[1]}<br>"
     "%{customdata[2]} × %{customdata[3]} × %{customdata[4]} mm<extra>%{fullData.name}</extra>"
 )
-# From outside, over the left edge of the entrance, which is the side of x = 7 m.
-EYE = np.array([11.6, -2.9, 4.4])  # m
-TARGET = np.array([4.4, 1.1, 0.9])  # m
-CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-# The faces whose outer sides point along x, against y and along z: corners, and brightness.
-FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
-WIDTH = 8.0  # inches, at 100 pixels each
-# The insides of the container that are seen: corners, and brightness of the grey.
-INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
-EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
-FILE_COLOURS = 128  # of a still picture
-LEGEND = 0.15  # share of the width at the left
 
 
 class View(go.Figure):
@@ -140,26 +105,28 @@ def view(
             f"expected ({len(load)},) bool"
         )
     height = checks.integer("height", height, 50, 5000)
+
+    # Packages and picks are groups, too, in colours of their own.
     if order is not None:
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
         items = _items("order", order, len(load))[:FIRST_PICKS]
-        groups = {
-            f"pick {number}": np.array([item]) for number, item in enumerate(items.tolist(), 1)
-        }
+        picks = range(1, len(items) + 1)
+        groups = {f"pick {number}": items[number - 1 : number] for number in picks}
         of_item, names = _grouped(present, groups, PICK_COLOURS)
         names = {name.replace("unseen", "picked later"): names[name] for name in names}
     elif groups is None:
-        names = {f"package {p}": package_colour(p) for p in np.unique(load.packages[present])}
-        numbers = np.unique(load.packages[present], return_inverse=True)[1]
-        of_item = np.zeros(len(load), dtype=int)
-        of_item[present] = numbers
+        packages = np.unique(load.packages[present]).tolist()
+        groups = {f"package {p}": np.flatnonzero(load.packages == p) for p in packages}
+        of_item, names = _grouped(present, groups, [package_colour(p) for p in packages])
     else:
-        of_item, names = _grouped(present, groups)
+        of_item, names = _grouped(present, groups, OTHER_COLOURS)
     traces = [
         mesh(load, np.flatnonzero(present & (of_item == number)), name, colour, legend=True)
         for number, (name, colour) in enumerate(names.items())
     ]
+
+    # The still picture is drawn when the figure is displayed, if it is at all.
     drawn = np.flatnonzero(present)
     palette = np.array([*names.values(), (0, 0, 0)])
 
@@ -172,7 +139,7 @@ def view(
 def _grouped(
     present: np.ndarray,
     groups: Mapping[str, np.ndarray],
-    colours: Sequence[tuple[float, float, float]] = OTHER_COLOURS,
+    colours: Sequence[tuple[float, float, float]],
 ) -> tuple[np.ndarray, dict]:
     """The number of each item's group, (n,) int, and the colours of all groups by name.
 
@@ -189,6 +156,8 @@ def _grouped(
             f"besides {list(COLOURS)}"
         )
     named = COLOURS | dict(zip(others, colours))
+
+    # Of two groups that share an item the later one wins; a last group holds the rest.
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
         of_item[_items(f"groups[{name!r}]", items, count)] = number
@@ -205,13 +174,6 @@ def _items(name: str, items: object, count: int) -> np.ndarray:
     if items.size and not (0 <= items.min() and items.max() < count):
         raise ValueError(f"{name} holds {items.min()} to {items.max()}; expected 0 to {count - 1}")
     return items
-
-
-def corners(load: Load, items: np.ndarray, seam: float = SEAM) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners of items as they are drawn, (k, 3) float64 each, in m."""
-    centres = load.positions[items]
-    halves = np.maximum(load.sizes - seam, load.sizes / 2)[items] / 2
-    return centres - halves, centres + halves
 
 
 def mesh(
@@ -267,6 +229,7 @@ def layout(height: int) -> go.Layout:
         f"{axis}axis": {"title": {"text": f"{axis} (m)"}, "range": [0, length], "nticks": 8}
         for axis, length in zip("xyz", task.CONTAINER)
     }
+    # plotly measures the camera from the middle of the scene.
     middle = task.CONTAINER / 2
     return go.Layout(
         height=height,
@@ -289,123 +252,3 @@ def layout(height: int) -> go.Layout:
 def css(colour: tuple[float, float, float]) -> str:
     """Return a colour of three numbers in [0, 1] as CSS and plotly write it."""
     return "rgb({:.0f},{:.0f},{:.0f})".format(*(255 * value for value in colour))
-
-
-def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Return (480, 640, 3) uint8, a picture of some items, coloured by package, all upright.
-
-    Args:
-        load: the items.
-        present: (n,) bool, which of them are drawn.
-        positions: (n, 3) float, where their centres are in m.
-    """
-    items = np.flatnonzero(present)
-    moved = (positions - load.positions)[items]
-    low, high = (corner + moved for corner in corners(load, items))
-    colours = np.array([package_colour(package) for package in load.packages[items]])
-    figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
-    order = back_to_front(low, high)
-    draw(figure.add_axes((0, 0, 1, 1)), low[order], high[order], colours.reshape(-1, 3)[order])
-    return pixels(figure)
-
-
-def still(
-    low: np.ndarray,
-    high: np.ndarray,
-    colours: np.ndarray,
-    legend: Mapping[str, tuple[float, float, float]],
-    height: float,
-) -> bytes:
-    """Return a PNG picture of boxes in the container with a legend.
-
-    Args:
-        low, high: (n, 3) float64, corners in m.
-        colours: (n, 3) float64, RGB in [0, 1].
-        legend: name → colour.
-        height: of the picture in inches.
-    """
-    figure = Figure((WIDTH, height), dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
-    order = back_to_front(low, high)
-    draw(figure.add_axes((LEGEND, 0, 1 - LEGEND, 1)), low[order], high[order], colours[order])
-    handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
-    figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
-    file = io.BytesIO()
-    # Few colours take a quarter of the bytes.
-    Image.fromarray(pixels(figure)).quantize(FILE_COLOURS).save(file, "PNG", optimize=True)
-    return file.getvalue()
-
-
-def draw(axes: Axes, low: np.ndarray, high: np.ndarray, colours: np.ndarray) -> None:
-    """Draw boxes in the container, seen from ``EYE``; the container fills the axes.
-
-    Args:
-        axes: Matplotlib's.
-        low, high: (n, 3) float64, corners in m, in an order such as that of ``back_to_front``.
-        colours: (n, 3) float64, RGB in [0, 1].
-    """
-    frame = project(CORNERS * task.CONTAINER)
-    for face, brightness in INSIDES:
-        axes.fill(*frame[list(face)].T, color=str(brightness), zorder=0)
-    seen = project(low[:, None] + CORNERS * (high - low)[:, None])
-    polygons = np.stack([seen[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
-    shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
-    axes.add_collection(
-        PolyCollection(
-            list(polygons),
-            facecolors=shades.reshape(-1, 3),
-            edgecolors=EDGE * shades.reshape(-1, 3),
-            linewidths=0.5,
-        )
-    )
-    axes.set(aspect="equal", xlim=_wider(frame[:, 0]), ylim=_wider(frame[:, 1]))
-    axes.axis("off")
-
-
-def pixels(figure: Figure) -> np.ndarray:
-    """(height, width, 3) uint8, a Matplotlib figure as it is drawn."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.array(canvas.buffer_rgba())[:, :, :3]
-
-
-def project(points: np.ndarray) -> np.ndarray:
-    """Where points (..., 3) in m are seen from ``EYE``, (..., 2), right and up."""
-    ahead = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
-    right = np.cross(ahead, (0, 0, 1))
-    right /= np.linalg.norm(right)
-    seen = (points - EYE) @ np.array([right, np.cross(right, ahead), ahead]).T
-    return seen[..., :2] / seen[..., 2:]
-
-
-def back_to_front(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return an order of disjoint boxes in which none is hidden by an earlier one, (n,) int64.
-
-    The eye is outside the container, beyond its entrance, left wall and ceiling. Therefore
-    of two boxes that a plane separates, only the one at the plane's greater x, smaller y or
-    greater z can hide the other.
-    """
-    order = []
-    groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
-    for group in range(groups.max(initial=-1) + 1):
-        left = np.flatnonzero(groups == group)
-        low_left, high_left = low[left], high[left]
-        behind = _separated(low_left, high_left, 0) | _separated(low_left, high_left, 2)
-        behind |= _separated(low_left, high_left, 1).T
-        behind &= ~behind.T  # separated both ways: neither hides the other
-        while len(left):
-            free = ~behind.any(axis=0)
-            if not free.any():  # boxes that hide each other in a circle: the farthest first
-                free[np.linalg.norm(low[left] - EYE, axis=1).argmax()] = True
-            order.append(left[free])
-            left, behind = left[~free], behind[np.ix_(~free, ~free)]
-    return np.concatenate([*order, np.zeros(0, np.int64)])
-
-
-def _separated(low: np.ndarray, high: np.ndarray, axis: int) -> np.ndarray:
-    """(n, n) bool, whether box i ends where box j begins, or before."""
-    return high[:, None, axis] <= low[None, :, axis] + OVERLAP
-
-
-def _wider(values: np.ndarray, margin: float = 0.04) -> tuple[float, float]:
-    room = margin * np.ptp(values)
-    return values.min() - room, values.max() + room

@@ -67,6 +67,8 @@ def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]
             tensors = {name: file.get_tensor(name) for name in file.keys()}
     except (SafetensorError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} is not a safetensors file: {error}") from error
+
+    # Whatever is wrong from here on is a fault of the file, not of the caller.
     try:
         settings = json.loads(metadata[kind])
         if settings.pop("digest") != _digest(settings, tensors):

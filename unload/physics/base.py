@@ -24,6 +24,7 @@ class Physics(ABC):
 
     Raises:
         RuntimeError: a method is called before ``reset`` or after ``close``.
+        TypeError: the load is not a ``Load``.
     """
 
     exact = True
@@ -35,11 +36,7 @@ class Physics(ABC):
         self._world: World | None = None  # started when it is first needed
 
     def reset(self, load: Load) -> None:
-        """Fill the container with ``load``.
-
-        Raises:
-            TypeError: ``load`` is not a ``Load``.
-        """
+        """Fill the container with ``load``."""
         check_load(load)
         self._check_open()
         self.load = None  # until it is filled: nothing may be lifted in a half-filled container

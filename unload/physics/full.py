@@ -9,7 +9,7 @@ from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
 from unload.physics.situation import RESOLUTION
 from unload.support import checks
 
-AFTER_PICK = ("restore", "restore_failure", "keep")
+AFTER_PICK = ("restore", "keep")
 DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
 
@@ -18,9 +18,9 @@ class FullPhysics(Physics):
 
     Args:
         after_pick: what is done with the other boxes after a pick. ``"restore"`` puts all
-            back, ``"restore_failure"`` only after a failed lift, ``"keep"`` leaves
-            whatever the simulation made of them: they drift. ``"keep"`` simulates them
-            as plain rigid bodies, the others as multibodies, see ``bullet.World``.
+            back, ``"keep"`` leaves whatever the simulation made of them: they drift.
+            ``"keep"`` simulates them as plain rigid bodies, ``"restore"`` as multibodies,
+            see ``bullet.World``.
 
     Raises:
         ValueError: an unknown ``after_pick``.
@@ -86,8 +86,7 @@ class FullPhysics(Physics):
         except BaseException:  # interrupted: no box may stay halfway
             self._restore()
             raise
-        failed = distance < task.LIFT_THRESHOLD
-        if self.after_pick == "restore" or (self.after_pick == "restore_failure" and failed):
+        if self.after_pick == "restore":
             self._restore()
         else:
             self._keep()

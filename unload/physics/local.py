@@ -8,7 +8,7 @@ from unload.physics.base import Physics
 from unload.physics.bullet import World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
-MOST_SHAPES = 10_000  # in a world; loads of ever new sizes would fill the memory
+MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
 
 
 class LocalPhysics(Physics):
@@ -23,15 +23,11 @@ class LocalPhysics(Physics):
     """
 
     def simulate(self, situation: Situation) -> float:
-        """Lift the chosen box of a situation; return how far it moved, in m.
-
-        Raises:
-            RuntimeError: the physics is closed.
-        """
+        """Lift the chosen box of a situation; return how far it moved, in m."""
         self._check_open()
         if self._world is None:
             self._world = World()
-        elif self._world.shapes > MOST_SHAPES:
+        elif self._world.bodies > MOST_BODIES:
             self._world.clear()
         return lift(self._world, situation)
 

@@ -75,6 +75,7 @@ class Surroundings:
 
     def situation(self, item: int) -> Situation:
         """Return the situation of ``item``: the boxes that decide its lift."""
+        # What can move, and what that stands on or may rub against; the rest has no influence.
         dynamic = [item, *self.on_top(item)]
         static = {
             box
@@ -83,10 +84,13 @@ class Surroundings:
             for box in self.load.contacts.of(kind, mover).tolist()
             if self.present[box]
         }
+
         members = [*dynamic, *sorted(static.difference(dynamic))]
         boxes = self._geometry[members]
         centre = boxes[0, :3].copy()
         boxes[:, :3] -= centre  # before rounding: equal situations are equal wherever they are
+
+        # The floor matters to the chosen box alone, a side wall to each box that moves.
         floor = -centre[2] if self._low[item, 2] <= CONTACT_TOLERANCE else None
         sides = []
         if self._low[dynamic, 1].min() <= CONTACT_TOLERANCE:

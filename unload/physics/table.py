@@ -6,8 +6,11 @@ refused. Two rules answer without it: a box with nothing on top is free, one wit
 others on top is held down.
 """
 
+import errno
 import json
+import logging
 from functools import cache
+from hashlib import blake2b
 from pathlib import Path
 from threading import Lock
 
@@ -20,10 +23,14 @@ from unload.physics.situation import Situation
 from unload.support import files
 from unload.support.compiled import compiled
 
+LOGGER = logging.getLogger(__name__)
 HELD_DOWN = 3  # boxes on top that no lift moves
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
 FEWEST_SLOTS = 1024
+ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
+SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
+CLOSE = 1e-5  # m, other processors may round otherwise
 
 
 def _free_lift() -> float:
@@ -57,10 +64,12 @@ class LiftTable:
     Attributes:
         slots: digests, (n,) uint64, 0 in free slots, and their distances in micrometres,
             (n,) int32. n is a power of two, and at least half of the slots are free.
+        samples: of the situations that were added, those of the lowest digests, by digest.
     """
 
     def __init__(self) -> None:
         self._adding = Lock()
+        self.samples: dict[int, Situation] = {}
         self._hold(np.zeros(0, np.uint64), np.zeros(0, np.int32))
 
     def __len__(self) -> int:
@@ -89,6 +98,7 @@ class LiftTable:
                 return
             micrometres[slot] = round(distance * 1e6)
             digests[slot] = digest
+            self._take_samples({int(digest): situation})
             self._count += 1
             if 2 * self._count > len(digests):
                 self._hold(*self.entries())
@@ -107,12 +117,30 @@ class LiftTable:
         _fill(*slots, digests, micrometres)
         self.slots, self._count = slots, len(digests)
 
+    def _take_samples(self, samples: dict[int, Situation]) -> None:
+        """Keep the lowest ones, which do not depend on the order in which they came."""
+        self.samples = dict(sorted((self.samples | samples).items())[:SAMPLES])
+
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.entries()
-        settings = np.array(json.dumps(SETTINGS))
-        arrays = {"digests": digests, "micrometres": micrometres, "settings": settings}
-        files.write_arrays(path, arrays)
+        samples = [
+            {
+                "boxes": each.boxes.tolist(),
+                "dynamic": each.dynamic,
+                "floor": each.floor,
+                "sides": each.sides,
+            }
+            for each in self.samples.values()
+        ]
+        arrays = {
+            "digests": digests,
+            "micrometres": micrometres,
+            "settings": np.array(json.dumps(SETTINGS)),
+            "samples": np.array(json.dumps(samples)),
+        }
+        # A link to a file that several runs share stays one.
+        files.write_arrays(Path(path).resolve(), arrays | {"digest": _digest_of_file(arrays)})
 
     @classmethod
     def load(cls, path: str | Path) -> "LiftTable":
@@ -122,42 +150,82 @@ class LiftTable:
             FileNotFoundError: there is no such file.
             ValueError: the file is damaged, or was made with other physics settings.
         """
+        if Path(path).exists() and not Path(path).is_file():  # to read a pipe would take for ever
+            raise ValueError(f"{path} is no file; expected a lift table")
         arrays = files.read_arrays(path)
-        if set(arrays) != {"digests", "micrometres", "settings"}:
+        if set(arrays) != ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
-        digests, micrometres = arrays["digests"], arrays["micrometres"]
-        kinds = digests.dtype, micrometres.dtype, micrometres.shape
-        if kinds != (np.uint64, np.int32, (digests.size,)):
-            raise ValueError(f"{path} holds arrays that do not fit; expected a lift table")
+        if not np.array_equal(arrays.pop("digest"), _digest_of_file(arrays)):
+            raise ValueError(f"{path} was changed or damaged: its digest is another")
         settings = str(arrays["settings"])
         if settings != json.dumps(SETTINGS):
             raise ValueError(
                 f"{path} is of another physics, {settings}; expected {json.dumps(SETTINGS)}. "
                 "Remove it to fill a new one"
             )
+
         table = cls()
-        table._hold(digests, micrometres)
+        table._hold(arrays["digests"], arrays["micrometres"])
+        for each in json.loads(str(arrays["samples"])):
+            boxes, sides = np.array(each["boxes"], np.int32), tuple(each["sides"])
+            situation = Situation(boxes, each["dynamic"], each["floor"], sides)
+            table._take_samples({int(_digest(situation)): situation})
         return table
+
+    def check(self, path: str | Path) -> None:
+        """Simulate the samples again, where PyBullet is installed.
+
+        Raises:
+            ValueError: they move otherwise; the message names ``path``, from where they are.
+        """
+        local = LocalPhysics()
+        try:
+            for situation in self.samples.values():
+                known, distance = self.find(situation), local.simulate(situation)
+                if known is None or abs(known - distance) > CLOSE:
+                    raise ValueError(
+                        f"{path} says that a box moves by {known} m, PyBullet that it "
+                        f"moves by {distance} m. Remove it to fill a new one"
+                    )
+        except ModuleNotFoundError:
+            return
+        finally:
+            local.close()
 
     def exchange(self, path: str | Path) -> None:
         """Take in the lifts of a file, and write those that it lacks; it may be missing.
 
         Any number of processes may share one file: each waits for its turn, which it takes by
-        the folder ``<path>.lock``.
+        the folder ``<path>.lock``. A link is followed. A full disk is logged, because lifts can be
+        simulated again.
 
         Raises:
-            ValueError: as ``load``; nothing is changed then.
+            ValueError: ``path`` does not end in ``.npz``; as ``load`` and ``check``. Nothing is
+                changed then.
             OSError: the file cannot be written.
         """
-        with files.locked(f"{path}.lock", wait=True):
-            stored = LiftTable.load(path) if Path(path).exists() else LiftTable()
-            with self._adding:
-                digests, micrometres = map(np.concatenate, zip(self.entries(), stored.entries()))
-                digests, first = np.unique(digests, return_index=True)
-                if len(digests) > self._count:
-                    self._hold(digests, micrometres[first])
-            if len(digests) > len(stored):
-                self.save(path)
+        path = Path(path).resolve()
+        if path.suffix != ".npz":
+            raise ValueError(f"{path} is no name of a lift table; expected one that ends in .npz")
+        try:
+            with files.locked(f"{path}.lock", wait=True):
+                self._exchange(path)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            LOGGER.warning("lifts are kept in memory only: %s", error)
+
+    def _exchange(self, path: Path) -> None:
+        stored = LiftTable.load(path) if path.exists() else LiftTable()
+        stored.check(path)
+        with self._adding:
+            digests, micrometres = map(np.concatenate, zip(self.entries(), stored.entries()))
+            digests, first = np.unique(digests, return_index=True)
+            if len(digests) > self._count:
+                self._hold(digests, micrometres[first])
+            self._take_samples(stored.samples)
+        if len(digests) > len(stored):
+            self.save(path)
 
 
 class TablePhysics(LocalPhysics):
@@ -182,11 +250,7 @@ class TablePhysics(LocalPhysics):
             raise TypeError(f"table is {table!r}; expected a LiftTable or None")
 
     def simulate(self, situation: Situation) -> float:
-        """Look a lift up, or simulate and remember it; return the distance in m.
-
-        Raises:
-            RuntimeError: the physics is closed.
-        """
+        """Look a lift up, or simulate and remember it; return the distance in m."""
         self._check_open()
         if situation.on_top == 0:
             return FREE_LIFT
@@ -207,6 +271,14 @@ def shared_table() -> LiftTable:
 
 def _digest(situation: Situation) -> np.uint64:
     return np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
+
+
+def _digest_of_file(arrays: dict[str, np.ndarray]) -> np.ndarray:
+    """Digest of the arrays of a file, (32,) uint8, in the order of their names."""
+    found = blake2b(digest_size=32)
+    for name in sorted(arrays):
+        found.update(arrays[name].tobytes())
+    return np.frombuffer(found.digest(), np.uint8)
 
 
 @compiled

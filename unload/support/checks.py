@@ -1,4 +1,7 @@
-"""Errors for bad input: each names the argument, its value and what was expected."""
+"""Errors for bad input: each names the argument, its value and what was expected.
+
+What is of another type is a TypeError, what has another value a ValueError.
+"""
 
 from collections.abc import Hashable, Iterable, Mapping
 from numbers import Integral
@@ -59,12 +62,7 @@ def path(name: str, value: object) -> Path:
 
 
 def file(name: str, value: object) -> Path:
-    """Return ``value`` as the Path of a file, which may be missing.
-
-    Raises:
-        TypeError: it is no path.
-        ValueError: it is empty, or a folder.
-    """
+    """Return ``value`` as the Path of a file, which may be missing, but no folder and not empty."""
     named = path(name, value)
     if named.is_dir():  # as the empty path is: the working directory
         raise ValueError(f"{name} is {str(value)!r}; expected the name of a file")

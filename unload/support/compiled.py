@@ -1,117 +1,109 @@
 """Compiled functions, kept on disk for as long as nothing changes that they were built from.
 
 The constants that a function reads and the functions that it calls become part of its compiled
-code. ``numba.njit(cache=True)`` looks at the file of the function alone: after a change to a
-constant in another file it goes on with the old value. Here code is found on disk by the sources
-of all files of the package that its own one imports, and by the libraries' versions.
+code. numba's own cache looks at the file of the function alone: after a change to a constant in
+another file it goes on with the old value. Here each state of the sources has a folder of its own.
 """
 
-import ast
-import inspect
 import logging
+import os
 import sys
-import uuid
+import tempfile
 import warnings
 from collections.abc import Callable
 from functools import cache, partial
-from hashlib import sha256
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core import event
 
+CONFIG: Any = numba.config  # whose names type checkers do not see
 LOGGER = logging.getLogger(__name__)
+PACKAGE = Path(__file__).resolve().parents[1]
+# All that compiled functions are defined in, or take constants from.
+SOURCES = ("task.py", "support/*.py", "load/*.py", "physics/*.py", "fast/*.py")
 VERSIONS = sys.version, numba.__version__, llvmlite.__version__, np.__version__
 
 
 def compiled(function: Callable | None = None, **options) -> Callable:
-    """``numba.njit`` of a function, with a cache on disk that follows all that it is built from.
+    """``numba.njit`` of a function of this package, with a cache that follows all its sources.
 
-    The first function of a process that is not in the cache is logged, because a fresh
-    installation compiles for ten seconds. Where no folder can be written, compiled code is kept
-    in memory, with a warning.
+    The first function that a process has to compile is logged, because a fresh installation
+    compiles for ten seconds. Where no folder can be written, compiled code is kept in memory, with
+    a warning.
 
     Args:
-        function: of a module, to be compiled at its first call. What it uses is defined in that
-            module or imported at the top of it.
+        function: of a module that is one of ``SOURCES``, compiled at its first call.
         **options: of ``numba.njit`` except ``cache``, as in ``@compiled(nogil=True)``.
     """
     if function is None:
         return partial(compiled, **options)
-    dispatcher = numba.njit(**options)(function)
+    place = folder()
+    if place is None:
+        return numba.njit(**options)(function)
+    # numba reads this setting when it is told to cache a function; it is the user's again after.
+    before, CONFIG.CACHE_DIR = CONFIG.CACHE_DIR, str(place)
     try:
-        dispatcher._cache = _Cache(function)
-    except RuntimeError:  # numba's, of all folders that it tries
-        warnings.warn(  # shown once, because it comes from here each time
-            "compiled code cannot be kept, and every process compiles for ten seconds; set "
-            "NUMBA_CACHE_DIR to a folder that can be written",
-            stacklevel=1,
-        )
-    return dispatcher
-
-
-class _Cache(FunctionCache):
-    """numba's cache of a function, with the fingerprint of its module in each key."""
-
-    logged = False  # whether this process has said that it compiles
-
-    def __init__(self, function):
-        super().__init__(function)
-        # Now, while the module is imported: its file may have changed when it is compiled.
-        self._fingerprint = fingerprint(function.__module__)
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = _Files(self.cache_path, self._impl.filename_base, stamp)
-
-    def load_overload(self, sig, target_context):
-        found = super().load_overload(sig, target_context)
-        if found is None and not _Cache.logged:
-            _Cache.logged = True
-            LOGGER.warning(
-                "compiling %s and others for this processor, for about ten seconds in all; "
-                "kept for later in %s and the folders beside it",
-                f"{self._py_func.__module__}.{self._py_func.__name__}",
-                self.cache_path,
-            )
-        return found
-
-    def _index_key(self, sig, codegen):
-        # Of a named tuple numba compares the types of the fields, but not their names.
-        fields = tuple(str(getattr(kind, "fields", "")) for kind in sig)
-        return *super()._index_key(sig, codegen), fields, self._fingerprint
-
-
-class _Files(IndexDataCacheFile):
-    """numba's files, except that no index ever leads to the code of another key.
-
-    numba writes the index first, and then the data over a file that may hold older code. A
-    reader in between would get that, and so would all later ones if the writer ended there.
-    """
-
-    def save(self, key, data):
-        name = self._data_name(uuid.uuid4().int)  # never used before
-        self._save_data(name, data)
-        self._save_index({**self._load_index(), key: name})
+        return numba.njit(cache=True, **options)(function)
+    finally:
+        CONFIG.CACHE_DIR = before
 
 
 @cache
-def fingerprint(module: str) -> str:
-    """Digest of the source of a module and of all of its package that it imports.
+def folder() -> Path | None:
+    """Where compiled code is kept: the first of three places that can be written, None if none can.
 
-    Those that they import in turn count, too, and so do the versions of Python, numba, llvmlite
-    and NumPy.
+    They are ``NUMBA_CACHE_DIR`` if it is set, the package's ``__pycache__``, and the user's cache.
     """
-    package, digest, found = module.split(".")[0], sha256(repr(VERSIONS).encode()), [module]
-    for name in found:  # grows on the way
-        source = inspect.getsource(sys.modules[name])
-        digest.update(source.encode())
-        imported = []
-        for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.Import):
-                imported += [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom):  # of modules, or of names in a module
-                names = [f"{node.module}.{alias.name}" for alias in node.names]
-                imported += [name if name in sys.modules else node.module for name in names]
-        ours = [name for name in imported if name.split(".")[0] == package]
-        found += [name for name in dict.fromkeys(ours) if name not in found]
-    return digest.hexdigest()
+    user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    for place in (CONFIG.CACHE_DIR, PACKAGE / "__pycache__", Path(user, "unload")):
+        if not place:
+            continue
+        found = Path(place, f"compiled-{digest(PACKAGE)}")
+        try:
+            found.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=found).close()
+        except OSError:
+            continue
+        event.register("numba:compile", _Announcement(found))
+        return found
+    warnings.warn(
+        "compiled code cannot be kept, and every process compiles for ten seconds; set "
+        "NUMBA_CACHE_DIR to a folder that can be written",
+        stacklevel=2,
+    )
+    return None
+
+
+def digest(package: Path) -> str:
+    """Digest of ``SOURCES`` in a folder, and of the versions of Python and the libraries."""
+    found = blake2b(repr(VERSIONS).encode(), digest_size=8)
+    for pattern in SOURCES:
+        for path in sorted(package.glob(pattern)):
+            found.update(path.read_bytes())
+    return found.hexdigest()
+
+
+class _Announcement(event.Listener):
+    """Says once that functions of this package are compiled, which their cache does not hold."""
+
+    def __init__(self, place: Path) -> None:
+        self.place, self.logged = place, False
+
+    def on_start(self, event: event.Event) -> None:
+        function = event.data["dispatcher"].py_func
+        if self.logged or not function.__module__.startswith("unload."):
+            return
+        self.logged = True
+        LOGGER.warning(
+            "compiling %s and others for this processor, for about ten seconds in all; "
+            "kept for later in %s",
+            f"{function.__module__}.{function.__name__}",
+            self.place,
+        )
+
+    def on_end(self, event: event.Event) -> None: ...

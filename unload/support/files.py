@@ -1,14 +1,16 @@
-"""Files that are either whole or absent, their digests, locked folders, and the repository's.
+"""Files that are either whole or absent, their digests, and locked folders.
 
-Errors name the file: a damaged one is a ValueError whatever the decoder raises, one that
-cannot be written an OSError.
+Errors name the file: a damaged or changed one is a ValueError whatever the decoder raises, a
+missing one a FileNotFoundError, one that cannot be written an OSError.
 """
 
 import errno
 import fcntl
 import json
+import logging
 import os
 import socket
+import time
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -21,11 +23,9 @@ from uuid import uuid4
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[2]
-DATA = ROOT / "data"  # what the figures are drawn from
+LOGGER = logging.getLogger(__name__)
+PATIENCE = 5.0  # s
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
-FIGURES = ROOT / "figures"
-RUNS = ROOT / "runs"  # training runs, not kept in the repository
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
@@ -34,9 +34,6 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
     Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
     processes may write one file: the last to finish wins. A killed writer leaves its partial
     file behind, which nothing reads and git ignores.
-
-    Raises:
-        OSError: the disk is full or the folder cannot be written to; the error names ``path``.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -113,12 +110,7 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file is damaged or not of this kind.
-    """
+    """Read an ``.npz`` file of plain arrays."""
     try:
         # NumPy leaves a damaged file open that it has opened itself.
         with open(path, "rb") as file:
@@ -138,22 +130,13 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
 
 
 def digest(path: str | Path) -> str:
-    """Digest of a file's bytes: BLAKE2b, 32 hexadecimal digits.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-    """
+    """Digest of a file's bytes: BLAKE2b, 32 hexadecimal digits."""
     with open(path, "rb") as file:
         return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
 
 
 def check_digest(path: str | Path, wanted: str) -> None:
-    """Raise ValueError unless a file's bytes have the digest that was stored elsewhere.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file has been changed or damaged since.
-    """
+    """Raise ValueError unless a file's bytes have the digest that was stored elsewhere."""
     _check_equal(path, wanted, digest(path))
 
 
@@ -171,7 +154,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
 
     Args:
         folder: to be locked.
-        wait: until whoever holds the lock gives it back.
+        wait: until whoever holds the lock gives it back; after five seconds, say who does.
 
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock; not if
@@ -185,18 +168,33 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     with open(folder / "lock", "a+b", buffering=0, opener=_open_no_link) as file:
         if os.fstat(file.fileno()).st_nlink > 1:
             raise OSError(errno.EMLINK, "has several names; expected a file of its own", file.name)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError as error:
+
+        # Others hold such a lock for moments; who does so for longer may have been stopped.
+        patience = time.monotonic() + (PATIENCE if wait else 0)
+        while not _taken(file):
+            if time.monotonic() < patience:
+                time.sleep(0.05)
+                continue
             file.seek(0)
             owner = file.read().decode().strip() or "another process"
-            raise RuntimeError(
-                f"{folder} is in use by {owner}; wait, or take another folder"
-            ) from error
+            if not wait:
+                raise RuntimeError(f"{folder} is in use by {owner}; wait, or take another folder")
+            LOGGER.warning("waiting for %s, which uses %s", owner, folder)
+            fcntl.flock(file, fcntl.LOCK_EX)
+            break
         started = datetime.now().astimezone().isoformat(timespec="seconds")
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
         yield
+
+
+def _taken(file: BinaryIO) -> bool:
+    """Take the lock of a file, unless another process holds it."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _open_no_link(path: str, flags: int) -> int:

@@ -1,10 +1,10 @@
 from dataclasses import replace
 
+from studies import paths
 from studies.falls import long
 from studies.grid import read_policies
 from studies.paper.training import PAPER
 from studies.provenance import read_provenance
-from unload.support import files
 
 
 def test_runs_are_traced(tmp_path, monkeypatch):
@@ -34,7 +34,7 @@ def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
     """One published policy and one network without training, in one container each."""
     monkeypatch.setattr(long, "UNTRAINED", 1)
     name = "paper_mask/seed_0"
-    policy = read_policies(files.DATA / "falls/paper.safetensors")[name]
+    policy = read_policies(paths.DATA / "falls/paper.safetensors")[name]
     monkeypatch.setattr(
         long, "read_policies", lambda path: {name: policy} if path.stem == "paper" else {}
     )

@@ -6,7 +6,7 @@ import pytest
 
 from studies.heap import figures
 from studies.heap.table import SHOWN_WEIGHT, read_heap_table
-from unload.load.view import COLOURS
+from unload.load.picture import COLOURS
 
 
 def test_every_figure_draws_its_data():

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 import torch
 
+from studies import paths
 from studies.heap import table as study
 from studies.heap.env import HeapEnv
 from studies.heap.learning import save_networks
@@ -13,7 +14,6 @@ from studies.heap.recording import FULL, WEIGHTS
 from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan
 from studies.provenance import read_provenance
 from studies.statistics import bootstrap_interval
-from unload.support import files
 
 
 @pytest.fixture
@@ -134,7 +134,7 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
 
 
 def test_data_of_heaps_are_those_that_are_read():
-    names = {path.name.split(".")[0] for path in (files.DATA / "heap").iterdir()}
+    names = {path.name.split(".")[0] for path in (paths.DATA / "heap").iterdir()}
     assert names == {"networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == FULL.test).all() and len(table) == 19

@@ -110,7 +110,7 @@ def test_committed_lifts(committed):
     assert len(of["drawn"]) >= agreement.FULL_COUNT and len(of["buried"]) == agreement.FULL_COUNT
     close = committed["local"].between(*agreement.CLOSE)
     assert committed.loc[close, "full"].notna().all()
-    settings = read_provenance(agreement.files.DATA, agreement.NAME)["settings"]
+    settings = read_provenance(agreement.paths.DATA, agreement.NAME)["settings"]
     assert settings["lifts"] == len(committed)
     assert all(settings[f"in full, {why}"] == len(rows) for why, rows in of.items())
     assert settings["lift table"] == agreement.table_digest(), "another table ships: compare again"

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from studies import paths
 from studies.paper import animation
 from tests.agent.networks import lowest
 from unload import policies
-from unload.load import view
+from unload.load import picture
+from unload.load.picture import COLOURS
 from unload.load.substacks import front_walls, stack_load
-from unload.load.view import COLOURS
-from unload.support import files
 
 
 def small(rng):
@@ -45,7 +45,7 @@ def test_frames_begin_slowly_and_show_the_end_twice():
 def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_path, monkeypatch):
     texts, drawn = [], []
     monkeypatch.setattr(animation, "_draw_half", _noting(animation._draw_half, texts))
-    monkeypatch.setattr(animation, "draw", lambda *all: drawn.append(all[1:]) or view.draw(*all))
+    monkeypatch.setattr(animation, "draw", lambda *all: drawn.append(all[1:]) or picture.draw(*all))
     first, second = tmp_path / "a.gif", tmp_path / "b.gif"
     frames = animation.save_unloading(episodes, first)
     picks, boxes = len(episodes["stuck"].items), len(episodes["empty"].load)
@@ -89,4 +89,4 @@ def test_picked_boxes_rise_in_the_colours_of_what_became_of_them(episodes):
 
 
 def test_committed_picture_is_small_enough_for_a_readme():
-    assert (files.FIGURES / "unloading.gif").stat().st_size <= 2_000_000
+    assert (paths.FIGURES / "unloading.gif").stat().st_size <= 2_000_000

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from studies.paper.loads import wall_view
+from unload.load.picture import COLOURS
 from unload.load.substacks import front_walls, stack_load
-from unload.load.view import COLOURS
 
 
 @pytest.fixture

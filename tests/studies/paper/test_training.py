@@ -6,12 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies import grid
+from studies import grid, paths
 from studies.grid import Cell, Grid, read_policies
 from studies.paper import training
 from studies.paper.training import PAPER
 from unload import TrainConfig, load_policy
-from unload.support import files
 
 
 @pytest.fixture
@@ -51,12 +50,12 @@ def test_all_runs_of_the_papers_cells_are_published():
 
 def test_committed_runs_are_what_the_published_grid_exports(tmp_path, monkeypatch):
     names = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
-    committed = [pd.read_csv(files.DATA / name) for name in names]
+    committed = [pd.read_csv(paths.DATA / name) for name in names]
     curves = training.default_curves()
     monkeypatch.setattr(training, "default_curves", lambda folder: curves)
     training.export_training(committed[1]["Wall time"], tmp_path)
     for name in names:
-        assert (tmp_path / name).read_bytes() == (files.DATA / name).read_bytes()
+        assert (tmp_path / name).read_bytes() == (paths.DATA / name).read_bytes()
 
 
 def test_committed_policies_are_those_of_the_grid():

@@ -4,12 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies import grid
+from studies import grid, paths
 from studies.grid import read_grid
 from studies.paper import tuning
 from studies.paper.tuning import tuning_grid
 from unload.env.vector import HighestItemVectorEnv
-from unload.support import files
 
 
 @pytest.fixture
@@ -45,14 +44,14 @@ def test_a_search_is_published_in_a_table_per_batch_size(small, tmp_path):
 
 def test_committed_files_of_the_papers_plots_are_those_of_the_tables(tmp_path, monkeypatch):
     monkeypatch.setattr(
-        tuning, "read_grid", lambda grid, folder, cells: read_grid(grid, files.DATA, cells)
+        tuning, "read_grid", lambda grid, folder, cells: read_grid(grid, paths.DATA, cells)
     )
     tuning.export_tuning(tmp_path)
     written = {path.relative_to(tmp_path) for path in tmp_path.glob("*/*.csv")}
-    assert written == {path.relative_to(files.DATA) for path in files.DATA.glob("dummy_sim_*/*")}
+    assert written == {path.relative_to(paths.DATA) for path in paths.DATA.glob("dummy_sim_*/*")}
     assert len(written) == 8
     for path in written:
-        assert (tmp_path / path).read_bytes() == (files.DATA / path).read_bytes()
+        assert (tmp_path / path).read_bytes() == (paths.DATA / path).read_bytes()
 
 
 def test_committed_search_has_all_runs():

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from studies import paths
 from studies.paper import visible_items
 from studies.paper.visible_items import read_points
 from studies.provenance import read_provenance
-from unload.support import files
 
 NAMES = ("all_items", "Observation", "Equalized_Observation")
 
@@ -15,7 +15,7 @@ def test_committed_data_is_written_again_byte_for_byte(tmp_path):
     for name in NAMES:
         again, committed = (
             (folder / f"obs_hist_equal/{name}.csv").read_bytes()
-            for folder in (tmp_path, files.DATA)
+            for folder in (tmp_path, paths.DATA)
         )
         assert again == committed
     assert read_provenance(tmp_path / "obs_hist_equal", "observation")["settings"] == {"seed": 0}

@@ -3,6 +3,7 @@
 import pandas as pd
 import pytest
 
+from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.policies import comparison
 from studies.policies.comparison import (
@@ -53,7 +54,7 @@ def test_every_rule_has_its_name():
 
 @pytest.mark.parametrize("name", ["comparison", "robustness"])
 def test_committed_data_is_of_the_committed_policies(name):
-    assert read_provenance(files.DATA / "policies", name)["settings"]["policies"] == digests()
+    assert read_provenance(paths.DATA / "policies", name)["settings"]["policies"] == digests()
 
 
 def test_cards_are_measured_and_written(tmp_path, monkeypatch):

@@ -4,13 +4,13 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.grid import read_measures
 from studies.policies import variants
 from studies.policies.variants import GRIDS, judged, read_variants, variants_data
 from studies.provenance import read_provenance
 from unload import TrainConfig, evaluate, load_policy
-from unload.support import files
 
 FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
 
@@ -20,7 +20,7 @@ def test_data_hold_the_runs_of_the_plan(name):
     rows = read_measures(GRIDS[name])
     planned = list(GRIDS[name].configs())
     assert [f"{cell}/seed_{seed}" for cell, seed in zip(rows["cell"], rows["seed"])] == planned
-    provenance = read_provenance(files.DATA, f"variants/{name}")
+    provenance = read_provenance(paths.DATA, f"variants/{name}")
     assert provenance["runs"] == provenance["planned"] == len(planned)
     assert not provenance["reduced"]
 

@@ -1,0 +1,101 @@
+import io
+from itertools import combinations, permutations
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from unload.load.picture import (
+    COLOURS,
+    CORNERS,
+    EYE,
+    FACES,
+    INSIDES,
+    back_to_front,
+    snapshot,
+    still,
+)
+
+RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.1, 0.9)
+
+
+def pixels(low, high, colours) -> np.ndarray:
+    """(height, width, 3) float, a picture of boxes."""
+    legend = {}
+    png = still(np.array(low, float), np.array(high, float), np.array(colours), legend, 4.0)
+    return imread(io.BytesIO(png))[:, :, :3]
+
+
+def seen(picture, colour) -> int:
+    """Number of pixels in a colour, bright or shaded."""
+    strong = np.argmax(colour)
+    others = np.delete(picture, strong, axis=2).max(axis=2)
+    return int((picture[:, :, strong] > 2 * others).sum())
+
+
+def test_a_nearer_box_covers_a_farther_one():
+    near, far = [(6, 0, 0), (7, 2, 2)], [(4, 0.5, 0.5), (5, 1.5, 1.5)]
+    alone = seen(pixels(far[:1], far[1:], [RED]), RED)
+    for (first, one), (second, other) in permutations([(near, BLUE), (far, RED)]):
+        beside = seen(pixels([first[0], second[0]], [first[1], second[1]], [one, other]), RED)
+        assert beside < alone / 2
+
+
+def test_whatever_is_nearest_on_a_ray_is_drawn_last(full_load, rng):
+    low = full_load.positions - full_load.sizes / 2
+    high = low + full_load.sizes
+    drawn = back_to_front(low, high)
+    assert sorted(drawn) == list(range(len(full_load)))
+    rank = np.argsort(drawn)
+    for target in rng.uniform(0, (7, 2.5, 2.0), (300, 3)):
+        ahead = target - EYE
+        enters = np.minimum((low - EYE) / ahead, (high - EYE) / ahead).max(axis=1)
+        leaves = np.maximum((low - EYE) / ahead, (high - EYE) / ahead).min(axis=1)
+        hit = np.flatnonzero(enters < leaves - 1e-6)
+        assert hit.size
+        assert hit[rank[hit].argmax()] == hit[enters[hit].argmin()]
+
+
+def test_boxes_in_a_circle_are_all_drawn():
+    low = np.array([(0, 0, 0), (0, 1, 1), (1, 0.5, 0.2)], float)
+    assert sorted(back_to_front(low, low + 0.9)) == [0, 1, 2]
+
+
+def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
+    load, moved = boxes((0.8, 0.2), (0.8, 0.6)), boxes((1.6, 0.2), (1.6, 0.6))
+    both, one, none = (np.arange(2) < count for count in (2, 1, 0))
+    empty = snapshot(load, none, load.positions).mean(axis=2) / 255
+    shares = [(abs(empty - grey) < 0.006).mean() for grey in (0.87, 0.91, 0.94)]
+    assert shares == pytest.approx([0.23, 0.19, 0.08], abs=0.01), "the container's sides"
+    picture = snapshot(load, both, load.positions)
+    assert picture.shape == (480, 640, 3) and picture.dtype == np.uint8
+    boxes_drawn = [(snapshot(load, some, load.positions) != snapshot(load, none, load.positions))
+                   .any(axis=2).sum() for some in (one, both)]  # fmt: skip
+    assert 100 < boxes_drawn[0] < boxes_drawn[1]
+    assert (snapshot(load, both, moved.positions) == snapshot(moved, both, moved.positions)).all()
+    assert (snapshot(load, both, moved.positions) != picture).any()
+
+
+# Machado et al. (2009): linear RGB as seen without the long, the middle, the short cones.
+BLINDNESS = {
+    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+@pytest.mark.parametrize("kind", BLINDNESS)
+def test_the_colour_blind_tell_all_meanings_apart(kind):
+    linear = np.array(list(COLOURS.values())) ** 2.2
+    assert linear.max() <= 1
+    seen = (linear @ np.transpose(BLINDNESS[kind])).clip(0, 1) ** (1 / 2.2)
+    for (one, a), (other, b) in combinations(zip(COLOURS, seen), 2):
+        assert np.linalg.norm(a - b) > 0.1, (one, other)
+
+
+def test_faces_lie_in_the_sides_of_a_box():
+    """Their corners go round."""
+    for corners, _ in (*FACES, *INSIDES):
+        ring = CORNERS[list(corners)]
+        assert (np.abs(np.roll(ring, 1, axis=0) - ring).sum(axis=1) == 1).all()
+        assert sorted(np.ptp(ring, axis=0)) == [0, 1, 1]

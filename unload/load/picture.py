@@ -1,0 +1,189 @@
+"""Still pictures of a load: boxes drawn from the back, so that nearer ones cover farther ones.
+
+They are what environments render, and stand where plotly is not drawn. This module takes a third
+of a second to import, because Matplotlib does: import it where something is drawn.
+"""
+
+import io
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from PIL import Image
+
+from unload import task
+from unload.load.boxes import OVERLAP, Load, slabs
+from unload.load.substacks import package_colour
+
+# One colour for each meaning, in every picture of a load: Okabe and Ito's colours, which the
+# colour-blind tell apart as well; pale for what does not matter.
+COLOURS: dict[str, tuple[float, float, float]] = {
+    "unseen": (0.86, 0.86, 0.84),
+    "visible": (0.34, 0.71, 0.91),
+    "liftable": (0.00, 0.62, 0.45),
+    "blocked": (0.84, 0.37, 0.00),
+    "tried": (0.94, 0.89, 0.26),
+    "failed": (0.80, 0.47, 0.65),
+    "on top of it": (0.00, 0.45, 0.70),  # of the chosen box
+    "cannot move": (0.74, 0.74, 0.72),
+}
+SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
+# From outside, over the left edge of the entrance, which is the side of x = 7 m.
+EYE = np.array([11.6, -2.9, 4.4])  # m
+TARGET = np.array([4.4, 1.1, 0.9])  # m
+CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+# The faces whose outer sides point along x, against y and along z: corners, and brightness.
+FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
+# The insides of the container that are seen: corners, and brightness of the grey.
+INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
+EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
+WIDTH = 8.0  # inches, at 100 pixels each
+LEGEND = 0.15  # share of the width at the left
+FILE_COLOURS = 128  # of a still picture
+
+
+def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Return (480, 640, 3) uint8, a picture of some items, coloured by package, all upright.
+
+    Args:
+        load: the items.
+        present: (n,) bool, which of them are drawn.
+        positions: (n, 3) float, where their centres are in m.
+    """
+    items = np.flatnonzero(present)
+    moved = (positions - load.positions)[items]
+    low, high = (corner + moved for corner in corners(load, items))
+    colours = np.array([package_colour(package) for package in load.packages[items]])
+    return pixels(_drawn(low, high, colours.reshape(-1, 3), (6.4, 4.8), 0.0))
+
+
+def still(
+    low: np.ndarray,
+    high: np.ndarray,
+    colours: np.ndarray,
+    legend: Mapping[str, tuple[float, float, float]],
+    height: float,
+) -> bytes:
+    """Return a PNG picture of boxes in the container with a legend.
+
+    Args:
+        low, high: (n, 3) float64, corners in m.
+        colours: (n, 3) float64, RGB in [0, 1].
+        legend: name → colour.
+        height: of the picture in inches.
+    """
+    figure = _drawn(low, high, colours, (WIDTH, height), LEGEND)
+    handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
+    figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
+    file = io.BytesIO()
+    # Few colours take a quarter of the bytes.
+    Image.fromarray(pixels(figure)).quantize(FILE_COLOURS).save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def _drawn(
+    low: np.ndarray,
+    high: np.ndarray,
+    colours: np.ndarray,
+    size: tuple[float, float],
+    left: float,
+) -> Figure:
+    """A figure of boxes in the container, of this size in inches, free in a share at the left."""
+    figure = Figure(size, dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
+    order = back_to_front(low, high)
+    draw(figure.add_axes((left, 0, 1 - left, 1)), low[order], high[order], colours[order])
+    return figure
+
+
+def draw(axes: Axes, low: np.ndarray, high: np.ndarray, colours: np.ndarray) -> None:
+    """Draw boxes in the container, seen from ``EYE``; the container fills the axes.
+
+    Args:
+        axes: Matplotlib's.
+        low, high: (n, 3) float64, corners in m, in an order such as that of ``back_to_front``.
+        colours: (n, 3) float64, RGB in [0, 1].
+    """
+    # The container's insides lie behind all boxes.
+    frame = project(CORNERS * task.CONTAINER)
+    for face, brightness in INSIDES:
+        axes.fill(*frame[list(face)].T, color=str(brightness), zorder=0)
+
+    # Of each box only three faces are seen, because of where the eye is.
+    seen = project(low[:, None] + CORNERS * (high - low)[:, None])
+    polygons = np.stack([seen[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
+    shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
+    axes.add_collection(
+        PolyCollection(
+            list(polygons),
+            facecolors=shades.reshape(-1, 3),
+            edgecolors=EDGE * shades.reshape(-1, 3),
+            linewidths=0.5,
+        )
+    )
+
+    axes.set(aspect="equal", xlim=_wider(frame[:, 0]), ylim=_wider(frame[:, 1]))
+    axes.axis("off")
+
+
+def pixels(figure: Figure) -> np.ndarray:
+    """(height, width, 3) uint8, a Matplotlib figure as it is drawn."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[:, :, :3]
+
+
+def corners(load: Load, items: np.ndarray, seam: float = SEAM) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners of items as they are drawn, (k, 3) float64 each, in m."""
+    centres = load.positions[items]
+    halves = np.maximum(load.sizes - seam, load.sizes / 2)[items] / 2
+    return centres - halves, centres + halves
+
+
+def project(points: np.ndarray) -> np.ndarray:
+    """Where points (..., 3) in m are seen from ``EYE``, (..., 2), right and up."""
+    ahead = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    right = np.cross(ahead, (0, 0, 1))
+    right /= np.linalg.norm(right)
+    seen = (points - EYE) @ np.array([right, np.cross(right, ahead), ahead]).T
+    return seen[..., :2] / seen[..., 2:]  # what is farther away looks smaller
+
+
+def back_to_front(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return an order of disjoint boxes in which none is hidden by an earlier one, (n,) int64.
+
+    The eye is outside the container, beyond its entrance, left wall and ceiling. Therefore
+    of two boxes that a plane separates, only the one at the plane's greater x, smaller y or
+    greater z can hide the other.
+    """
+    # Slabs of depth are drawn one after the other, which keeps the matrices of pairs small.
+    order = []
+    groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
+    for group in range(groups.max(initial=-1) + 1):
+        left = np.flatnonzero(groups == group)
+        low_left, high_left = low[left], high[left]
+        behind = _separated(low_left, high_left, 0) | _separated(low_left, high_left, 2)
+        behind |= _separated(low_left, high_left, 1).T
+        behind &= ~behind.T  # separated both ways: neither hides the other
+
+        # Draw those that have nothing left behind them, until none is left.
+        while len(left):
+            free = ~behind.any(axis=0)
+            if not free.any():  # boxes that hide each other in a circle: the farthest first
+                free[np.linalg.norm(low[left] - EYE, axis=1).argmax()] = True
+            order.append(left[free])
+            left, behind = left[~free], behind[np.ix_(~free, ~free)]
+    return np.concatenate([*order, np.zeros(0, np.int64)])
+
+
+def _separated(low: np.ndarray, high: np.ndarray, axis: int) -> np.ndarray:
+    """(n, n) bool, whether box i ends where box j begins, or before."""
+    return high[:, None, axis] <= low[None, :, axis] + OVERLAP
+
+
+def _wider(values: np.ndarray, margin: float = 0.04) -> tuple[float, float]:
+    room = margin * np.ptp(values)
+    return values.min() - room, values.max() + room
