@@ -135,6 +135,6 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
 
 def test_data_of_heaps_are_those_that_are_read():
     names = {path.name.split(".")[0] for path in (files.DATA / "heap").iterdir()}
-    assert names == {"networks", "rules", "episodes", "table"}
+    assert names == {"heaps", "networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == FULL.test).all() and len(table) == 19

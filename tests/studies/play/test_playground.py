@@ -1,3 +1,4 @@
+import logging
 import re
 
 import numpy as np
@@ -144,12 +145,39 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
     unloaded = score(stuck)[0]
     assert "<td>without</td>" in stuck.board.value
     stuck.mask.value = True
+    assert "deadlock" not in stuck.message.value
     stuck.slider.value = 110
-    assert score(stuck)[0] == unloaded + 10
+    assert score(stuck)[0] == unloaded + 15
     stuck.slider.value = 94
     stuck.mask.value = False
     stuck.slider.value = 110
     assert score(stuck)[0] == unloaded
+
+
+def test_the_mask_ends_a_deadlock_that_has_lasted_to_the_end(stuck):
+    """Also where all picks have been watched: those from the first deadlocked one are made anew."""
+    stuck.mask.value = False
+    stuck.slider.value = 120
+    run = stuck.runs["the paper's agent"]
+    first = [pick.deadlocked for pick in run.picks].index(True)
+    before = run.picks[:first]
+    stuck.mask.value = True
+    assert run.picks[:first] == before and len(run.picks) == 120
+    stuck.slider.value = first + 5
+    assert not any(pick.deadlocked for pick in run.picks)
+    assert "deadlock" not in stuck.message.value
+
+
+def test_what_is_logged_while_it_starts_stands_in_its_own_line(monkeypatch):
+    def warm_up(playground):
+        logging.getLogger("unload.fast").warning("compiling <this> for ten seconds")
+
+    monkeypatch.setattr(Playground, "_warm_up", warm_up)
+    game = Playground(seed=4)
+    assert "compiling &lt;this&gt; for ten seconds" in game.message.value
+    game.slider.value = 1
+    game._show()
+    assert "compiling" not in game.message.value and not logging.getLogger("unload").handlers
 
 
 def test_a_replay_stands_beside_the_widget(game):
