@@ -1,3 +1,4 @@
+import html
 import logging
 import re
 
@@ -111,13 +112,38 @@ def test_hints_are_what_can_be_lifted(game):
 
 
 def test_all_players_have_as_many_picks_as_you(game):
-    for item in game.you.liftable()[:3]:
+    liftable = game.you.liftable()
+    for item in (*liftable[:2], np.setdiff1d(game.you.visible, liftable)[0]):
         click(game, item)
-    standings = {name: (picks, unloaded) for name, picks, unloaded in game.standings()}
-    assert set(standings) == {"you", *game.runs}
-    assert {picks for picks, _ in standings.values()} == {3}
-    assert standings["highest"] == (3, 3)
-    assert all(name.split(",")[0].replace("'", "&#x27;") in game.board.value for name in standings)
+    alone = {name: Run(name, game.you.load, 4) for name in game.runs}
+    expected = [("you", 3, game.you.unloaded())]
+    expected += [(name, run.play_to(3), run.unloaded(3)) for name, run in alone.items()]
+    assert game.standings() == expected
+    for name, picks, unloaded in expected:
+        row = f"<td align=right>{unloaded}</td><td align=right>{picks}</td>"
+        assert f"<td>{html.escape(name)}</td>" in game.board.value and row in game.board.value
+    game.player.value = "highest"
+    game.slider.value = 2
+    assert game.standings()[0] == ("you", 2, game.you.unloaded(2))
+    assert [row[1] for row in game.standings()] == [2] * 7
+
+
+def test_only_the_last_pick_is_seen_to_rise_and_only_when_it_is_made(game):
+    first, second = game.you.liftable()[:2]
+    click(game, first)
+    click(game, second)
+    rise = game.canvas.lift
+    assert rise["item"] == second and rise["number"] == 2
+    game.hints.value = True
+    game.undo.click()
+    click(game, np.setdiff1d(game.you.visible, game.you.liftable())[0])
+    game.player.value = "highest"
+    assert game.canvas.lift == rise, "shown, taken back, failed or another's"
+    game.slider.value = 1
+    assert game.canvas.lift["number"] == 3
+    for count in (3, 2):
+        game.slider.value = count
+    assert game.canvas.lift["number"] == 3, "a jump, and a step back"
 
 
 def test_a_player_is_watched_by_the_slider(game):
