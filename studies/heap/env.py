@@ -192,14 +192,6 @@ class HeapEnv(EpisodeEnv):
             self._state = "finished"
         return self._observation.copy(), reward, terminated, truncated, self._info() | pick
 
-    def action_masks(self) -> np.ndarray:
-        """(96,) bool, ``info["action_mask"]``."""
-        self._check_started()
-        allowed = self.visible >= 0
-        untried = allowed.copy()
-        untried[allowed] = ~self._failed[self.visible[allowed]]
-        return untried if untried.any() else allowed
-
     def close(self) -> None:
         """Disconnect both clients; may be called again."""
         self._rake.close()
@@ -218,9 +210,12 @@ class HeapEnv(EpisodeEnv):
             self._observation = np.clip(rows, -LARGEST, LARGEST)
 
     def _info(self) -> dict:
+        boxes = self.visible >= 0
+        untried = boxes.copy()
+        untried[boxes] = ~self._failed[self.visible[boxes]]
         return {
-            "action_mask": self.action_masks().astype(np.int8),
-            "item_mask": (self.visible >= 0).astype(np.int8),
+            "action_mask": (untried if untried.any() else boxes).astype(np.int8),
+            "item_mask": boxes.astype(np.int8),
             "left": np.int64(len(self.heap)),
         }
 

@@ -10,6 +10,7 @@ from torch import nn
 
 from studies.heap.network import FEATURES, FateNetwork, fate_loss
 from studies.heap.observation import COLUMN
+from studies.heap.policies import Episode
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks
 
@@ -27,7 +28,7 @@ class Picks:
     Attributes:
         observations: (n, 96, 13) float32, before the pick.
         actions: (n,) int64, the row that was dragged.
-        unloaded, falls: (n,) float32.
+        unloaded, falls: (n,) int64.
         fates: (n, 96) int8, what happened to the box in each row, see ``HeapEnv``.
     """
 
@@ -41,10 +42,10 @@ class Picks:
         return len(self.actions)
 
 
-def joined(picks: Sequence[Picks]) -> Picks:
-    """All picks as one."""
+def joined(parts: Sequence[Picks | Episode]) -> Picks:
+    """All picks, or those of several episodes, as one."""
     names = Picks.__dataclass_fields__
-    return Picks(*(np.concatenate([getattr(each, name) for each in picks]) for name in names))
+    return Picks(*(np.concatenate([getattr(each, name) for each in parts]) for name in names))
 
 
 def holds_box(observations: torch.Tensor) -> torch.Tensor:
@@ -103,7 +104,7 @@ def batch_loss(
 ) -> torch.Tensor:
     """Negative log-likelihood of a batch per pick; arguments as in ``Picks``."""
     observations = without_empty_rows(observations)
-    present = holds_box(observations)
+    present, unloaded, falls = holds_box(observations), unloaded.float(), falls.float()
     answers = network.fates(observations, present, actions)
     loss = fate_loss(answers, present, fates[:, : observations.shape[1]], unloaded, falls)
     fell = (falls > 0).float()

@@ -16,7 +16,7 @@ from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from studies.heap.generate import BOXES, settled_heap, write_heaps
 from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
 from studies.heap.network import FateNetwork
-from studies.heap.policies import Episode, best, linear, play, random
+from studies.heap.policies import best, linear, play, random
 from studies.results import COMMAND, Result, digest, keep_all, packed, publish, unpacked
 from unload.agent.identity import identity
 from unload.support import files
@@ -112,7 +112,7 @@ def _record(round_number: int, number: int, explorer: str | None) -> str:
         episode = play(env, policy, heap, int(rng.integers(2**32)))
     finally:
         env.close()
-    return packed(vars(picks_of(episode)))
+    return packed(vars(joined([episode])))
 
 
 def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Callable:
@@ -131,17 +131,6 @@ def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Ca
         return chosen(observations, masks, rng)
 
     return policy
-
-
-def picks_of(episode: Episode) -> Picks:
-    """The picks of an episode, as ``fit`` needs them."""
-    return Picks(
-        episode.observations,
-        episode.actions,
-        episode.unloaded.astype(np.float32),
-        episode.falls.astype(np.float32),
-        episode.fates,
-    )
 
 
 def _learn(recorded: Sequence[str], seed: int) -> str:

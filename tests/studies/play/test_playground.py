@@ -10,7 +10,6 @@ from studies.play.canvas import ABSENT
 from studies.play.episode import Episode
 from studies.play.players import Run
 from studies.play.playground import SHOWN, Playground
-from studies.play.replay import replay
 from unload import stack_load
 from unload.load.view import PLOTLY_MIMETYPE
 
@@ -225,7 +224,6 @@ BAD_INPUT = {
     "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
     "mask is None": lambda load: Playground(mask=None),
     "picks is 0": lambda load: Playground(picks=0),
-    "height is 10": lambda load: replay(Episode(load), height=10),
 }
 
 
