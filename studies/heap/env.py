@@ -8,15 +8,7 @@ from gymnasium.utils import seeding
 
 from studies.heap import generate
 from studies.heap.boxes import Heap, check_heap
-from studies.heap.observation import (
-    COLUMNS,
-    FELL,
-    ROWS,
-    UNLOADED,
-    Camera,
-    features,
-    visible_boxes,
-)
+from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
 from studies.heap.rake import Rake
 from unload import task
 from unload.env.base import AllOrReset, EpisodeEnv

@@ -13,14 +13,7 @@ from matplotlib.patches import Patch
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.policies import RULES
 from studies.heap.rake import Outcome
-from studies.heap.table import (
-    LEARNED,
-    MEASURES,
-    ORACLE,
-    REFERENCE,
-    SHOWN_WEIGHT,
-    read_heap_table,
-)
+from studies.heap.table import LEARNED, MEASURES, ORACLE, REFERENCE, SHOWN_WEIGHT, read_heap_table
 from studies.style import COLOURS as RULE_COLOURS
 from studies.style import styled
 from unload.load.view import COLOURS, CORNERS, EYE, SEAM, project

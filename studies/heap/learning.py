@@ -1,6 +1,6 @@
 """Learning from recorded picks what dragging a box does: regression."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,7 +86,7 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
         batch = {name: each[rows] for name, each in data.items()}
         if torch.rand((), generator=generator) < 0.5:
             batch["observations"] = mirrored(batch["observations"])
-        loss = batch_loss(network, **batch)
+        loss = batch_loss(network, batch)
         adam.zero_grad()
         loss.backward()
         adam.step()
@@ -94,19 +94,14 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
     return network.eval()
 
 
-def batch_loss(
-    network: FateNetwork,
-    observations: torch.Tensor,
-    actions: torch.Tensor,
-    unloaded: torch.Tensor,
-    falls: torch.Tensor,
-    fates: torch.Tensor,
-) -> torch.Tensor:
-    """Negative log-likelihood of a batch per pick; arguments as in ``Picks``."""
-    observations = without_empty_rows(observations)
-    present, unloaded, falls = holds_box(observations), unloaded.float(), falls.float()
-    answers = network.fates(observations, present, actions)
-    loss = fate_loss(answers, present, fates[:, : observations.shape[1]], unloaded, falls)
+def batch_loss(network: FateNetwork, batch: Mapping[str, torch.Tensor]) -> torch.Tensor:
+    """Negative log-likelihood per pick of a batch, which has the fields of ``Picks``."""
+    observations = without_empty_rows(batch["observations"])
+    present = holds_box(observations)
+    unloaded, falls = batch["unloaded"].float(), batch["falls"].float()
+    fates = batch["fates"][:, : observations.shape[1]]
+    answers = network.fates(observations, present, batch["actions"])
+    loss = fate_loss(answers, present, fates, unloaded, falls)
     fell = (falls > 0).float()
     loss = loss + nn.functional.binary_cross_entropy_with_logits(answers.fall_logits[:, 0], fell)
     for mean, count in zip(answers.sums(present), (unloaded, falls)):

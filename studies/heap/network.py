@@ -79,10 +79,7 @@ class FateNetwork(nn.Module):
                 nn.init.uniform_(weight, -bound, bound, generator=generator)
 
     def fates(
-        self,
-        observations: torch.Tensor,
-        present: torch.Tensor,
-        rows: torch.Tensor | None = None,
+        self, observations: torch.Tensor, present: torch.Tensor, rows: torch.Tensor | None = None
     ) -> Fates:
         """Fates of all boxes for each row, or for one chosen row of each observation.
 

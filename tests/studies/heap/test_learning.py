@@ -92,7 +92,7 @@ def test_what_is_learned_of_a_fall_is_its_likelihood(learned):
     batch = {name: torch.from_numpy(each[:1]) for name, each in vars(picks).items()}
     with torch.no_grad():
         some, one_more, none = (
-            batch_loss(network, **(batch | {"falls": torch.tensor([count])}))
+            batch_loss(network, batch | {"falls": torch.tensor([count])})
             for count in (3.0, 4.0, 0.0)
         )
         seen = batch["observations"]
