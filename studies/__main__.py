@@ -2,8 +2,7 @@
 
 import argparse
 from collections.abc import Callable
-from importlib import import_module
-from importlib.util import find_spec
+from dataclasses import replace
 
 from studies.falls import fresh, laboratory, long
 from studies.lifts import agreement, lift_table
@@ -12,6 +11,8 @@ from studies.policies import comparison, robustness, variants
 from studies.results import COMMAND, JOBS
 from studies.seamless import jam_tables
 from studies.seamless import training as seamless
+from unload.agent.config import TrainConfig
+from unload.support import checks
 
 
 def lifts(n_jobs: int) -> None:
@@ -28,8 +29,10 @@ def policies(n_jobs: int) -> None:
 
 
 def heap(n_jobs: int) -> None:
-    """Make all data of heaps. Nothing else of them is imported here, see ``PARTS``."""
-    import_module("studies.heap.table").heap_data(n_jobs=n_jobs)
+    """Make all data of heaps: the heaps, recorded picks, networks, and the policies compared."""
+    from studies.heap import table  # no other part needs any of it
+
+    table.heap_data(n_jobs=n_jobs)
 
 
 # Part → summary, what makes its data, and its options.
@@ -47,9 +50,8 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "jams": ("jams in seamless walls, every box simulated", jam_tables.jams_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
+    "heap": ("heaps, of which a rake picks several boxes at once", heap, JOBS),
 }  # fmt: skip
-if find_spec("studies.heap"):  # a room that may be taken out
-    PARTS["heap"] = "heaps, of which a rake picks several boxes at once", heap, JOBS
 
 
 def paper(n_jobs: int) -> None:
@@ -83,7 +85,20 @@ def main() -> None:
             part.add_argument(option, **details)
     chosen = vars(parser.parse_args())
     del chosen["part"]
+    try:
+        check(chosen)
+    except ValueError as error:
+        parser.error(str(error))
     chosen.pop("make")(**chosen)
+
+
+def check(chosen: dict) -> None:
+    """Raise a ValueError for a number that no part can run with, before anything starts."""
+    checks.jobs("--jobs", chosen.get("n_jobs", -1))
+    if chosen.get("seeds") is not None:
+        checks.integer("--seeds", chosen["seeds"], 1)
+    if chosen.get("picks") is not None:
+        replace(TrainConfig(), picks=chosen["picks"])
 
 
 if __name__ == "__main__":

@@ -68,8 +68,9 @@ class Grid(NamedTuple):
 
     def configs(self, picks: int | None = None) -> dict[str, TrainConfig]:
         """The configuration of each planned run by its name, ``<cell>/seed_<seed>``."""
+        length = {} if picks is None else {"picks": picks}
         return {
-            f"{name}/seed_{seed}": replace(cell.config, seed=seed, picks=picks or cell.config.picks)
+            f"{name}/seed_{seed}": replace(cell.config, seed=seed, **length)
             for name, cell in self.cells.items()
             for seed in cell.seeds
         }

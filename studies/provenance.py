@@ -103,10 +103,10 @@ def _versions() -> dict[str, str]:
 
 @cache
 def revision() -> str:
-    """The project's commit, with ``+`` if the package was changed since.
+    """The project's commit, with ``+`` if ``unload`` or ``studies`` was changed since.
 
-    ``"unknown"`` where the package does not lie in the project's own repository: a copy of it
-    in another one must not report that one's commits.
+    ``"unknown"`` where they do not lie in the project's own repository: a copy of them in
+    another one must not report that one's commits.
     """
     root = paths.ROOT
     # A named repository, because git would otherwise take an enclosing one.
@@ -121,7 +121,7 @@ def revision() -> str:
         if project != "unload":
             return "unknown"
         commit = output("rev-parse", "--short=12", "HEAD").strip()
-        changed = output("status", "--porcelain", "unload")
+        changed = output("status", "--porcelain", "unload", "studies")
     except (OSError, KeyError, tomllib.TOMLDecodeError, subprocess.CalledProcessError):
         return "unknown"
     return commit + ("+" if changed else "")

@@ -7,11 +7,14 @@ one is a table in ``data/`` with its provenance beside it.
 import json
 import sys
 import time
+from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from hashlib import blake2b
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
 from tqdm import tqdm
@@ -59,8 +62,7 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
         ValueError: a kept file is damaged or lacks an entry; the message names it.
     """
     question = json.loads(json.dumps(question, sort_keys=True))
-    digest = blake2b(json.dumps(question).encode(), digest_size=8).hexdigest()
-    path = Path(folder) / f"{digest}.json"
+    path = Path(folder) / f"{digest(question)}.json"
     stored = files.read_json(path) if path.exists() else {}
     if stored.get("question") != question:
         value, record = measured(compute)
@@ -69,6 +71,24 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
         stored = files.read_json(path)
     checks.entries(str(path), stored, ("value", "record"))
     return Result(stored["value"], stored["record"])
+
+
+def digest(value: Any) -> str:
+    """Digest of what JSON can hold, 16 hexadecimal digits."""
+    return blake2b(json.dumps(value).encode(), digest_size=8).hexdigest()
+
+
+def packed(arrays: Mapping[str, np.ndarray]) -> str:
+    """Named arrays as a text, so that an answer can hold them; see ``unpacked``."""
+    buffer = BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return b64encode(buffer.getvalue()).decode()
+
+
+def unpacked(text: str) -> dict[str, np.ndarray]:
+    """The arrays of ``packed``."""
+    with np.load(BytesIO(b64decode(text)), allow_pickle=False) as stored:
+        return dict(stored)
 
 
 def keep_all(

@@ -240,12 +240,13 @@ def laboratory_data(
     for cell in cells:
         checks.one_of("cells", cell, CELLS)
     fingerprint, jobs = training_fingerprint(), []
+    measured = identity([point, measures.judged])  # what is measured, whatever is trained
     for cell in cells:
+        changed = identity([CELLS[cell].change, SEEN.get(cell)])
         for seed in CELLS[cell].seeds[:seeds]:
             config = asdict(replace(CELLS[cell].config, seed=seed))
-            change = identity(CELLS[cell].change)
-            question = {"cell": cell, "change": change, "fingerprint": fingerprint, **config}
-            jobs.append((question, partial(run_cell, cell, seed)))
+            question = {"cell": cell, "changed": changed, "measured": measured, **config}
+            jobs.append((question | {"fingerprint": fingerprint}, partial(run_cell, cell, seed)))
     results = keep_all(Path(runs_dir) / "laboratory", jobs, n_jobs)
     rows = [result.value["row"] for result in results]
     traces = [

@@ -7,7 +7,7 @@ training.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
@@ -20,8 +20,9 @@ from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
-from studies.results import COMMAND, JOBS, keep_all, publish, read_table
+from studies.results import COMMAND, JOBS, digest, keep_all, packed, publish, read_table
 from unload.agent.config import TrainConfig
+from unload.agent.identity import identity
 from unload.network.peq import PEQNetwork
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
@@ -69,20 +70,16 @@ def trace_data(
 
     Arguments as of ``published_data``.
     """
-    fingerprint, picks = training_fingerprint(), CONFIG.picks
-    jobs = [
-        (
-            {"seed": seed, "picks": picks, "every": TRACE_EVERY, "fingerprint": fingerprint},
-            partial(_trace, replace(CONFIG, seed=seed)),
-        )
-        for seed in TRACED_SEEDS
-    ]
+    fingerprint = training_fingerprint()
+    question = {"every": TRACE_EVERY, "fingerprint": fingerprint, "measured": identity(_trace)}
+    configs = [replace(CONFIG, seed=seed) for seed in TRACED_SEEDS]
+    jobs = [(question | asdict(config), partial(_trace, config)) for config in configs]
     results = keep_all(Path(runs_dir) / "falls/trace", jobs, n_jobs)
     traces = [
         pd.DataFrame(result.value).assign(seed=seed) for seed, result in zip(TRACED_SEEDS, results)
     ]
     tables = {"long_trace": pd.concat(traces)[["seed", *POINT]].astype({"picks": int})}
-    settings = {"seeds": list(TRACED_SEEDS), "picks": picks}
+    settings = {"seeds": list(TRACED_SEEDS), "picks": CONFIG.picks}
     place, command = Path(folder) / "falls", f"{COMMAND} falls"
     publish(place, "long_trace", tables, command, settings, results, fingerprint, "%.4g")
 
@@ -122,10 +119,12 @@ def published_data(
     for seed in range(UNTRAINED):
         network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
         judged[f"untrained/seed_{seed}"] = PAPER.cells["paper_mask"].config, network
-    jobs = [
-        ({"name": name, "fingerprint": fingerprint, **LOADS}, partial(_judge, name, *each))
-        for name, each in judged.items()
-    ]
+    measured, jobs = identity(_judge), []
+    for name, (config, network) in judged.items():
+        weights = {part: each.numpy() for part, each in network.state_dict().items()}
+        question = {"name": name, "weights": digest(packed(weights)), "measured": measured}
+        question |= {"fingerprint": fingerprint, **asdict(config), **LOADS}
+        jobs.append((question, partial(_judge, name, config, network)))
     results = keep_all(Path(runs_dir) / "published", jobs, n_jobs)
     tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
     place, command = Path(folder) / "falls", f"{COMMAND} falls"

@@ -1,6 +1,5 @@
 """The heap as a Gymnasium environment."""
 
-from collections.abc import Sequence
 from functools import cache
 
 import gymnasium
@@ -9,24 +8,13 @@ from gymnasium.utils import seeding
 
 from studies.heap import generate
 from studies.heap.boxes import Heap, check_heap
-from studies.heap.observation import (
-    COLUMNS,
-    FELL,
-    ROWS,
-    UNLOADED,
-    Camera,
-    camera_boxes,
-    features,
-    true_boxes,
-)
-from studies.heap.rake import Outcome, Rake
+from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
+from studies.heap.rake import Rake
 from unload import task
 from unload.env.base import AllOrReset, EpisodeEnv
-from unload.physics.bullet import FRICTION
 from unload.support import checks
 
 MAX_PICKS = 15  # they unload some 25 to 40 of 100 boxes, the front of the heap
-OBSERVATIONS = {"truth": true_boxes, "camera": camera_boxes}
 LARGEST = 20.0  # of the observation: twice what a box 10 m away would show
 
 
@@ -52,7 +40,7 @@ class HeapEnv(EpisodeEnv):
 
     ## Observation space
     ``Box(-20, 20, (96, 13), float32)``: one row for each visible box, from the door to the
-    rear; rows without a box are 0. A box is visible if a depth camera of 128 × 96 pixels, 2 m
+    rear; rows without a box are 0. A box is visible if a camera of 128 × 96 pixels, 2 m
     outside the door and 2.4 m high, shows at least four pixels of it. That is true of about 55
     boxes. No row tells of hidden boxes, unless none is visible: then there is a row for each.
 
@@ -70,15 +58,12 @@ class HeapEnv(EpisodeEnv):
     12      visible pixels                                                                   1000
     ======  ===============================================================================  ====
 
-    With ``observation="camera"`` all of this is computed from the points that the camera sees
-    of each box, which its segmentation keeps apart; what is hidden of a box is not known.
-
     ## Rewards
-    Boxes unloaded by the pick, less ``falls_weight`` for each other box that dropped by more
-    than 0.5 m, and may be damaged.
+    Boxes unloaded by the pick, less the other boxes that dropped by more than 0.5 m, and may be
+    damaged: the price of a fall is λ = 1. ``info`` has both, for another price.
 
     ## Starting state
-    One of ``heaps``, drawn with equal probability.
+    One of the stored heaps of the split, drawn with equal probability.
 
     ## Episode end
     Termination when the last box is unloaded, truncation after ``max_picks`` picks.
@@ -107,16 +92,14 @@ class HeapEnv(EpisodeEnv):
 
     Args:
         split: ``"train"`` or ``"test"``, which of the stored heaps are played.
-        heaps: other heaps to play, instead of a split.
-        physics: ``"whole"``, ``"coarse"`` or ``"near"``, see ``Rake``.
-        observation: ``"truth"``, or ``"camera"`` for what the depth camera tells.
-        falls_weight: λ, boxes that a fall costs.
+        physics: ``"whole"`` or ``"coarse"``, see ``Rake``.
         max_picks: greatest length of an episode.
-        friction: of boxes, floor and walls, see ``Rake``.
         mass: kg, of each box.
 
     Attributes:
         heap: the ``Heap`` as it is.
+        heaps: those of the split.
+        outcome: what the last pick has done, box by box; None if it was of a row without a box.
         visible: (96,) int64, the box in each row of the observation, -1 in rows without.
 
     Raises:
@@ -131,31 +114,18 @@ class HeapEnv(EpisodeEnv):
     def __init__(
         self,
         split: str = "train",
-        heaps: Sequence[Heap] | None = None,
         physics: str = "whole",
-        observation: str = "truth",
-        falls_weight: float = 1.0,
         max_picks: int = MAX_PICKS,
-        friction: float = FRICTION,
         mass: float = task.MASS,
     ) -> None:
-        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
         self.max_picks = checks.integer("max_picks", max_picks, 1)
-        checks.one_of("observation", observation, OBSERVATIONS)
-        self._boxes_seen = OBSERVATIONS[observation]
         checks.one_of("split", split, generate.SPLITS)
-        if not isinstance(heaps, Sequence | None):
-            raise TypeError(f"heaps is {heaps!r}; expected a sequence of Heap, or None")
-        self.heaps = stored_heaps(split) if heaps is None else tuple(heaps)
-        if not self.heaps:
-            raise ValueError("heaps is empty; expected at least one Heap")
-        for number, heap in enumerate(self.heaps):
-            check_heap(f"heaps[{number}]", heap)
+        self.heaps = stored_heaps(split)
         self.observation_space = gymnasium.spaces.Box(
             -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
         )
         self.action_space = gymnasium.spaces.Discrete(ROWS)
-        self._rake, self._camera = Rake(physics, friction, mass), Camera()
+        self._rake, self._camera = Rake(physics, mass), Camera()
         self._state = "not started"
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
@@ -174,6 +144,7 @@ class HeapEnv(EpisodeEnv):
             heap = self.heaps[self.np_random.integers(len(self.heaps))]
         with AllOrReset(self):
             self.heap, self._failed, self._picks = heap, np.zeros(len(heap), bool), 0
+            self.outcome = None
             self._state = "running"
             self._look()
         return self._observation.copy(), self._info()
@@ -190,9 +161,9 @@ class HeapEnv(EpisodeEnv):
             "moved": np.float64(0), "came": np.False_, "fates": fates,
         }  # fmt: skip
         with AllOrReset(self):
-            self._picks += 1
+            self._picks, self.outcome = self._picks + 1, None
             if box >= 0:
-                outcome = self._rake.pick(self.heap, box)
+                self.outcome = outcome = self._rake.pick(self.heap, box)
                 pick |= {
                     "unloaded": outcome.unloaded.sum(),
                     "falls": outcome.fallen.sum(),
@@ -202,20 +173,16 @@ class HeapEnv(EpisodeEnv):
                 seen = self.visible >= 0
                 numbers = self.visible[seen]
                 fates[seen] = UNLOADED * outcome.unloaded[numbers] + FELL * outcome.fallen[numbers]
-                self._take(outcome, box)
-        reward = float(pick["unloaded"] - self.falls_weight * pick["falls"])
+                self._failed[box] = True
+                if outcome.unloaded.any():
+                    self._failed = np.zeros(len(outcome.heap), bool)
+                self.heap = outcome.heap
+                self._look()
+        reward = float(pick["unloaded"] - pick["falls"])
         terminated, truncated = len(self.heap) == 0, self._picks >= self.max_picks
         if terminated or truncated:
             self._state = "finished"
         return self._observation.copy(), reward, terminated, truncated, self._info() | pick
-
-    def action_masks(self) -> np.ndarray:
-        """(96,) bool, ``info["action_mask"]``."""
-        self._check_started()
-        allowed = self.visible >= 0
-        untried = allowed.copy()
-        untried[allowed] = ~self._failed[self.visible[allowed]]
-        return untried if untried.any() else allowed
 
     def close(self) -> None:
         """Disconnect both clients; may be called again."""
@@ -223,27 +190,24 @@ class HeapEnv(EpisodeEnv):
         self._camera.close()
         self._state = "closed"
 
-    def _take(self, outcome: Outcome, box: int) -> None:
-        if outcome.unloaded.any():
-            self._failed = np.zeros(len(outcome.heap), bool)
-        else:
-            self._failed[box] = True
-        self.heap = outcome.heap
-        self._look()
-
     def _look(self) -> None:
         """Update which boxes are visible, and the observation of them."""
         self.visible = np.full(ROWS, -1)
         self._observation = np.zeros(self.observation_space.shape, np.float32)
         if len(self.heap):
-            seen = self._boxes_seen(self.heap, self._camera.scan(self.heap))
-            self.visible[: len(seen.numbers)] = seen.numbers
-            self._observation = np.clip(features(seen), -LARGEST, LARGEST)
+            pixels = self._camera.pixels(self.heap)
+            seen = visible_boxes(self.heap, pixels)
+            self.visible[: len(seen)] = seen
+            rows = features(self.heap.only(seen), pixels[seen])
+            self._observation = np.clip(rows, -LARGEST, LARGEST)
 
     def _info(self) -> dict:
+        boxes = self.visible >= 0
+        untried = boxes.copy()
+        untried[boxes] = ~self._failed[self.visible[boxes]]
         return {
-            "action_mask": self.action_masks().astype(np.int8),
-            "item_mask": (self.visible >= 0).astype(np.int8),
+            "action_mask": (untried if untried.any() else boxes).astype(np.int8),
+            "item_mask": boxes.astype(np.int8),
             "left": np.int64(len(self.heap)),
         }
 

@@ -14,17 +14,9 @@ from studies import paths
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.policies import RULES
 from studies.heap.rake import Outcome
-from studies.heap.recording import NAME
-from studies.heap.table import (
-    LEARNED,
-    MEASURES,
-    ORACLE,
-    REFERENCE,
-    SHOWN_WEIGHT,
-    read_heap_table,
-)
+from studies.heap.table import LEARNED, MEASURES, ORACLE, REFERENCE, SHOWN_WEIGHT, read_heap_table
 from studies.style import COLOURS as RULE_COLOURS
-from studies.style import mark_reduced, styled
+from studies.style import styled
 from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
@@ -35,6 +27,7 @@ MEANINGS = {
     "is dragged": COLOURS["tried"],
 }
 OUTSIDE = FARTHEST_EDGE + 0.6  # m, how far the pictures reach
+# The outer sides of these faces point against and along a box's own axes, one after the other.
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 LIGHT = np.array([0.55, -0.45, 0.7]) / np.linalg.norm([0.55, -0.45, 0.7])
 LINES = {REFERENCE: RULE_COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
@@ -52,42 +45,35 @@ def corners(heap: Heap) -> np.ndarray:
     return heap.positions[:, None] + own @ heap.axes().transpose(0, 2, 1)
 
 
-def meanings(outcome: Outcome, box: int) -> np.ndarray:
-    """(n,) int, the number in ``MEANINGS`` of what a pick does to each box before it."""
-    numbers = np.zeros(len(outcome.unloaded), int)
-    numbers[outcome.unloaded] = 1
-    numbers[outcome.fallen] = 2
-    numbers[box] = 3
-    return numbers
+def outcome_colours(outcome: Outcome, box: int) -> np.ndarray:
+    """(n, 3) float, the colour in ``MEANINGS`` of what a pick does to each box before it."""
+    stays, comes, falls, dragged = MEANINGS.values()
+    colours = np.tile(stays, (len(outcome.unloaded), 1))
+    colours[outcome.unloaded] = comes
+    colours[outcome.fallen] = falls
+    colours[box] = dragged
+    return colours
 
 
-def colours_of(numbers: np.ndarray) -> np.ndarray:
-    """(n, 3) float, the colours of meanings that are given by their places in ``MEANINGS``."""
-    return np.array(list(MEANINGS.values()))[numbers]
-
-
-def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray, title: str = "") -> None:
+def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray | None = None, title: str = "") -> None:
     """Draw a heap as seen from outside the door, the conveyor's edge as a line on the floor.
 
     Args:
         axes: where.
         heap: the boxes.
-        colours: (n, 3) float in [0, 1], red, green and blue of each box.
+        colours: (n, 3) float in [0, 1], red, green and blue of each box; all stay if None.
         title: of the picture.
     """
     for line in _room(heap.edge()):
         axes.plot(*project(line).T, color="0.6", lw=0.8, zorder=0)
     faces = corners(heap)[:, FACES].reshape(-1, 4, 3)
-    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-    # Away from the box's own centre, whichever way round its corners are listed.
-    middle = faces.mean(axis=1)
-    outward = middle - np.repeat(heap.positions, len(FACES), axis=0)
-    normals *= np.sign((normals * outward).sum(axis=1))[:, None]
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+    middle, turns = faces.mean(axis=1), heap.axes().transpose(0, 2, 1)
+    normals = np.stack([-turns, turns], axis=2).reshape(-1, 3)  # in the order of FACES
     towards = ((EYE - middle) * normals).sum(axis=1) > 0
     order = np.argsort(-np.linalg.norm(middle - EYE, axis=1), kind="stable")
     order = order[towards[order]]
     shade = 0.72 + 0.28 * (normals[order] @ LIGHT)
+    colours = np.tile(MEANINGS["stays"], (len(heap), 1)) if colours is None else colours
     colours = np.repeat(colours, len(FACES), axis=0)[order] * shade[:, None]
     axes.add_collection(
         PolyCollection(
@@ -135,7 +121,7 @@ def episodes(played: Mapping[str, tuple[Sequence[Heap], np.ndarray, Sequence[Out
         unloaded = np.cumsum([0, *(one.unloaded.sum() for one in outcomes)])
         falls = np.cumsum([0, *(one.fallen.sum() for one in outcomes)])
         for axes, pick in zip(line, (0, len(outcomes) // 2, len(outcomes) - 1)):
-            colours = colours_of(meanings(outcomes[pick], int(boxes[pick])))
+            colours = outcome_colours(outcomes[pick], int(boxes[pick]))
             title = f"{name}, pick {pick + 1}: {unloaded[pick]} unloaded, {falls[pick]} fallen"
             draw_heap(axes, heaps[pick], colours, title)
             axes.title.set_fontsize(8)
@@ -157,14 +143,14 @@ def expected_fates(
             the share of these colours in the box's own.
         outcome: of the pick.
     """
-    stays, comes, falls, dragged = colours_of(np.arange(len(MEANINGS)))
+    stays, comes, falls, dragged = map(np.array, MEANINGS.values())
     share = chances / np.maximum(chances.sum(axis=1, keepdims=True), 1)
     colours = np.tile(stays, (len(before), 1))
     colours[visible] += share[:, :1] * (comes - stays) + share[:, 1:] * (falls - stays)
     colours[box] = dragged
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
     draw_heap(left, before, colours, "expected by the network")
-    draw_heap(right, before, colours_of(meanings(outcome, box)), "what the pick does")
+    draw_heap(right, before, outcome_colours(outcome, box), "what the pick does")
     add_legend(figure)
     return figure
 
@@ -190,7 +176,6 @@ def policies(folder: str | Path = paths.DATA) -> Figure:
             axes.plot([low, high], [place, place], color=colour, lw=2)
             axes.plot(value, place, "o", color=colour, ms=5)
         axes.set(yticks=places, yticklabels=list(rows.index), xlabel=UNITS[measure])
-    mark_reduced(figure, Path(folder) / NAME, "table")
     return figure
 
 
@@ -230,5 +215,4 @@ def throughput_falls(folder: str | Path = paths.DATA) -> Figure:
     axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"])
     axes.set_xlim(left=0)
     axes.legend(loc="lower right", fontsize=8)
-    mark_reduced(figure, Path(folder) / NAME, "table")
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 
 from studies import paths
 from studies.heap.boxes import DOOR, REAR, WIDTH, Heap, package_sizes
-from studies.heap.rake import PHYSICS, add_walls
+from studies.heap.rake import PHYSICS, add_walls, fill
 from unload import task
 from unload.load.substacks import PACKAGES
 from unload.physics.bullet import World
@@ -26,24 +26,6 @@ ROUNDS = 8  # of settling and clearing at most, after the barrier is gone
 TRIES = 20  # heaps made at most until one is accepted
 FEWEST, HIGHEST, FASTEST = 80, float(task.CONTAINER[2]), 0.1  # boxes, m, m/s: see ``settled_heap``
 SPLITS = "train", "test"
-
-# What a heap depends on besides the generator of ``settled_heap``.
-CONSTANTS = (
-    BOXES,
-    LAYER,
-    BARRIER,
-    MARGIN,
-    SPACING,
-    LAYER_TIME,
-    SETTLE,
-    PAUSE,
-    ROUNDS,
-    FEWEST,
-    HIGHEST,
-    FASTEST,
-    task.MASS,
-    *PHYSICS.values(),
-)
 
 
 def settled_heap(rng: np.random.Generator) -> Heap:
@@ -72,7 +54,7 @@ def _dropped(rng: np.random.Generator) -> Heap:
     """Boxes that have come to lie behind the barrier."""
     packages = rng.integers(len(PACKAGES), size=BOXES)
     sizes = package_sizes(packages)
-    time_step, iterations, _ = PHYSICS["coarse"]
+    time_step, iterations = PHYSICS["coarse"]
     world = World(time_step, iterations=iterations)
     add_walls(world)
     world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0)
@@ -110,13 +92,7 @@ def _length(vector: np.ndarray) -> float:
 def _settled(heap: Heap) -> tuple[Heap, float]:
     """The heap without its barrier and without what leaves the door, and its fastest box's m/s."""
     world = World()
-    add_walls(world)
-    bodies = {
-        number: world.add_box(place, size, task.MASS, turn)
-        for number, (place, size, turn) in enumerate(
-            zip(heap.positions, heap.sizes, heap.orientations)
-        )
-    }
+    bodies = fill(world, heap, task.MASS)
     for _ in range(ROUNDS):
         world.step(SETTLE)
         outside = [number for number, body in bodies.items() if world.pose(body)[0][0] > DOOR]

@@ -1,17 +1,16 @@
 """Learning from recorded picks what dragging a box does: regression."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
 from torch import nn
 
-from studies.heap.network import FateNetwork, expected_of, fate_loss
-from studies.heap.observation import COLUMN, COLUMNS, ROWS
-from studies.heap.policies import check_batch
+from studies.heap.network import FEATURES, FateNetwork, fate_loss
+from studies.heap.observation import COLUMN
+from studies.heap.policies import Episode
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks
 
@@ -29,7 +28,7 @@ class Picks:
     Attributes:
         observations: (n, 96, 13) float32, before the pick.
         actions: (n,) int64, the row that was dragged.
-        unloaded, falls: (n,) float32.
+        unloaded, falls: (n,) int64.
         fates: (n, 96) int8, what happened to the box in each row, see ``HeapEnv``.
     """
 
@@ -43,10 +42,10 @@ class Picks:
         return len(self.actions)
 
 
-def joined(picks: Sequence[Picks]) -> Picks:
-    """All picks as one."""
+def joined(parts: Sequence[Picks | Episode]) -> Picks:
+    """All picks, or those of several episodes, as one."""
     names = Picks.__dataclass_fields__
-    return Picks(*(np.concatenate([getattr(each, name) for each in picks]) for name in names))
+    return Picks(*(np.concatenate([getattr(each, name) for each in parts]) for name in names))
 
 
 def holds_box(observations: torch.Tensor) -> torch.Tensor:
@@ -80,15 +79,14 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
         raise ValueError("picks is empty; expected at least one")
     generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
     network = FateNetwork(generator=generator)
-    arrays = picks.observations, picks.actions, picks.unloaded, picks.falls, picks.fates
-    data = _Batch(*map(torch.from_numpy, arrays), torch.from_numpy(picks.falls > 0).float())
+    data = {name: torch.from_numpy(array) for name, array in vars(picks).items()}
     adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(adam, steps)
     for rows in batches(len(picks), steps, generator):
-        batch = _Batch(*(each[rows] for each in data))
+        batch = {name: each[rows] for name, each in data.items()}
         if torch.rand((), generator=generator) < 0.5:
-            batch = batch._replace(observations=mirrored(batch.observations))
-        loss = _loss(network, batch)
+            batch["observations"] = mirrored(batch["observations"])
+        loss = batch_loss(network, batch)
         adam.zero_grad()
         loss.backward()
         adam.step()
@@ -96,31 +94,19 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
     return network.eval()
 
 
-class _Batch(NamedTuple):
-    """Recorded picks as tensors."""
-
-    observations: torch.Tensor
-    actions: torch.Tensor
-    boxes: torch.Tensor
-    falls: torch.Tensor
-    fates: torch.Tensor
-    fell: torch.Tensor  # whether anything fell
-
-
-def _loss(network: FateNetwork, batch: _Batch) -> torch.Tensor:
-    """Negative log-likelihood of a batch, per pick."""
-    observations = without_empty_rows(batch.observations)
+def batch_loss(network: FateNetwork, batch: Mapping[str, torch.Tensor]) -> torch.Tensor:
+    """Negative log-likelihood per pick of a batch, which has the fields of ``Picks``."""
+    observations = without_empty_rows(batch["observations"])
     present = holds_box(observations)
-    fates = network.fates(observations, present, batch.actions)
-    expected = expected_of(fates, present)
-    found = batch.fates[:, : observations.shape[1]]
-    loss = fate_loss(fates, present, found, batch.boxes, batch.falls)
-    fell = nn.functional.binary_cross_entropy_with_logits(expected.fall_logits[:, 0], batch.fell)
-    boxes, falls = (
-        nn.functional.poisson_nll_loss(mean[:, 0], count, log_input=False)
-        for mean, count in ((expected.boxes, batch.boxes), (expected.falls, batch.falls))
-    )
-    return loss + boxes + falls + fell
+    unloaded, falls = batch["unloaded"].float(), batch["falls"].float()
+    fates = batch["fates"][:, : observations.shape[1]]
+    answers = network.fates(observations, present, batch["actions"])
+    loss = fate_loss(answers, present, fates, unloaded, falls)
+    fell = (falls > 0).float()
+    loss = loss + nn.functional.binary_cross_entropy_with_logits(answers.fall_logits[:, 0], fell)
+    for mean, count in zip(answers.sums(present), (unloaded, falls)):
+        loss = loss + nn.functional.poisson_nll_loss(mean[:, 0], count, log_input=False)
+    return loss
 
 
 def batches(count: int, steps: int, generator: torch.Generator) -> Iterator[torch.Tensor]:
@@ -158,24 +144,19 @@ class Learned:
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
-        observations, allowed = check_batch(observations, masks)
-        boxes, falls, _ = self.expected(observations)
-        return np.where(allowed, boxes - self.falls_weight * falls, -np.inf).argmax(axis=1)
+        boxes, falls = self.expected(observations)
+        return np.where(masks, boxes - self.falls_weight * falls, -np.inf).argmax(axis=1)
 
     @torch.no_grad()
-    def expected(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Expected boxes and falls and the probability of a fall, (batch, 96) float32 each.
-
-        Rows without a box mean nothing.
-        """
-        whole = np.zeros((3, *np.shape(observations)[:2]), np.float32)
+    def expected(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Expected boxes and falls, (batch, 96) float32 each; rows without a box mean nothing."""
+        whole = np.zeros((2, *np.shape(observations)[:2]), np.float32)
         for start in range(0, len(observations), AT_ONCE):
             chunk = np.asarray(observations[start : start + AT_ONCE], np.float32)
             rows = without_empty_rows(torch.from_numpy(chunk))
-            answers = [network(rows, holds_box(rows)) for network in self.networks]
-            boxes, falls, logits = (torch.stack(part) for part in zip(*answers))
-            parts = torch.stack([boxes, falls, logits.sigmoid()]).mean(dim=1)
-            whole[:, start : start + AT_ONCE, : rows.shape[1]] = parts.numpy()
+            answers = [torch.stack(network(rows, holds_box(rows))) for network in self.networks]
+            mean = torch.stack(answers).mean(dim=0).numpy()
+            whole[:, start : start + AT_ONCE, : rows.shape[1]] = mean
         return tuple(whole)
 
     @torch.no_grad()
@@ -185,13 +166,8 @@ class Learned:
         Args:
             observation: (96, 13), of one heap.
             row: of the box that is dragged.
-
-        Raises:
-            TypeError, ValueError: an argument is not as described.
         """
-        observation = checks.finite_array("observation", observation, (ROWS, len(COLUMNS)))
-        asked = torch.tensor([checks.integer("row", row, 0, ROWS - 1)])
-        rows = torch.from_numpy(observation[None].astype(np.float32))
+        rows, asked = torch.tensor(observation[None]), torch.tensor([row])
         logits = [network.fates(rows, holds_box(rows), asked).logits for network in self.networks]
         chances = torch.stack(logits).sigmoid().mean(dim=0)[0, 0]
         return (chances * holds_box(rows)[0, :, None]).numpy()
@@ -220,10 +196,15 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
 
 def _networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
     """The networks of a file."""
-    networks = []
-    for number, n_features in enumerate(settings["n_features"]):
-        network, start = FateNetwork(n_features), f"{number}."
-        own = {name: weights[name] for name in weights if name.startswith(start)}
-        network.load_state_dict({name.removeprefix(start): own[name] for name in own})
-        networks.append(network.eval())
-    return networks
+    own: list[dict] = [{} for _ in settings["n_features"]]
+    for name, weight in weights.items():
+        number, _, part = name.partition(".")
+        own[int(number)][part] = weight
+    return [network_of(each, n) for each, n in zip(own, settings["n_features"])]
+
+
+def network_of(weights: dict[str, torch.Tensor], n_features: int = FEATURES) -> FateNetwork:
+    """The network with these weights."""
+    network = FateNetwork(n_features)
+    network.load_state_dict(weights)
+    return network.eval()

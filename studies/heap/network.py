@@ -18,14 +18,6 @@ HEADS = 3
 FATES = 2  # a box may be unloaded, and may fall, or both
 
 
-class Expected(NamedTuple):
-    """What dragging each box would bring; each (batch, asked) float32."""
-
-    boxes: torch.Tensor  # unloaded, expected number
-    falls: torch.Tensor  # expected number
-    fall_logits: torch.Tensor  # of the probability that anything falls
-
-
 class Fates(NamedTuple):
     """What happens to the boxes when one is dragged; all float32.
 
@@ -39,6 +31,11 @@ class Fates(NamedTuple):
     logits: torch.Tensor
     hidden: torch.Tensor
     fall_logits: torch.Tensor
+
+    def sums(self, present: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Expected boxes and falls over the boxes that are there, (batch, asked) each."""
+        visible = (self.logits.sigmoid() * present[:, None, :, None]).sum(dim=2)
+        return (visible + self.hidden).unbind(2)
 
 
 class FateNetwork(nn.Module):
@@ -82,10 +79,7 @@ class FateNetwork(nn.Module):
                 nn.init.uniform_(weight, -bound, bound, generator=generator)
 
     def fates(
-        self,
-        observations: torch.Tensor,
-        present: torch.Tensor,
-        rows: torch.Tensor | None = None,
+        self, observations: torch.Tensor, present: torch.Tensor, rows: torch.Tensor | None = None
     ) -> Fates:
         """Fates of all boxes for each row, or for one chosen row of each observation.
 
@@ -106,13 +100,10 @@ class FateNetwork(nn.Module):
         return Fates(self.fate(pair), nn.functional.softplus(heads[..., :2]), heads[..., 2])
 
     def forward(
-        self,
-        observations: torch.Tensor,
-        present: torch.Tensor,
-        rows: torch.Tensor | None = None,
-    ) -> Expected:
-        """Sums of ``fates``, with the same arguments."""
-        return expected_of(self.fates(observations, present, rows), present)
+        self, observations: torch.Tensor, present: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Expected boxes and falls of dragging each row; arguments as in ``fates``."""
+        return self.fates(observations, present).sums(present)
 
     def _messages(
         self, asked: torch.Tensor, others: torch.Tensor, present: torch.Tensor
@@ -136,13 +127,6 @@ def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
     apart = others[:, None, :, place] - asked[:, :, None, place]
     reach = (others[:, None, :, block] + asked[:, :, None, block]) / 2
     return torch.cat([apart, apart.abs() - reach], dim=3)
-
-
-def expected_of(fates: Fates, present: torch.Tensor) -> Expected:
-    """Sums of fates over the boxes that are there."""
-    visible = (fates.logits.sigmoid() * present[:, None, :, None]).sum(dim=2)
-    boxes, falls = (visible + fates.hidden).unbind(2)
-    return Expected(boxes, falls, fates.fall_logits)
 
 
 def fate_loss(

@@ -21,26 +21,11 @@ Score = Callable[[np.ndarray], np.ndarray]  # (batch, 96, 13) → (batch, 96)
 TRIED_AGAIN = 8  # boxes, by an oracle
 
 
-def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the observations as a float64 array and the masks as bool.
-
-    Raises:
-        TypeError, ValueError: they are not as described above, or a mask allows no box.
-    """
-    observations = checks.finite_array("observations", observations, (None, None, len(COLUMNS)))
-    allowed = checks.flag_array("masks", masks, observations.shape[:2])
-    if not allowed.any(axis=1).all():
-        row = int(np.argmin(allowed.any(axis=1)))
-        raise ValueError(f"masks is all zero in row {row}; expected at least one box to pick")
-    return observations, allowed
-
-
 def best(score: Score) -> Callable:
     """The policy that picks the allowed box with the highest score, the foremost if several."""
 
     def policy(observations, masks, rng):
-        observations, allowed = check_batch(observations, masks)
-        return np.where(allowed, score(observations), -np.inf).argmax(axis=1)
+        return np.where(masks, score(np.asarray(observations, float)), -np.inf).argmax(axis=1)
 
     return policy
 
@@ -59,8 +44,7 @@ def linear(weights: Mapping[str, float]) -> Score:
 
 def random(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Any allowed box, each with the same probability."""
-    _, allowed = check_batch(observations, masks)
-    return any_allowed(allowed, checks.generator("rng", rng))
+    return any_allowed(masks, rng)
 
 
 def _nearness(observations: np.ndarray) -> np.ndarray:
@@ -133,6 +117,7 @@ class Episode:
         moved: (t,) float64, m, how far the dragged box came.
         fates: (t, 96) int8, what happened to the box in each row, see ``HeapEnv``.
         heaps: t + 1 heaps, before each pick and after the last.
+        outcomes: t, what each pick has done, box by box; None if it was of a row without a box.
     """
 
     observations: np.ndarray
@@ -143,6 +128,7 @@ class Episode:
     moved: np.ndarray
     fates: np.ndarray
     heaps: tuple[Heap, ...]
+    outcomes: tuple[Outcome | None, ...]
 
 
 _TOLD = "box", "unloaded", "falls", "moved", "fates"  # by the environment, in this order
@@ -159,33 +145,13 @@ def play(env: HeapEnv, policy: Callable, heap: Heap, seed: int) -> Episode:
     """
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
     observation, info = env.reset(options={"heap": heap})
-    picks, heaps, ended = [], [env.heap], False
+    picks, heaps, outcomes, ended = [], [env.heap], [], False
     while not ended:
         (action,) = policy(observation[None], info["action_mask"][None], rng)
         after, _, terminated, truncated, info = env.step(int(action))
         ended = terminated or truncated
         picks.append((observation, action, *(info[name] for name in _TOLD)))
         heaps.append(env.heap)
+        outcomes.append(env.outcome)
         observation = after
-    return Episode(*(np.array(column) for column in zip(*picks)), tuple(heaps))
-
-
-def outcomes(episode: Episode, rake: Rake) -> list[Outcome]:
-    """What each pick of an episode has done, box by box.
-
-    It is computed again, which gives the same to the bit, because a pick is a function of the
-    heap and the box.
-
-    Args:
-        episode: of the picks.
-        rake: with the physics of the environment that was played.
-
-    Raises:
-        ValueError: the rake's physics is another.
-    """
-    found = []
-    for heap, box, after in zip(episode.heaps, episode.boxes.tolist(), episode.heaps[1:]):
-        found.append(rake.pick(heap, box))
-        if not np.array_equal(found[-1].heap.positions, after.positions):
-            raise ValueError(f"rake has other physics than the episode's; it is {rake.physics}")
-    return found
+    return Episode(*(np.array(column) for column in zip(*picks)), tuple(heaps), tuple(outcomes))

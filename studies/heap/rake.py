@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, check_heap
+from studies.heap.boxes import DOOR, REAR, WIDTH, Heap, check_heap
 from unload import task
-from unload.physics.bullet import FRICTION, World
+from unload.physics.bullet import World
 from unload.support import checks
 
 SPEED = 1.0  # m/s, a slow conveyor's
@@ -18,35 +18,8 @@ REST = 0.5  # s: free fall from 1.2 m
 RESTS = 4  # at most, as long as boxes are unloaded or move
 STILL = 0.2  # m/s; a toppling box is faster, a creeping one slower
 FALL = 0.5  # m: a box that drops deeper may be damaged
-NEAR = 0.6  # m around the drag, within which ``near`` lets boxes move
-SUPPORT = 0.05  # m around those, within which it keeps boxes as obstacles
-# Name → time step in s, solver iterations, whether boxes far from the drag are left out. Coarse
-# takes a third of the time of whole. Near takes a seventh, but it counts fewer falls, because
-# chains of boxes end where its neighbourhood does.
-PHYSICS = {
-    "whole": (1 / 240, 50, False),
-    "coarse": (1 / 120, 20, False),
-    "near": (1 / 120, 20, True),
-}
-
-# What a pick depends on besides the heap, the box and the arguments of ``Rake``.
-CONSTANTS = (
-    SPEED,
-    FORCE,
-    REACH,
-    TIME,
-    CAME,
-    REST,
-    RESTS,
-    STILL,
-    FALL,
-    NEAR,
-    SUPPORT,
-    FARTHEST_EDGE,
-    FRICTION,
-    task.MASS,
-    *PHYSICS.values(),
-)
+# Name → time step in s, and solver iterations. Coarse takes a third of the time of whole.
+PHYSICS = {"whole": (1 / 240, 50), "coarse": (1 / 120, 20)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +28,6 @@ class Outcome:
 
     Attributes:
         heap: what is left.
-        left: (m,) int64, the numbers that its boxes had before.
         unloaded: (n,) bool, of the boxes before.
         fallen: (n,) bool, others than the dragged one that dropped by more than ``FALL``,
             whether they were unloaded or not.
@@ -64,14 +36,13 @@ class Outcome:
     """
 
     heap: Heap
-    left: np.ndarray
     unloaded: np.ndarray
     fallen: np.ndarray
     moved: float
     came: bool
 
 
-def add_walls(world: World, friction: float = FRICTION) -> None:
+def add_walls(world: World) -> None:
     """Add floor, rear wall and both side walls, each 1 m thick and reaching beyond the door."""
     middle = (REAR + DOOR) / 2
     for position, size in (
@@ -80,7 +51,24 @@ def add_walls(world: World, friction: float = FRICTION) -> None:
         ((middle, -0.5, 5), (12, 1, 10)),
         ((middle, WIDTH + 0.5, 5), (12, 1, 10)),
     ):
-        world.add_box(position, size, 0, friction=friction)
+        world.add_box(position, size, 0)
+
+
+def fill(world: World, heap: Heap, mass: float) -> dict[int, int]:
+    """Let a world hold the walls and the boxes of a heap alone; return their bodies by number.
+
+    Args:
+        world: whatever was in it is removed.
+        heap: of the boxes.
+        mass: of each box, kg; 0 makes them immovable.
+    """
+    world.clear()
+    add_walls(world)
+    boxes = zip(heap.positions, heap.sizes, heap.orientations)
+    return {
+        number: world.add_box(place, size, mass, turn)
+        for number, (place, size, turn) in enumerate(boxes)
+    }
 
 
 def drag(world: World, body: int, mass: float) -> float:
@@ -109,22 +97,6 @@ def drag(world: World, body: int, mass: float) -> float:
     return moved
 
 
-def near_boxes(heap: Heap, box: int) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes that may move when ``box`` is dragged, and their fixed neighbours, by distance.
-
-    Returns:
-        Two (n,) bool: less than ``NEAR`` from the block that the dragged box passes through,
-        and of the others those within ``SUPPORT`` of one of these.
-    """
-    half = heap.extents() / 2
-    low, high = heap.positions - half, heap.positions + half
-    reach = high[box] + (REACH, 0, 0)
-    gap = np.maximum(np.maximum(low - reach, low[box] - high), 0)
-    moving = (gap**2).sum(axis=1) < NEAR**2
-    touching = (low[:, None] < high[moving] + SUPPORT) & (high[:, None] > low[moving] - SUPPORT)
-    return moving, touching.all(axis=2).any(axis=1) & ~moving
-
-
 class Rake:
     """Picks boxes of heaps in one PyBullet client.
 
@@ -142,24 +114,18 @@ class Rake:
     bit: not on earlier picks, of which PyBullet would remember contacts.
 
     Args:
-        physics: ``"whole"``, all boxes at PyBullet's default of 240 Hz and 50 iterations of
-            the solver; ``"coarse"``, all boxes at 120 Hz and 20 iterations; ``"near"``, as
-            coarse, but only boxes near the drag can move.
-        friction: of boxes, floor and walls; Bullet multiplies the two of a contact.
+        physics: ``"whole"``, PyBullet's default of 240 Hz and 50 iterations of the solver, or
+            ``"coarse"``, 120 Hz and 20 iterations.
         mass: kg, of each box.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
 
-    def __init__(
-        self, physics: str = "whole", friction: float = FRICTION, mass: float = task.MASS
-    ) -> None:
+    def __init__(self, physics: str = "whole", mass: float = task.MASS) -> None:
         checks.one_of("physics", physics, PHYSICS)
-        self.physics = physics
-        self.friction = checks.real("friction", friction, 0, 10)
         self.mass = checks.real("mass", mass, 0.01, 1000)
-        time_step, iterations, self._near = PHYSICS[physics]
+        time_step, iterations = PHYSICS[physics]
         self._world = World(time_step, iterations=iterations)
 
     def pick(self, heap: Heap, box: int) -> Outcome:
@@ -169,18 +135,20 @@ class Rake:
             TypeError, ValueError: ``heap`` is as ``check_heap`` refuses it, or ``box`` none of
                 its boxes.
         """
-        box = self._check(heap, box)
+        check_heap("heap", heap)
+        box = checks.integer("box", box, 0, len(heap) - 1)
         world, edge = self._world, heap.edge()
-        bodies = self._build(heap, box)
+        bodies = fill(world, heap, self.mass)
         moved = drag(world, bodies[box], self.mass)
         came = moved >= CAME
         unloaded = np.zeros(len(heap), bool)
-        last = Poses(heap)
+        positions, orientations = heap.positions.copy(), heap.orientations.copy()
         for _ in range(RESTS):
             world.step(REST)
-            last.read(world, bodies)
-            gone = last.positions[:, 0] > edge
-            gone[box] |= came
+            for number, body in bodies.items():
+                positions[number], orientations[number] = world.pose(body)
+            gone = positions[:, 0] > edge
+            gone[box] |= came  # the rake holds it, wherever it lies
             gone &= ~unloaded
             speeds = [np.linalg.norm(world.velocity(body)) for body in bodies.values()]
             if not gone.any() and max(speeds, default=0) < STILL:
@@ -188,48 +156,11 @@ class Rake:
             unloaded |= gone
             for number in np.flatnonzero(gone).tolist():
                 world.remove(bodies.pop(number))
-        fallen = heap.positions[:, 2] - last.positions[:, 2] > FALL
+        fallen = heap.positions[:, 2] - positions[:, 2] > FALL
         fallen[box] = False
-        left = np.flatnonzero(~unloaded)
-        after = Heap(last.positions, last.orientations, heap.sizes, heap.packages).only(left)
-        return Outcome(after, left, unloaded, fallen, float(moved), bool(came))
-
-    def _check(self, heap: Heap, box: int) -> int:
-        """The box as an int, if both are as ``pick`` expects them."""
-        check_heap("heap", heap)
-        return checks.integer("box", box, 0, len(heap) - 1)
-
-    def _build(self, heap: Heap, box: int) -> dict[int, int]:
-        """Fill the world; return the bodies of the boxes that can move, by box number."""
-        self._world.clear()
-        add_walls(self._world, self.friction)
-        moving, fixed = np.ones(len(heap), bool), np.zeros(len(heap), bool)
-        if self._near:
-            moving, fixed = near_boxes(heap, box)
-        bodies = {}
-        for number in np.flatnonzero(moving | fixed).tolist():
-            body = self._world.add_box(
-                heap.positions[number],
-                heap.sizes[number],
-                self.mass if moving[number] else 0,
-                heap.orientations[number],
-                self.friction,
-            )
-            if moving[number]:
-                bodies[number] = body
-        return bodies
+        after = Heap(positions, orientations, heap.sizes, heap.packages).only(~unloaded)
+        return Outcome(after, unloaded, fallen, float(moved), bool(came))
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""
         self._world.close()
-
-
-class Poses:
-    """Where the boxes of a heap were last seen."""
-
-    def __init__(self, heap: Heap) -> None:
-        self.positions, self.orientations = heap.positions.copy(), heap.orientations.copy()
-
-    def read(self, world: World, bodies: dict[int, int]) -> None:
-        for number, body in bodies.items():
-            self.positions[number], self.orientations[number] = world.pose(body)

@@ -4,169 +4,115 @@ Picks are recorded in two rounds: the first explores around random linear rules,
 around the networks that were learned from the first.
 """
 
-import json
 from collections.abc import Callable, Sequence
 from functools import partial
-from hashlib import blake2b
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
 
 from studies import paths
-from studies.heap import generate, observation, rake
 from studies.heap.boxes import Heap, package_sizes
 from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from studies.heap.generate import BOXES, settled_heap, write_heaps
-from studies.heap.learning import STEPS, Learned, Picks, fit, joined, load_networks, save_networks
-from studies.heap.policies import Episode, best, linear, play, random
-from studies.provenance import joined as joined_records
-from studies.provenance import write_provenance
-from studies.results import COMMAND, keep_all
-from unload.support import files
+from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
+from studies.heap.network import FateNetwork
+from studies.heap.policies import best, linear, play, random
+from studies.results import COMMAND, Result, digest, keep_all, packed, publish, unpacked
+from unload.agent.identity import identity
 
 NAME = "heap"
+HEAPS = {"train": 70, "test": 30}
 SEEDS = {"train": 3000, "test": 4000}  # of the heaps; of recorded picks, the first with more
 PHYSICS = "coarse"  # of recorded picks
-ROUNDS = 2
+ROUNDS, PICKS = 2, 50_000  # recorded in all rounds
+NETWORKS = 5
 WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, the price of a fall
 EXPLORED = "z", "behind", "extent_y", "clear_above"  # columns that a random rule weighs
-# What an episode depends on besides heap, policy and the arguments of the environment.
-CONSTANTS = *rake.CONSTANTS, *observation.CONSTANTS
-
-
-class Size(NamedTuple):
-    """How large the experiment is."""
-
-    train: int = 70  # heaps
-    test: int = 30
-    picks: int = 50_000  # to record, in both rounds
-    networks: int = 5
-    steps: int = STEPS  # of each network's training
-    first_rule_heaps: int = 4  # training heaps that all rules play
-    rule_heaps: int = 20  # training heaps that the best of them play
-
-
-FULL = Size()
 
 
 def make_heaps(
-    size: Size = FULL,
-    folder: str | Path = paths.DATA / NAME,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = 1,
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> None:
-    """Make the heaps of both splits; write ``heaps.npz`` and its provenance.
+    """Make the heaps of both splits; write ``heap/heaps.npz`` and its provenance.
 
     Heap i of a split is the same however many there are.
     """
-    counts = {"train": size.train, "test": size.test}
-    names = [(split, number) for split, count in counts.items() for number in range(count)]
-    jobs = [heap_job(SEEDS[split], number) for split, number in names]
+    code = identity(_new_heap)
+    names = [(split, number) for split, count in HEAPS.items() for number in range(count)]
+    jobs = []
+    for split, number in names:
+        question = {"heap": [SEEDS[split], number], "code": code}
+        jobs.append((question, partial(_new_heap, SEEDS[split], number)))
     answers = keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs)
-    heaps: dict[str, list[Heap]] = {split: [] for split in counts}
+    heaps: dict[str, list[Heap]] = {split: [] for split in HEAPS}
     for (split, _), answer in zip(names, answers):
-        positions, orientations, packages = map(np.array, answer.value.values())
-        heaps[split].append(Heap(positions, orientations, package_sizes(packages), packages))
-    write_heaps(Path(folder) / "heaps.npz", heaps)
-    settings = {"heaps": counts, "seeds": SEEDS, "boxes dropped": BOXES}
-    record = joined_records(answer.record for answer in answers)
-    write_provenance(folder, "heaps", f"{COMMAND} {NAME}", settings, size != FULL, record)
+        arrays = unpacked(answer.value)
+        heaps[split].append(Heap(**arrays, sizes=package_sizes(arrays["packages"])))
+    write_heaps(Path(folder) / NAME / "heaps.npz", heaps)
+    settings = {"heaps": HEAPS, "seeds": SEEDS, "boxes dropped": BOXES}
+    publish(Path(folder) / NAME, "heaps", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
-def heap_job(seed: int, number: int) -> tuple[dict, Callable]:
-    """The question of a new heap and what makes it, see ``keep_all``."""
-    question = {"heap": [seed, number], "constants": generate.CONSTANTS}
-    return question, partial(_heap_lists, seed, number)
-
-
-def _heap_lists(seed: int, number: int) -> dict[str, list]:
-    """A new heap as lists that can be kept: ``positions``, ``orientations`` and ``packages``."""
+def _new_heap(seed: int, number: int) -> str:
+    """A new heap: ``positions``, ``orientations`` and ``packages``, see ``packed``."""
     heap = settled_heap(np.random.default_rng([seed, number]))
-    names = "positions", "orientations", "packages"
-    return {name: getattr(heap, name).tolist() for name in names}
+    return packed({name: getattr(heap, name) for name in ("positions", "orientations", "packages")})
 
 
 def make_networks(
-    size: Size = FULL,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = 1,
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> None:
     """Record and learn in both rounds; write ``heap/networks.safetensors`` and its provenance."""
-    place = Path(runs_dir) / NAME
-    episodes = -(-size.picks // ROUNDS // MAX_PICKS)
-    recorded: list[Path] = []
-    learned: list[Path] = []
-    records = []
+    place, episodes = Path(runs_dir) / NAME, -(-PICKS // ROUNDS // MAX_PICKS)
+    heaps = stored_heaps("train")
+    recorded: list[str] = []
+    learned: list[str] = []
+    answers: list[Result] = []
     for round_number in range(ROUNDS):
+        question = {"round": round_number, "explorers": digest(learned), "code": identity(_record)}
+        jobs = []
+        for number in range(episodes):
+            one = question | {"number": number, "heap": heaps[number % len(heaps)].digest()}
+            explorer = learned[number % len(learned)] if learned else None
+            jobs.append((one, partial(_record, round_number, number, explorer)))
+        found = keep_all(place / "picks", jobs, n_jobs)
+        answers += found
+        recorded += [answer.value for answer in found]
+        question = {"picks": digest(recorded), "steps": STEPS, "code": identity(_learn)}
         jobs = [
-            episode_job(place / "picks", round_number, number, learned)
-            for number in range(episodes)
+            (question | {"seed": seed}, partial(_learn, recorded, seed)) for seed in range(NETWORKS)
         ]
-        answers = keep_all(place / "picks", jobs, n_jobs)
-        recorded += [place / "picks" / answer.value for answer in answers]
-        records += [answer.record for answer in answers]
-        jobs = [
-            network_job(place / "networks", recorded, seed, size.steps)
-            for seed in range(size.networks)
-        ]
-        answers = keep_all(place / "networks", jobs, n_jobs)
-        learned = [place / "networks" / answer.value for answer in answers]
-        records += [answer.record for answer in answers]
-    networks = [network for path in learned for network in load_networks(path)]
-    save_networks(networks, Path(folder) / NAME / "networks.safetensors")
+        found = keep_all(place / "networks", jobs, n_jobs)
+        answers += found
+        learned = [answer.value for answer in found]
+    save_networks(list(map(_network, learned)), Path(folder) / NAME / "networks.safetensors")
     settings = {
-        "picks": size.picks, "physics": PHYSICS, "rounds": ROUNDS, "networks": size.networks,
-        "steps": size.steps,
+        "picks": PICKS, "physics": PHYSICS, "rounds": ROUNDS, "networks": NETWORKS, "steps": STEPS,
     }  # fmt: skip
-    command, record = f"{COMMAND} {NAME}", joined_records(records)
-    write_provenance(Path(folder) / NAME, "networks", command, settings, size != FULL, record)
+    publish(Path(folder) / NAME, "networks", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
-def episode_job(
-    folder: Path, round_number: int, number: int, explorers: Sequence[Path]
-) -> tuple[dict, Callable]:
-    """The question of a recorded episode and what plays it, see ``keep_all``.
+def _record(round_number: int, number: int, explorer: str | None) -> str:
+    """The picks of one exploring episode, see ``packed``.
 
     Args:
-        folder: of the file of its picks, whose name is the answer.
         round_number: of the recording.
         number: of the episode; it chooses the training heap.
-        explorers: networks around which it explores, none in the first round.
+        explorer: the network around which it explores, none in the first round.
     """
-    heaps = stored_heaps("train")
-    question = {
-        "round": round_number,
-        "number": number,
-        "heap": heaps[number % len(heaps)].digest(),
-        "explorers": [path.name for path in explorers],  # which say all that they depend on
-        "seed": SEEDS["train"],
-        "physics": PHYSICS,
-        "picks": MAX_PICKS,
-        "constants": CONSTANTS,
-    }
-    path = _path(folder, question, "npz")
-    return question, partial(_record, path, round_number, number, explorers)
-
-
-def _record(path: Path, round_number: int, number: int, explorers: Sequence[Path]) -> str:
-    """Play one exploring episode and write its picks."""
     torch.set_num_threads(1)
     rng = np.random.default_rng([SEEDS["train"], round_number, number])
     favourite = None
-    if explorers:
-        weight = float(rng.choice(WEIGHTS))
-        favourite = Learned(load_networks(explorers[number % len(explorers)]), weight)
+    if explorer is not None:
+        favourite = Learned([_network(explorer)], float(rng.choice(WEIGHTS)))
     env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
     try:
-        heap = env.heaps[number % len(env.heaps)]
-        episode = play(env, exploring(rng, favourite), heap, int(rng.integers(2**32)))
+        policy, heap = exploring(rng, favourite), env.heaps[number % len(env.heaps)]
+        episode = play(env, policy, heap, int(rng.integers(2**32)))
     finally:
         env.close()
-    files.write_arrays(path, vars(picks_of(episode)))
-    return path.name
+    return packed(vars(joined([episode])))
 
 
 def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Callable:
@@ -187,41 +133,13 @@ def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Ca
     return policy
 
 
-def picks_of(episode: Episode) -> Picks:
-    """The picks of an episode, as ``fit`` needs them."""
-    return Picks(
-        episode.observations,
-        episode.actions,
-        episode.unloaded.astype(np.float32),
-        episode.falls.astype(np.float32),
-        episode.fates,
-    )
-
-
-def network_job(
-    folder: Path, recorded: Sequence[Path], seed: int, steps: int
-) -> tuple[dict, Callable]:
-    """The question of a network and what learns it, see ``keep_all``.
-
-    Args:
-        folder: of the file of its weights, whose name is the answer.
-        recorded: files of the picks that it learns from.
-        seed, steps: see ``fit``.
-    """
-    question = {"picks": [path.name for path in recorded], "seed": seed, "steps": steps}
-    path = _path(folder, question, "safetensors")
-    return question, partial(_learn, path, recorded, seed, steps)
-
-
-def _learn(path: Path, recorded: Sequence[Path], seed: int, steps: int) -> str:
-    """Learn one network and write its weights."""
+def _learn(recorded: Sequence[str], seed: int) -> str:
+    """The weights of one network that has learned from recorded picks, see ``packed``."""
     torch.set_num_threads(1)
-    picks = joined([Picks(**files.read_arrays(each)) for each in recorded])
-    save_networks([fit(picks, seed, steps)], path)
-    return path.name
+    network = fit(joined([Picks(**unpacked(each)) for each in recorded]), seed, STEPS)
+    return packed({name: weight.numpy() for name, weight in network.state_dict().items()})
 
 
-def _path(folder: Path, question: dict, suffix: str) -> Path:
-    """A file that is named by a digest of all that is in it."""
-    text = json.dumps(question, sort_keys=True).encode()
-    return folder / f"{blake2b(text, digest_size=8).hexdigest()}.{suffix}"
+def _network(weights: str) -> FateNetwork:
+    """The network of ``_learn``."""
+    return network_of({name: torch.from_numpy(each) for name, each in unpacked(weights).items()})

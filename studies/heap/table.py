@@ -8,11 +8,10 @@ the whole physics takes 0.55 s of CPU, and the whole experiment about a day.
 """
 
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import partial
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -22,18 +21,11 @@ from scipy import stats
 from studies import paths
 from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from studies.heap.learning import Learned, load_networks
-from studies.heap.policies import RULES, TRIED_AGAIN, Oracle, best, linear, play
-from studies.heap.recording import (
-    CONSTANTS,
-    FULL,
-    NAME,
-    WEIGHTS,
-    Size,
-    make_heaps,
-    make_networks,
-)
+from studies.heap.policies import RULES, Oracle, best, linear, play
+from studies.heap.recording import HEAPS, NAME, WEIGHTS, make_heaps, make_networks
 from studies.results import COMMAND, Result, keep_all, publish, read_table
 from studies.statistics import LEVEL, RESAMPLES
+from unload.agent.identity import identity
 from unload.support import checks, files
 
 # A box near the front takes many along if others lie before it and on it; how much each of these
@@ -44,21 +36,15 @@ FAMILY_COLUMNS = {
     "clear_in_front": (-1.0, -0.5, 0.0),
     "clear_above": (-0.5, 0.0, 0.5),
 }
+FIRST_HEAPS, RULE_HEAPS = 4, 20  # training heaps that all rules play, and the best of them
 KEPT = 10  # rules for each price of a fall that play more heaps
-RULE_PHYSICS = "coarse"  # the rules are many; "near" would favour those that make boxes fall
+TEST_HEAPS = HEAPS["test"]  # all unseen ones
+RULE_PHYSICS = "coarse"  # the rules are many
 PHYSICS = "whole"  # that judges
 SHOWN_WEIGHT = 1.0  # λ at which all policies play; at the others, only those that depend on it
 REFERENCE, LEARNED, ORACLE = "best rule", "learned", "oracle"
 MEASURES = "boxes", "falls", "net"
 ENDS = "", "_low", "_high"  # of a mean and its interval
-COLUMNS = [
-    "falls_weight", "policy", "heaps",
-    *(
-        name + end
-        for name in (*MEASURES, "boxes_ratio", "net_ratio", *(f"{name}_more" for name in MEASURES))
-        for end in ENDS
-    ),
-]  # fmt: skip
 
 
 def family() -> dict[str, dict[str, float]]:
@@ -85,43 +71,51 @@ def candidates() -> dict[str, Callable]:
 
 
 def choose_rules(
-    size: Size = FULL,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = 1,
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> pd.DataFrame:
     """Let the rules play training heaps, and the best of them more; write ``heap/rules.csv``.
 
     Returns:
         One row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and ``falls`` a pick.
     """
-    first = _played(candidates(), size.first_rule_heaps, runs_dir, n_jobs)
-    frame = _means(first)
+    first = {name: ({"rule": name}, FIRST_HEAPS) for name in candidates()}
+    answers = _played(first, "train", RULE_PHYSICS, runs_dir, n_jobs)
+    frame = _means(answers)
     chosen = {rule: None for weight in WEIGHTS for rule in _ranked(frame, weight)[:KEPT]}
-    answers = first | _played(chosen, size.rule_heaps, runs_dir, n_jobs)
+    more = {name: ({"rule": name}, RULE_HEAPS) for name in chosen}
+    answers |= _played(more, "train", RULE_PHYSICS, runs_dir, n_jobs)
     rules = _means(answers)
     settings = {
-        "heaps": [size.first_rule_heaps, size.rule_heaps], "split": "train",
-        "physics": RULE_PHYSICS, "picks": MAX_PICKS,
+        "heaps": [FIRST_HEAPS, RULE_HEAPS], "split": "train", "physics": RULE_PHYSICS,
+        "picks": MAX_PICKS,
     }  # fmt: skip
     results = [answer for of in answers.values() for answer in of]
-    command, tables = f"{COMMAND} {NAME}", {"rules": rules}
-    publish(Path(folder) / NAME, "rules", tables, command, settings, results, reduced=size != FULL)
+    publish(Path(folder) / NAME, "rules", {"rules": rules}, f"{COMMAND} {NAME}", settings, results)
     return rules
 
 
 def _played(
-    names: Iterable[str], heaps: int, runs_dir: str | Path, n_jobs: int
-) -> dict[str, list[Result]]:
-    """The episodes of rules on the first training heaps, by rule."""
-    names = list(names)
-    jobs = [
-        episode_job({"rule": name}, "train", number, RULE_PHYSICS)
-        for name in names
-        for number in range(heaps)
-    ]
-    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs)
-    return {name: answers[place * heaps : (place + 1) * heaps] for place, name in enumerate(names)}
+    players: Mapping[Hashable, tuple[dict, int]],
+    split: str,
+    physics: str,
+    runs_dir: str | Path,
+    n_jobs: int,
+) -> dict[Hashable, list[Result]]:
+    """The episodes of players, see ``_play``, each on the first heaps of a split, by their names.
+
+    Networks are known by what is in their file, wherever it is.
+    """
+    code, jobs = identity(_play), []
+    for player, heaps in players.values():
+        known = player | {
+            name: files.digest(path) for name, path in player.items() if name == "networks"
+        }
+        for number, heap in enumerate(stored_heaps(split)[:heaps]):
+            question = {"player": known, "heap": heap.digest(), "number": number, "code": code}
+            question |= {"physics": physics, "picks": MAX_PICKS}
+            jobs.append((question, partial(_play, player, split, number, physics)))
+    answers = iter(keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs))
+    return {name: list(islice(answers, heaps)) for name, (_, heaps) in players.items()}
 
 
 def _means(answers: dict[str, list[Result]]) -> pd.DataFrame:
@@ -145,8 +139,8 @@ def best_rule(rules: pd.DataFrame, falls_weight: float) -> str:
     return _ranked(rules[rules["heaps"] == rules["heaps"].max()], falls_weight)[0]
 
 
-def episode_job(player: dict, split: str, number: int, physics: str) -> tuple[dict, Callable]:
-    """The question of one episode and what plays it, see ``keep_all``.
+def _play(player: dict, split: str, number: int, physics: str) -> dict[str, float]:
+    """Boxes and falls a pick of one episode.
 
     Args:
         player: ``{"rule": name}``, ``{"networks": path, "falls_weight": λ}`` or
@@ -155,21 +149,6 @@ def episode_job(player: dict, split: str, number: int, physics: str) -> tuple[di
         number: of the heap.
         physics: see ``Rake``.
     """
-    question = {
-        "player": dict(player),
-        "heap": stored_heaps(split)[number].digest(),
-        "number": number,
-        "physics": physics,
-        "constants": [*CONSTANTS, TRIED_AGAIN],
-        "picks": MAX_PICKS,
-    }
-    if "networks" in player:  # named by what is in them, wherever they are
-        question["player"]["networks"] = files.digest(player["networks"])
-    return question, partial(_play, player, split, number, physics)
-
-
-def _play(player: dict, split: str, number: int, physics: str) -> dict[str, float]:
-    """Boxes and falls a pick of one episode."""
     torch.set_num_threads(1)
     env = HeapEnv(split, physics=physics, max_picks=MAX_PICKS)
     if "rule" in player:
@@ -187,16 +166,8 @@ def _play(player: dict, split: str, number: int, physics: str) -> dict[str, floa
     return {"boxes": float(episode.unloaded.mean()), "falls": float(episode.falls.mean())}
 
 
-class Cell(NamedTuple):
-    """A policy at a price of a fall."""
-
-    falls_weight: float
-    policy: str
-    player: dict  # see ``episode_job``
-
-
-def plan(rules: pd.DataFrame, networks: str | Path) -> list[Cell]:
-    """What plays: all policies at λ = 1, and at the other λ those that depend on it.
+def plan(rules: pd.DataFrame, networks: str | Path) -> dict[tuple[float, str], dict]:
+    """What plays, see ``_play``, by λ and policy: those that depend on λ at each, others at λ = 1.
 
     The oracle takes 4 minutes of CPU a heap, and therefore plays at λ = 1 only.
 
@@ -204,19 +175,15 @@ def plan(rules: pd.DataFrame, networks: str | Path) -> list[Cell]:
         rules: of which the best one at each λ plays, see ``choose_rules``.
         networks: file of those that the learned policy averages.
     """
-    cells = [Cell(SHOWN_WEIGHT, name, {"rule": name}) for name in RULES]
+    players = {(SHOWN_WEIGHT, name): {"rule": name} for name in RULES}
     for weight in WEIGHTS:
-        cells.append(Cell(weight, REFERENCE, {"rule": best_rule(rules, weight)}))
-        player = {"networks": str(networks), "falls_weight": weight}
-        cells.append(Cell(weight, LEARNED, player))
-    return [*cells, Cell(SHOWN_WEIGHT, ORACLE, {"oracle": SHOWN_WEIGHT})]
+        players[weight, REFERENCE] = {"rule": best_rule(rules, weight)}
+        players[weight, LEARNED] = {"networks": str(networks), "falls_weight": weight}
+    return players | {(SHOWN_WEIGHT, ORACLE): {"oracle": SHOWN_WEIGHT}}
 
 
 def compare(
-    size: Size = FULL,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = 1,
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> pd.DataFrame:
     """Let all policies play the unseen heaps; write ``heap/{episodes,table}.csv``.
 
@@ -228,22 +195,22 @@ def compare(
     """
     place, command = Path(folder) / NAME, f"{COMMAND} {NAME}"
     rules = read_table(place / "rules.csv", command, ["rule", "heaps", "boxes", "falls"])
-    cells = plan(rules, place / "networks.safetensors")
-    places = [(cell, number) for cell in cells for number in range(size.test)]
-    jobs = [episode_job(cell.player, "test", number, PHYSICS) for cell, number in places]
-    answers = keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs)
+    planned = plan(rules, place / "networks.safetensors")
+    players = {cell: (player, TEST_HEAPS) for cell, player in planned.items()}
+    played = _played(players, "test", PHYSICS, runs_dir, n_jobs)
     episodes = pd.DataFrame(
-        {"falls_weight": cell.falls_weight, "policy": cell.policy, "heap": number} | answer.value
-        for (cell, number), answer in zip(places, answers)
+        {"falls_weight": weight, "policy": policy, "heap": number} | answer.value
+        for (weight, policy), of in played.items()
+        for number, answer in enumerate(of)
     )
     episodes["net"] = episodes["boxes"] - episodes["falls_weight"] * episodes["falls"]
     table = compared(episodes)
     settings = {
-        "heaps": size.test, "physics": PHYSICS, "picks": MAX_PICKS,
+        "heaps": TEST_HEAPS, "physics": PHYSICS, "picks": MAX_PICKS,
         "best rules": {str(weight): best_rule(rules, weight) for weight in WEIGHTS},
     }  # fmt: skip
-    tables = {"episodes": episodes, "table": table}
-    publish(place, "table", tables, command, settings, answers, reduced=size != FULL)
+    results = [answer for of in played.values() for answer in of]
+    publish(place, "table", {"episodes": episodes, "table": table}, command, settings, results)
     return table
 
 
@@ -266,27 +233,22 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
         reference = of[REFERENCE]
         for name, each in of.items():
             row = {"falls_weight": weight, "policy": name, "heaps": len(each)}
-            for measure in MEASURES:
-                row |= _ends(measure, *mean_interval(each[measure]))
-                more = each[measure] - reference[measure]
-                row |= _ends(f"{measure}_more", *mean_interval(more))
+            intervals = {measure: mean_interval(each[measure]) for measure in MEASURES}
             for measure in ("boxes", "net"):
                 ratio = ratio_interval(each[measure], reference[measure])
-                row |= _ends(f"{measure}_ratio", *ratio)
+                intervals[f"{measure}_ratio"] = ratio
+            for measure in MEASURES:
+                more = each[measure] - reference[measure]
+                intervals[f"{measure}_more"] = mean_interval(more)
+            for measure, ends in intervals.items():
+                row |= {f"{measure}{end}": value for end, value in zip(ENDS, ends)}
             rows.append(row)
-    return pd.DataFrame(rows)[COLUMNS]
-
-
-def _ends(name: str, value: float, low: float, high: float) -> dict[str, float]:
-    return {name: value, f"{name}_low": low, f"{name}_high": high}
+    return pd.DataFrame(rows)
 
 
 def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
     """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
-    values = checks.finite_array("values", values, (None,))
-    if np.ptp(values) < 1e-12:
-        return (float(values.mean()),) * 3
-    return float(values.mean()), *_bca((values,), np.mean)
+    return ratio_interval(values, np.ones(len(values)))
 
 
 def ratio_interval(
@@ -295,7 +257,8 @@ def ratio_interval(
     """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
 
     NaN where the reference's mean is not > 0 in every resample, because such a ratio means
-    nothing. If all pairs have the same ratio, the interval has no width.
+    nothing. If all pairs have the same ratio, the interval has no width. Of fewer than two pairs,
+    it is NaN.
     """
     values = checks.finite_array("values", values, (None,))
     reference = checks.finite_array("reference", reference, values.shape)
@@ -305,24 +268,17 @@ def ratio_interval(
     ratio = float(values.mean() / reference.mean())
     if np.abs(values - ratio * reference).max() < 1e-12:
         return ratio, ratio, ratio
-    return ratio, *_bca((values, reference), _ratio)
+    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
+        warnings.simplefilter("ignore")
+        low, high = stats.bootstrap(
+            (values, reference), _ratio, n_resamples=RESAMPLES, paired=True, method="BCa",
+            confidence_level=LEVEL, vectorized=True, axis=-1, rng=np.random.default_rng(0),
+        ).confidence_interval  # fmt: skip
+    return ratio, float(low), float(high)
 
 
 def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
     return values.mean(axis=axis) / reference.mean(axis=axis)
-
-
-def _bca(samples: tuple[np.ndarray, ...], statistic: Callable) -> tuple[float, float]:
-    """BCa interval of a statistic of one sample, or of pairs; NaN of fewer than two values."""
-    if len(samples[0]) < 2:
-        return np.nan, np.nan
-    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
-        warnings.simplefilter("ignore")
-        interval = stats.bootstrap(
-            samples, statistic, n_resamples=RESAMPLES, paired=True, confidence_level=LEVEL,
-            method="BCa", vectorized=True, axis=-1, rng=np.random.default_rng(0),
-        ).confidence_interval  # fmt: skip
-    return float(interval.low), float(interval.high)
 
 
 def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
@@ -331,34 +287,12 @@ def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
     Raises:
         FileNotFoundError: it is missing; the message names the command.
     """
-    return read_table(Path(folder) / NAME / "table.csv", f"{COMMAND} {NAME}", COLUMNS)
-
-
-def by_price(table: pd.DataFrame) -> pd.DataFrame:
-    """The learned policy beside the best rule at each λ, as text, with 95 % intervals.
-
-    Args:
-        table: see ``compared``.
-
-    Returns:
-        One row per λ: boxes and falls a pick of both, and of boxes - λ falls the ratio and the
-        difference.
-    """
-    by = table.set_index(["policy", "falls_weight"])
-    rows = {}
-    for weight in WEIGHTS:
-        row = {}
-        for name in (REFERENCE, LEARNED):
-            for measure in ("boxes", "falls"):
-                row[f"{measure}, {name}"] = f"{by.loc[(name, weight), measure]:.2f}"
-        for title, measure in (("ratio", "net_ratio"), ("difference", "net_more")):
-            value, low, high = (by.loc[(LEARNED, weight), f"{measure}{e}"] for e in ENDS)
-            row[title] = f"{value:.2f} ({low:.2f} to {high:.2f})"
-        rows[f"λ = {weight:g}"] = row
-    return pd.DataFrame(rows).T
+    columns = [f"{measure}{end}" for measure in MEASURES for end in ENDS]
+    path, command = Path(folder) / NAME / "table.csv", f"{COMMAND} {NAME}"
+    return read_table(path, command, ["falls_weight", "policy", *columns])
 
 
 def heap_data(n_jobs: int) -> None:
-    """Make all data of heaps: the heaps that the package needs, and what ``data/heap`` holds."""
+    """Make all data of heaps, which is what ``data/heap`` holds."""
     for step in (make_heaps, make_networks, choose_rules, compare):
         step(n_jobs=n_jobs)

@@ -1,7 +1,5 @@
 """What an agent sees, under sliders for exploration, noise and ties, as a Jupyter widget."""
 
-from typing import NamedTuple
-
 import ipywidgets as widgets
 import numpy as np
 
@@ -22,21 +20,9 @@ RANK_COLOURS = np.array([(0.99, 0.91, 0.40), (0.20, 0.65, 0.52), (0.25, 0.05, 0.
 DRAWS = 50  # of the noise, for the share of greedy picks that succeed
 
 
-class Sight(NamedTuple):
-    """What an agent sees of k items, and what it would pick.
-
-    Attributes:
-        ranks: (k, 3) float64, of each item along x, y and z, from 0 to k - 1.
-        greedy: the row of the item with the highest value.
-        chance: probability that the next pick succeeds, exploration included.
-    """
-
-    ranks: np.ndarray
-    greedy: int
-    chance: float
-
-
-def look(seen: np.ndarray, liftable: np.ndarray, agent: Greedy, epsilon: float, ties: str) -> Sight:
+def look(
+    seen: np.ndarray, liftable: np.ndarray, agent: Greedy, epsilon: float, ties: str
+) -> tuple[np.ndarray, int, float]:
     """Let an agent look at the visible items.
 
     Args:
@@ -45,6 +31,10 @@ def look(seen: np.ndarray, liftable: np.ndarray, agent: Greedy, epsilon: float, 
         agent: the policy; ``ties`` stands in for its own.
         epsilon: probability of a random pick.
         ties: see ``unload.equalize``.
+
+    Returns:
+        (k, 3) float64, the rank of each item along x, y and z, from 0 to k - 1; the row of the
+        item with the highest value; and the probability that the next pick succeeds.
     """
     seen = scaled(seen)
     equalized = equalize(seen, ties)
@@ -53,7 +43,7 @@ def look(seen: np.ndarray, liftable: np.ndarray, agent: Greedy, epsilon: float, 
     greedy = int(greedy_actions(agent.network, features[None], everything)[0])
     chance = (1 - epsilon) * liftable[greedy] + epsilon * liftable.mean()
     ranks = (equalized.astype(np.float64) + 1) / 2 * (len(seen) - 1)
-    return Sight(np.rint(2 * ranks) / 2, greedy, float(chance))  # means of ranks are halves
+    return np.rint(2 * ranks) / 2, greedy, float(chance)  # means of ranks are halves
 
 
 class AgentView(widgets.VBox):
@@ -103,7 +93,7 @@ class AgentView(widgets.VBox):
         for control in sum(self._controls, ()):
             control.observe(lambda _: self._show(), "value")
 
-    def _look(self, draw: int) -> Sight:
+    def _look(self, draw: int) -> tuple[np.ndarray, int, float]:
         """What the agent sees with one draw of the noise; draw 0 is the environment's."""
         visible = self._moment.visible
         if draw == 0:
@@ -120,8 +110,9 @@ class AgentView(widgets.VBox):
         )
 
     def _show(self) -> None:
-        visible, sight = self._moment.visible, self._look(self.draw.value)
-        ranks = sight.ranks[:, HEIGHT]
+        visible = self._moment.visible
+        all_ranks, greedy, chance = self._look(self.draw.value)
+        ranks = all_ranks[:, HEIGHT]
         levels = np.minimum((ranks * LEVELS / len(ranks)).astype(int), LEVELS - 1)
         numbers = np.where(self._moment.present, LEVELS, ABSENT)
         numbers[visible] = levels
@@ -130,21 +121,21 @@ class AgentView(widgets.VBox):
             f"rank {low} to {high - 1} in height": _colour(level / (LEVELS - 1))
             for level, (low, high) in enumerate(zip(edges, edges[1:]))
         } | {"unseen": COLOURS["unseen"]}
-        item = visible[sight.greedy]
+        item = visible[greedy]
         self.canvas.show(numbers, palette, {"picked if greedy": [item]})
-        others = np.mean([self._look(draw).chance for draw in range(DRAWS)])
+        others = np.mean([self._look(draw)[2] for draw in range(DRAWS)])
         can = "can" if item in self._liftable else "cannot"
         self.message.value = (
             f"The {len(visible)} visible items have <b>{len(np.unique(ranks))}</b> different ranks "
             f"in height. The greedy choice is item <b>{item}</b> of rank "
-            f"{ranks[sight.greedy]:.1f}, which <b>{can}</b> be lifted.<br>With this ε, the next "
-            f"pick succeeds with probability <b>{sight.chance:.2f}</b>; on average over {DRAWS} "
+            f"{ranks[greedy]:.1f}, which <b>{can}</b> be lifted.<br>With this ε, the next "
+            f"pick succeeds with probability <b>{chance:.2f}</b>; on average over {DRAWS} "
             f"draws of the noise, with {others:.2f}."
         )
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
         """The widget, and what is shown of it where no kernel runs."""
-        picked = self._moment.visible[[self._look(0).greedy]]
+        picked = self._moment.visible[[self._look(0)[1]]]
         groups = {
             "visible": self._moment.visible,
             "liftable": self._liftable,

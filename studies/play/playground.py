@@ -1,6 +1,8 @@
 """A container to unload by hand, and to watch rules and agents unload, as a Jupyter widget."""
 
 import html
+import logging
+from logging.handlers import BufferingHandler
 
 import ipywidgets as widgets
 import numpy as np
@@ -47,14 +49,21 @@ class Playground(widgets.VBox):
         checks.one_of("player", player, (YOU, *PLAYERS))
         picks = checks.integer("picks", picks, 1, 10_000)
         load = stack_load(np.random.default_rng(seed))
-        self.you = Episode(load, seed)
-        self.runs = {name: Run(name, load, seed, mask) for name in PLAYERS}
-        self._warm_up()
+        heard = BufferingHandler(100)  # in a notebook, what is logged would stand above the widget
+        logging.getLogger("unload").addHandler(heard)
+        try:
+            self.you = Episode(load, seed)
+            self.runs = {name: Run(name, load, seed, mask) for name in PLAYERS}
+            self._warm_up()
+        finally:
+            logging.getLogger("unload").removeHandler(heard)
         self.canvas = Canvas(load)
         self.canvas.on_msg(self._clicked)
         self._make_controls(player, mask, picks)
         super().__init__([self._bar, widgets.HBox([self._left, self._right])])
         self._choose_player()
+        if heard.buffer:
+            self._tell(". ".join(record.getMessage() for record in heard.buffer))
 
     def _warm_up(self) -> None:
         """Do once what a click does, because compiled code is loaded the first time."""
@@ -130,10 +139,17 @@ class Playground(widgets.VBox):
             self._show()
 
     def _change_mask(self) -> None:
-        """Go on from the pick that is shown, with the mask or without it."""
+        """Go on from the pick that is shown, with the mask or without it.
+
+        With the mask from the first deadlocked pick, if that was before: it forbids this one.
+        """
         run = self._run
         if run and run.mask != self.mask.value:
-            run.back_to(run.play_to(self.slider.value))
+            start = run.play_to(self.slider.value)
+            if self.mask.value:
+                deadlocked = (pick.deadlocked for pick in run.picks[:start])
+                start = next((number for number, stuck in enumerate(deadlocked) if stuck), start)
+            run.back_to(start)
             run.mask = self.mask.value
         self._show()
 

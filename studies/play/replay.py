@@ -11,10 +11,11 @@ from unload.load.view import View, layout, mesh, view
 
 STOPS = 24  # of the slider, at most
 EARLY, LATE = np.array((0.00, 0.30, 0.25)), np.array((0.70, 0.93, 0.85))  # what is unloaded
+HEIGHT = 520  # pixels
 PAUSE = 250  # ms between two stops while it plays
 
 
-def replay(episode: Episode, height: int = 520) -> View:
+def replay(episode: Episode) -> View:
     """Show an episode's picks at up to 24 stops.
 
     The earlier an item is unloaded, the darker it is. Where plotly is not drawn, there is a
@@ -22,7 +23,6 @@ def replay(episode: Episode, height: int = 520) -> View:
 
     Args:
         episode: holds the load and the picks.
-        height: of the figure in pixels.
     """
     load, picks = episode.load, episode.picks
     stops = np.unique(np.linspace(0, len(picks), STOPS + 1).round().astype(int)).tolist()
@@ -51,8 +51,8 @@ def replay(episode: Episode, height: int = 520) -> View:
         for now, stop in enumerate(stops)
     ]
     middle = episode.moment(stops[len(stops) // 2])
-    still = view(load, middle.present, middle.groups(), height)
-    figure = View(traces, layout(height), frames, picture=still.picture)
+    still = view(load, middle.present, middle.groups(), HEIGHT)
+    figure = View(traces, layout(HEIGHT), frames, picture=still.picture)
     labels = {str(stop): f"{stop} picks, {episode.unloaded(stop)} unloaded" for stop in stops}
     figure.update_layout(_controls(labels))
     return figure
@@ -64,21 +64,18 @@ def _controls(labels: Mapping[str, str]) -> dict:
     Args:
         labels: name of each frame → what the slider says there.
     """
-    at_once, slowly = (
-        {
+
+    def animate(label: str, frames: list | None, pause: int) -> dict:
+        timing = {
             "mode": "immediate",
             "fromcurrent": True,
             "frame": {"duration": pause, "redraw": True},
             "transition": {"duration": 0},
         }
-        for pause in (0, PAUSE)
-    )
-
-    def animate(label: str, frames: list | None, timing: dict) -> dict:
         return {"label": label, "method": "animate", "args": [frames, timing]}
 
     slider = {
-        "steps": [animate(label, [name], at_once) for name, label in labels.items()],
+        "steps": [animate(label, [name], 0) for name, label in labels.items()],
         "x": 0.12,
         "len": 0.86,
         "y": 0.02,
@@ -94,7 +91,7 @@ def _controls(labels: Mapping[str, str]) -> dict:
         "xanchor": "left",
         "y": 0.04,
         "yanchor": "bottom",
-        "buttons": [animate("▶", None, slowly), animate("❚❚", [None], at_once)],
+        "buttons": [animate("▶", None, PAUSE), animate("❚❚", [None], 0)],
     }
     return {"sliders": [slider], "updatemenus": [buttons]}
 

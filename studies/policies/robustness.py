@@ -19,6 +19,7 @@ from studies import paths
 from studies.policies.comparison import LEARNED, SIMPLE, digests, find_policy
 from studies.results import COMMAND, keep_all, publish
 from unload.agent.evaluation import Policy, success_rate
+from unload.agent.identity import identity
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.substacks import FRONT_WALLS, front_walls, stack_load
@@ -46,13 +47,14 @@ def robustness_data(
         runs_dir: where finished episodes are kept.
         n_jobs: processes, as in joblib.
     """
-    weights = digests()
+    weights, code = digests(), identity(play)
     seeds = np.random.SeedSequence(SEED).generate_state(EPISODES).tolist()
     containers, jobs = [], []
     for (name, after_pick), (episode, seed) in product(PLAYED, enumerate(seeds)):
         containers.append({"policy": name, "after_pick": after_pick, "episode": episode})
         size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS}
         question = containers[-1] | size | {"weights": weights.get(name), "settings": SETTINGS}
+        question |= {"code": code}
         jobs.append((question, partial(play, find_policy(name), after_pick, seed, PICKS)))
     answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
     rows = [one | answer.value for one, answer in zip(containers, answers)]

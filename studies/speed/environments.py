@@ -17,14 +17,13 @@ from unload.physics.table import TablePhysics
 CONTAINER = "unload/Container-v0"
 
 
-def lift_rates(load: unload.Load, full: int = 2, others: int = 100, rounds: int = 2) -> dict:
+def lift_rates(load: unload.Load, full: int = 2, others: int = 100) -> dict[str, float]:
     """Lifts per second in a full container, all known to the table.
 
     Args:
         load: the container's.
         full: lifts of one round of ``FullPhysics``, which needs seconds for each.
         others: lifts of one round of the others.
-        rounds: see ``best_times``.
 
     Returns:
         By physics.
@@ -35,8 +34,7 @@ def lift_rates(load: unload.Load, full: int = 2, others: int = 100, rounds: int 
     for physics in answering.values():
         physics.reset(load)
     times = best_times(
-        {name: _lifts(physics, items[: counts[name]]) for name, physics in answering.items()},
-        rounds,
+        {name: _lifts(physics, items[: counts[name]]) for name, physics in answering.items()}
     )
     for physics in answering.values():
         physics.close()
@@ -51,9 +49,7 @@ def _lifts(physics: Physics, items: list[int]) -> Callable[[], None]:
     return lift_all
 
 
-def pick_rates(
-    num_envs: int = task.NUM_ENVS, picks: int = 500, rounds: int = 3
-) -> dict[str, float]:
+def pick_rates(num_envs: int = task.NUM_ENVS, picks: int = 500) -> dict[str, float]:
     """Random picks per second of one container, and of many in a loop and in arrays.
 
     The same episodes are played in each round, all but for their last pick, so that each
@@ -62,7 +58,6 @@ def pick_rates(
     Args:
         num_envs: how many containers the last three have.
         picks: of an episode.
-        rounds: see ``best_times``.
 
     Returns:
         By environment.
@@ -86,7 +81,7 @@ def pick_rates(
         f"{num_envs} in arrays, equalized": arrays(True),
     }
     counts = {name: (picks - 1) * getattr(env, "num_envs", 1) for name, env in envs.items()}
-    times = best_times({name: _episode(env, picks) for name, env in envs.items()}, rounds)
+    times = best_times({name: _episode(env, picks) for name, env in envs.items()})
     for env in envs.values():
         env.close()
     return {name: counts[name] / seconds for name, seconds in times.items()}

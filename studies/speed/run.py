@@ -1,13 +1,11 @@
 """How fast the parts are: measured, printed and kept in data/benchmarks.
 
-    python -m studies.speed.run            all, in about five minutes
-    python -m studies.speed.run --quick    at reduced size, within a minute; nothing is kept
+    python -m studies.speed.run            in about five minutes
 
 Absolute times depend on the machine and on what else it does; the ratios, each to the
 first row of its kind and all of one run, say more. All is on one thread unless said.
 """
 
-import argparse
 import sys
 from datetime import date
 from functools import partial
@@ -27,30 +25,23 @@ from studies.speed.updates import update_times
 COMMAND = "python -m studies.speed.run"
 
 
-def speeds(quick: bool = False) -> pd.DataFrame:
+def speeds() -> pd.DataFrame:
     """The speeds of all parts.
-
-    Args:
-        quick: measure less, to see that all works.
 
     Returns:
         One row per way of doing a thing: ``what``, ``how``, ``value``, ``unit``, and
         ``ratio``, how many times as fast as the first way.
     """
-    load = unload.stack_load(np.random.default_rng(0), *([1] if quick else []))
-    batch_size = 128 if quick else 2048
-    update = f"update, b = {batch_size}, n = 64"
-    few = {"ours": 6400, "memory": 3200, "plain": 128, "before": 2304, "theirs": 64}
-    parts = (  # what, unit, how it is measured, and what changes at reduced size
-        ("lifts", "lifts/s", partial(lift_rates, load), {"full": 1, "others": 5, "rounds": 1}),
-        ("random picks", "picks/s", pick_rates, {"num_envs": 2, "picks": 20, "rounds": 1}),
-        (update, "ms", partial(update_times, batch_size), {"rounds": 1}),
-        ("training", "picks/s", training_rates, few),
+    parts = (
+        ("lifts", "lifts/s", partial(lift_rates, unload.stack_load(np.random.default_rng(0)))),
+        ("random picks", "picks/s", pick_rates),
+        ("update, b = 2048, n = 64", "ms", update_times),
+        ("training", "picks/s", training_rates),
     )
     rows = []
-    for what, unit, measure, small in parts:
+    for what, unit, measure in parts:
         print(f"measuring: {what} …", file=sys.stderr, flush=True)
-        values = measure(**(small if quick else {}))
+        values = measure()
         first = next(iter(values.values()))
         for how, value in values.items():
             ratio = first / value if unit == "ms" else value / first
@@ -65,16 +56,9 @@ def show(table: pd.DataFrame) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--quick", action="store_true", help="measure less and keep nothing")
-    options = parser.parse_args()
     torch.set_num_threads(1)
-    result = measured(partial(speeds, options.quick))
+    result = measured(speeds)
     show(result.value)
-    if options.quick:
-        return
     settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
     publish(FOLDER, "benchmarks", {"speeds": result.value}, COMMAND, settings, [result])
 

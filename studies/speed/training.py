@@ -7,22 +7,38 @@ from unittest import mock
 import numpy as np
 import stable_baselines3
 import torch
-from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 
 import unload
-from studies.speed.stable_baselines import PEQPolicy
 from unload.env.sb3 import ContainerVecEnv
 from unload.fast import fused
 
+# Picks that count, of ours with the fused update, of ours with plain PyTorch's, and of theirs.
+FUSED, PLAIN, THEIRS = 256_000, 3_200, 960
+THREADS = {1: "1 thread", 2: "2 threads"}
 
-def training_rates(
-    ours: int = 256_000,
-    memory: int = unload.TrainConfig().replay_size,
-    plain: int = 3_200,
-    before: int = 3_200,
-    theirs: int = 960,
-) -> dict[str, float]:
-    """Picks per second in the paper's configuration, from end to end.
+
+class PEQValues(QNetwork):
+    """``PEQNetwork`` where Stable-Baselines3 expects a network; n is ``net_arch[0]``."""
+
+    def __init__(self, *args, **kwargs) -> None:
+        super().__init__(*args, **kwargs)
+        self.q_net = unload.PEQNetwork(self.net_arch[0])
+
+    def forward(self, obs):
+        return self.q_net(obs)
+
+
+class PEQPolicy(DQNPolicy):
+    """Stable-Baselines3's DQN policy with the paper's network; ``net_arch=[n]``."""
+
+    def make_q_net(self) -> PEQValues:
+        arguments = self._update_features_extractor(self.net_args, features_extractor=None)
+        return PEQValues(**arguments).to(self.device)
+
+
+def training_rates() -> dict[str, float]:
+    """Picks per second in the paper's configuration, from end to end, by who trains and how.
 
     Both train the same network on the same 64 containers, with one update per 64 picks on
     a batch of 2048, as soon as there are 2048 picks to learn from; the picks before that
@@ -30,26 +46,15 @@ def training_rates(
     either: what the system takes to hand out the memory is nothing beside the paper's 20
     million picks. Exploration falls over the picks made here as it does in the paper. Ours is
     the median over episodes, theirs over steps: what else runs on the machine stalls a few.
-
-    Args:
-        ours: picks that count of our training with the fused update.
-        memory: picks made before them.
-        plain: picks that count with plain PyTorch's update.
-        before: picks made before those.
-        theirs: of Stable-Baselines3's DQN.
-
-    Returns:
-        By who trains and how.
     """
     rates = {}
-    for threads in (1, 2):
-        name = f"{threads} thread{'s' * (threads > 1)}"
-        rates[f"Stable-Baselines3, {name}"] = _their_rate(theirs, threads)
+    for threads, name in THREADS.items():
+        rates[f"Stable-Baselines3, {name}"] = _their_rate(THEIRS, threads)
     with mock.patch.object(fused, "applies", return_value=False):
-        rates["here, PyTorch's update, 1 thread"] = _our_rate(plain, 1, before)
-    for threads in (1, 2):
-        name = f"{threads} thread{'s' * (threads > 1)}"
-        rates[f"here, fused update, {name}"] = _our_rate(ours, threads, memory)
+        rates["here, PyTorch's update, 1 thread"] = _our_rate(PLAIN, 1, before=PLAIN)
+    memory = unload.TrainConfig().replay_size
+    for threads, name in THREADS.items():
+        rates[f"here, fused update, {name}"] = _our_rate(FUSED, threads, before=memory)
     torch.set_num_threads(1)
     return rates
 
@@ -64,18 +69,6 @@ def _our_rate(picks: int, threads: int, before: int) -> float:
     episode = min(config.max_picks // config.log_interval, len(times) - 1)  # points of the curve
     seconds = np.median(times[episode:] - times[:-episode])
     return episode * config.log_interval * config.num_envs / float(seconds)
-
-
-class _Clock(BaseCallback):
-    """Notes the time of each step."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.times: list[float] = []
-
-    def _on_step(self) -> bool:
-        self.times.append(time.perf_counter())
-        return True
 
 
 def _their_rate(picks: int, threads: int) -> float:
@@ -100,9 +93,9 @@ def _their_rate(picks: int, threads: int) -> float:
         device="cpu",
         seed=config.seed,
     )
-    clock = _Clock()
+    times: list[float] = []
     warm = config.batch_size + 2 * config.num_envs  # two updates do not count
-    model.learn(warm + picks, clock)
+    model.learn(warm + picks, lambda *_: times.append(time.perf_counter()) is None)
     envs.close()
-    steps = np.diff(clock.times)[-(picks // config.num_envs) :]
+    steps = np.diff(times)[-(picks // config.num_envs) :]
     return config.num_envs / float(np.median(steps))

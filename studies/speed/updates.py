@@ -12,13 +12,12 @@ from unload import task
 from unload.agent import learner
 
 
-def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) -> dict[str, float]:
+def update_times(batch_size: int = 2048, n_features: int = 64) -> dict[str, float]:
     """Time of one ``DQN.update``: gradients of a batch, and a step of Adam.
 
     Args:
         batch_size: b.
         n_features: n.
-        rounds: see ``best_times``.
 
     Returns:
         ms, by how it is done.
@@ -47,8 +46,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64, rounds: int = 5) 
             f"PyTorch, chunks of {learner.ROWS_PER_PASS}": update(False, 1),
             "fused": update(True, 1),
             "fused, 2 threads": update(True, 2),
-        },
-        rounds,
+        }
     )
     torch.set_num_threads(1)
     return {name: seconds * 1e3 for name, seconds in times.items()}

@@ -117,12 +117,12 @@ def test_a_step_without_a_success_stores_the_step_before():
     added = []
     run.replay.add = lambda **picks: added.append(picks)
     changes.successes_only(run, start=0)
-    won = {"rewards": np.array([1.0, -1.0]), "actions": np.array([4, 5])}
-    lost = {"rewards": np.array([-1.0, -1.0]), "actions": np.array([6, 7])}
+    won = {"rewards": np.array([1.0, -1.0, 1.0]), "actions": np.array([4, 5, 8])}
+    lost = {"rewards": np.full(3, -1.0), "actions": np.array([6, 7, 9])}
     run.replay.add(**won)
     run.replay.add(**lost)
     run.rollout.close()
-    assert [list(picks["actions"]) for picks in added] == [[4, 4], [4, 4]]
+    assert [list(picks["actions"]) for picks in added] == [[4, 8, 4], [4, 8, 4]]
 
 
 def test_a_teacher_chooses_by_height_and_its_preference():

@@ -66,6 +66,26 @@ def test_unknown_arguments_are_refused(called, arguments, capsys):
     assert "error: " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["training", "--picks", "0"], "picks is 0; expected an integer >= 1"),
+        (["training", "--picks", "1000"], "picks is 1000; expected a multiple of num_envs=64"),
+        (["seamless", "--picks", "128"], "picks is 128; expected at least 2112"),
+        (["paper", "--jobs", "0"], "--jobs is 0; expected a number of processes"),
+        (["laboratory", "--seeds", "0"], "--seeds is 0; expected an integer >= 1"),
+    ],
+)
+def test_numbers_that_nothing_can_run_with_are_refused_in_one_line(
+    called, arguments, message, capsys
+):
+    with pytest.raises(SystemExit):
+        called(*arguments)
+    assert (
+        capsys.readouterr().err.splitlines()[-1].startswith(f"python -m studies: error: {message}")
+    )
+
+
 def test_help_names_every_part(called, capsys):
     with pytest.raises(SystemExit):
         called("--help")

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from studies import paths
-from unload.support import provenance
+from studies import paths, provenance
 
 
 def test_written_and_read(tmp_path):
@@ -56,7 +55,7 @@ def commit(folder: Path) -> str:
 
 def revision_of_copy(folder: Path) -> str:
     """What the package's copy in ``folder`` gives as its revision."""
-    script = "from unload.support import provenance; print(provenance.revision())"
+    script = "from studies import provenance; print(provenance.revision())"
     return subprocess.check_output(
         [sys.executable, "-c", script], cwd=folder, text=True, env=OUTSIDE
     ).strip()
@@ -64,14 +63,15 @@ def revision_of_copy(folder: Path) -> str:
 
 @pytest.fixture
 def copy(tmp_path) -> Path:
-    """A folder with the part of the package that finds the revision, and no repository."""
-    package = tmp_path / "copy" / "unload"
-    shutil.copytree(
-        paths.ROOT / "unload" / "support", package / "support",
-        ignore=shutil.ignore_patterns("__pycache__"),
-    )  # fmt: skip
-    (package / "__init__.py").touch()
-    return package.parent
+    """A folder with the parts of the project that find the revision, and no repository."""
+    folder = tmp_path / "copy"
+    for part in ("unload/support", "studies"):
+        shutil.copytree(
+            paths.ROOT / part, folder / part,
+            ignore=lambda place, names: [name for name in names if not name.endswith(".py")],
+        )  # fmt: skip
+    (folder / "unload" / "__init__.py").touch()
+    return folder
 
 
 def test_the_projects_own_commit_is_its_revision(copy):
@@ -80,8 +80,10 @@ def test_the_projects_own_commit_is_its_revision(copy):
     (copy / "README.md").write_text("not part of the package")
     (copy / ".gitignore").write_text("__pycache__\n")
     assert revision_of_copy(copy) == own
-    (copy / "unload" / "task.py").touch()
-    assert revision_of_copy(copy) == f"{own}+"
+    for changed in ("unload/task.py", "studies/more.py"):
+        (copy / changed).touch()
+        assert revision_of_copy(copy) == f"{own}+"
+        (copy / changed).unlink()
 
 
 def test_an_enclosing_repositorys_commit_is_not_the_revision(copy):

@@ -7,13 +7,7 @@ import pandas as pd
 import pytest
 
 from studies.provenance import read_provenance, revision
-from studies.results import (
-    keep_all,
-    kept,
-    measured,
-    publish,
-    read_table,
-)
+from studies.results import keep_all, kept, measured, publish, read_table
 
 
 @pytest.fixture

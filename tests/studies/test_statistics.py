@@ -25,6 +25,12 @@ def course(msr, loss) -> pd.DataFrame:
     return pd.DataFrame({"picks": picks, "success_rate": msr, "loss": loss})
 
 
+def test_a_window_ends_with_its_last_pick():
+    run = pd.DataFrame({"picks": [1, 500_000, 500_001, 1_000_000, 1_000_001]})
+    run = run.assign(success_rate=[0.0, 1.0, 0.2, 0.4, 0.9], loss=1.0)
+    assert statistics.windows(run)["success_rate"].tolist() == pytest.approx([0.5, 0.3, 0.9])
+
+
 def test_the_end_is_the_last_tenth():
     run = curve([0.3, 0.3])
     run.loc[run["picks"] > 18_000_000, "success_rate"] = 0.7

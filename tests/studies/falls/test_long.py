@@ -42,6 +42,11 @@ def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
     monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
     long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
     judged = long.read_published(tmp_path)
+    kept = set((tmp_path / "runs/published").iterdir())
+    policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
+    long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
+    again = set((tmp_path / "runs/published").iterdir())
+    assert kept < again and len(again) == len(kept) + 1
     assert list(judged["cell"]) == ["paper_mask", "untrained"]
     policy, network = judged.itertuples()
     assert policy.judged_place == 1 > policy.judged_as_is

@@ -8,6 +8,7 @@ from studies.falls import measures
 from studies.falls.laboratory import CONFIG
 from unload import policies
 from unload.network.peq import PEQNetwork
+from unload.network.variants import NETWORKS
 
 
 @pytest.fixture
@@ -29,6 +30,27 @@ def observations():
 
 def test_slopes_are_those_of_the_score(network, observations):
     assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
+
+
+@pytest.mark.parametrize("name", ["two_layer", "stack", "attention"])
+def test_slopes_of_other_networks_are_those_of_their_values(name, observations):
+    """Their first weights are no slopes, and not all of them have an extractor."""
+    seen, step = observations[:2, :7].astype(float), 1e-5
+    network = NETWORKS[name](8, torch.Generator().manual_seed(0)).double()
+
+    def value(change, row, item):
+        with torch.no_grad():
+            return network(torch.from_numpy(seen + change))[row, item].item()
+
+    found = []
+    for row, item in np.argwhere(seen[..., 2] > np.median(seen[..., 2])):
+        moves = np.zeros((3, *seen.shape))
+        moves[range(3), row, item, range(3)] = step
+        ends = [[value(sign * move, row, item) for sign in (1, -1)] for move in moves]
+        found.append([(after - before) / (2 * step) for after, before in ends])
+    expected = np.mean(found, axis=0)
+    assert measures.slopes(network, seen) == pytest.approx(expected, abs=1e-7)
+    assert np.abs(expected).max() > 1e-3
 
 
 def test_tilt_is_the_effect_of_place_at_equal_height(observations):

@@ -1,4 +1,4 @@
-"""Small heaps that are made at once: towers of upright cubes, and a real one."""
+"""Small heaps that are made at once: towers of upright cubes, and a real one; and an outcome."""
 
 from collections.abc import Callable, Iterator
 
@@ -8,7 +8,8 @@ import pytest
 from studies.heap.boxes import Heap
 from studies.heap.env import HeapEnv
 from studies.heap.generate import settled_heap
-from studies.heap.rake import Rake
+from studies.heap.rake import Outcome, Rake
+from unload.physics.bullet import World
 
 EDGE = 0.4  # m
 
@@ -58,14 +59,45 @@ def make_rake() -> Iterator[Callable[..., Rake]]:
 
 
 @pytest.fixture
-def make_heap_env(pile) -> Iterator[Callable[..., HeapEnv]]:
-    """``make_heap_env(...)``: an environment of the small pile, closed after the test."""
+def set_friction(monkeypatch) -> Callable[[float], None]:
+    """``set_friction(value)``: of boxes, floor and walls, 0.5 if it is not called."""
+
+    def change(value: float) -> None:
+        add_box = World.add_box
+        monkeypatch.setattr(World, "add_box", lambda *given: add_box(*given, friction=value))
+
+    return change
+
+
+@pytest.fixture
+def make_heap_env(pile, monkeypatch) -> Iterator[Callable[..., HeapEnv]]:
+    """``make_heap_env(*heaps, ...)``: an environment of the small pile or others, then closed."""
     made = []
 
-    def make(**kwargs) -> HeapEnv:
-        made.append(HeapEnv(**({"heaps": [pile], "physics": "coarse"} | kwargs)))
+    def make(*heaps: Heap, **settings) -> HeapEnv:
+        monkeypatch.setattr("studies.heap.env.stored_heaps", lambda split: heaps or (pile,))
+        made.append(HeapEnv(**({"physics": "coarse"} | settings)))
         return made[-1]
 
     yield make
     for env in made:
         env.close()
+
+
+@pytest.fixture
+def heap(cubes) -> Heap:
+    """Three upright cubes of 0.4 m, and one that is turned by 45° about the vertical."""
+    upright = cubes((5, 1, 0), (5, 1, 1), (6, 2, 0), (6, 1, 0))
+    turns = upright.orientations.copy()
+    turns[3] = (0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8))
+    return Heap(upright.positions, turns, upright.sizes, upright.packages)
+
+
+@pytest.fixture
+def outcome(heap) -> Outcome:
+    """Box 0 was dragged and box 2 came with it; box 1 fell."""
+    after = heap.only(np.array([1, 3]))
+    places = after.positions - [[0, 0, 0.4], [0, 0, 0]]
+    after = Heap(places, after.orientations, after.sizes, after.packages)
+    unloaded, fallen = np.array([1, 0, 1, 0], bool), np.array([0, 1, 0, 0], bool)
+    return Outcome(after, unloaded, fallen, 0.7, True)

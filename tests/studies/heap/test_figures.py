@@ -57,7 +57,7 @@ def test_an_expected_fate_is_the_share_of_its_colour(heap, outcome):
     def tint(colour):
         return tuple(np.round(colour / colour.max(), 2))
 
-    stays, comes, falls, dragged = figures.colours_of(np.arange(4))
+    stays, comes, falls, dragged = map(np.array, figures.MEANINGS.values())
     assert left == {tint(c) for c in (dragged, falls, (stays + comes) / 2, stays)}
     assert right == {tint(c) for c in (dragged, falls, comes, stays)}
     names = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -73,7 +73,8 @@ def test_episodes_are_drawn_before_their_first_middle_and_last_pick(heap, outcom
 def test_nearer_boxes_are_painted_later(heap):
     """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
     axes = plt.figure().add_subplot()
-    figures.draw_heap(axes, heap.only(np.array([2, 0])), figures.colours_of(np.array([1, 3])))
+    colours = np.array([figures.MEANINGS[name] for name in ("comes along", "is dragged")])
+    figures.draw_heap(axes, heap.only(np.array([2, 0])), colours)
     painted = axes.collections[0].get_facecolors()[:, :3]
     assert len(painted) == 6, "three faces of a box are turned to the eye"
     dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 import torch
 
+from studies.heap import learning
 from studies.heap.learning import (
     Learned,
     Picks,
+    batch_loss,
     batches,
     fit,
     holds_box,
@@ -52,16 +54,14 @@ def learned() -> tuple[FateNetwork, Picks]:
 
 
 def answers(network: FateNetwork, picks: Picks) -> tuple[np.ndarray, ...]:
-    boxes, falls, probability = Learned([network]).expected(picks.observations)
     rows = np.arange(len(picks)), picks.actions
-    return boxes[rows], falls[rows], probability[rows]
+    return tuple(each[rows] for each in Learned([network]).expected(picks.observations))
 
 
 def test_it_learns_what_neighbours_do(learned):
     network, unseen = learned
-    boxes, falls, probability = answers(network, unseen)
+    boxes, falls = answers(network, unseen)
     assert np.corrcoef(boxes, unseen.unloaded)[0, 1] > 0.8
-    assert ((probability > 0.5) == (unseen.falls > 0)).mean() > 0.9
     assert np.corrcoef(falls, unseen.falls)[0, 1] > 0.8
     assert boxes.mean() == pytest.approx(unseen.unloaded.mean(), rel=0.1)
 
@@ -77,6 +77,32 @@ def test_each_pick_is_learned_from_equally_often_until_the_steps_are_done():
     rows = [each.tolist() for each in batches(300, 4, torch.Generator().manual_seed(0))]
     assert [len(each) for each in rows] == [128, 128, 44, 128]
     assert sorted(sum(rows[:3], [])) == list(range(300))
+
+
+def test_half_of_the_batches_are_mirrored(monkeypatch):
+    seen = []
+    monkeypatch.setattr(learning, "mirrored", lambda each: seen.append(each) or mirrored(each))
+    fit(made_up_picks(np.random.default_rng(1), 128), 0, steps=40)
+    assert 10 < len(seen) < 30
+
+
+def test_what_is_learned_of_a_fall_is_its_likelihood(learned):
+    """A fall changes that of their number, of the hidden ones among them, and of having any."""
+    network, picks = learned
+    batch = {name: torch.from_numpy(each[:1]) for name, each in vars(picks).items()}
+    with torch.no_grad():
+        some, one_more, none = (
+            batch_loss(network, batch | {"falls": torch.tensor([count])})
+            for count in (3.0, 4.0, 0.0)
+        )
+        seen = batch["observations"]
+        answer = network.fates(seen, holds_box(seen), batch["actions"])
+        counts = answer.sums(holds_box(seen))[1][0, 0], answer.hidden[0, 0, 1]
+    each = -sum(np.log(count.item() + 1e-8) for count in counts)  # as PyTorch keeps 0 out
+    assert (one_more - some).item() == pytest.approx(each, rel=1e-5)
+    any_fall = -answer.fall_logits[0, 0].item()
+    assert (some - none).item() == pytest.approx(3 * each + any_fall, rel=1e-5)
+    assert abs(any_fall) > 0.1
 
 
 def test_mirrored_changes_the_side_only():

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from studies.heap.learning import holds_box
-from studies.heap.network import FateNetwork, expected_of, fate_loss, pair_columns
+from studies.heap.network import FateNetwork, fate_loss, pair_columns
 from studies.heap.observation import COLUMN, COLUMNS
 
 
@@ -27,10 +27,10 @@ def network(generator) -> FateNetwork:
 def test_what_is_expected_is_the_sum_of_fates(network, observations):
     present = holds_box(observations)
     fates = network.fates(observations, present)
-    boxes, falls, logits = network(observations, present)
+    boxes, falls = network(observations, present)
     chance = fates.logits.sigmoid()
     assert fates.logits.shape == (2, 5, 5, 2)
-    assert boxes.shape == falls.shape == logits.shape == (2, 5)
+    assert boxes.shape == falls.shape == fates.fall_logits.shape == (2, 5)
     torch.testing.assert_close(boxes[1], chance[1, :, :3, 0].sum(1) + fates.hidden[1, :, 0])
     torch.testing.assert_close(falls[0], chance[0, :, :, 1].sum(1) + fates.hidden[0, :, 1])
 
@@ -53,7 +53,7 @@ def test_boxes_in_another_order_have_the_same_fates(network, observations):
 def test_empty_rows_change_nothing(network, observations):
     more = torch.cat([observations, torch.zeros(2, 4, len(COLUMNS))], dim=1)
     few, many = (network(each, holds_box(each)) for each in (observations, more))
-    torch.testing.assert_close(many.boxes[:, :5], few.boxes)
+    torch.testing.assert_close(many[0][:, :5], few[0])
 
 
 def test_the_loss_is_least_for_what_has_happened(network, observations):
@@ -68,9 +68,9 @@ def test_the_loss_is_least_for_what_has_happened(network, observations):
     boxes, falls = torch.ones(2), torch.full((2,), 2.0)
     losses = [fate_loss(each, present, found, boxes, falls) for each in (right, fates)]
     assert losses[0] < losses[1]
-    counts = expected_of(right, present)
-    assert counts.boxes.numpy() == pytest.approx(1, abs=0.01)
-    assert counts.falls.numpy() == pytest.approx(2, abs=0.01)
+    counts = right.sums(present)
+    assert counts[0].numpy() == pytest.approx(1, abs=0.01)
+    assert counts[1].numpy() == pytest.approx(2, abs=0.01)
     empty = fates.logits.clone()
     empty[1, :, 3:] += 5
     same = fate_loss(fates._replace(logits=empty), present, found, boxes, falls)

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from studies.heap.boxes import Heap
 from studies.heap.observation import (
     COLUMN,
     COLUMNS,
@@ -9,11 +10,7 @@ from studies.heap.observation import (
     ROWS,
     SEEN,
     Camera,
-    Scan,
-    SeenBoxes,
-    camera_boxes,
     features,
-    true_boxes,
     visible_boxes,
 )
 
@@ -25,95 +22,79 @@ def camera():
     made.close()
 
 
+@pytest.fixture
+def observed(camera):
+    """``observed(heap)``: numbers of the visible boxes, and the rows that hold one."""
+
+    def observe(heap: Heap) -> tuple[np.ndarray, np.ndarray]:
+        pixels = camera.pixels(heap)
+        visible = visible_boxes(heap, pixels)
+        rows = features(heap.only(visible), pixels[visible])
+        assert rows.shape == (ROWS, len(COLUMNS)) and rows.dtype == np.float32
+        assert not rows[len(visible) :].any()
+        return visible, rows[: len(visible)]
+
+    return observe
+
+
 def column(rows: np.ndarray, name: str) -> np.ndarray:
-    return rows[rows.any(axis=1), COLUMN[name]]
-
-
-def test_points_lie_on_the_faces_of_their_boxes(camera, pile):
-    """Within the 3 cm that a pixel is wide on a slanted face."""
-    scan = camera.scan(pile)
-    axes = pile.axes()[scan.owners]
-    local = np.einsum("nji,nj->ni", axes, scan.points - pile.positions[scan.owners])
-    outside = (np.abs(local) - pile.sizes[scan.owners] / 2).max(axis=1)
-    assert np.abs(outside).max() < 0.03 and np.abs(np.median(outside)) < 0.01
+    return rows[:, COLUMN[name]]
 
 
 def test_pixels_are_counted_by_box(camera, pile):
-    scan = camera.scan(pile)
-    assert scan.pixels.tolist() == np.bincount(scan.owners, minlength=len(pile)).tolist()
-    assert len(scan.points) == scan.pixels.sum() < PIXELS_WIDE * PIXELS_HIGH
+    pixels = camera.pixels(pile)
+    assert len(pixels) == len(pile) and 0 < pixels.sum() < PIXELS_WIDE * PIXELS_HIGH
+    alone = camera.pixels(pile.only(np.array([3])))
+    assert alone[0] >= pixels[3], "others hide it"
 
 
 def test_a_box_behind_another_is_not_visible(camera, cubes):
     heap = cubes((6.5, 1.25, 0), (6.5, 1.25, 1), (6.5, 1.25, 2), (6.5, 1.25, 3), (4.5, 1.25, 0))
-    assert visible_boxes(camera.scan(heap)).tolist() == [0, 1, 2, 3]
-    assert camera.scan(heap.only(np.array([4]))).pixels[0] > 50
+    assert visible_boxes(heap, camera.pixels(heap)).tolist() == [0, 1, 2, 3]
+    assert camera.pixels(heap.only(np.array([4])))[0] > 50
 
 
-def test_boxes_with_few_pixels_are_not_visible_unless_there_are_no_others(camera, pile):
-    scan = camera.scan(pile)
-    few = type(scan)(np.array([SEEN, SEEN - 1, 0]), scan.points, scan.owners)
-    none = type(scan)(np.array([SEEN - 1, 0, 0]), scan.points, scan.owners)
-    assert visible_boxes(few).tolist() == [0]
-    assert visible_boxes(none).tolist() == [0, 1, 2]
+def test_boxes_with_few_pixels_are_not_visible_unless_there_are_no_others(cubes):
+    heap = cubes((5, 1, 0), (6, 1, 0), (4.5, 1, 0))
+    assert visible_boxes(heap, np.array([SEEN, SEEN - 1, 0])).tolist() == [0]
+    assert visible_boxes(heap, np.array([SEEN - 1, 0, 0])).tolist() == [1, 0, 2]
 
 
-def test_features_of_upright_cubes(camera, cubes):
-    heap = cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (6.0, 2.0, 0))
-    seen = true_boxes(heap, camera.scan(heap))
-    assert sorted(seen.numbers.tolist()) == [0, 1, 2] and seen.numbers[0] == 2
-    rows = features(seen)
-    assert rows.shape == (ROWS, len(COLUMNS)) and rows.dtype == np.float32
-    order = np.argsort(seen.numbers)
-    assert column(rows, "behind")[order] == pytest.approx([1.2, 1.2, 0.2])
-    assert column(rows, "y")[order] == pytest.approx([-0.25, -0.25, 0.75])
-    assert column(rows, "z")[order] == pytest.approx([0.2, 0.6, 0.2])
+def test_features_of_upright_cubes(observed, cubes):
+    numbers, rows = observed(cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (6.0, 2.0, 0)))
+    assert numbers.tolist() == [2, 0, 1]
+    assert column(rows, "behind") == pytest.approx([0.2, 1.2, 1.2])
+    assert column(rows, "y") == pytest.approx([0.75, -0.25, -0.25])
+    assert column(rows, "z") == pytest.approx([0.2, 0.2, 0.6])
     for name in ("extent_x", "extent_y", "extent_z", "longest", "middle", "shortest"):
         assert column(rows, name) == pytest.approx([0.4, 0.4, 0.4])
     assert column(rows, "tilt") == pytest.approx([0, 0, 0], abs=1e-6)
-    assert column(rows, "clear_above")[order] == pytest.approx([0, 1, 1], abs=1e-6)
-    assert column(rows, "clear_in_front")[order] == pytest.approx([1, 1, 1], abs=1e-6)
+    assert column(rows, "clear_above") == pytest.approx([1, 0, 1], abs=1e-6)
+    assert column(rows, "clear_in_front") == pytest.approx([1, 1, 1], abs=1e-6)
     assert (column(rows, "pixels") * 1000 >= 4).all()
 
 
-def test_a_box_half_in_front_covers_half(camera, cubes):
-    heap = cubes((5.0, 1.0, 0), (5.5, 1.2, 0))
-    seen = true_boxes(heap, camera.scan(heap))
-    rows = features(seen)
-    assert column(rows, "clear_in_front")[np.argsort(seen.numbers)] == pytest.approx([0.5, 1])
+def test_edges_are_sorted_whichever_way_a_box_lies():
+    turn = np.array([[0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)]])
+    heap = Heap(np.array([[5.0, 1, 1]]), turn, np.array([[0.2, 0.6, 0.4]]), np.array([0]))
+    row = features(heap, np.array([9]))[:1]
+    assert row[0, COLUMN["extent_x"] : COLUMN["tilt"]].tolist() == pytest.approx(
+        [0.6, 0.2, 0.4, 0.6, 0.4, 0.2]
+    )
 
 
-def test_boxes_outside_the_door_do_not_move_the_edge(camera, cubes):
-    heap = cubes((6.0, 1.0, 0), (7.1, 2.0, 0))
-    rows = features(true_boxes(heap, camera.scan(heap)))
+def test_a_box_half_in_front_covers_half(observed, cubes):
+    numbers, rows = observed(cubes((5.0, 1.0, 0), (5.5, 1.2, 0)))
+    assert numbers.tolist() == [1, 0]
+    assert column(rows, "clear_in_front") == pytest.approx([1, 0.5])
+
+
+def test_boxes_outside_the_door_do_not_move_the_edge(observed, cubes):
+    _, rows = observed(cubes((6.0, 1.0, 0), (7.1, 2.0, 0)))
     assert column(rows, "behind") == pytest.approx([0.1, 1.2])
 
 
-def test_the_camera_knows_the_part_that_shows(camera, pile):
-    scan = camera.scan(pile)
-    true, seen = true_boxes(pile, scan), camera_boxes(pile, scan)
-    assert sorted(seen.numbers) == sorted(true.numbers)
-    order = [seen.numbers.tolist().index(box) for box in true.numbers.tolist()]
-    assert (seen.extents[order] <= true.extents + 0.05).all()
-    assert np.abs(seen.centres[order] - true.centres).max() < 0.4
-    front = seen.centres[:, 0] + seen.extents[:, 0] / 2
-    assert front.max() == pytest.approx(pile.front(), abs=0.05)
-
-
-def test_without_any_visible_box_all_are_seen(cubes):
-    heap = cubes((5, 1, 0), (6, 1, 0))
-    blind = Scan(np.zeros(2, int), np.zeros((0, 3)), np.zeros(0, int))
-    for look in (true_boxes, camera_boxes):
-        assert look(heap, blind).numbers.tolist() == [1, 0]
-    half_blind = Scan(np.array([1, 0]), np.zeros((1, 3)), np.zeros(1, int))
-    assert camera_boxes(heap, half_blind).numbers.tolist() == [1, 0]
-
-
-def test_only_the_foremost_boxes_get_a_row():
+def test_only_the_foremost_boxes_get_a_row(cubes):
     count = ROWS + 10
-    centres = np.column_stack([np.linspace(4, 7, count), np.ones(count), np.ones(count)])
-    blocks = np.full((count, 3), 0.1)
-    seen = SeenBoxes(
-        np.arange(count), centres, blocks, blocks, np.zeros(count), np.full(count, 9)
-    ).ordered()
-    assert seen.numbers.tolist() == list(range(count - 1, 9, -1))
+    heap = cubes(*((x, 1, 0) for x in np.linspace(4, 7, count)))
+    assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))

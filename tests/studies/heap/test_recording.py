@@ -8,8 +8,10 @@ from studies.heap.boxes import Heap
 from studies.heap.env import stored_heaps
 from studies.heap.generate import read_heaps
 from studies.heap.learning import load_networks
-from studies.heap.recording import FULL, exploring, heap_job, make_heaps, make_networks
+from studies.heap.recording import exploring, make_heaps, make_networks
 from studies.provenance import read_provenance
+from studies.results import unpacked
+from unload.agent.identity import identity
 
 
 @pytest.fixture
@@ -25,24 +27,26 @@ def quick_heaps(monkeypatch):
 
 def test_the_shipped_heaps_are_what_the_generator_makes():
     """Of number 60, boxes were still leaving in the last round of settling."""
-    lists = heap_job(recording.SEEDS["train"], 60)[1]()
-    assert stored_heaps("train")[60].positions.tolist() == lists["positions"]
+    made = unpacked(recording._new_heap(recording.SEEDS["train"], 60))
+    assert stored_heaps("train")[60].positions.tolist() == made["positions"].tolist()
 
 
-def test_heaps_are_those_of_their_seeds(quick_heaps, tmp_path):
+def test_heaps_are_those_of_their_seeds(quick_heaps, tmp_path, monkeypatch):
     few, more = tmp_path / "few", tmp_path / "more"
-    make_heaps(FULL._replace(train=2, test=1), few, tmp_path)
-    make_heaps(FULL._replace(train=3, test=2), more, tmp_path / "again")
+    monkeypatch.setattr(recording, "HEAPS", {"train": 2, "test": 1})
+    make_heaps(few, tmp_path)
+    monkeypatch.setattr(recording, "HEAPS", {"train": 3, "test": 2})
+    make_heaps(more, tmp_path / "again")
     for split, count in (("train", 2), ("test", 1)):
-        first = read_heaps(split, few / "heaps.npz")
-        second = read_heaps(split, more / "heaps.npz")
+        first = read_heaps(split, few / "heap/heaps.npz")
+        second = read_heaps(split, more / "heap/heaps.npz")
         assert len(first) == count and len(second) == count + 1
         for one, other in zip(first, second):
             assert one.positions.tobytes() == other.positions.tobytes()
-    train, test = (read_heaps(split, more / "heaps.npz")[0] for split in ("train", "test"))
+    train, test = (read_heaps(split, more / "heap/heaps.npz")[0] for split in ("train", "test"))
     assert not np.array_equal(train.positions, test.positions)
-    provenance = read_provenance(few, "heaps")
-    assert provenance["reduced"] and provenance["settings"]["heaps"] == {"train": 2, "test": 1}
+    provenance = read_provenance(few / "heap", "heaps")
+    assert provenance["settings"]["heaps"] == {"train": 2, "test": 1}
 
 
 def test_exploring_picks_half_at_random_and_half_as_its_favourite(rng):
@@ -59,37 +63,52 @@ def test_exploring_picks_half_at_random_and_half_as_its_favourite(rng):
 
 
 def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "MAX_PICKS", 3)
-    monkeypatch.setattr(recording, "PHYSICS", "near")
+    small = {"MAX_PICKS": 3, "PICKS": 12, "NETWORKS": 2, "STEPS": 2}
+    for name, value in small.items():
+        monkeypatch.setattr(recording, name, value)
     learned, explorers = [], []
     fit, policy = recording.fit, recording.Learned
-    monkeypatch.setattr(
-        recording, "fit", lambda picks, *how: learned.append(picks) or fit(picks, *how)
-    )
-    monkeypatch.setattr(
-        recording,
-        "Learned",
-        lambda networks, weight: explorers.append(weight) or policy(networks, weight),
-    )
-    size = FULL._replace(picks=12, networks=2, steps=2)
-    make_networks(size, tmp_path / "data", tmp_path)
+
+    def noted_fit(picks, seed, steps):
+        learned.append(picks)
+        return fit(picks, seed, steps)
+
+    def noted_policy(networks, weight):
+        explorers.append(weight)
+        return policy(networks, weight)
+
+    monkeypatch.setattr(recording, "fit", noted_fit)
+    monkeypatch.setattr(recording, "Learned", noted_policy)
+    make_networks(tmp_path, tmp_path)
     assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
     assert len(explorers) == 2 and set(explorers) <= set(recording.WEIGHTS)
     picks = learned[-1]
     assert np.isfinite(picks.observations).all() and picks.unloaded.sum() > 0
     came = picks.fates[np.arange(12), picks.actions] & 1
     assert (came <= picks.unloaded).all(), "fates are those of the picks"
-    published = tmp_path / "data" / "heap" / "networks.safetensors"
+    published = tmp_path / "heap" / "networks.safetensors"
     assert len(load_networks(published)) == 2
-    provenance = read_provenance(tmp_path / "data" / "heap", "networks")
-    assert provenance["reduced"] and provenance["runs"] == 4 + 4
+    assert read_provenance(tmp_path / "heap", "networks")["runs"] == 4 + 4
     written = published.read_bytes()
-    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap").rglob("*.*")}
-    make_networks(size, tmp_path / "data", tmp_path)
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "heap").rglob("*.*")} == kept
-    assert published.read_bytes() == written and len(learned) == 4
-    make_networks(size, tmp_path / "again", tmp_path / "again")
+    make_networks(tmp_path, tmp_path)
+    assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
+    make_networks(tmp_path / "again", tmp_path / "again")
     assert (tmp_path / "again" / "heap" / "networks.safetensors").read_bytes() == written
-    make_networks(size._replace(steps=3), tmp_path / "data", tmp_path)
-    assert len(learned) == 12 and published.read_bytes() != written, "other settings, other files"
-    assert len(list((tmp_path / "heap" / "picks").glob("*.npz"))) == 6, "other explorers, too"
+    monkeypatch.setattr(recording, "STEPS", 3)
+    make_networks(tmp_path, tmp_path)
+    assert len(learned) == 12 and published.read_bytes() != written, "another question"
+    assert len(list((tmp_path / "heap" / "picks").glob("*.json"))) == 6, "other explorers, too"
+
+
+def test_other_code_is_another_question(monkeypatch):
+    """Seeds and heaps do not say how a rake picks, or how a network learns."""
+
+    def codes() -> list[str]:
+        return [identity(getattr(recording, name)) for name in ("_new_heap", "_record", "_learn")]
+
+    before = codes()
+    monkeypatch.setattr("studies.heap.rake.CAME", 0.6)
+    monkeypatch.setattr("studies.heap.learning.WEIGHT_DECAY", 0.1)
+    assert [one == other for one, other in zip(before, codes())] == [True, False, False]
+    monkeypatch.setattr("studies.heap.generate.FASTEST", 0.2)
+    assert codes()[0] != before[0]

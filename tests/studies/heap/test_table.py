@@ -7,10 +7,9 @@ import torch
 
 from studies import paths
 from studies.heap import table as study
-from studies.heap.env import HeapEnv
 from studies.heap.learning import save_networks
 from studies.heap.network import FateNetwork
-from studies.heap.recording import FULL, WEIGHTS
+from studies.heap.recording import HEAPS, WEIGHTS
 from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan
 from studies.provenance import read_provenance
 from studies.statistics import bootstrap_interval
@@ -76,21 +75,22 @@ def test_the_best_rule_depends_on_the_weight_of_falls():
     )
     assert best_rule(rules, 0.0) == "bold"
     assert best_rule(rules, 1.0) == "shy"
-    cells = plan(rules, "networks")
-    assert len(cells) == len(study.RULES) + 2 * len(WEIGHTS) + 1
-    chosen = {cell.falls_weight: cell.player for cell in cells if cell.policy == "best rule"}
-    assert chosen[0.0] == {"rule": "bold"} and chosen[4.0] == {"rule": "shy"}
-    assert {cell.falls_weight for cell in cells if cell.policy in ("random", "oracle")} == {1.0}
+    players = plan(rules, "networks")
+    assert len(players) == len(study.RULES) + 2 * len(WEIGHTS) + 1
+    assert players[0.0, "best rule"] == {"rule": "bold"}
+    assert players[4.0, "best rule"] == {"rule": "shy"}
+    assert {weight for weight, policy in players if policy in ("random", "oracle")} == {1.0}
 
 
 def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pile):
     small = [pile, pile.only(np.arange(8))]
     for name, value in {
         "stored_heaps": lambda split: small,
-        "HeapEnv": lambda split, **given: HeapEnv(heaps=small, **given),
         "MAX_PICKS": 1,
-        "PHYSICS": "near",
-        "RULE_PHYSICS": "near",
+        "PHYSICS": "coarse",
+        "FIRST_HEAPS": 1,
+        "RULE_HEAPS": 2,
+        "TEST_HEAPS": 2,
         "WEIGHTS": (0.0, 1.0),
         "KEPT": 1,
         "RULES": {name: study.RULES[name] for name in ("random", "lowest", "highest")},
@@ -98,25 +98,25 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
         monkeypatch.setattr(study, name, value)
     some = dict(list(family().items())[:2])
     monkeypatch.setattr(study, "family", lambda: some)
-    size = FULL._replace(test=2, first_rule_heaps=1, rule_heaps=2)
+    monkeypatch.setattr("studies.heap.env.stored_heaps", study.stored_heaps)
     where = {"folder": tmp_path, "runs_dir": tmp_path}
     with pytest.raises(FileNotFoundError, match="python -m studies heap makes it"):
-        study.compare(size, **where)
-    rules = study.choose_rules(size, **where)
+        study.compare(**where)
+    rules = study.choose_rules(**where)
     assert rules["rule"].tolist() == ["lowest", "highest", *some]
     assert sorted(set(rules["heaps"])) == [1, 2] and (rules["heaps"] == 2).sum() <= 2
     networks = [FateNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 1)]
     save_networks(networks, tmp_path / "heap" / "networks.safetensors")
-    table = study.compare(size, **where)
+    table = study.compare(**where)
     curve = [("best rule", 0.0), ("learned", 0.0), ("best rule", 1.0), ("learned", 1.0)]
     played = [(row["policy"], row["falls_weight"]) for _, row in table.iterrows()]
     others = [(name, 1.0) for name in ("random", "lowest", "highest", "oracle")]
     assert sorted(played) == sorted(curve + others) and (table["heaps"] == 2).all()
     by = table.set_index(["policy", "falls_weight"])
     assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
-    assert read_provenance(tmp_path / "heap", "table")["reduced"]
+    assert read_provenance(tmp_path / "heap", "table")["settings"]["heaps"] == 2
     stored = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
-    pd.testing.assert_frame_equal(study.compare(size, **where), table)
+    pd.testing.assert_frame_equal(study.compare(**where), table)
     pd.testing.assert_frame_equal(study.read_heap_table(tmp_path), table, check_dtype=False)
     again = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
     assert again == stored
@@ -127,7 +127,7 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
         return {"boxes": 2.0 + number, "falls": 0.5}
 
     monkeypatch.setattr(study, "_play", made_up)
-    table = study.compare(size, tmp_path, tmp_path / "made up")
+    table = study.compare(tmp_path, tmp_path / "made up")
     assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
     weights = [player["falls_weight"] for player in players if "networks" in player]
     assert weights == [0.0, 0.0, 1.0, 1.0]
@@ -135,6 +135,6 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
 
 def test_data_of_heaps_are_those_that_are_read():
     names = {path.name.split(".")[0] for path in (paths.DATA / "heap").iterdir()}
-    assert names == {"networks", "rules", "episodes", "table"}
+    assert names == {"heaps", "networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
-    assert (table["heaps"] == FULL.test).all() and len(table) == 19
+    assert (table["heaps"] == HEAPS["test"]).all() and len(table) == 19

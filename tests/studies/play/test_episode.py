@@ -48,12 +48,14 @@ def test_a_moment_is_the_container_after_some_picks(episode):
 
 
 def test_failed_items_are_kept_until_the_next_success(boxes):
-    episode = Episode(boxes((1.0, 0.2), (1.0, 0.6), (2.0, 0.2)))
-    episode.pick(0)
-    assert episode.moment().failed.tolist() == [0]
+    episode = Episode(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0), (2.0, 0.2)))
+    for item in (1, 0):
+        episode.pick(item)
+    assert episode.moment().failed.tolist() == [0, 1]
     assert episode.moment().groups()["failed"].tolist() == [0]
-    assert episode.pick(0).deadlocked
-    episode.pick(2)
+    assert episode.moment().groups()["tried"].tolist() == [0, 1]
+    assert episode.pick(0).deadlocked and episode.moment().failed.tolist() == [0, 1]
+    episode.pick(3)
     assert episode.moment().failed.tolist() == []
     assert "failed" not in episode.moment().groups()
     assert not episode.pick(0).deadlocked

@@ -1,3 +1,5 @@
+import html
+import logging
 import re
 
 import numpy as np
@@ -8,7 +10,6 @@ from studies.play.canvas import ABSENT
 from studies.play.episode import Episode
 from studies.play.players import Run
 from studies.play.playground import SHOWN, Playground
-from studies.play.replay import replay
 from unload import stack_load
 from unload.load.view import PLOTLY_MIMETYPE
 
@@ -110,13 +111,38 @@ def test_hints_are_what_can_be_lifted(game):
 
 
 def test_all_players_have_as_many_picks_as_you(game):
-    for item in game.you.liftable()[:3]:
+    liftable = game.you.liftable()
+    for item in (*liftable[:2], np.setdiff1d(game.you.visible, liftable)[0]):
         click(game, item)
-    standings = {name: (picks, unloaded) for name, picks, unloaded in game.standings()}
-    assert set(standings) == {"you", *game.runs}
-    assert {picks for picks, _ in standings.values()} == {3}
-    assert standings["highest"] == (3, 3)
-    assert all(name.split(",")[0].replace("'", "&#x27;") in game.board.value for name in standings)
+    alone = {name: Run(name, game.you.load, 4) for name in game.runs}
+    expected = [("you", 3, game.you.unloaded())]
+    expected += [(name, run.play_to(3), run.unloaded(3)) for name, run in alone.items()]
+    assert game.standings() == expected
+    for name, picks, unloaded in expected:
+        row = f"<td align=right>{unloaded}</td><td align=right>{picks}</td>"
+        assert f"<td>{html.escape(name)}</td>" in game.board.value and row in game.board.value
+    game.player.value = "highest"
+    game.slider.value = 2
+    assert game.standings()[0] == ("you", 2, game.you.unloaded(2))
+    assert [row[1] for row in game.standings()] == [2] * 7
+
+
+def test_only_the_last_pick_is_seen_to_rise_and_only_when_it_is_made(game):
+    first, second = game.you.liftable()[:2]
+    click(game, first)
+    click(game, second)
+    rise = game.canvas.lift
+    assert rise["item"] == second and rise["number"] == 2
+    game.hints.value = True
+    game.undo.click()
+    click(game, np.setdiff1d(game.you.visible, game.you.liftable())[0])
+    game.player.value = "highest"
+    assert game.canvas.lift == rise, "shown, taken back, failed or another's"
+    game.slider.value = 1
+    assert game.canvas.lift["number"] == 3
+    for count in (3, 2):
+        game.slider.value = count
+    assert game.canvas.lift["number"] == 3, "a jump, and a step back"
 
 
 def test_a_player_is_watched_by_the_slider(game):
@@ -144,12 +170,39 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
     unloaded = score(stuck)[0]
     assert "<td>without</td>" in stuck.board.value
     stuck.mask.value = True
+    assert "deadlock" not in stuck.message.value
     stuck.slider.value = 110
-    assert score(stuck)[0] == unloaded + 10
+    assert score(stuck)[0] == unloaded + 15
     stuck.slider.value = 94
     stuck.mask.value = False
     stuck.slider.value = 110
     assert score(stuck)[0] == unloaded
+
+
+def test_the_mask_ends_a_deadlock_that_has_lasted_to_the_end(stuck):
+    """Also where all picks have been watched: those from the first deadlocked one are made anew."""
+    stuck.mask.value = False
+    stuck.slider.value = 120
+    run = stuck.runs["the paper's agent"]
+    first = [pick.deadlocked for pick in run.picks].index(True)
+    before = run.picks[:first]
+    stuck.mask.value = True
+    assert run.picks[:first] == before and len(run.picks) == 120
+    stuck.slider.value = first + 5
+    assert not any(pick.deadlocked for pick in run.picks)
+    assert "deadlock" not in stuck.message.value
+
+
+def test_what_is_logged_while_it_starts_stands_in_its_own_line(monkeypatch):
+    def warm_up(playground):
+        logging.getLogger("unload.fast").warning("compiling <this> for ten seconds")
+
+    monkeypatch.setattr(Playground, "_warm_up", warm_up)
+    game = Playground(seed=4)
+    assert "compiling &lt;this&gt; for ten seconds" in game.message.value
+    game.slider.value = 1
+    game._show()
+    assert "compiling" not in game.message.value and not logging.getLogger("unload").handlers
 
 
 def test_a_replay_stands_beside_the_widget(game):
@@ -171,7 +224,6 @@ BAD_INPUT = {
     "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
     "mask is None": lambda load: Playground(mask=None),
     "picks is 0": lambda load: Playground(picks=0),
-    "height is 10": lambda load: replay(Episode(load), height=10),
 }
 
 

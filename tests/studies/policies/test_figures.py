@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from studies.policies import comparison, figures, robustness, speed
+from studies.policies import comparison, figures, robustness
+from studies.speed import figures as speed
 
 
 def test_every_condition_has_its_panel():

@@ -67,6 +67,10 @@ def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
     table = pd.read_csv(tmp_path / "policies/robustness.csv")
     assert table["after_pick"].tolist() == 2 * ["keep"] + 2 * ["restore"]
     assert read_provenance(tmp_path / "policies", "robustness")["settings"]["episodes"] == 2
-    monkeypatch.setattr(robustness, "play", lambda *_: pytest.fail("played again"))
+    monkeypatch.setattr(robustness, "ContainerEnv", lambda *_, **__: pytest.fail("played again"))
     robustness.robustness_data(tmp_path, tmp_path / "runs")
     assert (tmp_path / "policies/robustness.csv").read_text() == written
+    other = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 2))
+    monkeypatch.setattr(robustness, "play", other)
+    with pytest.raises(pytest.fail.Exception, match="played again"):
+        robustness.robustness_data(tmp_path, tmp_path / "runs")
