@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from unload.agent.greedy import check_network
-from unload.agent.learner import PlainLearner
+from unload.agent.learner import PlainLearner, flat, grouped
 from unload.agent.policies import any_allowed
 from unload.fast import fused
 from unload.fast.learner import FusedLearner
@@ -159,12 +159,11 @@ class DQN:
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of weights, target weights and optimizer state, to go on from later."""
-        groups = {
-            "network": {k: v.numpy().copy() for k, v in self.network.state_dict().items()},
-            "target": {k: v.numpy().copy() for k, v in self.target.items()},
-            "adam": self.learner.state(),
-        }
-        return {f"{group}.{k}": v for group, arrays in groups.items() for k, v in arrays.items()}
+        weights = {"network": self.network.state_dict(), "target": self.target}
+        return flat(
+            {name: {k: v.numpy().copy() for k, v in each.items()} for name, each in weights.items()}
+            | {"adam": self.learner.state()}
+        )
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what ``state`` returned.
@@ -172,10 +171,7 @@ class DQN:
         Raises:
             KeyError, RuntimeError: an array is missing or of another shape.
         """
-        groups: dict[str, dict[str, np.ndarray]] = {"network": {}, "target": {}, "adam": {}}
-        for name, array in arrays.items():
-            group, _, rest = name.partition(".")
-            groups[group][rest] = array
+        groups = grouped(arrays)
         self.network.load_state_dict(_tensors(groups["network"]))
         target = _tensors(groups["target"])
         self.target = {name: target[name] for name in self.target}
