@@ -8,7 +8,6 @@ import ast
 import inspect
 import json
 import textwrap
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import partial
 from hashlib import blake2b
@@ -95,7 +94,8 @@ def _absorb(value: Any, package: str, digest, seen: set) -> None:
         if isinstance(method, FunctionType):
             used += _used(method)
     for each in used:
-        each = inspect.unwrap(each) if callable(each) else each
+        if not isinstance(each, FunctionType):  # a cached one, whose cache encloses it
+            each = inspect.unwrap(each) if callable(each) else each
         if isinstance(each, (FunctionType, type)):
             if _package(each) == package:
                 _absorb(each, package, digest, seen)
@@ -144,7 +144,7 @@ def _names(code: CodeType) -> list[str]:
 def _tree(value: Any) -> ast.AST | None:
     """The syntax of a function or class without docstrings; None where there is no source."""
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(value)))
+        tree = ast.parse(textwrap.dedent(inspect.getsource(getattr(value, "__code__", value))))
     except (OSError, TypeError, SyntaxError):  # typed at a prompt, or a part of a statement
         return None
     if value.__name__ == "<lambda>":
