@@ -85,14 +85,20 @@ def _absorb(value: Any, package: str, digest, seen: set) -> None:
     if value in seen:  # functions may call each other
         return
     seen.add(value)
-    tree = _tree(value)
-    source = _bytecode(getattr(value, "__code__", None)) if tree is None else ast.unparse(tree)
-    digest.update(f"{value.__module__}.{value.__qualname__}\n{source}\n".encode())
-    used = list(value.__bases__) if isinstance(value, type) else _used(value, tree)
-    for method in vars(value).values() if isinstance(value, type) else ():
-        method = getattr(method, "__func__", method)  # of a static one, or one of the class
-        if isinstance(method, FunctionType):
-            used += _used(method)
+    digest.update(f"{value.__module__}.{value.__qualname__}\n".encode())
+    if isinstance(value, type):  # its own source is not to be had where it stands in a notebook
+        members = [
+            each
+            for name, each in vars(value).items()
+            if isinstance(each, FunctionType) or not name.startswith("__")
+        ]
+        functions = [getattr(each, "__func__", getattr(each, "fget", each)) for each in members]
+        used = [*value.__bases__, *functions]
+    else:
+        tree = _tree(value)
+        source = _bytecode(value.__code__) if tree is None else ast.unparse(tree)
+        digest.update(f"{source}\n".encode())
+        used = _used(value, tree)
     for each in used:
         if not isinstance(each, FunctionType):  # a cached one, whose cache encloses it
             each = inspect.unwrap(each) if callable(each) else each
@@ -103,7 +109,7 @@ def _absorb(value: Any, package: str, digest, seen: set) -> None:
             digest.update(json.dumps(identity(each, frozenset(seen))).encode())
 
 
-def _used(function: FunctionType, tree: ast.AST | None = None) -> list[Any]:
+def _used(function: FunctionType, tree: ast.AST | None) -> list[Any]:
     """What a function encloses, its defaults, and the values that it names.
 
     Of modules of its package, these are the values that it may take from them.
@@ -141,13 +147,13 @@ def _names(code: CodeType) -> list[str]:
     return names
 
 
-def _tree(value: Any) -> ast.AST | None:
-    """The syntax of a function or class without docstrings; None where there is no source."""
+def _tree(function: FunctionType) -> ast.AST | None:
+    """The syntax of a function without docstrings; None where there is no source."""
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(getattr(value, "__code__", value))))
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function.__code__)))
     except (OSError, TypeError, SyntaxError):  # typed at a prompt, or a part of a statement
         return None
-    if value.__name__ == "<lambda>":
+    if function.__name__ == "<lambda>":
         found = [node for node in ast.walk(tree) if isinstance(node, ast.Lambda)]
         return found[0] if len(found) == 1 else None
     for node in ast.walk(tree):
@@ -156,8 +162,6 @@ def _tree(value: Any) -> ast.AST | None:
     return tree.body[0]
 
 
-def _bytecode(code: CodeType | None) -> str:
-    if code is None:
-        return ""
+def _bytecode(code: CodeType) -> str:
     constants = [_bytecode(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
     return f"{code.co_code!r} {code.co_names} {constants}"
