@@ -84,13 +84,13 @@ def test_a_damaged_checkpoint_is_refused_by_name(tmp_path):
             train(config, tmp_path, progress=False)
     incomplete = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
     for name, value in (
-        ("config", "{"), ("config", "[]"), ("config", "3"), ("format", [6, 6]), ("rest", "{"),
+        ("settings", "{"), ("settings", "[]"), ("settings", "3"), ("format", [6, 6]), ("rest", "{"),
         ("envs.generators", ["{}"] * 4), ("replay.total", 7),
     ):  # fmt: skip
         incomplete.append(arrays | {name: np.array(value)})
     for content in incomplete:
         files.write_arrays(path, content)
-        with pytest.raises(ValueError, match=f"checkpoint.npz|{tmp_path.name}"):
+        with pytest.raises(ValueError, match="checkpoint.npz"):
             train(config, tmp_path, progress=False)
 
 

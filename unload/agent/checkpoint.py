@@ -101,7 +101,7 @@ class RunFolder:
 
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
-        marks = {"format": np.array(FORMAT), "config": np.array(json.dumps(run.settings))}
+        marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
         files.write_arrays(self.checkpoint, run.state() | marks)
 
     def save_curve(self, run) -> None:
@@ -118,21 +118,18 @@ class RunFolder:
         if not self.checkpoint.exists():
             return
         stored = files.read_arrays(self.checkpoint)
-        checks.entries(str(self.checkpoint), stored, ("config",))
         if not np.array_equal(stored.pop("format", None), FORMAT):
             raise ValueError(
                 f"{self.checkpoint} was written by another version of unload; expected format "
                 f"{FORMAT}. Remove it to start anew, or go on with that version"
             )
         try:
-            settings = dict(json.loads(str(stored.pop("config"))))
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{self.checkpoint} holds no configuration: {error}") from error
-        self._check_same(settings, run.settings)
-        try:
+            settings = dict(json.loads(str(stored.pop("settings"))))
+            self._check_same(settings, run.settings)
             run.load_state(stored)
         except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
-            raise ValueError(f"{self.checkpoint} does not fit its run: {error!r}") from error
+            reason = f"{type(error).__name__}: {error}"
+            raise ValueError(f"{self.checkpoint} does not fit this run: {reason}") from error
 
     def finish(self, run) -> None:
         """Keep what a ``Training`` leaves at its end."""

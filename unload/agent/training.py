@@ -403,22 +403,19 @@ def deferred_interrupts() -> Iterator[list[int]]:
     """Note the first Ctrl-C of a run instead of raising; the second one stops at once.
 
     Yields:
-        The signals received so far. The caller polls them and stops at a safe point.
-
-    Raises:
-        KeyboardInterrupt: at the second Ctrl-C, or at the end if nobody has stopped since the
-            first one.
+        The signals received so far. The caller polls them and stops at a safe point; if it has
+        not stopped since the first one, KeyboardInterrupt is raised at the end.
     """
     received: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield received  # only the main thread receives signals
-        return
 
     def receive(number: int, frame: object) -> None:
         received.append(number)
         if len(received) > 1:
             raise KeyboardInterrupt
 
+    if threading.current_thread() is not threading.main_thread():
+        yield received  # only the main thread receives signals
+        return
     previous = signal.signal(signal.SIGINT, receive)
     try:
         yield received
