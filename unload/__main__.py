@@ -107,7 +107,7 @@ def _named(text: str) -> Callable:
 def _explained(kind: type) -> dict[str, str]:
     """What the docstring of a dataclass says of each of its attributes."""
     attributes = kind.__doc__.partition("Attributes:\n")[2].partition("\n\n")[0]
-    found = {}
+    found: dict[str, str] = {}
     for entry in re.split(r"\n {8}(?=\w)", "\n" + attributes)[1:]:
         names, _, text = " ".join(entry.replace("``", "").split()).partition(": ")
         found |= dict.fromkeys(names.split(", "), text)

@@ -51,10 +51,6 @@ class RunFolder:
     Attributes:
         path: of the folder, absolute, so that it stays the same one wherever the process goes.
         checkpoint: the file from which a run that was stopped goes on.
-
-    Raises:
-        TypeError: ``run_dir`` is no path.
-        ValueError: ``run_dir`` is empty.
     """
 
     def __init__(self, run_dir: str | Path) -> None:
@@ -109,12 +105,7 @@ class RunFolder:
         files.write_text(self._curve, run.curve.table().to_csv(index=False))
 
     def restore(self, run) -> None:
-        """Let a ``Training`` go on from the checkpoint, if there is one.
-
-        Raises:
-            ValueError: the checkpoint is damaged, or of another version, configuration, change or
-                stack.
-        """
+        """Let a ``Training`` go on from the checkpoint, if there is one."""
         if not self.checkpoint.exists():
             return
         stored = files.read_arrays(self.checkpoint)
@@ -146,10 +137,6 @@ class RunFolder:
 
         Args:
             config, stack, change: of the run, see ``training.train_changed``.
-
-        Raises:
-            ValueError: a file is damaged, or the run is of another configuration, change or stack.
-            FileNotFoundError: a file is missing.
         """
         stored = files.read_json(self._config, checked=True)
         marks = stored.pop("marks", {})

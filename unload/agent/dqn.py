@@ -31,10 +31,6 @@ class DQN:
     Attributes:
         learner: the ``PlainLearner`` or ``FusedLearner`` that chooses and updates.
         target: the target network's weights by name.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described, or ``fused_update`` is asked
-            for and does not apply.
     """
 
     def __init__(
@@ -80,9 +76,6 @@ class DQN:
 
         Returns:
             (batch,) int64.
-
-        Raises:
-            ValueError, FloatingPointError: a row allows no action, or none of a finite value.
         """
         explore = rng.random(len(observations)) < epsilon
         exploit = ~explore
@@ -118,9 +111,6 @@ class DQN:
         Returns:
             A function that completes the update, returns the loss and may raise as ``update``
             does. The weights stay as they are until it is called, and so must the arrays.
-
-        Raises:
-            TypeError, ValueError: as ``update`` does.
         """
         names = ["observations", "actions", "rewards"]
         if self.gamma == 0:
@@ -166,11 +156,7 @@ class DQN:
         )
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned.
-
-        Raises:
-            KeyError, RuntimeError: an array is missing or of another shape.
-        """
+        """Go on from what ``state`` returned."""
         groups = grouped(arrays)
         self.network.load_state_dict(_tensors(groups["network"]))
         target = _tensors(groups["target"])

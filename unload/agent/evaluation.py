@@ -26,10 +26,6 @@ def success_rate(rewards: np.ndarray) -> float:
 
     Args:
         rewards: any shape, not empty, each +1 or -1.
-
-    Raises:
-        TypeError: ``rewards`` does not hold numbers.
-        ValueError: ``rewards`` is empty or holds another value.
     """
     rewards = checks.finite_array("rewards", rewards, None)
     if rewards.size == 0:

@@ -1,6 +1,7 @@
 """The greedy choice among the allowed items; the policy of a trained network, and its file."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -43,10 +44,6 @@ def greedy_actions(
 
     Returns:
         (batch,) int64.
-
-    Raises:
-        TypeError, ValueError: see ``unload.agent.policies.check_batch``.
-        FloatingPointError: see ``highest_values``.
     """
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
@@ -67,9 +64,6 @@ class Greedy:
         ties: see ``unload.equalize``.
         card: what is known of the policy, as JSON can hold it, such as the ``configuration``
             that it was trained with, the ``loads``, and its ``msr``; None if nothing is.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(
@@ -106,9 +100,6 @@ class Greedy:
 
         Args:
             observations: (batch, items, 3) float, not equalized.
-
-        Raises:
-            TypeError, ValueError: ``observations`` is not as described.
         """
         observations = checks.finite_array("observations", observations, (None, None, 3))
         observations, present = self._seen(observations)
@@ -167,7 +158,7 @@ def load_policy(path: str | Path, network: torch.nn.Module | None = None) -> Gre
             f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "
             + ", ".join(map(repr, SHIPPED))
         )
-    return read_weights(file, "policy", lambda *content: policy_of(*content, network))
+    return read_weights(file, "policy", partial(policy_of, network=network))
 
 
 def settings_of(policy: Greedy) -> dict:
@@ -188,9 +179,6 @@ def policy_of(
     Args:
         settings, tensors: of the policy.
         network: see ``load_policy``.
-
-    Raises:
-        KeyError, TypeError, ValueError, RuntimeError: they do not fit.
     """
     if network is None:
         names = {kind.__name__: name for name, kind in NETWORKS.items()}

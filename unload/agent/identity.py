@@ -109,7 +109,7 @@ def _absorb(value: Any, package: str, digest, seen: set) -> None:
             digest.update(json.dumps(identity(each, frozenset(seen))).encode())
 
 
-def _used(function: FunctionType, tree: ast.AST | None) -> list[Any]:
+def _used(function: FunctionType, tree: Any) -> list[Any]:
     """What a function encloses, its defaults, and the values that it names.
 
     Of modules of its package, these are the values that it may take from them.

@@ -6,7 +6,7 @@ network on a CPU, a few hundred times faster; a test holds the two equal.
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
@@ -83,7 +83,7 @@ class PlainLearner:
         self.optimizer.load_state_dict({**self.optimizer.state_dict(), "state": moments})
 
 
-def flat(groups: Mapping[object, Mapping[str, Each]]) -> dict[str, Each]:
+def flat(groups: Mapping[Any, Mapping[str, Each]]) -> dict[str, Each]:
     """What stands in groups, by ``<group>.<name>``, as a file of arrays holds it."""
     return {f"{group}.{name}": each for group in groups for name, each in groups[group].items()}
 
@@ -129,10 +129,6 @@ def highest_values(
 
     Returns:
         (batch,) int64.
-
-    Raises:
-        FloatingPointError: a row has no allowed action, or an allowed action's value is not
-            finite.
     """
     values = action_values(network, observations, present)
     values = values.masked_fill(torch.from_numpy(~allowed), -torch.inf)
