@@ -76,7 +76,9 @@ def see(run: Training, change: Callable[[np.ndarray], np.ndarray]) -> None:
 def untilted(run: Training, axes: tuple[int, ...] = (0, 1)) -> None:
     """Choose by what is seen with random signs; the replay memory holds it as it was.
 
-    Whatever side the network prefers, it prefers each side equally often, and digs out none.
+    Whatever side the network prefers, it prefers each side equally often, and digs out none. The
+    signs are drawn in the order of the choices, so that a resumed run would draw others: it is for
+    runs that are trained in one piece, such as the laboratory's.
     """
     choose, rng = run.agent.choose, np.random.default_rng(run.config.seed)
     run.agent.choose = lambda observations, *rest: choose(
@@ -102,16 +104,17 @@ def successes_only(run: Training, start: int) -> None:
     """Store no failed pick from ``start`` picks on.
 
     In its place a successful one of the same step is stored twice, so that the memory reaches as
-    far back as otherwise; where all of a step failed, the last successful step is stored again.
+    far back as otherwise; where all of a step failed, what was stored last is stored again.
     """
-    add, last = run.replay.add, {}
+    replay, add = run.replay, run.replay.add
 
     def add_successes(**picks: np.ndarray) -> None:
-        won = np.flatnonzero(picks["rewards"] > 0)
-        if run.replay.total >= start and len(won) < len(picks["rewards"]):
-            rows = np.resize(won, len(picks["rewards"]))
-            picks = {name: each[rows] for name, each in picks.items()} if len(won) else last
-        last.update(picks)
+        won, count = np.flatnonzero(picks["rewards"] > 0), len(picks["rewards"])
+        if replay.total >= start and len(won) < count and (len(won) or replay.total):
+            rows = np.resize(won, count)
+            if not len(won):
+                picks, rows = replay.arrays, np.arange(replay.total - count, replay.total)
+            picks = {name: each.take(rows, axis=0, mode="wrap") for name, each in picks.items()}
         add(**picks)
 
     run.replay.add = add_successes

@@ -10,7 +10,7 @@ curves are published in a table of that name, so that no file of a large grid be
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -156,7 +156,7 @@ def publish_grid(
         rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
         write_measures(place, rows)
     first = {
-        name: asdict(configs[f"{name}/seed_{cell.seeds[0]}"]) for name, cell in grid.cells.items()
+        name: configs[f"{name}/seed_{cell.seeds[0]}"].plain() for name, cell in grid.cells.items()
     }
     record = joined(files.read_json(records[name]) for name in done)
     record |= {"fingerprint": fingerprint, "planned": len(configs)}

@@ -9,11 +9,11 @@ from unload import PEQNetwork
 class HeightNetwork(torch.nn.Module):
     """Values each item by its z, times a weight."""
 
-    def __init__(self, weight: float = 1.0) -> None:
+    def __init__(self, weight: float | torch.Tensor = 1.0) -> None:
         super().__init__()
-        self.weight = torch.nn.Parameter(torch.tensor(weight))
+        self.weight = torch.nn.Parameter(torch.as_tensor(weight))
 
-    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+    def forward(self, observations: torch.Tensor, present=None) -> torch.Tensor:
         return observations[..., 2] * self.weight
 
 

@@ -1,7 +1,10 @@
 """What the tests of training share: small runs, and ways to stop them."""
 
 import itertools
+import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,9 +12,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from unload import TrainConfig, train
-from unload.agent.checkpoint import RunFolder
-from unload.agent.rollout import Rollout
+from studies import paths
+from unload import TrainConfig, stack_load, train
 from unload.agent.training import Training
 
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
@@ -28,10 +30,26 @@ RUNS = {
     "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
     "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100, "gradient_steps": 1},
 }
+KILLED = """
+import os, signal
+from tests.agent import runs
+from unload import TrainConfig, train
+
+def kill(point):
+    if point["picks"] == {picks}:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+train(TrainConfig(**{fields!r}), {folder!r}, False, callback=kill, stack={stack})
+"""
 
 
-class Breakdown(Exception):
+class Breakdown(BaseException):
     """A crash at a moment of the test's choosing."""
+
+
+def few_walls(rng):
+    """Loads that are unloaded before an episode of many picks ends."""
+    return stack_load(rng, walls=1)
 
 
 @contextmanager
@@ -55,11 +73,6 @@ def at_step(number: int, action: Callable[[], None]):
     return at(Training, "step", number, action)
 
 
-def at_pick(number: int, action: Callable[[], None]):
-    """Do something right after the picks of a step, be they new or repeated."""
-    return at(Rollout, "pick", number, action)
-
-
 def crash() -> None:
     raise Breakdown
 
@@ -75,13 +88,18 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
         train(config, folder, progress=False)
 
 
+def kill_run(fields: dict, folder: Path, picks: int, stack: str = "None") -> None:
+    """Start a run in another process, which is killed at a point of its curve."""
+    code = KILLED.format(picks=picks, fields=fields, folder=str(folder), stack=stack)
+    done = subprocess.run([sys.executable, "-c", code], cwd=paths.ROOT, env=os.environ)
+    assert done.returncode == -signal.SIGKILL
+
+
 @contextmanager
-def begun(config: TrainConfig, folder: Path) -> Iterator[Training]:
-    """A run in progress that has gone on from its checkpoint, if it has one."""
+def begun(config: TrainConfig) -> Iterator[Training]:
+    """A run in progress, in memory alone."""
     run = Training(config)
     try:
-        for _ in RunFolder(folder).restore(run):
-            pass
         yield run
     finally:
         run.rollout.close()

@@ -1,6 +1,9 @@
+"""What is kept of a run on disk, and how it goes on from there."""
+
 import errno
 import json
 import os
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,51 +17,42 @@ from tests.agent.runs import (
     CONTAINER,
     RUNS,
     assert_same,
-    at_pick,
     begun,
-    interrupt,
+    few_walls,
     interrupt_run,
+    kill_run,
 )
 from unload import TrainConfig, stack_load, train
 from unload.agent.checkpoint import RunFolder
 from unload.support import files
 
-LEFT = ("policy.safetensors", "curve.csv", "config.json")
+OWN = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz")
 
 
-@pytest.mark.parametrize("name", RUNS)
-@pytest.mark.parametrize("changes", [{}, {"replay_size": 61}, {"replay_size": 5000}])
-def test_a_checkpoint_brings_everything_back(tmp_path, name, changes):
-    """A memory smaller and larger than the run, and one of no whole number of steps."""
-    config = TrainConfig(**RUNS[name] | changes)
-    for steps in (1, 23, 24, 25, config.picks // config.num_envs):
-        with begun(config, tmp_path / str(steps)) as run:
-            for _ in range(steps):
-                run.step()
-            RunFolder(tmp_path / str(steps)).save(run)
-            with begun(config, tmp_path / str(steps)) as other:
-                assert other.rollout.steps == steps and other.replay.total == run.replay.total
-                filled = len(run.replay)
-                for name, array in run.replay.arrays.items():
-                    assert (array[:filled] == other.replay.arrays[name][:filled]).all(), name
-                assert (run.rollout.observations == other.rollout.observations).all()
-                assert (run.rollout.masks == other.rollout.masks).all()
-                assert (run.agent.state()["network.scorer.weight"]
-                        == other.agent.state()["network.scorer.weight"]).all()  # fmt: skip
-                assert run.rollout.state()["start"] == other.rollout.state()["start"]
+@pytest.mark.parametrize(
+    ("fields", "stack"),
+    [
+        *((fields, "None") for fields in RUNS.values()),
+        (CONTAINER | {"shuffle_places": True}, "None"),
+        (CONTAINER | {"max_picks": 200, "network": "two_layer"}, "runs.few_walls"),
+    ],
+    ids=[*RUNS, "shuffled places", "own stack"],
+)
+def test_a_killed_run_goes_on_with_the_same_bits(tmp_path, fields, stack):
+    """From its last checkpoint, or from the start where the memory is not full yet."""
+    own = {"stack": few_walls} if stack != "None" else {}
+    train(TrainConfig(**fields), tmp_path / "straight", progress=False, **own)
+    for picks in (60, 160):
+        kill_run(fields | {"checkpoint_interval": 0}, tmp_path / "killed", picks, stack)
+        assert (tmp_path / "killed" / "checkpoint.npz").exists()
+    train(TrainConfig(**fields), tmp_path / "killed", progress=False, **own)
+    assert_same(tmp_path / "straight", tmp_path / "killed")
+    assert not (tmp_path / "killed" / "checkpoint.npz").exists()
 
 
-def test_ctrl_c_while_going_on_keeps_the_checkpoint(tmp_path):
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path / "straight", progress=False)
-    interrupt_run(config, tmp_path / "broken", 20)
-    before = (tmp_path / "broken" / "checkpoint.npz").read_bytes()
-    message = "stopped after 80 picks; call train again with run_dir="
-    with at_pick(3, interrupt), pytest.raises(KeyboardInterrupt, match=message):
-        train(config, tmp_path / "broken", progress=False)
-    assert (tmp_path / "broken" / "checkpoint.npz").read_bytes() == before
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
+def test_a_run_that_ends_soon_writes_no_checkpoint(tmp_path, monkeypatch):
+    monkeypatch.setattr(RunFolder, "save", lambda *_: pytest.fail("it was written"))
+    train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -72,66 +66,60 @@ def test_a_run_of_another_configuration_is_refused(tmp_path, finished):
     message = r"another configuration: seed \(0, not 5\), batch_size \(16, not 8\)"
     with pytest.raises(ValueError, match=message):
         train(other, tmp_path, progress=False)
+    with pytest.raises(ValueError, match=r"stack \(None, not 'unload.load.substacks.stack_load'\)"):
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False, stack=stack_load)
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.*")} == before
+    train(TrainConfig(**CONTAINER | {"checkpoint_interval": 9.0}), tmp_path, progress=False)
 
 
 def test_a_damaged_checkpoint_is_refused_by_name(tmp_path):
-    """Cut short, without one of its arrays, or with another content."""
+    """Cut short, with a flipped bit, without one of its arrays, or with another content."""
     config, path = TrainConfig(**CONTAINER), tmp_path / "checkpoint.npz"
     interrupt_run(config, tmp_path, 20)
     whole, arrays = path.read_bytes(), files.read_arrays(path)
-    assert arrays["format"] == 5
-    path.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(ValueError, match="checkpoint.npz is not a readable .npz file"):
-        train(config, tmp_path, progress=False)
-    damaged = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
+    middle = len(whole) // 2
+    for damaged in (whole[:middle], whole[:middle] + b"!!" + whole[middle + 2 :]):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="checkpoint.npz is not a readable .npz file"):
+            train(config, tmp_path, progress=False)
+    incomplete = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
     for name, value in (
-        ("config", "{"), ("config", "[]"), ("config", "3"), ("format", [5, 5]),
-        ("rollout.start", 99),
+        ("settings", "{"), ("settings", "[]"), ("settings", "3"), ("format", [6, 6]), ("rest", "{"),
+        ("envs.generators", ["{}"] * 4), ("replay.total", 7),
     ):  # fmt: skip
-        damaged.append(arrays | {name: np.array(value)})
-    for content in damaged:
+        incomplete.append(arrays | {name: np.array(value)})
+    for content in incomplete:
         files.write_arrays(path, content)
-        with pytest.raises(ValueError, match=f"checkpoint.npz|{tmp_path.name}"):
+        with pytest.raises(ValueError, match="checkpoint.npz"):
             train(config, tmp_path, progress=False)
 
 
 def test_a_checkpoint_of_another_version_is_refused(tmp_path):
-    """The first version's configuration had a further field, and its checkpoints no format."""
-    old = json.dumps(asdict(TrainConfig(**CONTAINER)) | {"physics": "table"})
-    np.savez(tmp_path / "checkpoint.npz", config=np.array(old))
+    old = json.dumps(asdict(TrainConfig(**CONTAINER)))
+    np.savez(tmp_path / "checkpoint.npz", config=np.array(old), format=np.array(5))
     with pytest.raises(ValueError, match="checkpoint.npz was written by another version"):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    (tmp_path / "checkpoint.npz").unlink()
-    (tmp_path / "config.json").write_text(old)
-    with pytest.raises(ValueError, match=r"another configuration: physics \('table', not None\)"):
-        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
-def test_other_loads_than_at_the_start_are_refused(tmp_path):
+def test_a_disk_without_room_is_refused_before_training(tmp_path, monkeypatch):
+    """Two versions of the checkpoint must fit, one of which may be there already."""
     config = TrainConfig(**CONTAINER)
-    interrupt_run(config, tmp_path, 20)
-    with pytest.raises(ValueError, match="checkpoint.npz: its picks lead to other observations"):
-        train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=10))
+    interrupt_run(config, tmp_path, 40)  # the memory is full
+    there = (tmp_path / "checkpoint.npz").stat().st_size
 
+    def disk(free: int) -> None:
+        usage = shutil._ntuple_diskusage(1, 1, free)
+        monkeypatch.setattr("shutil.disk_usage", lambda path: usage)
 
-@pytest.mark.parametrize(("walls", "others"), [(10, 12), (12, 10)])
-def test_a_finished_run_on_other_loads_is_refused(tmp_path, walls, others):
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=walls))
-    train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=walls))
-    with pytest.raises(ValueError, match="holds a run on other loads; expected the stack"):
-        train(config, tmp_path, progress=False, stack=lambda rng: stack_load(rng, walls=others))
-
-
-@pytest.mark.parametrize("finished", [True, False])
-def test_a_run_may_go_on_with_another_checkpoint_interval(tmp_path, finished):
-    config = TrainConfig(**CONTAINER)
-    if finished:
+    disk(there // 2)
+    with pytest.raises(OSError, match="GB for checkpoints; expected .* that replaces it") as full:
         train(config, tmp_path, progress=False)
-    else:
-        interrupt_run(config, tmp_path, 3)
-    train(TrainConfig(**CONTAINER | {"checkpoint_interval": 9.0}), tmp_path, progress=False)
+    assert full.value.errno == errno.ENOSPC
+    disk(2 * there)
+    with pytest.raises(OSError, match="expected"):
+        train(TrainConfig(**CONTAINER | {"replay_size": 200}), tmp_path / "other", progress=False)
+    disk(there)
+    train(config, tmp_path, progress=False)
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +143,6 @@ def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypat
 
 @pytest.mark.parametrize("name", ["policy.safetensors", "curve.csv", "config.json"])
 def test_every_flipped_bit_is_noticed(finished, rng, name):
-    """33 of 40 once passed."""
     path = finished / name
     whole = path.read_bytes()
     for place in rng.choice(len(whole), 40, replace=False):
@@ -168,11 +155,22 @@ def test_every_flipped_bit_is_noticed(finished, rng, name):
     RunFolder(finished).result(TrainConfig(**CONTAINER))
 
 
+def test_a_configuration_without_its_digest_is_not_believed(finished):
+    path = finished / "config.json"
+    whole = path.read_bytes()
+    files.write_json(path, files.read_json(path))
+    with pytest.raises(ValueError, match="config.json was changed or damaged"):
+        train(TrainConfig(**CONTAINER), finished, progress=False)
+    path.write_bytes(whole)
+
+
 def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
     """Of the run's own files; what others write beside them or below stays."""
     (tmp_path / "below").mkdir()
-    others = [tmp_path / "notes.txt.0123.partial", tmp_path / "below/checkpoint.npz.0123.partial"]
-    own = [tmp_path / f"{name}.0123.partial" for name in (*LEFT, "checkpoint.npz")]
+    tail = f"{'0123456789abcdef' * 2}.partial"
+    names = ("curve.csv.bak.partial", "curve.csv.0123.partial", f"notes.{tail}")
+    others = [tmp_path / name for name in (*names, f"below/checkpoint.npz.{tail}")]
+    own = [tmp_path / f"{name}.{tail}" for name in OWN]
     for path in (*others, *own):
         path.write_bytes(b"half")
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
@@ -187,7 +185,7 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
             "equalize": st.booleans(),
             "ties": st.sampled_from(["noise", "average"]),
             "max_picks": st.integers(1, 30),
-            "replay_size": st.integers(4, 150),
+            "replay_size": st.integers(4, 300),
             "log_interval": st.integers(1, 20),
             "gradient_steps": st.integers(0, 2),
             "seed": st.integers(0, 2**31),
@@ -199,27 +197,17 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
 def test_any_run_goes_on_as_if_it_had_not_been_stopped(tmp_path_factory, changes, steps):
     config = TrainConfig(**CONTAINER | changes)
     folder = RunFolder(tmp_path_factory.mktemp("run"))
-    with begun(config, folder.path) as run:
+    with begun(config) as run, begun(config) as other:
         for _ in range(steps):
             run.step()
         folder.save(run)
-        with begun(config, folder.path) as other:
-            for each in (run, other):
-                while not each.rollout.finished:
-                    each.step()
-            assert weights_of(run) == weights_of(other)
-            tables = [each.curve.table().drop(columns="wall_time") for each in (run, other)]
-            pd.testing.assert_frame_equal(*tables, check_exact=True)
-
-
-def weights_of(run) -> bytes:
-    return b"".join(value.numpy().tobytes() for value in run.agent.network.state_dict().values())
-
-
-def test_a_run_with_a_setting_that_there_is_not_is_refused(tmp_path):
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path, progress=False)
-    content = files.read_json(tmp_path / "config.json")
-    files.write_json(tmp_path / "config.json", content | {"snapshots": 0}, checked=True)
-    with pytest.raises(ValueError, match=r"another configuration: snapshots \(0, not None\)"):
-        train(config, tmp_path, progress=False)
+        folder.restore(other)
+        assert (other.rollout.picks, other.replay.total) == (4 * steps, 4 * steps)
+        for each in (run, other):
+            while not each.rollout.finished:
+                each.step()
+        states = [each.state() for each in (run, other)]
+        for name in states[0].keys() - {"rest"}:
+            assert np.array_equal(*(state[name] for state in states)), name
+        tables = [each.curve.table().drop(columns="wall_time") for each in (run, other)]
+        pd.testing.assert_frame_equal(*tables, check_exact=True)

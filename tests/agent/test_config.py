@@ -46,6 +46,7 @@ def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
         ("seed", -1, ValueError),
         ("num_envs", 0, ValueError),
         ("learning_rate", -1e-3, ValueError),
+        ("learning_rate", 10**400, ValueError),  # beyond the largest float
         ("batch_size", 0, ValueError),
         ("replay_size", 63, ValueError),  # less than a step of all environments
         ("epsilon_init", 1.1, ValueError),
@@ -55,6 +56,7 @@ def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
         ("beta", float("inf"), ValueError),
         ("position_noise", -1e-3, ValueError),
         ("network", "mlp", ValueError),
+        ("network", 3, ValueError),
         ("n_features", 0, ValueError),
         ("equalize", "no", TypeError),
         ("mask", None, TypeError),

@@ -77,14 +77,27 @@ def test_a_weight_that_is_not_finite_chooses_nothing(observations, name, value):
 
 
 def test_only_learned_policies_are_saved(tmp_path):
-    class Subclass(PEQNetwork):
-        """Its file would be read as another network."""
-
-    others = (Greedy(network, equalize=False) for network in (HeightNetwork(), Subclass()))
-    for policy in (policies.highest, *others):
-        with pytest.raises(TypeError, match="policy is .*; expected a Greedy of one of PEQNetwork"):
-            save_policy(policy, tmp_path / "policy.safetensors")
+    with pytest.raises(TypeError, match="policy is <function highest.*; expected an unload.Greedy"):
+        save_policy(policies.highest, tmp_path / "policy.safetensors")
     assert not list(tmp_path.iterdir())
+
+
+class Subclass(PEQNetwork):
+    """Its weights would fit the package's network, too."""
+
+
+def test_a_policy_of_ones_own_network_comes_back_into_one_of_its_kind(tmp_path, observations, rng):
+    path, masks = tmp_path / "policy.safetensors", np.ones(observations.shape[:2])
+    for network, fresh in ((HeightNetwork(-2.0), HeightNetwork()), (Subclass(8), Subclass(8))):
+        policy = Greedy(network, equalize=True)
+        save_policy(policy, path)
+        loaded = load_policy(path, fresh)
+        assert loaded.network is fresh and torch.equal(*(weights(n)[0] for n in (fresh, network)))
+        assert (loaded(observations, masks, rng) == policy(observations, masks, rng)).all()
+        message = "holds no policy .* it is of a tests.*(Subclass|HeightNetwork); expected one"
+        for other in (None, peq()):
+            with pytest.raises(ValueError, match=message):
+                load_policy(path, other)
 
 
 @pytest.mark.parametrize("kind", NETWORKS.values())

@@ -1,6 +1,7 @@
 import json
 import os
 import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -8,13 +9,13 @@ import pandas as pd
 import pytest
 import torch
 
+from tests.agent.networks import HeightNetwork
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
     Breakdown,
     assert_same,
     at,
-    at_pick,
     at_step,
     begun,
     crash,
@@ -29,17 +30,23 @@ from unload.network.variants import NETWORKS
 from unload.physics.table import LiftTable, shared_table
 from unload.support import files
 
+
+def own_network(n_features, generator):
+    """A factory of a network that the package does not have."""
+    return HeightNetwork(0.1)
+
+
+def metres(run) -> None:
+    run.reward = lambda picks, distances: distances
+
+
 HIGHEST = TrainConfig(**RUNS["highest item"])
 LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
 
 
-def test_the_same_seed_gives_the_same_bytes(tmp_path, config):
-    for name in ("a", "b"):
-        train(config, tmp_path / name, progress=False)
-    assert_same(tmp_path / "a", tmp_path / "b")
-
-
-def test_what_a_run_leaves(tmp_path, config):
+@pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
+def test_what_a_run_leaves(tmp_path, fields):
+    config = TrainConfig(**fields)
     folder = tmp_path / "new" / "run"
     result = train(config, folder, progress=False)
     assert {path.name for path in folder.iterdir()} == LEFT
@@ -61,16 +68,17 @@ def test_what_a_run_leaves(tmp_path, config):
     assert loaded.card["loads"] == "the paper's"
     assert loaded.card["msr"] == {"at the end of its training": curve["success_rate"].iloc[-1]}
     stored = json.loads((folder / "config.json").read_text())
-    assert stored.pop("marks").keys() == {"first_loads", "policy.safetensors", "curve.csv"}
-    stored.pop("digest")
+    assert stored.pop("marks").keys() == {"policy.safetensors", "curve.csv"}
+    assert stored.pop("change") is None and stored.pop("stack") is None and stored.pop("digest")
     assert TrainConfig(**stored) == config
+    assert loaded.card["configuration"] == stored
 
 
-def test_deadlocked_is_the_share_of_picks_that_had_failed_before(tmp_path):
+def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
     """Row 5 again and again: it changes only when it is unloaded."""
     small = {"num_envs": 1, "picks": 11, "log_interval": 11, "gradient_steps": 0}
     config = TrainConfig(**CONTAINER | small)
-    with begun(config, tmp_path) as run:
+    with begun(config) as run:
         run.agent.choose = lambda *arguments: np.array([5])
         for _ in range(11):
             run.step()
@@ -104,12 +112,68 @@ def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, coun
 
 @pytest.mark.parametrize("network", NETWORKS)
 def test_every_network_is_trained_and_gone_on_with(tmp_path, network):
+    """With the same bits where PyTorch's default is double precision."""
     config = TrainConfig(**CONTAINER | {"network": network})
     result = train(config, tmp_path / "straight", progress=False)
     assert type(result.policy.network) is NETWORKS[network]
+    table = evaluate(result.policy, 1, max_picks=20)
+    torch.set_default_dtype(torch.float64)
+    try:
+        interrupt_run(config, tmp_path / "broken", 17)
+        train(config, tmp_path / "broken", progress=False)
+        loaded = load_policy(tmp_path / "broken" / "policy.safetensors")
+        pd.testing.assert_frame_equal(evaluate(loaded, 1, max_picks=20), table)
+    finally:
+        torch.set_default_dtype(torch.float32)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+def test_a_network_of_ones_own_is_trained(tmp_path):
+    config = TrainConfig(**CONTAINER | {"network": own_network, "epsilon_fraction": 0.1})
+    result = train(config, tmp_path / "straight", progress=False)
+    assert result.policy.network.weight.item() > 0.12  # it was 0.1: to pick high ones pays
     interrupt_run(config, tmp_path / "broken", 17)
     train(config, tmp_path / "broken", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "broken")
+    assert result.policy.card["configuration"]["network"].startswith(
+        "tests.agent.test_training.own"
+    )
+    plain = replace(config, network="peq")
+    with pytest.raises(
+        ValueError, match="another configuration: network .*own_network .* not 'peq"
+    ):
+        train(plain, tmp_path / "broken", progress=False)
+
+
+@pytest.mark.parametrize(
+    ("network", "error", "message"),
+    [
+        (lambda n, generator: None, TypeError, "network returned None; expected a torch.nn.Module"),
+        (
+            lambda n, generator: HeightNetwork().double(), TypeError,
+            "network has weight of dtype torch.float64; expected torch.float32",
+        ),
+        (
+            lambda n, generator: HeightNetwork(torch.ones(2, 1, 1)), ValueError,
+            r"network returned values of shape \(2, 2, 3\); expected \(2, 3\)",
+        ),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_trained_is_refused_at_the_start(tmp_path, network, error, message):
+    with pytest.raises(error, match=message):
+        train(TrainConfig(**CONTAINER | {"network": network}), tmp_path, progress=False)
+
+
+def test_a_reward_of_ones_own_gets_the_distance():
+    """In metres; what is learned from changes, and the curve does not."""
+    run = Training(TrainConfig(**CONTAINER), change=metres)
+    for _ in range(20):
+        run.step()
+    run.rollout.close()
+    learned = run.replay.arrays["rewards"][:80]
+    assert (learned >= 0).all() and len(np.unique(learned)) > 1
+    successes = run.curve.table()["success_rate"].iloc[-1]
+    assert successes == pytest.approx((learned[-20:] >= 0.2).mean())
 
 
 @pytest.mark.slow
@@ -134,10 +198,9 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
         train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
     assert "200/200" in (tmp_path / "log.txt").read_text()
     interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)
-    shown = []
-    with at_pick(3, lambda: shown.append(capsys.readouterr().out)):  # one that is repeated
-        train(TrainConfig(**CONTAINER), tmp_path / "resumed")
-    assert "4.00/200" in shown[0] and "200/200" in capsys.readouterr().out
+    train(TrainConfig(**CONTAINER), tmp_path / "resumed")
+    shown = capsys.readouterr().out
+    assert "80.0/200" in shown and "0.00/200" not in shown and "200/200" in shown
     train(TrainConfig(**CONTAINER), tmp_path / "quiet", progress=False)
     assert capsys.readouterr() == ("", "")
 
@@ -170,9 +233,9 @@ def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
-def test_the_target_network_follows_once_an_interval(tmp_path, monkeypatch, gamma, picks):
+def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
     copied = []
-    with begun(TrainConfig(**CONTAINER | {"gamma": gamma}), tmp_path) as run:
+    with begun(TrainConfig(**CONTAINER | {"gamma": gamma})) as run:
         monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
         while not run.rollout.finished:
             run.step()
@@ -216,37 +279,27 @@ def test_lifts_that_are_damaged_at_the_end_lose_no_run(tmp_path):
         assert len(train(config, tmp_path / "run", progress=False, lifts=lifts).curve) == 10
 
 
-@pytest.mark.parametrize("broken", ["callback", "stack"])
-def test_an_error_in_what_is_handed_over_keeps_what_can_be_kept(tmp_path, monkeypatch, broken):
-    """The lifts; and the picks, unless a step was broken off."""
+def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path, monkeypatch):
     config, lifts, table = TrainConfig(**CONTAINER), tmp_path / "lifts.npz", LiftTable()
     for place in ("unload.agent.training", "unload.env.vector"):
         monkeypatch.setattr(f"{place}.shared_table", lambda: table)
-    loads, points = [], []
+    loads = []
 
     def stack(rng):
         loads.append(own_load(rng, "continuous sizes"))
-        if broken == "stack" and len(loads) == 12:
+        if len(loads) == 12:
             raise Breakdown
         return loads[-1]
 
-    def callback(point):
-        points.append(point["picks"])
-        if broken == "callback" and point["picks"] == 100:
-            raise Breakdown
-
-    usual = {"progress": False, "stack": stack, "lifts": lifts, "callback": callback}
     with pytest.raises(Breakdown):
-        train(config, tmp_path / "run", **usual)
+        train(config, tmp_path / "run", progress=False, stack=stack, lifts=lifts)
     assert len(LiftTable.load(lifts)) == len(table) > 0
-    assert (tmp_path / "run" / "checkpoint.npz").exists() == (broken == "callback")
-    train(config, tmp_path / "run", **usual)
-    assert (points == list(range(20, 201, 20))) == (broken == "callback")
+    assert not (tmp_path / "run" / "checkpoint.npz").exists()
 
 
-def test_without_updates_the_weights_stay(tmp_path):
+def test_without_updates_the_weights_stay():
     config = TrainConfig(**CONTAINER | {"gradient_steps": 0})
-    with begun(config, tmp_path) as run:
+    with begun(config) as run:
         before = run.agent.state()
         for _ in range(20):
             run.step()
@@ -255,9 +308,9 @@ def test_without_updates_the_weights_stay(tmp_path):
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
-def test_a_run_of_the_fewest_picks_makes_one_update(tmp_path, replay_size, picks):
+def test_a_run_of_the_fewest_picks_makes_one_update(replay_size, picks):
     config = TrainConfig(**CONTAINER | {"replay_size": replay_size, "picks": picks})
-    with begun(config, tmp_path) as run:
+    with begun(config) as run:
         while not run.rollout.finished:
             before = run.curve.sums["updates"]
             run.step()
@@ -289,11 +342,6 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
         ({"lifts": ""}, ValueError, "lifts is ''; expected the name of a file"),
         ({"stack": 3}, TypeError, "stack is 3; expected"),
         ({"stack": lambda rng: "load"}, TypeError, "is 'load'; expected an unload.Load"),
-        (
-            {"stack": lambda rng: stack_load(np.random.default_rng())},
-            ValueError,
-            "stack made two different loads from generators in the same state; expected the same",
-        ),
         ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
         ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
@@ -334,19 +382,54 @@ def test_a_point_holds_the_means_since_the_last_one():
     assert table["wall_time"].is_monotonic_increasing
 
 
-def test_a_second_ctrl_c_stops_at_once(tmp_path):
-    config = TrainConfig(**CONTAINER, checkpoint_interval=0)
+@pytest.mark.parametrize("where", ["step", "callback"])
+def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
+    """Nothing is written any more; the run goes on from the checkpoint before."""
+    config = TrainConfig(**CONTAINER)
     train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "broken", 10)
 
-    def twice() -> None:
+    def twice(point=None) -> None:
         interrupt()
         interrupt()
         pytest.fail("still running")
 
-    with at_pick(7, twice), pytest.raises(KeyboardInterrupt, match="^$"):
-        train(config, tmp_path / "broken", progress=False)
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt, match="^$"):
+        patch.setattr(RunFolder, "save", lambda *_: pytest.fail("it was written"))
+        with at_step(7, twice) if where == "step" else nullcontext():
+            train(
+                config, tmp_path / "broken", progress=False,
+                callback=twice if where == "callback" else None,
+            )  # fmt: skip
     train(config, tmp_path / "broken", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "broken")
+
+
+@pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt, OSError, GeneratorExit])
+@pytest.mark.parametrize("picks", [100, 200])
+def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
+    """Also after the last pick; and wherever the callback has gone meanwhile."""
+    config, steps = TrainConfig(**CONTAINER), []
+
+    def callback(point):
+        os.chdir(tmp_path / "elsewhere")
+        steps.append(point["picks"])
+        if len(steps) == picks // 20:
+            raise raised("no more")
+
+    (tmp_path / "elsewhere").mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        usual = {"progress": False, "lifts": "lifts.npz", "callback": callback}
+        with pytest.raises(raised, match="no more"):
+            train(config, "run", **usual)
+        patch.chdir(tmp_path)
+        train(config, "run", **usual)
+    assert steps == list(range(20, 201, 20))
+    assert not list((tmp_path / "elsewhere").iterdir())
+    assert {path.name for path in (tmp_path / "run").iterdir()} == LEFT
+    train(config, tmp_path / "straight", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "run")
 
 
 @pytest.mark.parametrize("method", ["finish", "result"])

@@ -69,7 +69,7 @@ def test_nothing_works_before_reset_or_after_close(make):
     action = np.zeros(64, int) if isinstance(env, gymnasium.vector.VectorEnv) else 0
     calls = [lambda: env.step(action)]
     calls += [env.render] if isinstance(env, gymnasium.Env) else []
-    calls += [getattr(env, name) for name in ("action_masks", "liftable", "starts")
+    calls += [getattr(env, name) for name in ("action_masks", "liftable", "state")
               if hasattr(env, name)]  # fmt: skip
     for call in calls:
         with pytest.raises(ResetNeeded, match="not started; call reset first"):
@@ -189,10 +189,10 @@ def test_seeds():
 def test_bad_actions_change_nothing(actions, error, message):
     envs = gymnasium.make_vec(CONTAINER, 2)
     envs.reset(seed=0)
-    before = envs.unwrapped.starts(), envs.unwrapped.visible
+    before = envs.unwrapped.state(), envs.unwrapped.visible
     with pytest.raises(error, match=message):
         envs.step(actions)
-    assert_same((envs.unwrapped.starts(), envs.unwrapped.visible), before)
+    assert_same((envs.unwrapped.state(), envs.unwrapped.visible), before)
 
 
 @pytest.mark.parametrize(
@@ -218,10 +218,10 @@ def test_bad_numbers_of_environments_are_refused(make, num_envs, error):
 def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
     envs = gymnasium.make_vec(CONTAINER, 2)
     envs.reset(seed=0)
-    before = envs.unwrapped.starts()
+    before = envs.unwrapped.state()
     with pytest.raises(error, match=message):
         envs.reset(seed=seed)
-    assert_same(envs.unwrapped.starts(), before)
+    assert_same(envs.unwrapped.state(), before)
 
 
 @pytest.mark.parametrize(
@@ -236,10 +236,10 @@ def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
 def test_bad_options_leave_the_episodes_as_they_were(env_id, options, error, message):
     envs = gymnasium.make_vec(env_id, 2)
     envs.reset(seed=0)
-    before = envs.unwrapped.starts()
+    before = envs.unwrapped.state()
     with pytest.raises(error, match=message):
         envs.reset(seed=3, options=options)
-    assert_same(envs.unwrapped.starts(), before)
+    assert_same(envs.unwrapped.state(), before)
 
 
 @pytest.mark.parametrize("failing", [1, 3, 5])
@@ -251,60 +251,41 @@ def test_a_call_whose_stack_fails_needs_a_reset(failing):
         envs.reset(seed=0)
         envs.reset(seed=0)
         envs.step(np.zeros(2, int))
-    for call in (lambda: envs.step(np.zeros(2, int)), envs.starts, envs.action_masks):
+    for call in (lambda: envs.step(np.zeros(2, int)), envs.state, envs.action_masks):
         with pytest.raises(ResetNeeded, match="the episodes are broken off; call reset first"):
             call()
     assert_same(envs.reset(seed=0), other.reset(seed=0))
     assert_same(envs.step(np.zeros(2, int)), other.step(np.zeros(2, int)))
 
 
-# --- starts -------------------------------------------------------------------------
+# --- state --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 @pytest.mark.parametrize("picks", [0, 10, 13])
-def test_episodes_begin_again_where_they_began(env_id, picks, rng):
+def test_environments_go_on_from_a_state(env_id, picks, rng):
+    """Others do, whatever they hold, and the same ones, whose state was not changed by picks."""
     envs, other = (gymnasium.make_vec(env_id, 3, max_picks=10).unwrapped for _ in range(2))
-    envs.reset(seed=1)
+    shown = envs.reset(seed=1)
     actions = rng.integers(128, size=(picks + 25, 3))
     for action in actions[:picks]:
-        envs.step(action)
-    starts = envs.starts()
-    again = other.restart(starts)
-    assert_same(other.starts(), starts)
-    for action in actions[picks - picks % 10 : picks]:
-        again = other.step(action)
-    for action in actions[picks:]:
-        assert_same(other.step(action), envs.step(action))
-    assert len(again) >= 2 and starts.dtype.kind == "U"
-
-
-@pytest.mark.parametrize(
-    ("starts", "message"),
-    [
-        (["{}"], r"starts has shape \(1,\); expected \(2,\)"),
-        (None, r"starts has shape \(\)"),
-        *(
-            ([text] * 2, "starts is .*; expected a generator's state")
-            for text in ("", "dice", "{}", 3, '{"bit_generator": "MT19937"}', "[" * 100_000)
-        ),
-    ],
-)
-def test_what_no_episodes_began_from_is_refused(starts, message):
-    envs = ContainerVectorEnv(2)
-    envs.reset(seed=0)
-    before = envs.starts()
-    with pytest.raises(ValueError, match=message):
-        envs.restart(starts)
-    assert_same(envs.starts(), before)
+        shown = envs.step(action)[::4]
+    state = envs.state()
+    observations, infos = other.load_state(state)
+    assert (observations == shown[0]).all()
+    assert (infos["action_mask"] == shown[1]["action_mask"]).all()
+    steps = [envs.step(action) for action in actions[picks:]]
+    for action, step in zip(actions[picks:], steps):
+        assert_same(other.step(action), step)
+    assert_same(other.reset(), envs.reset())
 
 
 def test_results_are_no_views_of_what_the_environments_hold():
     """Whatever is returned stays as it was, and may be written to."""
     envs = ContainerVectorEnv(2)
     seen, infos = envs.reset(seed=0)
-    masks, visible, starts = envs.action_masks(), envs.visible, envs.starts()
-    kept = [seen, infos["action_mask"], infos["unloaded"], masks, visible, starts]
+    masks, visible, state = envs.action_masks(), envs.visible, envs.state()
+    kept = [seen, infos["action_mask"], infos["unloaded"], masks, visible, *state.values()]
     before = [array.copy() for array in kept]
     rows = np.array([seen[0, :, 2].argmax(), seen[1, :, 2].argmin()])
     for _ in range(3):
@@ -315,7 +296,7 @@ def test_results_are_no_views_of_what_the_environments_hold():
     envs, other = ContainerVectorEnv(2), ContainerVectorEnv(2)
     for each in (envs, other):
         each.reset(seed=0)
-    for array in (envs.visible, envs.action_masks(), envs.starts(), envs.step(rows)[0]):
+    for array in (envs.visible, envs.action_masks(), envs.step(rows)[0]):
         array[:] = 0
     other.step(rows)
     assert_same(envs.step(rows), other.step(rows))

@@ -2,14 +2,17 @@
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from studies import changes
 from studies.falls.laboratory import CONFIG
+from studies.seamless.jamming import jam, weigh
 from unload import task
 from unload.agent.config import TrainConfig
+from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training, train_changed
 from unload.env.equalization import equalize
 from unload.load.substacks import stack_load
@@ -112,17 +115,15 @@ def test_failures_are_replaced_by_successes_of_the_same_step():
     assert run.replay.total == 256
 
 
-def test_a_step_without_a_success_stores_the_step_before():
-    run = Training(SMALL)
-    added = []
-    run.replay.add = lambda **picks: added.append(picks)
-    changes.successes_only(run, start=0)
-    won = {"rewards": np.array([1.0, -1.0, 1.0]), "actions": np.array([4, 5, 8])}
-    lost = {"rewards": np.full(3, -1.0), "actions": np.array([6, 7, 9])}
-    run.replay.add(**won)
-    run.replay.add(**lost)
-    run.rollout.close()
-    assert [list(picks["actions"]) for picks in added] == [[4, 8, 4], [4, 8, 4]]
+def test_a_step_without_a_success_stores_what_was_stored_before():
+    """Round the end of the memory, too; the very first step is stored as it is."""
+    replay = ReplayBuffer(5, 1)
+    changes.successes_only(SimpleNamespace(replay=replay), start=0)
+    for rewards, actions in (([-1, -1], [0, 1]), ([1, -1], [4, 5]), ([-1, -1], [6, 7])):
+        replay.add(
+            observations=np.zeros((2, 1, 3)), actions=np.array(actions), rewards=np.array(rewards)
+        )
+    assert list(replay.arrays["actions"]) == [4, 1, 4, 4, 4] and replay.total == 6
 
 
 def test_a_teacher_chooses_by_height_and_its_preference():
@@ -183,26 +184,28 @@ def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
 
 
 @pytest.mark.slow
-def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "change",
+    [
+        changes.shuffled,
+        partial(changes.several, makes=(partial(jam, share=0.4), changes.mirrored)),
+        partial(jam, share=0.4, lasts=1),
+        partial(weigh, z=1.0),
+        partial(changes.successes_only, start=1280),
+        partial(changes.height_reward, share=0.5),
+    ],
+)
+def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, change):
     """Otherwise the long runs would depend on where they were stopped."""
-    whole = train_changed(SMALL, tmp_path / "whole", changes.shuffled, progress=False)
-    steps = []
+    config = replace(SMALL, max_picks=25)
+    whole = train_changed(config, tmp_path / "whole", change, progress=False)
 
-    def stop(run):
-        changes.shuffled(run)
-        step = run.step
+    def stop(point):
+        if point["picks"] == 3840:
+            raise SystemExit
 
-        def step_or_stop():
-            if len(steps) == 60:
-                raise KeyboardInterrupt
-            steps.append(step())
-
-        run.step = step_or_stop
-
-    eager = replace(SMALL, checkpoint_interval=0)
-    with pytest.raises(KeyboardInterrupt):
-        train_changed(eager, tmp_path / "stopped", stop, progress=False)
-    assert (tmp_path / "stopped" / "checkpoint.npz").exists()
-    resumed = train_changed(SMALL, tmp_path / "stopped", changes.shuffled, progress=False)
+    with pytest.raises(SystemExit):
+        train_changed(config, tmp_path / "stopped", change, progress=False, callback=stop)
+    resumed = train_changed(config, tmp_path / "stopped", change, progress=False)
     columns = ["picks", "success_rate", "loss"]
     assert resumed.curve[columns].equals(whole.curve[columns])

@@ -1,9 +1,10 @@
 """The folder of a training run: checkpoint, policy, curve and configuration."""
 
+import errno
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,12 +14,11 @@ import pandas as pd
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.identity import identity, unchanged
-from unload.agent.rollout import Rollout
+from unload.network.variants import make_network
 from unload.support import checks, files
 
-FORMAT = 5  # of the checkpoints
-# Of a ``Training``: what has a state besides the generator.
-STATEFUL = ("agent", "curve", "rollout")
+FORMAT = 6  # of the checkpoints
+LEFTOVER = "." + "[0-9a-f]" * 32 + ".partial"  # what ``files.write_atomically`` adds to a name
 
 
 class TrainResult(NamedTuple):
@@ -39,7 +39,7 @@ class TrainResult(NamedTuple):
 def settings_of(config: TrainConfig, stack: Callable | None, change: Callable) -> dict:
     """What a run is: its configuration, and the identity of its change and stack, None without."""
     change = None if change is unchanged else identity(change)
-    return asdict(config) | {"change": change, "stack": stack and identity(stack)}
+    return config.plain() | {"change": change, "stack": stack and identity(stack)}
 
 
 class RunFolder:
@@ -49,20 +49,17 @@ class RunFolder:
         run_dir: made when it is locked or written to, if it does not exist.
 
     Attributes:
-        path: of the folder.
+        path: of the folder, absolute, so that it stays the same one wherever the process goes.
         checkpoint: the file from which a run that was stopped goes on.
-
-    Raises:
-        TypeError: ``run_dir`` is no path.
-        ValueError: ``run_dir`` is empty.
     """
 
     def __init__(self, run_dir: str | Path) -> None:
-        self.path = checks.path("run_dir", run_dir)
-        if self.path == Path():
+        path = checks.path("run_dir", run_dir)
+        if path == Path():
             raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
+        self.path = path.absolute()
         self.checkpoint = self.path / "checkpoint.npz"
-        self._policy, self._curve = self.path / "policy.safetensors", self.path / "curve.csv"
+        self.policy, self._curve = self.path / "policy.safetensors", self.path / "curve.csv"
         self._config = self.path / "config.json"
 
     @contextmanager
@@ -72,8 +69,8 @@ class RunFolder:
         What a killed process has left half written of the run's files is removed.
         """
         with files.locked(self.path):
-            for path in (self.checkpoint, self._policy, self._curve, self._config):
-                for leftover in self.path.glob(f"{path.name}.*.partial"):
+            for path in (self.checkpoint, self.policy, self._curve, self._config):
+                for leftover in self.path.glob(path.name + LEFTOVER):
                     leftover.unlink()
             yield
 
@@ -82,81 +79,56 @@ class RunFolder:
         """Whether the run has made all its picks."""
         return self._config.exists()
 
+    def check_room(self, run) -> None:
+        """Raise OSError unless the disk has room for the checkpoints of a fresh ``Training``.
+
+        There are two versions of them while one replaces the other, with a full replay memory.
+        """
+        arrays = [*run.state().values(), *run.replay.arrays.values()]
+        needed = 2 * sum(array.nbytes for array in arrays)
+        there = self.checkpoint.stat().st_size if self.checkpoint.exists() else 0
+        room = shutil.disk_usage(self.path).free + there
+        if room < needed:
+            reason = (
+                f"the disk has {room / 1e9:.2f} GB for checkpoints; expected {needed / 1e9:.2f} GB,"
+                " for one and the next one that replaces it"
+            )
+            raise OSError(errno.ENOSPC, reason, str(self.path))
+
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
-        arrays = {
-            f"{part}.{name}": array
-            for part in STATEFUL
-            for name, array in getattr(run, part).state().items()
-        }
-        arrays |= {
-            "format": np.array(FORMAT),
-            "config": np.array(json.dumps(run.settings)),
-            "rng": np.array(json.dumps(run.rng.bit_generator.state)),
-        }
-        files.write_arrays(self.checkpoint, arrays)
+        marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
+        files.write_arrays(self.checkpoint, run.state() | marks)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
         files.write_text(self._curve, run.curve.table().to_csv(index=False))
 
-    def restore(self, run) -> Iterator[int]:
-        """Let a ``Training`` go on from the checkpoint, if there is one.
-
-        Yields:
-            How many picks the checkpoint holds, after each step that is repeated.
-
-        Raises:
-            ValueError: the checkpoint is damaged, or of another configuration, version or stack.
-        """
+    def restore(self, run) -> None:
+        """Let a ``Training`` go on from the checkpoint, if there is one."""
         if not self.checkpoint.exists():
             return
         stored = files.read_arrays(self.checkpoint)
-        checks.entries(str(self.checkpoint), stored, ("config",))
-        if not np.array_equal(stored.get("format"), FORMAT):
+        if not np.array_equal(stored.pop("format", None), FORMAT):
             raise ValueError(
                 f"{self.checkpoint} was written by another version of unload; expected format "
                 f"{FORMAT}. Remove it to start anew, or go on with that version"
             )
         try:
-            config = dict(json.loads(str(stored["config"])))
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{self.checkpoint} holds no configuration: {error}") from error
-        self._check_same(config, run.settings)
-        parts: dict[str, dict[str, np.ndarray]] = {part: {} for part in STATEFUL}
-        for name, array in stored.items():
-            part, _, rest = name.partition(".")
-            if part in parts:
-                parts[part][rest] = array
-        try:
-            run.agent.load_state(parts["agent"])
-            run.curve.load_state(parts["curve"])
-            run.rng.bit_generator.state = json.loads(str(stored["rng"]))
-            first = int(parts["rollout"]["start"])
-            run.replay.total = first * run.config.num_envs
-            picks = run.replay.total + parts["rollout"]["actions"].size
-            for transitions in run.rollout.load_state(parts["rollout"]):
-                run.replay.add(**transitions)
-                yield picks
-        except KeyError as error:
-            raise ValueError(f"{self.checkpoint} has no array {error}; it is damaged") from error
-        except (IndexError, OverflowError, TypeError, ValueError, RuntimeError) as error:
-            raise ValueError(f"{self.checkpoint}: {error}") from error
+            settings = dict(json.loads(str(stored.pop("settings"))))
+            self._check_same(settings, run.settings)
+            run.load_state(stored)
+        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            reason = f"{type(error).__name__}: {error}"
+            raise ValueError(f"{self.checkpoint} does not fit this run: {reason}") from error
 
-    def finish(self, run, first_shown: str) -> None:
-        """Write what a ``Training`` leaves.
-
-        Args:
-            run: at its end.
-            first_shown: digest of its first observations, which shows what loads it was on.
-        """
-        save_policy(run.policy(), self._policy)
+    def finish(self, run) -> None:
+        """Keep what a ``Training`` leaves at its end."""
+        save_policy(run.policy(), self.policy)
         self.save_curve(run)
-        marks = {"first_loads": first_shown}
-        marks |= {path.name: files.digest(path) for path in (self._policy, self._curve)}
-        content = run.settings | {"marks": marks}
+        marks = {path.name: files.digest(path) for path in (self.policy, self._curve)}
         # Last, because it marks the run as finished.
-        files.write_json(self._config, content, checked=True)
+        files.write_json(self._config, run.settings | {"marks": marks}, checked=True)
 
     def result(
         self, config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
@@ -165,28 +137,16 @@ class RunFolder:
 
         Args:
             config, stack, change: of the run, see ``training.train_changed``.
-
-        Raises:
-            ValueError: a file is damaged, or the run is of another configuration or stack.
-            FileNotFoundError: a file is missing.
         """
-        stored = files.read_json(self._config)
-        marks = stored.get("marks")
-        marks = marks if isinstance(marks, dict) else {}
-        stored = {name: stored[name] for name in stored if name != "marks"}
+        stored = files.read_json(self._config, checked=True)
+        marks = stored.pop("marks", {})
         self._check_same(stored, settings_of(config, stack, change))
-        rollout = Rollout(config, 1, stack)
-        rollout.close()
-        if marks.get("first_loads") != rollout.digest():
-            raise ValueError(
-                f"run_dir {str(self.path)!r} holds a run on other loads; expected the stack that "
-                "it was trained with, or an empty folder"
-            )
-        for path in (self._policy, self._curve):
+        for path in (self.policy, self._curve):
             files.check_digest(path, marks.get(path.name))
         with suppress(OSError):  # it is gone already, or the folder is read-only
             self.checkpoint.unlink()
-        return TrainResult(load_policy(self._policy), pd.read_csv(self._curve))
+        network = make_network(config.network, config.n_features)
+        return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve))
 
     def _check_same(self, stored: dict, settings: dict) -> None:
         """Raise ValueError unless stored settings are ``settings``."""

@@ -1,9 +1,11 @@
 """The configuration of a training run (Sec. IV-B)."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from unload.agent.identity import identity
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.variants import HEADS, NETWORKS
@@ -30,7 +32,8 @@ class TrainConfig:
         gamma: discount (Sec. III-E).
         beta: threshold of the smooth-L1 loss (Sec. III-G).
         network: ``"peq"`` (Sec. III-G); the others, in ``unload.network.variants``, take padded
-            rows for items in training.
+            rows for items in training. Or a function ``(n_features, generator)`` that makes a
+            network of your own, see ``unload.network.variants.make_network``.
         n_features: * n, features per item.
         equalize: whether observations are equalized (Sec. III-F).
         ties: * ``"noise"`` or ``"average"``, see ``unload.equalize``.
@@ -41,7 +44,7 @@ class TrainConfig:
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve.
-        checkpoint_interval: * seconds.
+        checkpoint_interval: * seconds between two checkpoints.
 
     Raises:
         TypeError, ValueError: a field is not as described, or the picks are too few to learn from.
@@ -60,7 +63,7 @@ class TrainConfig:
     epsilon_fraction: float = 0.5
     gamma: float = 0.0
     beta: float = 1.0
-    network: str = "peq"
+    network: str | Callable = "peq"
     n_features: int = 64
     equalize: bool = True
     ties: str = "noise"
@@ -70,10 +73,12 @@ class TrainConfig:
     gradient_steps: int = 1
     target_update_interval: int = 10_000
     log_interval: int = 500
-    checkpoint_interval: float = 60.0
+    checkpoint_interval: float = 600.0
 
     def __post_init__(self) -> None:
         for name, options in (("env", ENVS), ("ties", TIES), ("network", NETWORKS)):
+            if name == "network" and callable(self.network):
+                continue
             checks.one_of(name, getattr(self, name), options)
             self._set(name, str(getattr(self, name)))
         for name in ("equalize", "mask", "shuffle_places"):
@@ -120,6 +125,10 @@ class TrainConfig:
     def _set(self, name: str, value: object) -> None:
         """Keep a checked value as one of Python's own types, which JSON can hold."""
         object.__setattr__(self, name, value)
+
+    def plain(self) -> dict:
+        """Return the fields by name as JSON can hold them, of a function its identity."""
+        return {field.name: identity(getattr(self, field.name)) for field in fields(self)}
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""

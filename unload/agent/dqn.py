@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from unload.agent.greedy import check_network
-from unload.agent.learner import PlainLearner
+from unload.agent.learner import PlainLearner, flat, grouped
 from unload.agent.policies import any_allowed
 from unload.fast import fused
 from unload.fast.learner import FusedLearner
@@ -31,10 +31,6 @@ class DQN:
     Attributes:
         learner: the ``PlainLearner`` or ``FusedLearner`` that chooses and updates.
         target: the target network's weights by name.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described, or ``fused_update`` is asked
-            for and does not apply.
     """
 
     def __init__(
@@ -80,9 +76,6 @@ class DQN:
 
         Returns:
             (batch,) int64.
-
-        Raises:
-            ValueError, FloatingPointError: a row allows no action, or none of a finite value.
         """
         explore = rng.random(len(observations)) < epsilon
         exploit = ~explore
@@ -118,9 +111,6 @@ class DQN:
         Returns:
             A function that completes the update, returns the loss and may raise as ``update``
             does. The weights stay as they are until it is called, and so must the arrays.
-
-        Raises:
-            TypeError, ValueError: as ``update`` does.
         """
         names = ["observations", "actions", "rewards"]
         if self.gamma == 0:
@@ -159,23 +149,15 @@ class DQN:
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of weights, target weights and optimizer state, to go on from later."""
-        groups = {
-            "network": {k: v.numpy().copy() for k, v in self.network.state_dict().items()},
-            "target": {k: v.numpy().copy() for k, v in self.target.items()},
-            "adam": self.learner.state(),
-        }
-        return {f"{group}.{k}": v for group, arrays in groups.items() for k, v in arrays.items()}
+        weights = {"network": self.network.state_dict(), "target": self.target}
+        return flat(
+            {name: {k: v.numpy().copy() for k, v in each.items()} for name, each in weights.items()}
+            | {"adam": self.learner.state()}
+        )
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned.
-
-        Raises:
-            KeyError, RuntimeError: an array is missing or of another shape.
-        """
-        groups: dict[str, dict[str, np.ndarray]] = {"network": {}, "target": {}, "adam": {}}
-        for name, array in arrays.items():
-            group, _, rest = name.partition(".")
-            groups[group][rest] = array
+        """Go on from what ``state`` returned."""
+        groups = grouped(arrays)
         self.network.load_state_dict(_tensors(groups["network"]))
         target = _tensors(groups["target"])
         self.target = {name: target[name] for name in self.target}

@@ -26,10 +26,6 @@ def success_rate(rewards: np.ndarray) -> float:
 
     Args:
         rewards: any shape, not empty, each +1 or -1.
-
-    Raises:
-        TypeError: ``rewards`` does not hold numbers.
-        ValueError: ``rewards`` is empty or holds another value.
     """
     rewards = checks.finite_array("rewards", rewards, None)
     if rewards.size == 0:
@@ -125,26 +121,36 @@ def _play(
     picks, failures = np.zeros((2, len(seeds)), np.int64)  # so far, and failed ones in a row
     observations, infos = envs.reset(seed=seeds)  # type: ignore[arg-type]
     while True:
+        # An episode is over where the mask tells the policy that every item has failed.
         allowed = infos["action_mask" if mask else "item_mask"]
-        hopeless = ~allowed.any(axis=1)  # the policy knows of every item that it has failed
+        hopeless = ~allowed.any(axis=1)
         running &= ~hopeless
         if not running.any():
             break
+
+        # A policy needs a choice in every row, also where the episode is over; what it returns
+        # is checked before anything is picked, because it may be anybody's.
         allowed = np.where(hopeless[:, np.newaxis], infos["item_mask"], allowed)
         actions = checks.integer_array(
             "what policy returned", policy(observations, allowed, rng), rows.shape
         )
         for action in (int(actions.min()), int(actions.max())):
             checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
+
+        # The masks of before the pick say whether its item had failed already.
         deadlocked.append(infos["action_mask"][rows, actions] == 0)
         observations, reward, terminations, truncations, infos = envs.step(actions)
         rewards.append(reward)
+
+        # An environment whose episode has ended goes on with the next one, which does not count.
         picks += running
         failures = np.where(reward > 0, 0, failures + 1)
         emptied |= running & terminations
         running &= ~(terminations | truncations)
         if give_up:
             running &= failures < GIVE_UP
+
+    # Of each environment, the picks of its own episode, which came first.
     rewards, deadlocked = (
         [each[:count] for count, each in zip(picks, np.transpose(steps))]
         for steps in (rewards, deadlocked)

@@ -1,6 +1,7 @@
 """The greedy choice among the allowed items; the policy of a trained network, and its file."""
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
 from unload.fast import fused
-from unload.network.variants import NETWORKS
+from unload.network.variants import NETWORKS, make_network
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
 
@@ -43,10 +44,6 @@ def greedy_actions(
 
     Returns:
         (batch,) int64.
-
-    Raises:
-        TypeError, ValueError: see ``unload.agent.policies.check_batch``.
-        FloatingPointError: see ``highest_values``.
     """
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
@@ -67,9 +64,6 @@ class Greedy:
         ties: see ``unload.equalize``.
         card: what is known of the policy, as JSON can hold it, such as the ``configuration``
             that it was trained with, the ``loads``, and its ``msr``; None if nothing is.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(
@@ -106,9 +100,6 @@ class Greedy:
 
         Args:
             observations: (batch, items, 3) float, not equalized.
-
-        Raises:
-            TypeError, ValueError: ``observations`` is not as described.
         """
         observations = checks.finite_array("observations", observations, (None, None, 3))
         observations, present = self._seen(observations)
@@ -129,14 +120,13 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     this, so that a damaged one is not read.
 
     Raises:
-        TypeError: ``policy`` is no ``Greedy`` of one of ``unload.network.variants.NETWORKS``,
-            its weights are not float32, or JSON cannot hold its card.
+        TypeError: ``policy`` is no ``Greedy``, its weights are not float32, or JSON cannot hold
+            its card.
         ValueError: ``path`` is empty or a folder.
         OSError: the file cannot be written.
     """
-    if not (isinstance(policy, Greedy) and type(policy.network) in NETWORKS.values()):
-        known = ", ".join(kind.__name__ for kind in NETWORKS.values())
-        raise TypeError(f"policy is {policy!r}; expected a Greedy of one of {known}")
+    if not isinstance(policy, Greedy):
+        raise TypeError(f"policy is {policy!r}; expected an unload.Greedy")
     card = {"version": task.VERSION} | (policy.card or {})
     try:
         held = json.loads(json.dumps(card)) == card
@@ -148,16 +138,19 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
     write_weights(path, "policy", settings, policy.network.state_dict())
 
 
-def load_policy(path: str | Path) -> Greedy:
+def load_policy(path: str | Path, network: torch.nn.Module | None = None) -> Greedy:
     """Read a policy that ``save_policy`` wrote; printed, it shows its card.
 
     Args:
         path: of the file, or the name of a policy that comes with the package, such as
             ``"recommended"``.
+        network: takes the weights in; a fresh one if None. A policy of a network that is none of
+            the package's needs one of its kind.
 
     Raises:
         FileNotFoundError: there is no such file; the message lists the known names.
-        ValueError: the file is not one of a policy, is damaged, or its tensors do not fit.
+        ValueError: the file is not one of a policy, is damaged, or its tensors do not fit
+            ``network``.
     """
     file = SHIPPED.get(str(path), checks.path("path", path))
     if not file.is_file():
@@ -165,26 +158,41 @@ def load_policy(path: str | Path) -> Greedy:
             f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "
             + ", ".join(map(repr, SHIPPED))
         )
-    return read_weights(file, "policy", policy_of)
+    return read_weights(file, "policy", partial(policy_of, network=network))
 
 
 def settings_of(policy: Greedy) -> dict:
     """What ``policy_of`` needs of a policy besides its weights, as JSON can hold it."""
     return {
-        "network": type(policy.network).__name__,
-        "n_features": policy.network.n_features,
+        "network": _kind(policy.network),
+        "n_features": getattr(policy.network, "n_features", None),
         "equalize": policy.equalize,
         "ties": policy.ties,
     }
 
 
-def policy_of(settings: dict, tensors: dict[str, torch.Tensor]) -> Greedy:
+def policy_of(
+    settings: dict, tensors: dict[str, torch.Tensor], network: torch.nn.Module | None = None
+) -> Greedy:
     """The policy of ``settings_of``, with its ``card`` if they hold one, and of its weights.
 
-    Raises:
-        KeyError, TypeError, RuntimeError: they do not fit.
+    Args:
+        settings, tensors: of the policy.
+        network: see ``load_policy``.
     """
-    kinds = {kind.__name__: kind for kind in NETWORKS.values()}
-    network = kinds[settings["network"]](settings["n_features"])
+    if network is None:
+        names = {kind.__name__: name for name, kind in NETWORKS.items()}
+        if settings["network"] not in names:
+            raise ValueError(f"it is of a {settings['network']}; expected one as network, too")
+        network = make_network(names[settings["network"]], settings["n_features"])
+    elif _kind(network) != settings["network"]:
+        raise ValueError(f"it is of a {settings['network']}; expected one, not {_kind(network)}")
     network.load_state_dict(tensors)
     return Greedy(network, settings["equalize"], settings["ties"], settings.get("card"))
+
+
+def _kind(network: torch.nn.Module) -> str:
+    """The name by which a file tells what its network is; those of the package have short ones."""
+    kind = type(network)
+    known = kind in NETWORKS.values()
+    return kind.__name__ if known else f"{kind.__module__}.{kind.__qualname__}"

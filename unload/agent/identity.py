@@ -1,14 +1,13 @@
 """What a run is besides its configuration: the functions that were handed to it, as data.
 
-A configuration says nothing of a change or a stack of the caller's own. Without their identity, a
-finished run would be taken for another one that was made by a different function.
+A configuration says nothing of a change, a stack or a network of the caller's own. Without their
+identity, a finished run would be taken for another one that was made by a different function.
 """
 
 import ast
 import inspect
 import json
 import textwrap
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import partial
 from hashlib import blake2b
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 
 PLAIN = (bool, int, float, str, type(None))
-# Values whose content is told; of other objects that a function uses, nothing is.
+# Values whose content counts; of other objects that a function uses, nothing does.
 HELD = (*PLAIN, list, tuple, range, dict, np.ndarray, np.generic, partial)
 
 
@@ -26,11 +25,12 @@ def unchanged(run) -> None:
     """The change that leaves a ``Training`` as its configuration has it."""
 
 
-def identity(value: Any) -> Any:
+def identity(value: Any, within: frozenset = frozenset()) -> Any:
     """What a function or one of its arguments is, as JSON can hold it.
 
     Args:
         value: a function, also a ``functools.partial``, or what it holds.
+        within: the functions of whose content this is a part, which are given by name.
 
     Returns:
         Plain values as they are. Of a function its qualified name and a digest of its source, of
@@ -44,31 +44,33 @@ def identity(value: Any) -> Any:
         return value
     if isinstance(value, np.generic):
         return value.item()
-    if isinstance(value, partial):
-        given = [identity(each) for each in value.args]
-        named = {name: identity(each) for name, each in sorted(value.keywords.items())}
-        return {"function": identity(value.func), "arguments": given, "keywords": named}
     if isinstance(value, (list, tuple, range)):
-        return [identity(each) for each in value]
+        return [identity(each, within) for each in value]
     if isinstance(value, dict):
-        return {str(name): identity(each) for name, each in value.items()}
+        return {str(name): identity(each, within) for name, each in value.items()}
+    if isinstance(value, partial):
+        given, named = identity(value.args, within), identity(value.keywords, within)
+        named = {name: named[name] for name in sorted(named)}
+        return {"function": identity(value.func, within), "arguments": given, "keywords": named}
     if isinstance(value, MethodType):
-        return {"function": identity(value.__func__), "of": identity(value.__self__)}
+        function, owner = identity(value.__func__, within), identity(value.__self__, within)
+        return {"function": function, "of": owner}
     if isinstance(value, (FunctionType, type)):
         name = f"{value.__module__}.{value.__qualname__}"
-        if _package(value) == "unload":
+        if _package(value) == "unload" or value in within:
             return name
         digest = blake2b(digest_size=8)
-        _absorb(value, _package(value), digest, set())
+        _absorb(value, _package(value), digest, set(within))
         return f"{name} {digest.hexdigest()}"
     name = f"{type(value).__module__}.{type(value).__qualname__}"
     if isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
-    elif is_dataclass(value):
-        held = {field.name: identity(getattr(value, field.name)) for field in fields(value)}
-        content = json.dumps(held).encode()
     elif callable(value) and hasattr(value, "__dict__"):
-        content = json.dumps([identity(type(value)), identity(vars(value))]).encode()
+        held = [identity(type(value), within), identity(vars(value), within)]
+        content = json.dumps(held).encode()
+    elif is_dataclass(value):
+        parts = {each.name: identity(getattr(value, each.name), within) for each in fields(value)}
+        content = json.dumps(parts).encode()
     else:
         return name
     return f"{name} {blake2b(content, digest_size=8).hexdigest()}"
@@ -78,34 +80,62 @@ def _package(value: Any) -> str:
     return (value.__module__ or "").partition(".")[0]
 
 
-def _absorb(value: Any, package: str, digest, seen: set[str]) -> None:
+def _absorb(value: Any, package: str, digest, seen: set) -> None:
     """Add to a digest a function or class, and what it uses of its own package."""
-    name = f"{value.__module__}.{value.__qualname__}"
-    if name in seen:  # functions may call each other
+    if value in seen:  # functions may call each other
         return
-    seen.add(name)
-    digest.update(f"{name}\n{_source(value)}\n".encode())
-    methods = vars(value).values() if isinstance(value, type) else [value]
-    for function in methods:
-        if not isinstance(function, FunctionType):
-            continue
-        used = [cell.cell_contents for cell in function.__closure__ or ()] + _used(function)
-        for each in used:
-            if isinstance(each, (FunctionType, type)):
-                if _package(each) == package:
-                    _absorb(each, package, digest, seen)
-            elif isinstance(each, HELD) or is_dataclass(each):
-                digest.update(json.dumps(identity(each)).encode())
+    seen.add(value)
+    digest.update(f"{value.__module__}.{value.__qualname__}\n".encode())
+    if isinstance(value, type):  # its own source is not to be had where it stands in a notebook
+        members = [
+            each
+            for name, each in vars(value).items()
+            if isinstance(each, FunctionType) or not name.startswith("__")
+        ]
+        functions = [getattr(each, "__func__", getattr(each, "fget", each)) for each in members]
+        used = [*value.__bases__, *functions]
+    else:
+        tree = _tree(value)
+        source = _bytecode(value.__code__) if tree is None else ast.unparse(tree)
+        digest.update(f"{source}\n".encode())
+        used = _used(value, tree)
+    for each in used:
+        if not isinstance(each, FunctionType):  # a cached one, whose cache encloses it
+            each = inspect.unwrap(each) if callable(each) else each
+        if isinstance(each, (FunctionType, type)):
+            if _package(each) == package:
+                _absorb(each, package, digest, seen)
+        elif isinstance(each, HELD) or is_dataclass(each):
+            digest.update(json.dumps(identity(each, frozenset(seen))).encode())
 
 
-def _used(function: FunctionType) -> list[Any]:
-    """The global values that a function names, and what it takes from modules of its package."""
+def _used(function: FunctionType, tree: Any) -> list[Any]:
+    """What a function encloses, its defaults, and the values that it names.
+
+    Of modules of its package, these are the values that it may take from them.
+    """
+    used = [cell.cell_contents for cell in function.__closure__ or ()]
+    defaults = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
+    if tree is not None:  # a default that is written out stands in the source already
+        written = [*tree.args.defaults, *filter(None, tree.args.kw_defaults)]
+        defaults = [
+            value for value, node in zip(defaults, written, strict=True) if not _literal(node)
+        ]
+    used += defaults
     names = _names(function.__code__)
     held = [function.__globals__[name] for name in names if name in function.__globals__]
     for module in [each for each in held if isinstance(each, ModuleType)]:
         if module.__name__.partition(".")[0] == _package(function):
             held += [vars(module)[name] for name in names if name in vars(module)]
-    return held
+    return used + held
+
+
+def _literal(node: ast.AST) -> bool:
+    try:
+        ast.literal_eval(node)
+    except ValueError:
+        return False
+    return True
 
 
 def _names(code: CodeType) -> list[str]:
@@ -117,21 +147,21 @@ def _names(code: CodeType) -> list[str]:
     return names
 
 
-def _source(value: Callable) -> str:
-    """The source of a function or class without comments and docstrings, or its bytecode."""
+def _tree(function: FunctionType) -> ast.AST | None:
+    """The syntax of a function without docstrings; None where there is no source."""
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(value)))
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function.__code__)))
     except (OSError, TypeError, SyntaxError):  # typed at a prompt, or a part of a statement
-        return _bytecode(value)
-    if value.__name__ == "<lambda>":
+        return None
+    if function.__name__ == "<lambda>":
         found = [node for node in ast.walk(tree) if isinstance(node, ast.Lambda)]
-        return ast.unparse(found[0]) if len(found) == 1 else _bytecode(value)
+        return found[0] if len(found) == 1 else None
     for node in ast.walk(tree):
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and ast.get_docstring(node):
             node.body = node.body[1:] or [ast.Pass()]
-    return ast.unparse(tree)
+    return tree.body[0]
 
 
-def _bytecode(value: Any) -> str:
-    code = getattr(value, "__code__", None)
-    return "" if code is None else f"{code.co_code!r} {code.co_names} {code.co_consts!r}"
+def _bytecode(code: CodeType) -> str:
+    constants = [_bytecode(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
+    return f"{code.co_code!r} {code.co_names} {constants}"

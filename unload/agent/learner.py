@@ -4,12 +4,15 @@ This is the version to read first. ``unload.fast.learner`` does the same for the
 network on a CPU, a few hundred times faster; a test holds the two equal.
 """
 
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
 from torch.nn.functional import smooth_l1_loss
 
+Each = TypeVar("Each")
 # Rows of a batch per backward pass, because what a pass stores then stays in the cache.
 ROWS_PER_PASS = 64
 
@@ -68,19 +71,30 @@ class PlainLearner:
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of Adam's moments, by parameter number and name."""
-        return {
-            f"{number}.{key}": value.numpy().copy()
-            for number, moments in self.optimizer.state_dict()["state"].items()
-            for key, value in moments.items()
-        }
+        moments = self.optimizer.state_dict()["state"]
+        return {name: value.numpy().copy() for name, value in flat(moments).items()}
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what ``state`` returned."""
-        moments: dict[int, dict[str, torch.Tensor]] = {}
-        for name, array in arrays.items():
-            number, _, key = name.partition(".")
-            moments.setdefault(int(number), {})[key] = torch.from_numpy(np.array(array))
+        moments = {
+            int(number): {key: torch.from_numpy(np.array(array)) for key, array in each.items()}
+            for number, each in grouped(arrays).items()
+        }
         self.optimizer.load_state_dict({**self.optimizer.state_dict(), "state": moments})
+
+
+def flat(groups: Mapping[Any, Mapping[str, Each]]) -> dict[str, Each]:
+    """What stands in groups, by ``<group>.<name>``, as a file of arrays holds it."""
+    return {f"{group}.{name}": each for group in groups for name, each in groups[group].items()}
+
+
+def grouped(arrays: Mapping[str, Each]) -> dict[str, dict[str, Each]]:
+    """The groups of ``flat``, by name; one that is missing is empty."""
+    groups: dict[str, dict[str, Each]] = defaultdict(dict)
+    for name, array in arrays.items():
+        group, _, rest = name.partition(".")
+        groups[group][rest] = array
+    return groups
 
 
 @torch.no_grad()
@@ -115,10 +129,6 @@ def highest_values(
 
     Returns:
         (batch,) int64.
-
-    Raises:
-        FloatingPointError: a row has no allowed action, or an allowed action's value is not
-            finite.
     """
     values = action_values(network, observations, present)
     values = values.masked_fill(torch.from_numpy(~allowed), -torch.inf)

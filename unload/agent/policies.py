@@ -15,13 +15,7 @@ from unload.support import checks
 
 
 def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the observations as a float64 array and the masks as bool.
-
-    Raises:
-        TypeError: observations or masks that are not numbers.
-        ValueError: shapes that are not (batch, items, 3) and (batch, items), an observation
-            that is not finite, a mask other than 0 and 1, or one that allows no item at all.
-    """
+    """Return the observations as a float64 array and the masks as bool."""
     observations = checks.finite_array("observations", observations, (None, None, 3))
     allowed = checks.flag_array("masks", masks, observations.shape[:2])
     if not allowed.any(axis=1).all():
@@ -37,11 +31,7 @@ def random(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
 
 
 def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """An allowed action, each with the same probability, (batch,) int64.
-
-    Raises:
-        ValueError: a row allows none.
-    """
+    """An allowed action, each with the same probability, (batch,) int64."""
     draws = np.where(allowed, rng.random(allowed.shape), -1.0)
     if (draws.max(axis=1) < 0).any():
         raise ValueError("allowed is False in a whole row; expected at least one item to pick")

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from unload import task
+from unload.agent.config import TrainConfig
+
 
 def shuffle_places(
     observations: np.ndarray, rng: np.random.Generator, present: np.ndarray | None = None
@@ -60,6 +63,12 @@ class ReplayBuffer:
             name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
         }
 
+    @classmethod
+    def of(cls, config: TrainConfig) -> "ReplayBuffer":
+        """The memory of a run, still empty; the machine gives it room as it is filled."""
+        size = min(config.replay_size, config.picks)
+        return cls(size, task.N_VISIBLE, next_state=config.gamma > 0)
+
     def __len__(self) -> int:
         return min(self.total, self.size)
 
@@ -83,6 +92,20 @@ class ReplayBuffer:
         for name, array in self.arrays.items():
             array[slots] = batch[name]
         self.total += count
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return what ``load_state`` needs to go on from here: views of the slots in use."""
+        filled = {name: array[: len(self)] for name, array in self.arrays.items()}
+        return filled | {"total": np.array(self.total)}
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` returned; arrays that are full are kept, not copied."""
+        self.total = int(arrays["total"])
+        for name, array in self.arrays.items():
+            if len(self) == self.size:
+                self.arrays[name] = arrays[name]
+            else:
+                array[: len(self)] = arrays[name]
 
     def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
         """Draw slots of picks that were added, uniformly, with replacement, (batch_size,) int64."""

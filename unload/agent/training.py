@@ -1,5 +1,6 @@
 """The training loop (Sec. II-B and IV-B): ε-greedy picks, replay, updates, learning curve."""
 
+import json
 import signal
 import sys
 import threading
@@ -8,7 +9,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from typing import TextIO
@@ -18,16 +18,16 @@ import pandas as pd
 import torch
 from tqdm import tqdm
 
-from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult, settings_of
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy
 from unload.agent.identity import unchanged
+from unload.agent.learner import flat, grouped
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
-from unload.network.variants import NETWORKS
+from unload.network.variants import make_network
 from unload.physics.table import shared_table
 from unload.support import checks
 
@@ -35,7 +35,6 @@ CURVE_COLUMNS = (
     "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
 )  # fmt: skip
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
-SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 # PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
 INSTRUCTIONS = ("AVX2", "AVX512")
 
@@ -45,7 +44,7 @@ class Curve:
 
     Attributes:
         points: one tuple of ``CURVE_COLUMNS`` each, see ``TrainResult``.
-        sums: by the names in ``SUMS``.
+        sums: of ``picks``, ``rewards``, ``deadlocked``, ``updates`` and ``losses``.
     """
 
     def __init__(self) -> None:
@@ -53,7 +52,8 @@ class Curve:
         self._start_point()
 
     def _start_point(self) -> None:
-        self.sums = dict.fromkeys(SUMS, 0.0)
+        names = ("picks", "rewards", "deadlocked", "updates", "losses")
+        self.sums = dict.fromkeys(names, 0.0)
 
     def add(self, rewards: np.ndarray, deadlocked: np.ndarray, losses: Iterable[float]) -> None:
         """Count one step.
@@ -86,16 +86,6 @@ class Curve:
         """Return one row per point, with the columns ``CURVE_COLUMNS``."""
         return pd.DataFrame(self.points, columns=CURVE_COLUMNS)
 
-    def state(self) -> dict[str, np.ndarray]:
-        """Return what ``load_state`` needs to go on from here."""
-        points = np.array(self.points, dtype=np.float64).reshape(-1, len(CURVE_COLUMNS))
-        return {"points": points, "sums": np.array([self.sums[name] for name in SUMS])}
-
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned."""
-        self.points = [(int(picks), *means) for picks, *means in arrays["points"].tolist()]
-        self.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
-
 
 @cache  # once; Python's own filter forgets where another module changes filters
 def warn_of_other_bits(instructions: str) -> None:
@@ -117,6 +107,7 @@ class Training:
         change: is made at the end, see ``train_changed``.
 
     Attributes:
+        settings: what the run is, as JSON can hold it.
         rollout: the environments and the picks made in them.
         agent: the ``DQN``.
         replay: the picks that the agent learns from.
@@ -135,43 +126,52 @@ class Training:
         _, rng_seed, weights_seed = config.seeds()
         self.rng = np.random.default_rng(rng_seed)
         generator = torch.Generator().manual_seed(weights_seed)
-        network = NETWORKS[config.network](config.n_features, generator)
+        network = make_network(config.network, config.n_features, generator)
         self.agent = DQN(network, config.learning_rate, config.gamma, config.beta)
-        self.replay = ReplayBuffer(
-            min(config.replay_size, config.picks),
-            task.N_VISIBLE,
-            next_state=config.gamma > 0,
-        )
+        self.replay = ReplayBuffer.of(config)
         self.curve = Curve()
-        self.rollout = Rollout(config, self.replay.size, stack)
+        self.rollout = Rollout(config, stack)
         change(self)
 
     def step(self) -> None:
-        """Pick once in every environment, and learn from the picks before.
-
-        The update is begun before the picks, because the fused one can then be computed while
-        the environments step; it never learns from the picks of its own step.
-        """
+        """Pick once in every environment, and learn from the picks before."""
         config, rollout = self.config, self.rollout
+
+        # The update is begun before the picks, because the fused one can then be computed while
+        # the environments step; it never learns from the picks of its own step.
         enough = len(self.replay) >= min(config.batch_size, self.replay.size)
         updates = config.gradient_steps if enough else 0
         finish_update = self.start_update() if updates else None
 
+        # Whether a pick is deadlocked must be asked before it changes the masks.
         epsilon = config.epsilon(rollout.picks)
         actions = self.agent.choose(rollout.observations, rollout.allowed, epsilon, self.rng)
         deadlocked = rollout.deadlocked(actions)
-        rewards, transitions = rollout.pick(actions)
+        picks, distances = rollout.pick(actions)
 
+        # Further updates come one after the other, because each needs the weights of the last.
         losses = [finish_update()] if updates else []
         for _ in range(1, updates):
             losses.append(self.start_update()())
-        self.replay.add(**transitions)
+
+        # The curve shows the environment's rewards, whatever is learned from.
+        self.curve.add(picks["rewards"], deadlocked, losses)
+        self.replay.add(**picks | {"rewards": self.reward(picks, distances)})
         if config.gamma > 0 and rollout.picks % config.target_update_interval < config.num_envs:
             self.agent.update_target()
-
-        self.curve.add(rewards, deadlocked, losses)
         if rollout.steps % config.log_interval == 0 or rollout.finished:
             self.curve.end_point(rollout.picks, epsilon)
+
+    def reward(self, picks: dict[str, np.ndarray], distances: np.ndarray) -> np.ndarray:
+        """Return what picks are worth in learning; a change may put another function here.
+
+        Args:
+            picks: of a step, ``observations``, ``actions``, ``rewards`` and so on, as
+                ``ReplayBuffer`` holds them.
+            distances: (num_envs,) float64, how far each item was lifted in m, NaN in a task
+                without lifts.
+        """
+        return picks["rewards"]
 
     def start_update(self) -> Callable[[], float]:
         """Begin an update by a batch of the replay, see ``DQN.start_update``."""
@@ -180,15 +180,40 @@ class Training:
 
     def policy(self) -> Greedy:
         """Return a copy of what has been learned so far, with a card."""
-        config = self.config
+        config, settings = self.config, dict(self.settings)
         card = {
-            "configuration": asdict(config),
-            "change": self.settings["change"],
-            "loads": self.settings["stack"] or "the paper's",
+            "change": settings.pop("change"),
+            "loads": settings.pop("stack") or "the paper's",
+            "configuration": settings,
             "picks": self.rollout.picks,
             "msr": {"at the end of its training": self.curve.table()["success_rate"].iloc[-1]},
         }
         return Greedy(deepcopy(self.agent.network), config.equalize, config.ties, card)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return what ``load_state`` needs to go on from here; the replay memory is not copied."""
+        parts = {
+            "agent": self.agent.state(),
+            "envs": self.rollout.envs.state(),
+            "replay": self.replay.state(),
+        }
+        rest = {
+            "steps": self.rollout.steps,
+            "points": self.curve.points,
+            "sums": self.curve.sums,
+            "rng": self.rng.bit_generator.state,
+        }
+        return flat(parts) | {"rest": np.array(json.dumps(rest))}
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Go on from what ``state`` returned."""
+        parts = grouped(arrays)
+        rest = json.loads(str(arrays["rest"]))
+        self.agent.load_state(parts["agent"])
+        self.replay.load_state(parts["replay"])
+        self.rollout.resume(rest["steps"], parts["envs"])
+        self.curve.points, self.curve.sums = list(map(tuple, rest["points"])), rest["sums"]
+        self.rng.bit_generator.state = rest["rng"]
 
 
 def train(
@@ -203,11 +228,15 @@ def train(
 
     A run that was interrupted and resumed gives the same weights and curves, bit by bit but
     for the wall times, as one that was not, and so does one that was killed: it goes on
-    from its last checkpoint. Ctrl-C writes one first; pressed again, it stops at once. A
-    finished run is not repeated. The same configuration gives the same bits on all x86-64
-    processors with AVX2, with AVX-512 or without; a run on another one warns. The updates use
-    ``torch.get_num_threads()`` threads; with the paper's network they go on while the
-    environments step, and the result does not depend on the number of threads.
+    from its last checkpoint. A finished run is not repeated. The same configuration gives the
+    same bits on all x86-64 processors with AVX2, with AVX-512 or without; a run on another one
+    warns. The updates use ``torch.get_num_threads()`` threads; with the paper's network they go
+    on while the environments step, and the result does not depend on the number of threads.
+
+    A checkpoint is written every ``config.checkpoint_interval`` seconds, on Ctrl-C, which pressed
+    again stops at once, and after an error in ``callback``. It holds all that the run is, also
+    its replay memory, 1.6 GB with the paper's configuration and twice that with gamma > 0, and
+    needs twice that room on the disk while a new one replaces it. The end of the run removes it.
 
     Args:
         config: what to train.
@@ -216,13 +245,13 @@ def train(
             ``pandas.read_csv("runs/mine/curve.csv").plot("picks", ["success_rate", "loss"])``
             draws it at any time.
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
-        stack: makes the loads, as in ``ContainerEnv``; the paper's if None. It must make the
-            same load whenever it is called with a generator in the same state.
+        stack: makes the loads, as in ``ContainerEnv``; the paper's if None. What it makes must
+            depend on its generator alone; otherwise a resumed run would differ.
         lifts: file in which the lifts that PyBullet has computed are kept, because loads whose
             boxes have other sizes need many of them. Read at the start if it exists, and filled
             up with each checkpoint and when the run ends, for whatever reason; runs, one after
             the other or side by side, may share it. It changes the speed of a run and nothing
-            else; without it, a resumed run simulates the lifts of the repeated picks again.
+            else.
         callback: is called at each point of the curve with that point, a dict by the columns of
             ``TrainResult.curve``: ``picks``, ``success_rate``, ``loss`` and so on. A run that is
             resumed calls it for new points only; an error in it ends the run.
@@ -234,16 +263,15 @@ def train(
         TypeError: an argument is not of the kind described.
         ValueError: ``run_dir`` is empty, or holds another configuration, another stack or a
             damaged file; ``stack`` or ``lifts`` is given for an environment without loads;
-            ``stack`` does not make the same load again; ``lifts`` is empty or a folder, or its
-            file is damaged, or of another physics.
-        OSError: ``run_dir`` is a file, cannot be written, or holds a finished run of which a file
-            is missing; ``lifts`` cannot be written.
+            ``lifts`` is empty or a folder, or its file is damaged, or of another physics.
+        OSError: ``run_dir`` is a file, cannot be written, has no room for checkpoints, or holds a
+            finished run of which a file is missing; ``lifts`` cannot be written.
         RuntimeError: another process is training in ``run_dir``; the message names it.
         FloatingPointError: the loss or a weight is no longer finite; the message names the
             pick, and the last checkpoint, if there is one, is kept.
         KeyboardInterrupt: after Ctrl-C, naming the folder to go on from.
-        Exception: what ``callback`` raises, after a checkpoint, or ``stack``, where the run goes
-            on from the last checkpoint.
+        BaseException: what ``callback`` raises, after a checkpoint, or ``stack``, where the run
+            goes on from the last checkpoint.
     """
     return train_changed(config, run_dir, unchanged, progress, stack, lifts, callback)
 
@@ -257,7 +285,14 @@ def train_changed(
     lifts: str | Path | None = None,
     callback: Callable[[dict[str, float]], None] | None = None,
 ) -> TrainResult:
-    """``train`` with something changed that no ``TrainConfig`` offers, for an experiment.
+    """``train`` with something changed that no ``TrainConfig`` offers, such as the reward.
+
+    This one learns that a pick is worth the metres by which it lifts::
+
+        def metres(run):
+            run.reward = lambda picks, distances: distances
+
+        train_changed(TrainConfig(), "runs/metres", metres)
 
     Args:
         config, run_dir, progress, stack, lifts, callback: see ``train``.
@@ -280,13 +315,12 @@ def train_changed(
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
-    if lifts is not None:
-        checks.file("lifts", lifts)
+    table = None if lifts is None else checks.file("lifts", lifts).absolute()
 
     def keep_lifts() -> None:
         try:
-            if lifts is not None:
-                shared_table().exchange(lifts)
+            if table is not None:
+                shared_table().exchange(table)
         except ValueError as error:
             raise ValueError(f"lifts: {error}") from error
 
@@ -298,7 +332,10 @@ def train_changed(
         if not folder.finished:  # by another process meanwhile
             run = Training(config, stack, change)
             try:
+                folder.check_room(run)
+                folder.restore(run)
                 _go(run, folder, keep_lifts, callback, progress, interrupts)
+                folder.finish(run)
             finally:
                 run.rollout.close()
                 keep_lifts()
@@ -313,56 +350,52 @@ def _go(
     progress: bool | TextIO,
     interrupts: list[int],
 ) -> None:
-    """Train to the end, with a checkpoint now and then and on Ctrl-C."""
+    """Train to the end, with a checkpoint now and then, and one where the run is stopped."""
     config, rollout = run.config, run.rollout
-
-    def stop_if_interrupted(picks: int) -> None:
-        if interrupts:
-            raise KeyboardInterrupt(
-                f"stopped after {picks} picks; call train again with "
-                f"run_dir={str(folder.path)!r} to go on"
-            )
-
-    first_shown = rollout.digest()
-    repeated = folder.restore(run)
-    next(repeated, None)  # its first step says where the bar begins
-    with _progress_bar(rollout.picks, config.picks, progress) as bar:
-        for picks in repeated:
-            stop_if_interrupted(picks)
-            bar.update(config.num_envs)
-        saved, shown = time.monotonic(), 0.0
+    saved, shown = time.monotonic(), 0.0
+    bar = tqdm(
+        total=config.picks, initial=rollout.picks, unit="pick", unit_scale=True, mininterval=1.0,
+        disable=not progress, ncols=100, file=sys.stdout if progress is True else progress,
+    )  # fmt: skip
+    with bar:
         while not rollout.finished:
+            # An error in a step leaves it half done: nothing can be saved then.
             try:
                 run.step()
-                due = interrupts or time.monotonic() - saved > config.checkpoint_interval
+                due = time.monotonic() - saved > config.checkpoint_interval
                 if due or rollout.finished:
                     run.agent.check_finite()
             except FloatingPointError as error:
                 raise FloatingPointError(
                     f"after {rollout.picks} picks: {error}; the last checkpoint, if any, is kept"
                 ) from error
-            if due:
+            if due and not rollout.finished:
                 folder.save(run)
                 keep_lifts()
                 saved = time.monotonic()
-            bar.update(config.num_envs)
-            if not run.curve.sums["picks"]:
-                point = dict(zip(CURVE_COLUMNS, run.curve.points[-1]))
-                msr, loss = point["success_rate"], point["loss"]
-                bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
-                if time.monotonic() - shown > CURVE_INTERVAL:
-                    folder.save_curve(run)
-                    shown = time.monotonic()
-                try:
+
+            # From here on the step is whole, and the run can go on after whatever is raised.
+            try:
+                bar.update(config.num_envs)
+                if not run.curve.sums["picks"]:
+                    point = dict(zip(CURVE_COLUMNS, run.curve.points[-1]))
+                    msr, loss = point["success_rate"], point["loss"]
+                    bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
+                    if time.monotonic() - shown > CURVE_INTERVAL:
+                        folder.save_curve(run)
+                        shown = time.monotonic()
                     if callback is not None:
                         callback(point)
-                except Exception:  # the step is complete
+                if interrupts:
+                    raise KeyboardInterrupt(
+                        f"stopped after {rollout.picks} picks; call train again with "
+                        f"run_dir={str(folder.path)!r} to go on"
+                    )
+            except BaseException:
+                if len(interrupts) < 2:  # the second Ctrl-C stops at once
                     run.agent.check_finite()
                     folder.save(run)
-                    raise
-            if due:  # and therefore saved
-                stop_if_interrupted(rollout.picks)
-    folder.finish(run, first_shown)
+                raise
 
 
 @contextmanager
@@ -370,22 +403,19 @@ def deferred_interrupts() -> Iterator[list[int]]:
     """Note the first Ctrl-C of a run instead of raising; the second one stops at once.
 
     Yields:
-        The signals received so far. The caller polls them and stops at a safe point.
-
-    Raises:
-        KeyboardInterrupt: at the second Ctrl-C, or at the end if nobody has stopped since the
-            first one.
+        The signals received so far. The caller polls them and stops at a safe point; if it has
+        not stopped since the first one, KeyboardInterrupt is raised at the end.
     """
     received: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield received  # only the main thread receives signals
-        return
 
     def receive(number: int, frame: object) -> None:
         received.append(number)
         if len(received) > 1:
             raise KeyboardInterrupt
 
+    if threading.current_thread() is not threading.main_thread():
+        yield received  # only the main thread receives signals
+        return
     previous = signal.signal(signal.SIGINT, receive)
     try:
         yield received
@@ -393,16 +423,3 @@ def deferred_interrupts() -> Iterator[list[int]]:
         signal.signal(signal.SIGINT, previous)
     if received:
         raise KeyboardInterrupt
-
-
-def _progress_bar(picks: int, total: int, progress: bool | TextIO) -> tqdm:
-    return tqdm(
-        total=total,
-        initial=picks,
-        unit="pick",
-        unit_scale=True,
-        mininterval=1.0,
-        disable=not progress,
-        ncols=100,
-        file=sys.stdout if progress is True else progress,
-    )

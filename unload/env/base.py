@@ -169,7 +169,7 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
 
     Raises:
         TypeError, ValueError: an argument, a seed or actions are not as described.
-        gymnasium.error.ResetNeeded: ``step`` or ``starts`` before ``reset``, or after a call
+        gymnasium.error.ResetNeeded: ``step`` or ``state`` before ``reset``, or after a call
             that raised an error half-way.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
@@ -182,7 +182,6 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         super().__init__(**settings)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self._rngs: list[np.random.Generator] = []
-        self._starts = [""] * self.num_envs  # the generators' states before each episode's reset
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
 
     def _set_spaces(self, observations: gymnasium.Space, actions: gymnasium.Space) -> None:
@@ -197,7 +196,7 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
             seed: environment i gets ``seed + i``, or ``seed[i]`` of a sequence; None lets
                 the generators go on, or seeds them at random.
             options: as for the single environment, the same for all. They hold for these
-                episodes, not for the next ones, nor for ``restart``.
+                episodes, not for the next ones.
         """
         self._check_open()
         options = check_options(options, self.options)
@@ -275,24 +274,30 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         infos |= {"final_info": final_infos, "_final_info": ended}
         return self._look(), infos
 
-    def starts(self) -> np.ndarray:
-        """(num_envs,) str, the generators' states before each environment's latest reset."""
+    def state(self) -> dict[str, np.ndarray]:
+        """Return copies of the arrays that ``load_state`` needs to go on from here."""
         self._check_started()
-        return np.array(self._starts)
+        generators = np.array([json.dumps(rng.bit_generator.state) for rng in self._rngs])
+        arrays = {name: array.copy() for name, array in self._arrays().items()}
+        return arrays | {"generators": generators, "picks": self._picks.copy()}
 
-    def restart(self, starts: np.ndarray):
-        """Begin the episodes again that began from what ``starts`` returned, here or elsewhere.
+    def load_state(self, arrays: dict[str, np.ndarray]):
+        """Go on from what ``state`` returned, here or elsewhere; the arrays are kept, not copied.
 
         Returns:
             Observations and infos, as ``reset`` does.
 
         Raises:
-            ValueError: ``starts`` is something else.
+            KeyError, TypeError, ValueError: ``arrays`` are something else.
         """
         self._check_open()
-        if np.shape(starts) != (self.num_envs,):
-            raise ValueError(f"starts has shape {np.shape(starts)}; expected ({self.num_envs},)")
-        return self._restart([_generator(start) for start in starts])
+        with AllOrReset(self):
+            rest = dict(arrays)
+            self._rngs = [_generator(state) for state in rest.pop("generators")]
+            self._picks = rest.pop("picks")
+            self._hold(rest)
+        self._state = "running"
+        return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
 
     def _restart(self, rngs: list[np.random.Generator], **options):
         """Begin an episode in every environment; return ``reset``'s observations and infos."""
@@ -303,8 +308,6 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
     def _begin(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
         """Begin an episode in each of these environments."""
         with AllOrReset(self):
-            for env, rng in zip(envs, rngs):
-                self._starts[env] = json.dumps(rng.bit_generator.state)
             self._picks[envs] = 0
             self._fill(envs, rngs, **options)
 
@@ -339,6 +342,14 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         """The observations as a fresh array, (num_envs, 128, 3) float32."""
 
     @abstractmethod
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """What a subclass holds of its episodes, by name."""
+
+    @abstractmethod
+    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        """Replace what ``_arrays`` returns."""
+
+    @abstractmethod
     def _infos(self) -> dict[str, np.ndarray]:
         """The infos of ``reset`` and ``step``, without Gymnasium's flags."""
 
@@ -360,15 +371,8 @@ def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.nda
     return infos
 
 
-def _generator(start: object) -> np.random.Generator:
-    """A generator that goes on from one of ``starts``.
-
-    Raises:
-        ValueError: ``start`` is something else.
-    """
+def _generator(state: object) -> np.random.Generator:
+    """A generator in a state that is given as JSON."""
     rng = np.random.default_rng()
-    try:
-        rng.bit_generator.state = json.loads(str(start))
-    except (KeyError, OverflowError, RecursionError, TypeError, ValueError) as error:
-        raise ValueError(f"starts is {start!r}; expected a generator's state") from error
+    rng.bit_generator.state = json.loads(str(state))
     return rng

@@ -160,6 +160,12 @@ class ContainerVectorEnv(PickingVectorEnv):
             "unloaded": self._containers.unloaded.copy(),
         }
 
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return self._containers._asdict()
+
+    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        self._containers = containers.Containers(**arrays)
+
     def _pick_infos(self) -> dict[str, np.ndarray]:
         return {"item": self._items, "distance": self._distances}
 
@@ -208,3 +214,9 @@ class HighestItemVectorEnv(PickingVectorEnv):
     def _infos(self) -> dict[str, np.ndarray]:
         shape = (self.num_envs, task.N_VISIBLE)
         return {name: np.ones(shape, np.int8) for name in ("action_mask", "item_mask")}
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {"observations": self._observations, "highest": self._highest}
+
+    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        self._observations, self._highest = arrays["observations"], arrays["highest"]

@@ -4,6 +4,9 @@ Their input and output are those of ``PEQNetwork``. They are permutation-equivar
 same weights serve every item, so permuting the items permutes the values.
 """
 
+from collections.abc import Callable
+from copy import deepcopy
+
 import torch
 from torch import nn
 from torch.nn.functional import linear
@@ -146,6 +149,49 @@ NETWORKS = {  # by their names in TrainConfig
     "stack": EquivariantStack,
     "attention": AttentionNetwork,
 }
+
+
+def make_network(
+    network: str | Callable, n_features: int, generator: torch.Generator | None = None
+) -> nn.Module:
+    """Make a network in float32 on the CPU, whatever PyTorch's defaults are.
+
+    Args:
+        network: a name in ``NETWORKS``, or a function ``(n_features, generator)`` that returns a
+            module whose arguments and values are those of ``PEQNetwork.forward``.
+        n_features: n.
+        generator: source of the initial weights, PyTorch's default one if None.
+
+    Raises:
+        TypeError: the function returns no module, or one with weights of another dtype.
+        ValueError: its module returns other than a value per item.
+    """
+    default = torch.get_default_dtype()
+    torch.set_default_dtype(torch.float32)
+    try:
+        with torch.device("cpu"):
+            if isinstance(network, str):
+                return NETWORKS[network](n_features, generator)
+            made = network(n_features, generator)
+            _check_own(made)
+            return made
+    finally:
+        torch.set_default_dtype(default)
+
+
+@torch.no_grad()
+def _check_own(network: object) -> None:
+    """Raise unless this is a network that can be trained and saved, before hours are spent."""
+    if not isinstance(network, nn.Module):
+        raise TypeError(f"network returned {network!r}; expected a torch.nn.Module")
+    for name, value in network.state_dict().items():
+        if value.dtype != torch.float32:
+            raise TypeError(f"network has {name} of dtype {value.dtype}; expected torch.float32")
+    observations, present = torch.zeros(2, 3, 3), torch.ones(2, 3, dtype=torch.bool)
+    # A copy, because a module may count its calls.
+    values = deepcopy(network).eval()(observations, present)
+    if values.shape != (2, 3):
+        raise ValueError(f"network returned values of shape {tuple(values.shape)}; expected (2, 3)")
 
 
 def maximum_over_items(features: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:

@@ -78,7 +78,10 @@ def real(name: str, value: object, low: float, high: float = np.inf) -> float:
     wanted = f"expected a number {f'>= {low}' if high == np.inf else f'in [{low}, {high}]'}"
     if isinstance(value, bool) or not isinstance(value, numbers):
         raise TypeError(f"{name} is {value!r}; {wanted}")
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:  # an integer beyond the largest float
+        number = np.inf
     if not np.isfinite(number) or not low <= number <= high:
         raise ValueError(f"{name} is {value!r}; {wanted}")
     return number

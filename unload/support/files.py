@@ -80,12 +80,16 @@ def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
     write_text(path, json.dumps(value, indent=2) + "\n")
 
 
-def read_json(path: str | Path) -> dict:
+def read_json(path: str | Path, checked: bool = False) -> dict:
     """Read a JSON file that holds an object; without the ``digest`` that ``write_json`` added.
+
+    Args:
+        path: of the file.
+        checked: whether it must have such a digest.
 
     Raises:
         FileNotFoundError: there is no such file.
-        ValueError: it is damaged or holds something else.
+        ValueError: it is damaged, holds something else or lacks its digest.
     """
     try:
         value = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -93,8 +97,8 @@ def read_json(path: str | Path) -> dict:
         raise ValueError(f"{path} is not a readable JSON file: {error}") from error
     if not isinstance(value, dict):
         raise ValueError(f"{path} holds a {type(value).__name__}; expected an object")
-    if "digest" in value:
-        wanted = value.pop("digest")
+    if checked or "digest" in value:
+        wanted = value.pop("digest", None)
         _check_equal(path, wanted, _digest_of(value))
     return value
 

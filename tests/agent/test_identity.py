@@ -1,0 +1,191 @@
+"""The identity of functions that are handed to a run."""
+
+import itertools
+import subprocess
+import sys
+import textwrap
+from functools import partial
+
+import numpy as np
+import pytest
+
+from studies import paths
+from tests.agent.runs import CONTAINER, interrupt_run
+from unload import PEQNetwork, TrainConfig, stack_load, train
+from unload.agent.identity import identity
+from unload.agent.training import train_changed
+from unload.load.boxes import Load
+from unload.support import files
+
+NUMBERS = itertools.count()
+
+
+@pytest.fixture
+def make(tmp_path, monkeypatch):
+    """``make(source, name)``: what a fresh module of a caller's own calls ``name``."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def written(source: str, name: str = "change", **replaced):
+        monkeypatch.delitem(sys.modules, "own", raising=False)
+        # Another file each time, because Python keeps the lines of one that it has read.
+        path = tmp_path / f"{next(NUMBERS)}.py"
+        path.write_text(textwrap.dedent(source))
+        space = {"__name__": "own.module", "__file__": str(path)}
+        exec(compile(path.read_text(), str(path), "exec"), space)
+        return space[name]
+
+    return written
+
+
+CODE = """
+    import functools
+    LIMIT = 3
+    TABLE = {"a": [1, 2]}
+
+    @functools.cache
+    def table():
+        return 7
+
+    def helper(run):
+        return run * LIMIT
+
+    def change(run, share=LIMIT):
+        "What it does."
+        # why
+        return helper(run) + table() + len(TABLE["a"])
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "same"),
+    [
+        ("# why", "# another comment, and a line\n\n", True),
+        ('"What it does."', '"Something else."', True),
+        ("helper(run) +", "helper(run) -", False),
+        ("run * LIMIT", "run / LIMIT", False),  # in what it calls
+        ("return 7", "return 8", False),  # in what it calls, which is cached
+        ("LIMIT = 3", "LIMIT = 4", False),  # a number of its own package
+        ("[1, 2]", "[1, 5]", False),
+    ],
+)
+def test_other_code_is_another_function_and_another_comment_is_not(make, old, new, same):
+    assert CODE.count(old) == 1
+    one, other = identity(make(CODE)), identity(make(CODE.replace(old, new)))
+    assert one.startswith("own.module.change ") and (one == other) == same
+    assert one == identity(make(CODE))
+
+
+def enclosing(walls: int):
+    return lambda rng: stack_load(rng, walls=walls)
+
+
+def with_default(walls: int):
+    return lambda rng, number=walls: stack_load(rng, walls=number)
+
+
+class Maker:
+    """A stack that has settings."""
+
+    def __init__(self, walls: int) -> None:
+        self.walls = walls
+
+    def __call__(self, rng):
+        return stack_load(rng, walls=self.walls)
+
+    def stack(self, rng):
+        return stack_load(rng, walls=self.walls)
+
+
+def load_of(x: float) -> Load:
+    one = np.zeros(1, int)
+    return Load(np.array([[x, 1.0, 0.5]]), np.ones((1, 3)), one, one)
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        enclosing,
+        with_default,
+        Maker,
+        lambda walls: Maker(walls).stack,
+        lambda walls: partial(stack_load, walls=walls),
+        lambda walls: partial(partial(stack_load, walls=walls), rows=3),
+        lambda walls: partial(print, [{"load": load_of(walls / 10)}]),
+        lambda walls: partial(print, np.arange(walls)),
+    ],
+)
+def test_what_a_function_holds_tells_it_from_another(made):
+    assert identity(made(10)) == identity(made(10)) != identity(made(11))
+
+
+def test_names_can_be_read():
+    assert identity(partial(stack_load, walls=3)) == {
+        "function": "unload.load.substacks.stack_load", "arguments": [], "keywords": {"walls": 3},
+    }  # fmt: skip
+    assert identity(PEQNetwork) == "unload.network.peq.PEQNetwork"
+    assert identity([np.float32(0.5), None, range(2)]) == [0.5, None, [0, 1]]
+
+
+def test_functions_that_use_each_other_come_to_an_end(make):
+    source = """
+        def change(run):
+            return TABLE["other"](run)
+        def other(run):
+            return change(run) or TABLE
+        TABLE = {"other": other, "change": change}
+    """
+    one = identity(make(source))
+    assert one == identity(make(source)) != identity(make(source.replace("or", "and")))
+
+
+def test_a_base_class_and_static_methods_belong_to_a_class(make):
+    source = """
+        class Base:
+            def size(self):
+                return 3
+        def outside():
+            return 1
+        class change(Base):
+            @staticmethod
+            def inside():
+                return outside()
+    """
+    one = identity(make(source))
+    for old, new in (("return 3", "return 4"), ("return 1", "return 2")):
+        assert identity(make(source.replace(old, new))) != one
+
+
+def test_a_function_without_source_is_the_same_in_each_process():
+    """Typed at a prompt, say: its bytecode holds no addresses."""
+    code = (
+        "from unload.agent.identity import identity\n"
+        "exec('def f(run): return [lambda: 3 for each in run]')\nprint(identity(f))"
+    )
+    found = [
+        subprocess.run([sys.executable, "-c", each], cwd=paths.ROOT, capture_output=True, text=True)
+        for each in (code, code, code.replace("3", "4"))
+    ]
+    one, same, other = (each.stdout for each in found)
+    assert one.startswith("__main__.f ") and one == same != other
+
+
+def doubled(run) -> None:
+    run.reward = lambda picks, distances: 2 * picks["rewards"]
+
+
+def halved(run) -> None:
+    run.reward = lambda picks, distances: picks["rewards"] / 2
+
+
+def test_a_changed_run_is_not_taken_for_the_plain_one(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    result = train_changed(config, tmp_path / "changed", doubled, progress=False)
+    assert result.policy.card["change"] == identity(doubled)
+    assert files.read_json(tmp_path / "changed" / "config.json")["change"] == identity(doubled)
+    with pytest.raises(ValueError, match=r"change \('tests.*doubled \w+', not None\)"):
+        train(config, tmp_path / "changed", progress=False)
+    with pytest.raises(ValueError, match=r"change \('tests.*doubled \w+', not 'tests.*halved"):
+        train_changed(config, tmp_path / "changed", halved, progress=False)
+    interrupt_run(config, tmp_path / "plain", 20)
+    with pytest.raises(ValueError, match=r"change \(None, not 'tests.*halved \w+'\)"):
+        train_changed(config, tmp_path / "plain", halved, progress=False)

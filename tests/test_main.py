@@ -1,0 +1,72 @@
+"""``python -m unload train``."""
+
+import re
+import subprocess
+import sys
+from dataclasses import fields
+
+import pytest
+
+from studies import paths
+from tests.agent.runs import CONTAINER, at_step, content, few_walls, interrupt
+from unload import TrainConfig, train
+from unload.__main__ import main
+
+OPTIONS = [
+    f"--{name.replace('_', '-')}={value}" for name, value in CONTAINER.items() if name != "picks"
+]
+
+
+def test_training_from_the_command_line_is_training(tmp_path, capsys):
+    """With a stack and a network of one's own, and a switch that is off by default."""
+    own = ["--stack=tests.agent.runs:few_walls", "--network=unload:TwoLayerScorer", "--mask"]
+    lifts = tmp_path / "lifts.npz"
+    main(
+        ["train", f"--run-dir={tmp_path / 'a'}", "--picks=200", f"--lifts={lifts}", *own, *OPTIONS]
+    )
+    shown = capsys.readouterr().out
+    assert "200/200" in shown and shown.endswith(f"\n{tmp_path}/a/policy.safetensors\n")
+    assert lifts.exists()
+    config = TrainConfig(**CONTAINER, mask=True, network="two_layer")
+    train(config, tmp_path / "b", progress=False, stack=few_walls)
+    (_, curve), (_, other) = map(content, (tmp_path / "a", tmp_path / "b"))
+    assert curve.equals(other)
+
+
+def test_every_field_is_an_option_that_is_explained_and_nothing_is_compiled(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "unload", "train", "--help"],
+        capture_output=True, text=True, cwd=paths.ROOT,
+        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path), "COLUMNS": "200"},
+    )  # fmt: skip
+    assert done.returncode == 0 and done.stderr == "" and not list(tmp_path.iterdir())
+    for field in fields(TrainConfig):
+        line = done.stdout.partition(f"  --{field.name.replace('_', '-')}")[2].partition("  --")[0]
+        assert f"({field.default})" in line, field.name
+    for text in ("--mask, --no-mask", "* whether failed items are masked", "μ, of Adam."):
+        assert text in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "status", "message"),
+    [
+        ("--learning-rate=-1", 1, "learning_rate is -1.0; expected"),
+        ("--network=mlp", 1, "network is 'mlp'; expected one of 'peq'"),
+        ("--picks=many", 2, "argument --picks: invalid int value: 'many'"),
+        ("--stack=stack_load", 2, "argument --stack: 'stack_load': .*; expected module:function"),
+        ("--stack=unload:stack", 2, "no attribute 'stack'; expected module:function"),
+        ("--stack=builtins:print", 1, "stack"),
+    ],
+)
+def test_a_bad_option_is_named(tmp_path, capsys, option, status, message):
+    with pytest.raises(SystemExit) as stopped:
+        main(["train", f"--run-dir={tmp_path / 'run'}", option])
+    assert stopped.value.code == status
+    assert re.search(message, capsys.readouterr().err)
+
+
+def test_ctrl_c_says_how_to_go_on(tmp_path, capsys):
+    with at_step(3, interrupt), pytest.raises(SystemExit) as stopped:
+        main(["train", f"--run-dir={tmp_path}", "--picks=200", *OPTIONS])
+    assert stopped.value.code == 130
+    assert "stopped after 12 picks; call train again" in capsys.readouterr().err
