@@ -6,7 +6,7 @@ The third part of ``data/falls/PLAN.md`` says what each cell is for.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -136,12 +136,12 @@ def fresh_data(
                 "change": identity(cell.change),
                 "measured": identity(run_cell),
                 "fingerprint": fingerprint,
-                **asdict(replace(cell.config, seed=seed)),
+                **replace(cell.config, seed=seed).plain(),
             }
             jobs.append((question, partial(run_cell, name, seed)))
     results = keep_all(Path(runs_dir) / "fresh", jobs, n_jobs)
     table = pd.DataFrame([result.value for result in results])[COLUMNS]
-    settings = {"config": asdict(CONFIG), "runs": len(table)}
+    settings = {"config": CONFIG.plain(), "runs": len(table)}
     place, command = Path(folder) / "falls", f"{COMMAND} fresh"
     publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")
 

@@ -6,7 +6,7 @@ First its cells, as ``data/falls/PLAN.md`` names them; then how a run is trained
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -244,7 +244,7 @@ def laboratory_data(
     for cell in cells:
         changed = identity([CELLS[cell].change, SEEN.get(cell)])
         for seed in CELLS[cell].seeds[:seeds]:
-            config = asdict(replace(CELLS[cell].config, seed=seed))
+            config = replace(CELLS[cell].config, seed=seed).plain()
             question = {"cell": cell, "changed": changed, "measured": measured, **config}
             jobs.append((question | {"fingerprint": fingerprint}, partial(run_cell, cell, seed)))
     results = keep_all(Path(runs_dir) / "laboratory", jobs, n_jobs)
@@ -260,7 +260,7 @@ def laboratory_data(
     reduced = seeds is not None or set(cells) < set(CELLS)
     place = Path(folder) / ("reduced/falls" if reduced else "falls")
     command = f"{COMMAND} laboratory"
-    settings = {"config": asdict(CONFIG), "runs": len(rows)}
+    settings = {"config": CONFIG.plain(), "runs": len(rows)}
     publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 

@@ -7,7 +7,7 @@ training.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -73,7 +73,7 @@ def trace_data(
     fingerprint = training_fingerprint()
     question = {"every": TRACE_EVERY, "fingerprint": fingerprint, "measured": identity(_trace)}
     configs = [replace(CONFIG, seed=seed) for seed in TRACED_SEEDS]
-    jobs = [(question | asdict(config), partial(_trace, config)) for config in configs]
+    jobs = [(question | config.plain(), partial(_trace, config)) for config in configs]
     results = keep_all(Path(runs_dir) / "falls/trace", jobs, n_jobs)
     traces = [
         pd.DataFrame(result.value).assign(seed=seed) for seed, result in zip(TRACED_SEEDS, results)
@@ -123,7 +123,7 @@ def published_data(
     for name, (config, network) in judged.items():
         weights = {part: each.numpy() for part, each in network.state_dict().items()}
         question = {"name": name, "weights": digest(packed(weights)), "measured": measured}
-        question |= {"fingerprint": fingerprint, **asdict(config), **LOADS}
+        question |= {"fingerprint": fingerprint, **config.plain(), **LOADS}
         jobs.append((question, partial(_judge, name, config, network)))
     results = keep_all(Path(runs_dir) / "published", jobs, n_jobs)
     tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}

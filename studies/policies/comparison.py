@@ -8,7 +8,7 @@ unload the same containers: in the conditions of the training, with blurred posi
 boxes of other sizes.
 """
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
@@ -68,7 +68,7 @@ def write_cards(folder: str | Path = files.SHIPPED) -> None:
         path = Path(folder) / "policies" / f"{name}.safetensors"
         policy = load_policy(path)
         policy.card = {
-            "configuration": asdict(config),
+            "configuration": config.plain(),
             "loads": "the paper's",
             "picks": config.picks,
             "fingerprint": read_provenance(paths.DATA, grid)["fingerprint"],

@@ -12,10 +12,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from studies import paths
 from unload import TrainConfig, stack_load, train
 from unload.agent.training import Training
 
+ROOT = Path(__file__).resolve().parents[2]
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
 # with gamma > 0, updates of the target network.
 SMALL = {"num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5}
@@ -91,7 +91,7 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
 def kill_run(fields: dict, folder: Path, picks: int, stack: str = "None") -> None:
     """Start a run in another process, which is killed at a point of its curve."""
     code = KILLED.format(picks=picks, fields=fields, folder=str(folder), stack=stack)
-    done = subprocess.run([sys.executable, "-c", code], cwd=paths.ROOT, env=os.environ)
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ)
     assert done.returncode == -signal.SIGKILL
 
 

@@ -5,17 +5,19 @@ import subprocess
 import sys
 import textwrap
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from studies import paths
 from tests.agent.runs import CONTAINER, interrupt_run
 from unload import PEQNetwork, TrainConfig, stack_load, train
 from unload.agent.identity import identity
 from unload.agent.training import train_changed
 from unload.load.boxes import Load
 from unload.support import files
+
+ROOT = Path(__file__).resolve().parents[2]
 
 NUMBERS = itertools.count()
 
@@ -162,7 +164,7 @@ def test_a_function_without_source_is_the_same_in_each_process():
         "exec('def f(run): return [lambda: 3 for each in run]')\nprint(identity(f))"
     )
     found = [
-        subprocess.run([sys.executable, "-c", each], cwd=paths.ROOT, capture_output=True, text=True)
+        subprocess.run([sys.executable, "-c", each], cwd=ROOT, capture_output=True, text=True)
         for each in (code, code, code.replace("3", "4"))
     ]
     one, same, other = (each.stdout for each in found)

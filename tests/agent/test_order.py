@@ -3,18 +3,20 @@
 import io
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from studies import paths
 from tests.load.walls import KINDS, own_load
 from unload import __main__ as command
 from unload import picking_order, policies, read_load
 from unload.load.packing_list import EXAMPLE
 from unload.physics.local import LocalPhysics
 from unload.task import LIFT_THRESHOLD
+
+ROOT = Path(__file__).resolve().parents[2]
 
 # Allowed at first, until it fails or holds no box; it ends in case nothing stops the policy.
 STUBBORN = iter([127] * 999)
@@ -92,7 +94,7 @@ def test_the_command_line_says_what_is_wrong(tmp_path, capsys, monkeypatch):
     (tmp_path / "boxes.csv").write_text("x_min,y_min,z_min,size_x,size_y,size_z\n0,0,1,1,1,1\n")
     done = subprocess.run(
         [sys.executable, "-m", "unload", str(tmp_path / "boxes.csv")],
-        capture_output=True, text=True, cwd=paths.ROOT,
+        capture_output=True, text=True, cwd=ROOT,
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith(f"{tmp_path}/boxes.csv: row 1 (id '1')")

@@ -1,6 +1,7 @@
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -8,7 +9,6 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from studies import paths
 from tests.env.comparing import FailingStack, assert_same, state_of
 from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
@@ -16,6 +16,8 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.picture import snapshot
 from unload.load.substacks import build_load
+
+ROOT = Path(__file__).resolve().parents[2]
 
 ENV_ID = "unload/Container-v0"
 
@@ -308,5 +310,5 @@ def test_a_reset_whose_stack_fails_needs_another_one(number):
 def test_an_environment_that_draws_nothing_imports_nothing_that_draws():
     """They take as long to import as all the rest."""
     code = "import sys, unload; unload.ContainerEnv; print(*sys.modules)"
-    names = subprocess.check_output([sys.executable, "-c", code], cwd=paths.ROOT, text=True).split()
+    names = subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, text=True).split()
     assert not {"PIL", "matplotlib", "pandas", "plotly", "torch"} & set(names)

@@ -7,13 +7,15 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from io import BytesIO
+from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
-from studies import paths
 from unload.support import files
+
+ROOT = Path(__file__).resolve().parents[2]
 
 # Other processes import the module alone: the package takes seconds.
 ALONE = os.path.dirname(files.__file__)
@@ -73,7 +75,7 @@ def test_what_a_killed_writer_leaves_is_ignored_by_git_and_overwrites_nothing(tm
     assert killed.returncode == 9
     (leftover,) = set(tmp_path.iterdir()) - {path}
     assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", leftover.name)
-    assert "*.partial" in (paths.ROOT / ".gitignore").read_text().splitlines()
+    assert "*.partial" in (ROOT / ".gitignore").read_text().splitlines()
     files.write_text(path, "new")
     assert path.read_text() == "new" and leftover.read_bytes() == b"half of the n"
 

@@ -151,8 +151,7 @@ class RunFolder:
     def _check_same(self, stored: dict, settings: dict) -> None:
         """Raise ValueError unless stored settings are ``settings``."""
         wanted = json.loads(json.dumps(settings))
-        # How often it is saved changes nothing in a run.
-        names = [name for name in wanted | stored if name != "checkpoint_interval"]
+        names = wanted | stored
         differing = [name for name in names if stored.get(name) != wanted.get(name)]
         if differing:
             details = ", ".join(

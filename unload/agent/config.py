@@ -127,8 +127,12 @@ class TrainConfig:
         object.__setattr__(self, name, value)
 
     def plain(self) -> dict:
-        """Return the fields by name as JSON can hold them, of a function its identity."""
-        return {field.name: identity(getattr(self, field.name)) for field in fields(self)}
+        """Return the fields by name as JSON can hold them, of a function its identity.
+
+        ``checkpoint_interval`` is left out, because how often a run is saved changes nothing in it.
+        """
+        names = [field.name for field in fields(self) if field.name != "checkpoint_interval"]
+        return {name: identity(getattr(self, name)) for name in names}
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""
