@@ -187,7 +187,7 @@ def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None
 
 
 def perfect_start(run: Training, change: Callable[[Training], None] = unchanged) -> None:
-    """Start from the weights of a run with places dealt anew; then ``change``."""
+    """Start from the weights of a run with shuffled places; then ``change``."""
     teacher = Training(replace(run.config, epsilon_init=1.0))
     shuffled(teacher)
     while not teacher.rollout.finished:

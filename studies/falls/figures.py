@@ -18,7 +18,7 @@ from unload import task
 MOST_PREFERENCE = 1.5  # larger ones are drawn at the edge
 NAMES = {
     "ranks": "ranks",
-    "shuffled": "places dealt anew",
+    "shuffled": "shuffled places",
     "averaged": "ties averaged",
     "level": "level loads",
 }

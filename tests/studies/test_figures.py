@@ -43,8 +43,8 @@ FROM_DATA = {
         read_trace(folder), read_laboratory(folder)
     ),
     "a_fall": lambda folder=paths.DATA: falls.fall(read_long_trace(folder).head(40)),
-    "what_holds_runs": lambda folder=paths.DATA: falls.ends(
-        read_laboratory(folder), {"ranks": "ranks", "shuffled": "places dealt anew"}
+    "what_keeps_runs_up": lambda folder=paths.DATA: falls.ends(
+        read_laboratory(folder), {"ranks": "ranks", "shuffled": "shuffled places"}
     ),
 }
 # The others, with what they are given here.
