@@ -110,11 +110,11 @@ class DQN:
             does. The weights stay as they are until it is called, and so must the arrays.
         """
         names = ["observations", "actions", "rewards"]
-        if self.gamma == 0:
-            checks.entries("batch", batch, names)
-            return self.learner.start(batch, batch["rewards"], rows)
-        names += ["next_observations", "next_masks", "terminations"]
+        if self.gamma > 0:
+            names += ["next_observations", "next_masks", "terminations"]
         checks.entries("batch", batch, names)
+        if self.gamma == 0:
+            return self.learner.start(batch, batch["rewards"], rows)
         if rows is not None:
             batch = {name: batch[name].take(rows, axis=0) for name in names}
         return self.learner.start(batch, self._targets(batch))

@@ -45,9 +45,9 @@ class PlainLearner:
             targets: (k,) float32.
             rows: which of the k rows to learn from, int64; all if None.
         """
-        arrays = batch["observations"], batch["actions"], targets
+        arrays = [batch["observations"], batch["actions"], targets]
         if rows is not None:
-            arrays = tuple(array.take(rows, axis=0) for array in arrays)
+            arrays = [array.take(rows, axis=0) for array in arrays]
         return partial(self._update, *map(torch.from_numpy, arrays))
 
     def _update(

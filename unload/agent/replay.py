@@ -46,7 +46,7 @@ class ReplayBuffer:
 
     def __init__(self, size: int, items: int, next_state: bool = False) -> None:
         self.size, self.total = size, 0
-        self.arrays = {
+        self.arrays: dict[str, np.ndarray] = {
             "observations": np.empty((size, items, 3), np.float32),
             "actions": np.empty(size, np.int64),
             "rewards": np.empty(size, np.float32),

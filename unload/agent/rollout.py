@@ -28,7 +28,7 @@ class Rollout:
 
     def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
         self._config, self.steps = config, 0
-        own = {} if stack is None else {"stack": stack}
+        own: dict[str, Any] = {} if stack is None else {"stack": stack}
         self.envs: Any = gymnasium.make_vec(
             config.env,
             config.num_envs,

@@ -41,7 +41,7 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
     wanted = f"expected an integer >= {low}" + ("" if high is None else f" and <= {high}")
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} is {value!r}; {wanted}")
-    if not low <= value <= (LARGEST if high is None else high):
+    if not low <= int(value) <= (LARGEST if high is None else high):
         raise ValueError(f"{name} is {value!r}; {wanted}")
     return int(value)
 

@@ -162,10 +162,14 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
 
         # Others hold such a lock for moments; who does so for longer may have been stopped.
         patience = time.monotonic() + (PATIENCE if wait else 0)
-        while not _taken(file):
-            if time.monotonic() < patience:
-                time.sleep(0.05)
-                continue
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() < patience:
+                    time.sleep(0.05)
+                    continue
             file.seek(0)
             owner = file.read().decode().strip() or "another process"
             if not wait:
@@ -177,15 +181,6 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
         yield
-
-
-def _taken(file: BinaryIO) -> bool:
-    """Take the lock of a file, unless another process holds it."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
 
 
 def _open_no_link(path: str, flags: int) -> int:
