@@ -71,13 +71,8 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_PLACES})
 
 
-gymnasium.register(
-    id="unload/Container-v0",
-    entry_point="unload.env.container:ContainerEnv",
-    vector_entry_point="unload.env.vector:ContainerVectorEnv",
-)
-gymnasium.register(
-    id="unload/HighestItem-v0",
-    entry_point="unload.env.highest_item:HighestItemEnv",
-    vector_entry_point="unload.env.vector:HighestItemVectorEnv",
-)
+for _id, _entry, _arrays in (
+    ("unload/Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
+    ("unload/HighestItem-v0", "highest_item:HighestItemEnv", "vector:HighestItemVectorEnv"),
+):
+    gymnasium.register(_id, f"unload.env.{_entry}", vector_entry_point=f"unload.env.{_arrays}")

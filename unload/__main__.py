@@ -24,11 +24,7 @@ those that are the package's own choice.
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line.
-
-    Args:
-        arguments: of the command; those of the process if None.
-    """
+    """Run the command line with these arguments, those of the process if None."""
     arguments = sys.argv[1:] if arguments is None else arguments
     if arguments[:1] == ["train"]:
         train_by(arguments[1:])
@@ -96,7 +92,6 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
 
 
 def _named(text: str) -> Callable:
-    """The function of a module that is given as ``module:function``."""
     try:
         module, _, name = text.partition(":")
         return getattr(import_module(module), name)

@@ -8,16 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
     assert_same,
-    begun,
     few_walls,
     interrupt_run,
     kill_run,
@@ -175,39 +171,3 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
         path.write_bytes(b"half")
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert sorted(tmp_path.rglob("*.partial")) == sorted(others)
-
-
-@given(
-    changes=st.fixed_dictionaries(
-        {
-            "gamma": st.sampled_from([0.0, 0.9]),
-            "mask": st.booleans(),
-            "equalize": st.booleans(),
-            "ties": st.sampled_from(["noise", "average"]),
-            "max_picks": st.integers(1, 30),
-            "replay_size": st.integers(4, 300),
-            "log_interval": st.integers(1, 20),
-            "gradient_steps": st.integers(0, 2),
-            "seed": st.integers(0, 2**31),
-        }
-    ),
-    steps=st.integers(0, 50),
-)
-@settings(max_examples=12)
-def test_any_run_goes_on_as_if_it_had_not_been_stopped(tmp_path_factory, changes, steps):
-    config = TrainConfig(**CONTAINER | changes)
-    folder = RunFolder(tmp_path_factory.mktemp("run"))
-    with begun(config) as run, begun(config) as other:
-        for _ in range(steps):
-            run.step()
-        folder.save(run)
-        folder.restore(other)
-        assert (other.rollout.picks, other.replay.total) == (4 * steps, 4 * steps)
-        for each in (run, other):
-            while not each.rollout.finished:
-                each.step()
-        states = [each.state() for each in (run, other)]
-        for name in states[0].keys() - {"rest"}:
-            assert np.array_equal(*(state[name] for state in states)), name
-        tables = [each.curve.table().drop(columns="wall_time") for each in (run, other)]
-        pd.testing.assert_frame_equal(*tables, check_exact=True)

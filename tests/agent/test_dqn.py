@@ -92,25 +92,6 @@ def test_choosing_from_nothing_is_refused(rng):
             DQN(peq()).choose(observations, allowed, epsilon, rng)
 
 
-@pytest.mark.parametrize(
-    ("mask", "terminated", "best"),
-    [([1, 1, 1], False, 0.8), ([1, 0, 1], False, 0.4), ([1, 1, 1], True, 0.0)],
-)
-def test_the_bootstrap_maximum_obeys_the_mask_and_the_end(mask, terminated, best):
-    following = np.zeros((1, 3, 3), np.float32)
-    following[0, :, 2] = [0.4, 0.8, -0.5]
-    batch = {
-        "observations": np.zeros((1, 3, 3), np.float32),
-        "actions": np.array([0]),
-        "rewards": np.array([0.1], np.float32),
-        "next_observations": following,
-        "next_masks": np.array([mask], dtype=bool),
-        "terminations": np.array([terminated]),
-    }
-    target = 0.1 + 0.5 * best
-    assert DQN(HeightNetwork(), gamma=0.5).update(batch) == pytest.approx(target**2 / 2)
-
-
 @pytest.mark.parametrize("fused", [False, True])
 @pytest.mark.parametrize("name", ["observations", "rewards"])
 def test_a_loss_that_is_not_finite_leaves_the_weights(rng, fused, name):

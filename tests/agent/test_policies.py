@@ -56,11 +56,6 @@ def test_bad_batches_are_refused(policy, observations, masks, error, message, rn
         policy(observations, masks, rng)
 
 
-def test_random_needs_a_generator():
-    with pytest.raises(TypeError, match="rng is None"):
-        policies.random(np.zeros((1, 2, 3)), np.ones((1, 2)), None)
-
-
 def test_a_mixed_policy_picks_at_random_now_and_then(rng):
     observations = rng.uniform(-1, 1, (4000, 128, 3))
     masks = np.ones((4000, 128), bool)
@@ -70,3 +65,5 @@ def test_a_mixed_policy_picks_at_random_now_and_then(rng):
         assert abs((actions != best).mean() - share * 127 / 128) < 0.03
     with pytest.raises(ValueError, match="share is 2"):
         policies.mixed(policies.highest, 2)
+    with pytest.raises(TypeError, match="rng is None"):
+        policies.random(observations, masks, None)

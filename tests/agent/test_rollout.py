@@ -34,15 +34,6 @@ def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
     assert min(fewest) < 70  # of 128 rows
 
 
-def test_training_meets_other_loads_than_evaluate_does_with_its_seed():
-    with begun(TrainConfig(**CONTAINER)) as run:
-        met = {observation.tobytes() for observation in run.rollout.observations}
-    envs = ContainerVectorEnv(8, equalize=True)
-    shown, _ = envs.reset(seed=np.random.SeedSequence(0).generate_state(8).tolist())
-    envs.close()
-    assert not met & {observation.tobytes() for observation in shown}
-
-
 def test_a_pick_says_how_far_it_has_lifted(monkeypatch):
     """Also where it was an episode's last one, whose infos stand apart; NaN without lifts."""
     lifted, pick = [], ContainerVectorEnv._pick

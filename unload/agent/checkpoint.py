@@ -18,6 +18,7 @@ from unload.network.variants import make_network
 from unload.support import checks, files
 
 FORMAT = 6  # of the checkpoints
+FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 LEFTOVER = "." + "[0-9a-f]" * 32 + ".partial"  # what ``files.write_atomically`` adds to a name
 
 
@@ -43,14 +44,11 @@ def settings_of(config: TrainConfig, stack: Callable | None, change: Callable) -
 
 
 class RunFolder:
-    """The folder of one training run.
-
-    Args:
-        run_dir: made when it is locked or written to, if it does not exist.
+    """The folder of one training run, which is made when it is locked.
 
     Attributes:
         path: of the folder, absolute, so that it stays the same one wherever the process goes.
-        checkpoint: the file from which a run that was stopped goes on.
+        policy: the file of the trained policy.
     """
 
     def __init__(self, run_dir: str | Path) -> None:
@@ -58,19 +56,15 @@ class RunFolder:
         if path == Path():
             raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
         self.path = path.absolute()
-        self.checkpoint = self.path / "checkpoint.npz"
-        self.policy, self._curve = self.path / "policy.safetensors", self.path / "curve.csv"
-        self._config = self.path / "config.json"
+        paths = [self.path / name for name in FILES]
+        self._checkpoint, self.policy, self._curve, self._config = paths
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other processes out of the folder, see ``files.locked``.
-
-        What a killed process has left half written of the run's files is removed.
-        """
+        """Lock the folder, and remove what a killed process has left half written of its files."""
         with files.locked(self.path):
-            for path in (self.checkpoint, self.policy, self._curve, self._config):
-                for leftover in self.path.glob(path.name + LEFTOVER):
+            for name in FILES:
+                for leftover in self.path.glob(name + LEFTOVER):
                     leftover.unlink()
             yield
 
@@ -86,7 +80,7 @@ class RunFolder:
         """
         arrays = [*run.state().values(), *run.replay.arrays.values()]
         needed = 2 * sum(array.nbytes for array in arrays)
-        there = self.checkpoint.stat().st_size if self.checkpoint.exists() else 0
+        there = self._checkpoint.stat().st_size if self._checkpoint.exists() else 0
         room = shutil.disk_usage(self.path).free + there
         if room < needed:
             reason = (
@@ -98,7 +92,7 @@ class RunFolder:
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
-        files.write_arrays(self.checkpoint, run.state() | marks)
+        files.write_arrays(self._checkpoint, run.state() | marks)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -106,21 +100,20 @@ class RunFolder:
 
     def restore(self, run) -> None:
         """Let a ``Training`` go on from the checkpoint, if there is one."""
-        if not self.checkpoint.exists():
+        if not self._checkpoint.exists():
             return
-        stored = files.read_arrays(self.checkpoint)
+        stored = files.read_arrays(self._checkpoint)
         if not np.array_equal(stored.pop("format", None), FORMAT):
             raise ValueError(
-                f"{self.checkpoint} was written by another version of unload; expected format "
+                f"{self._checkpoint} was written by another version of unload; expected format "
                 f"{FORMAT}. Remove it to start anew, or go on with that version"
             )
         try:
-            settings = dict(json.loads(str(stored.pop("settings"))))
-            self._check_same(settings, run.settings)
+            self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
             run.load_state(stored)
         except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
             reason = f"{type(error).__name__}: {error}"
-            raise ValueError(f"{self.checkpoint} does not fit this run: {reason}") from error
+            raise ValueError(f"{self._checkpoint} does not fit this run: {reason}") from error
 
     def finish(self, run) -> None:
         """Keep what a ``Training`` leaves at its end."""
@@ -133,31 +126,26 @@ class RunFolder:
     def result(
         self, config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
     ) -> TrainResult:
-        """Read back what a finished run has left.
-
-        Args:
-            config, stack, change: of the run, see ``training.train_changed``.
-        """
+        """Read back what a finished run of ``training.train_changed`` has left."""
         stored = files.read_json(self._config, checked=True)
         marks = stored.pop("marks", {})
         self._check_same(stored, settings_of(config, stack, change))
         for path in (self.policy, self._curve):
             files.check_digest(path, marks.get(path.name))
         with suppress(OSError):  # it is gone already, or the folder is read-only
-            self.checkpoint.unlink()
+            self._checkpoint.unlink()
         network = make_network(config.network, config.n_features)
         return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve))
 
     def _check_same(self, stored: dict, settings: dict) -> None:
-        """Raise ValueError unless stored settings are ``settings``."""
         wanted = json.loads(json.dumps(settings))
-        names = wanted | stored
-        differing = [name for name in names if stored.get(name) != wanted.get(name)]
+        differing = ", ".join(
+            f"{name} ({stored.get(name)!r}, not {wanted.get(name)!r})"
+            for name in wanted | stored
+            if stored.get(name) != wanted.get(name)
+        )
         if differing:
-            details = ", ".join(
-                f"{name} ({stored.get(name)!r}, not {wanted.get(name)!r})" for name in differing
-            )
             raise ValueError(
-                f"run_dir {str(self.path)!r} holds a run of another configuration: {details}; "
+                f"run_dir {str(self.path)!r} holds a run of another configuration: {differing}; "
                 "expected the same one or an empty folder"
             )

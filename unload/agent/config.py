@@ -13,6 +13,13 @@ from unload.support import checks
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
+OPTIONS = {"env": ENVS, "ties": TIES, "network": tuple(NETWORKS)}
+MAY_BE_ZERO = ("seed", "gradient_steps")  # of the whole numbers
+# Of the real numbers, which are 0 or larger.
+HIGHEST = {"position_noise": MOST_NOISE} | dict.fromkeys(
+    ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"), 1.0
+)
+
 
 @dataclass(frozen=True)
 class TrainConfig:
@@ -41,6 +48,7 @@ class TrainConfig:
         mask: * whether failed items are masked in training's choices, too.
         shuffle_places: * whether x and y of each stored pick are permuted among its items, so that
             no preference for a place can be learned (notebook 10); choices see them unpermuted.
+            Only with gamma = 0, because values of next observations rest on their places.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve.
@@ -76,55 +84,36 @@ class TrainConfig:
     checkpoint_interval: float = 600.0
 
     def __post_init__(self) -> None:
-        for name, options in (("env", ENVS), ("ties", TIES), ("network", NETWORKS)):
-            if name == "network" and callable(self.network):
-                continue
-            checks.one_of(name, getattr(self, name), options)
-            self._set(name, str(getattr(self, name)))
-        for name in ("equalize", "mask", "shuffle_places"):
-            self._set(name, checks.boolean(name, getattr(self, name)))
-        for name in (
-            "picks", "num_envs", "max_picks", "batch_size", "replay_size", "n_features",
-            "target_update_interval", "log_interval",
-        ):  # fmt: skip
-            self._set(name, checks.integer(name, getattr(self, name), 1))
-        for name in ("seed", "gradient_steps"):
-            self._set(name, checks.integer(name, getattr(self, name), 0))
-        for name in ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"):
-            self._set(name, checks.real(name, getattr(self, name), 0, 1))
-        for name in ("learning_rate", "beta", "checkpoint_interval"):
-            self._set(name, checks.real(name, getattr(self, name), 0))
-        self._set(
-            "position_noise", checks.real("position_noise", self.position_noise, 0, MOST_NOISE)
-        )
-        if self.network == "attention" and self.n_features % HEADS:
-            raise ValueError(
-                f"n_features is {self.n_features}; expected a multiple of {HEADS} for "
-                "network='attention'"
-            )
-        if self.shuffle_places and self.gamma > 0:
-            raise ValueError(
-                f"gamma is {self.gamma}; expected 0 with shuffle_places=True, because values of "
-                "next observations rest on their places"
-            )
-        if self.picks % self.num_envs:
-            raise ValueError(
-                f"picks is {self.picks}; expected a multiple of num_envs={self.num_envs}"
-            )
-        if self.replay_size < self.num_envs:
-            raise ValueError(
-                f"replay_size is {self.replay_size}; expected at least num_envs={self.num_envs}"
-            )
-        fewest = self.num_envs + min(self.batch_size, self.replay_size)
-        if self.gradient_steps and self.picks < fewest:
-            raise ValueError(
-                f"picks is {self.picks}; expected at least {fewest}, because the first update "
-                f"waits for batch_size={self.batch_size}"
-            )
+        # The default's type says what a field must be; what is kept is of Python's own types.
+        for field in fields(self):
+            name, value = field.name, getattr(self, field.name)
+            if isinstance(field.default, bool):
+                value = checks.boolean(name, value)
+            elif isinstance(field.default, int):
+                value = checks.integer(name, value, 0 if name in MAY_BE_ZERO else 1)
+            elif isinstance(field.default, float):
+                value = checks.real(name, value, 0, HIGHEST.get(name, np.inf))
+            elif not (name == "network" and callable(value)):
+                value = checks.one_of(name, value, OPTIONS[name])
+            object.__setattr__(self, name, value)
 
-    def _set(self, name: str, value: object) -> None:
-        """Keep a checked value as one of Python's own types, which JSON can hold."""
-        object.__setattr__(self, name, value)
+        # What the fields must be of each other.
+        fewest = self.num_envs + min(self.batch_size, self.replay_size)
+        odd_heads = self.network == "attention" and self.n_features % HEADS
+        for name, wrong, wanted in (
+            ("n_features", odd_heads, f"a multiple of {HEADS} for network='attention'"),
+            ("gamma", self.gamma and self.shuffle_places, "0 with shuffle_places=True"),
+            ("picks", self.picks % self.num_envs, f"a multiple of num_envs={self.num_envs}"),
+            ("replay_size", self.replay_size < self.num_envs, f"num_envs={self.num_envs} or more"),
+            (
+                "picks",
+                self.gradient_steps and self.picks < fewest,
+                f"at least {fewest}, because the first update waits for "
+                f"batch_size={self.batch_size}",
+            ),
+        ):
+            if wrong:
+                raise ValueError(f"{name} is {getattr(self, name)}; expected {wanted}")
 
     def plain(self) -> dict:
         """Return the fields by name as JSON can hold them, of a function its identity.

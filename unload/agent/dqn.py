@@ -1,6 +1,7 @@
 """The masked DQN agent (Sec. II-B and III-G)."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import torch
@@ -50,13 +51,9 @@ class DQN:
                 "fused_update is True; expected a PEQNetwork in float32 on the CPU with it"
             )
         self.gamma = checks.real("gamma", gamma, 0, 1)
-        learning_rate = checks.real("learning_rate", learning_rate, 0)
-        beta = checks.real("beta", beta, 0)
-        self.learner: FusedLearner | PlainLearner
-        if fused_update:
-            self.learner = FusedLearner(network, learning_rate, beta)  # type: ignore[arg-type]
-        else:
-            self.learner = PlainLearner(network, learning_rate, beta)
+        settings = checks.real("learning_rate", learning_rate, 0), checks.real("beta", beta, 0)
+        kind: Any = FusedLearner if fused_update else PlainLearner
+        self.learner: FusedLearner | PlainLearner = kind(network, *settings)
         self.update_target()
 
     def choose(
@@ -113,11 +110,11 @@ class DQN:
             does. The weights stay as they are until it is called, and so must the arrays.
         """
         names = ["observations", "actions", "rewards"]
-        if self.gamma == 0:
-            checks.entries("batch", batch, names)
-            return self.learner.start(batch, batch["rewards"], rows)
-        names += ["next_observations", "next_masks", "terminations"]
+        if self.gamma > 0:
+            names += ["next_observations", "next_masks", "terminations"]
         checks.entries("batch", batch, names)
+        if self.gamma == 0:
+            return self.learner.start(batch, batch["rewards"], rows)
         if rows is not None:
             batch = {name: batch[name].take(rows, axis=0) for name in names}
         return self.learner.start(batch, self._targets(batch))
@@ -149,11 +146,9 @@ class DQN:
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of weights, target weights and optimizer state, to go on from later."""
-        weights = {"network": self.network.state_dict(), "target": self.target}
-        return flat(
-            {name: {k: v.numpy().copy() for k, v in each.items()} for name, each in weights.items()}
-            | {"adam": self.learner.state()}
-        )
+        network = {name: value.numpy().copy() for name, value in self.network.state_dict().items()}
+        target = {name: value.numpy().copy() for name, value in self.target.items()}
+        return flat({"network": network, "target": target, "adam": self.learner.state()})
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what ``state`` returned."""

@@ -2,11 +2,12 @@
 
 import sys
 from collections.abc import Callable
+from contextlib import closing
+from functools import partial
 
-import gymnasium
 import numpy as np
 import pandas as pd
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 from unload import task
 from unload.env.container import ContainerEnv
@@ -60,9 +61,8 @@ def evaluate(
         mask: whether the policy's masks exclude items that failed since the last success.
             Rows without an item are always excluded.
         max_picks: most picks per episode; fewer if the container is empty before, or if the
-            mask excludes all items. With None it is unloaded completely,
-            however many picks that takes; only an episode in which 1280 picks in a row fail
-            is given up.
+            mask excludes all items. With None it is unloaded completely, unless 1280 picks in a
+            row fail.
         **env_kwargs: ``after_pick``, ``equalize``, ``position_noise``, ``stack`` and ``ties`` of
             ``ContainerEnv``.
 
@@ -92,26 +92,19 @@ def evaluate(
     for first in range(0, episodes, at_once):
         seeds = load_seeds[first : first + at_once]
         limit = sys.maxsize if max_picks is None else max_picks
-        envs = _side_by_side(len(seeds), physics, max_picks=limit, **env_kwargs)
-        try:
+        if physics == "table":
+            envs: VectorEnv = ContainerVectorEnv(len(seeds), max_picks=limit, **env_kwargs)
+        else:
+            make = partial(ContainerEnv, physics, max_picks=limit, **env_kwargs)
+            envs = SyncVectorEnv([make], autoreset_mode=AutoresetMode.SAME_STEP)
+        with closing(envs):
             frames.append(_play(envs, policy, seeds, mask, give_up=max_picks is None))
-        finally:
-            envs.close()
     table = pd.concat(frames, ignore_index=True)
     return table if max_picks is None else table.drop(columns=["picks", "emptied"])
 
 
-def _side_by_side(count: int, physics: str, **kwargs) -> gymnasium.vector.VectorEnv:
-    if physics == "table":
-        return ContainerVectorEnv(count, **kwargs)
-    return SyncVectorEnv(
-        [lambda: ContainerEnv(physics=physics, **kwargs)] * count,
-        autoreset_mode=AutoresetMode.SAME_STEP,
-    )
-
-
 def _play(
-    envs: gymnasium.vector.VectorEnv, policy: Policy, seeds: list[int], mask: bool, give_up: bool
+    envs: VectorEnv, policy: Policy, seeds: list[int], mask: bool, give_up: bool
 ) -> pd.DataFrame:
     """One episode in each environment; what follows after its end does not count."""
     rng = np.random.default_rng(seeds)
@@ -151,23 +144,13 @@ def _play(
             running &= failures < GIVE_UP
 
     # Of each environment, the picks of its own episode, which came first.
-    rewards, deadlocked = (
-        [each[:count] for count, each in zip(picks, np.transpose(steps))]
-        for steps in (rewards, deadlocked)
+    table = []
+    for count, reward, failed in zip(picks, np.transpose(rewards), np.transpose(deadlocked)):
+        reward, failed = reward[:count], failed[:count]
+        ends = np.flatnonzero(np.diff(failed, prepend=0, append=0))  # of deadlocks, and starts
+        longest = (ends[1::2] - ends[::2]).max(initial=0)
+        table.append((success_rate(reward), (reward > 0).sum(), failed.mean(), longest))
+    frame = pd.DataFrame(
+        table, columns=["success_rate", "unloaded", "deadlocked", "longest_deadlock"]
     )
-    return pd.DataFrame(
-        {
-            "success_rate": [success_rate(each) for each in rewards],
-            "unloaded": [(each > 0).sum() for each in rewards],
-            "deadlocked": [each.mean() for each in deadlocked],
-            "longest_deadlock": [_longest_run(each) for each in deadlocked],
-            "picks": picks,
-            "emptied": emptied,
-        }
-    )
-
-
-def _longest_run(flags: np.ndarray) -> int:
-    """The most 1s in a row."""
-    ends = np.flatnonzero(np.diff(flags, prepend=0, append=0))
-    return int((ends[1::2] - ends[::2]).max(initial=0))
+    return frame.assign(picks=picks, emptied=emptied)

@@ -34,17 +34,7 @@ def greedy_actions(
     masks: np.ndarray,
     present: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Return the allowed action of the highest value, by the fastest way for the network.
-
-    Args:
-        network: see ``highest_values``.
-        observations: (batch, items, 3) float.
-        masks: (batch, items), bool or 0 and 1, where an item may be picked.
-        present: (batch, items) bool, the rows that hold an item; all if None.
-
-    Returns:
-        (batch,) int64.
-    """
+    """Do as ``highest_values`` the fastest way; masks may hold 0 and 1, observations any float."""
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
     if fused.applies(network):  # an item's own features decide: padded rows do not matter
@@ -82,7 +72,6 @@ class Greedy:
         self.card = card
 
     def __repr__(self) -> str:
-        """The settings, and the card with a line per entry."""
         kind = type(self.network).__name__
         head = f"Greedy({kind}, equalize={self.equalize}, ties={self.ties!r})"
         if self.card is None:
@@ -174,12 +163,7 @@ def settings_of(policy: Greedy) -> dict:
 def policy_of(
     settings: dict, tensors: dict[str, torch.Tensor], network: torch.nn.Module | None = None
 ) -> Greedy:
-    """The policy of ``settings_of``, with its ``card`` if they hold one, and of its weights.
-
-    Args:
-        settings, tensors: of the policy.
-        network: see ``load_policy``.
-    """
+    """The policy of ``settings_of``, with its ``card`` if they hold one, and of its weights."""
     if network is None:
         names = {kind.__name__: name for name, kind in NETWORKS.items()}
         if settings["network"] not in names:

@@ -11,6 +11,7 @@ import textwrap
 from dataclasses import fields, is_dataclass
 from functools import partial
 from hashlib import blake2b
+from itertools import chain
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
@@ -49,12 +50,11 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
     if isinstance(value, dict):
         return {str(name): identity(each, within) for name, each in value.items()}
     if isinstance(value, partial):
-        given, named = identity(value.args, within), identity(value.keywords, within)
-        named = {name: named[name] for name in sorted(named)}
-        return {"function": identity(value.func, within), "arguments": given, "keywords": named}
+        named = dict(sorted(value.keywords.items()))
+        parts = {"function": value.func, "arguments": value.args, "keywords": named}
+        return identity(parts, within)
     if isinstance(value, MethodType):
-        function, owner = identity(value.__func__, within), identity(value.__self__, within)
-        return {"function": function, "of": owner}
+        return identity({"function": value.__func__, "of": value.__self__}, within)
     if isinstance(value, (FunctionType, type)):
         name = f"{value.__module__}.{value.__qualname__}"
         if _package(value) == "unload" or value in within:
@@ -66,11 +66,10 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
     if isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
     elif callable(value) and hasattr(value, "__dict__"):
-        held = [identity(type(value), within), identity(vars(value), within)]
-        content = json.dumps(held).encode()
+        content = json.dumps(identity([type(value), vars(value)], within)).encode()
     elif is_dataclass(value):
-        parts = {each.name: identity(getattr(value, each.name), within) for each in fields(value)}
-        content = json.dumps(parts).encode()
+        parts = {each.name: getattr(value, each.name) for each in fields(value)}
+        content = json.dumps(identity(parts, within)).encode()
     else:
         return name
     return f"{name} {blake2b(content, digest_size=8).hexdigest()}"
@@ -87,13 +86,10 @@ def _absorb(value: Any, package: str, digest, seen: set) -> None:
     seen.add(value)
     digest.update(f"{value.__module__}.{value.__qualname__}\n".encode())
     if isinstance(value, type):  # its own source is not to be had where it stands in a notebook
-        members = [
-            each
-            for name, each in vars(value).items()
-            if isinstance(each, FunctionType) or not name.startswith("__")
-        ]
-        functions = [getattr(each, "__func__", getattr(each, "fget", each)) for each in members]
-        used = [*value.__bases__, *functions]
+        used = list(value.__bases__)
+        for name, each in vars(value).items():
+            if isinstance(each, FunctionType) or not name.startswith("__"):
+                used.append(getattr(each, "__func__", getattr(each, "fget", each)))
     else:
         tree = _tree(value)
         source = _bytecode(value.__code__) if tree is None else ast.unparse(tree)
@@ -140,11 +136,8 @@ def _literal(node: ast.AST) -> bool:
 
 def _names(code: CodeType) -> list[str]:
     """The names in a function's code, in their order, those of functions within it included."""
-    names = list(code.co_names)
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            names += _names(constant)
-    return names
+    within = [_names(each) for each in code.co_consts if isinstance(each, CodeType)]
+    return [*code.co_names, *chain.from_iterable(within)]
 
 
 def _tree(function: FunctionType) -> ast.AST | None:

@@ -6,6 +6,7 @@ network on a CPU, a few hundred times faster; a test holds the two equal.
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -44,13 +45,10 @@ class PlainLearner:
             targets: (k,) float32.
             rows: which of the k rows to learn from, int64; all if None.
         """
-        if rows is None:
-            rows = np.arange(len(targets))
-        observations, actions, wanted = (
-            torch.from_numpy(array.take(rows, axis=0))
-            for array in (batch["observations"], batch["actions"], targets)
-        )
-        return lambda: self._update(observations, actions, wanted)
+        arrays = [batch["observations"], batch["actions"], targets]
+        if rows is not None:
+            arrays = [array.take(rows, axis=0) for array in arrays]
+        return partial(self._update, *map(torch.from_numpy, arrays))
 
     def _update(
         self, observations: torch.Tensor, actions: torch.Tensor, targets: torch.Tensor
@@ -101,11 +99,7 @@ def grouped(arrays: Mapping[str, Each]) -> dict[str, dict[str, Each]]:
 def action_values(
     network: torch.nn.Module, observations: np.ndarray, present: np.ndarray | None = None
 ) -> torch.Tensor:
-    """Return a network's action values, (batch, items), in plain PyTorch.
-
-    Args:
-        network, observations, present: see ``highest_values``.
-    """
+    """Return a network's action values, (batch, items); for the arguments see below."""
     arguments = [torch.from_numpy(observations)]
     if present is not None and not present.all():  # other modules need not know of padding
         arguments.append(torch.from_numpy(present))

@@ -9,12 +9,10 @@ from unload.agent.config import TrainConfig
 def shuffle_places(
     observations: np.ndarray, rng: np.random.Generator, present: np.ndarray | None = None
 ) -> np.ndarray:
-    """Permute the places (x, y) of each observation among its items; heights stay.
+    """Permute the places (x, y) of each observation (batch, items, 3) among its items.
 
-    Args:
-        observations: (batch, items, 3); not changed.
-        rng: draws a permutation for each observation.
-        present: (batch, items) bool, the rows that hold an item, the first ones; all if None.
+    Heights stay. ``present`` (batch, items) bool, all if None, says which rows, the first ones,
+    hold an item; the others stay, too.
     """
     keys = rng.random(observations.shape[:2])
     if present is not None:
@@ -48,26 +46,22 @@ class ReplayBuffer:
 
     def __init__(self, size: int, items: int, next_state: bool = False) -> None:
         self.size, self.total = size, 0
-        kinds: dict[str, tuple[tuple[int, ...], type]] = {
-            "observations": ((items, 3), np.float32),
-            "actions": ((), np.int64),
-            "rewards": ((), np.float32),
+        self.arrays: dict[str, np.ndarray] = {
+            "observations": np.empty((size, items, 3), np.float32),
+            "actions": np.empty(size, np.int64),
+            "rewards": np.empty(size, np.float32),
         }
         if next_state:
-            kinds |= {
-                "next_observations": ((items, 3), np.float32),
-                "next_masks": ((items,), bool),
-                "terminations": ((), bool),
+            self.arrays |= {
+                "next_observations": np.empty((size, items, 3), np.float32),
+                "next_masks": np.empty((size, items), bool),
+                "terminations": np.empty(size, bool),
             }
-        self.arrays: dict[str, np.ndarray] = {
-            name: np.empty((size, *shape), dtype) for name, (shape, dtype) in kinds.items()
-        }
 
     @classmethod
     def of(cls, config: TrainConfig) -> "ReplayBuffer":
         """The memory of a run, still empty; the machine gives it room as it is filled."""
-        size = min(config.replay_size, config.picks)
-        return cls(size, task.N_VISIBLE, next_state=config.gamma > 0)
+        return cls(min(config.replay_size, config.picks), task.N_VISIBLE, config.gamma > 0)
 
     def __len__(self) -> int:
         return min(self.total, self.size)
@@ -85,10 +79,7 @@ class ReplayBuffer:
             wanted = (count, *array.shape[1:])
             if np.shape(batch[name]) != wanted:
                 raise ValueError(f"{name} has shape {np.shape(batch[name])}; expected {wanted}")
-        start = self.total % self.size
-        slots: slice | np.ndarray = slice(start, start + count)
-        if start + count > self.size:  # round the end
-            slots = np.arange(start, start + count) % self.size
+        slots = np.arange(self.total, self.total + count) % self.size
         for name, array in self.arrays.items():
             array[slots] = batch[name]
         self.total += count

@@ -1,14 +1,13 @@
 """The environments of a training run, and the picks in them."""
 
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 import numpy as np
 
 from unload.agent.config import TrainConfig
 from unload.agent.replay import shuffle_places
-from unload.env.base import PickingVectorEnv
 
 
 class Rollout:
@@ -29,17 +28,16 @@ class Rollout:
 
     def __init__(self, config: TrainConfig, stack: Callable | None = None) -> None:
         self._config, self.steps = config, 0
-        options: dict[str, Any] = {} if stack is None else {"stack": stack}
-        envs = gymnasium.make_vec(
+        own: dict[str, Any] = {} if stack is None else {"stack": stack}
+        self.envs: Any = gymnasium.make_vec(
             config.env,
             config.num_envs,
             equalize=config.equalize,
             ties=config.ties,
             max_picks=config.max_picks,
             position_noise=config.position_noise,
-            **options,
+            **own,
         )
-        self.envs = cast(PickingVectorEnv, envs)
         self._see(*self.envs.reset(seed=config.seeds()[0]))
 
     def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
@@ -71,33 +69,31 @@ class Rollout:
             What a ``ReplayBuffer`` holds of the picks, with the environment's ``rewards``; and
             how far each item was lifted, (num_envs,) float64 in m, NaN in a task without lifts.
         """
+        stored = self.observations
+        if self._config.shuffle_places:
+            # By the pick's number, so that a resumed run draws the same permutation.
+            rng = np.random.default_rng((self._config.seed, self.picks))
+            stored = shuffle_places(stored, rng, self._present)
         following, rewards, terminations, truncations, infos = self.envs.step(actions)
-        picks = {
-            "observations": self._stored_observations(),
-            "actions": actions,
-            "rewards": rewards,
-        }
+        picks = {"observations": stored, "actions": actions, "rewards": rewards}
+
+        # Where an episode has ended, what its last pick has led to stands apart from the reset's.
+        ended, last = terminations | truncations, infos.get("final_info", {})
+        unknown = np.full(len(actions), np.nan)
+        distances = np.where(ended, last.get("distance", unknown), infos.get("distance", unknown))
         if self._config.gamma > 0:
-            picks |= _next_states(following, terminations, infos)
-        # Where an episode has ended, the infos of its last pick stand apart.
-        last, unknown = infos.get("final_info", {}), np.full(len(actions), np.nan)
-        distances = np.where(
-            terminations | truncations,
-            last.get("distance", unknown),
-            infos.get("distance", unknown),
-        )
+            observations, masks = following.copy(), infos["action_mask"].astype(bool)
+            for env in np.flatnonzero(ended):
+                observations[env] = infos["final_obs"][env]
+                masks[env] = last["action_mask"][env]
+            picks |= {
+                "next_observations": observations,
+                "next_masks": masks,
+                "terminations": terminations,
+            }
         self.steps += 1
         self._see(following, infos)
         return picks, distances
-
-    def _stored_observations(self) -> np.ndarray:
-        """What is remembered of what is seen now."""
-        config = self._config
-        if not config.shuffle_places:
-            return self.observations
-        # By the pick's number, so that a resumed run draws the same permutation.
-        rng = np.random.default_rng((config.seed, self.picks))
-        return shuffle_places(self.observations, rng, self._present)
 
     def resume(self, steps: int, arrays: dict[str, np.ndarray]) -> None:
         """Go on after so many steps, where the environments' ``state`` was ``arrays``."""
@@ -107,14 +103,3 @@ class Rollout:
     def close(self) -> None:
         """Free the environments."""
         self.envs.close()
-
-
-def _next_states(
-    observations: np.ndarray, terminations: np.ndarray, infos: dict[str, np.ndarray]
-) -> dict[str, np.ndarray]:
-    """Next observations, masks and terminations; at an episode's end the last, not the reset's."""
-    observations, masks = observations.copy(), infos["action_mask"].astype(bool)
-    for env in np.flatnonzero(infos.get("_final_obs", [])):
-        observations[env] = infos["final_obs"][env]
-        masks[env] = infos["final_info"]["action_mask"][env]
-    return {"next_observations": observations, "next_masks": masks, "terminations": terminations}

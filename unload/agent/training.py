@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 import numpy as np
 import pandas as pd
@@ -31,24 +31,33 @@ from unload.network.variants import make_network
 from unload.physics.table import shared_table
 from unload.support import checks
 
-CURVE_COLUMNS = (
-    "picks", "mean_reward", "success_rate", "deadlocked", "loss", "epsilon", "wall_time"
-)  # fmt: skip
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
 # PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
 INSTRUCTIONS = ("AVX2", "AVX512")
+
+
+class Point(NamedTuple):
+    """A point of the learning curve, see ``TrainResult``."""
+
+    picks: int
+    mean_reward: float
+    success_rate: float
+    deadlocked: float
+    loss: float
+    epsilon: float
+    wall_time: float
 
 
 class Curve:
     """The learning curve: points over every ``log_interval`` steps, and the sums since the last.
 
     Attributes:
-        points: one tuple of ``CURVE_COLUMNS`` each, see ``TrainResult``.
+        points: so far.
         sums: of ``picks``, ``rewards``, ``deadlocked``, ``updates`` and ``losses``.
     """
 
     def __init__(self) -> None:
-        self.points: list[tuple[float, ...]] = []
+        self.points: list[Point] = []
         self._start_point()
 
     def _start_point(self) -> None:
@@ -56,13 +65,7 @@ class Curve:
         self.sums = dict.fromkeys(names, 0.0)
 
     def add(self, rewards: np.ndarray, deadlocked: np.ndarray, losses: Iterable[float]) -> None:
-        """Count one step.
-
-        Args:
-            rewards: (num_envs,) of its picks.
-            deadlocked: (num_envs,) bool, picks of items that had failed since the last success.
-            losses: of its updates.
-        """
+        """Count the picks of one step, (num_envs,) arrays, and the losses of its updates."""
         sums = self.sums
         sums["picks"] += len(rewards)
         sums["rewards"] += rewards.sum()
@@ -74,17 +77,16 @@ class Curve:
     def end_point(self, picks: int, epsilon: float) -> None:
         """Add the point of the steps since the last one, after ``picks`` picks in all."""
         sums = self.sums
-        mean_reward = sums["rewards"] / sums["picks"]
+        reward, deadlocked = sums["rewards"] / sums["picks"], sums["deadlocked"] / sums["picks"]
         loss = sums["losses"] / sums["updates"] if sums["updates"] else float("nan")
-        self.points.append((
-            picks, mean_reward, (mean_reward + 1) / 2, sums["deadlocked"] / sums["picks"],
-            loss, epsilon, time.time(),
-        ))  # fmt: skip
+        self.points.append(
+            Point(picks, reward, (reward + 1) / 2, deadlocked, loss, epsilon, time.time())
+        )
         self._start_point()
 
     def table(self) -> pd.DataFrame:
-        """Return one row per point, with the columns ``CURVE_COLUMNS``."""
-        return pd.DataFrame(self.points, columns=CURVE_COLUMNS)
+        """Return one row per point."""
+        return pd.DataFrame(self.points, columns=Point._fields)
 
 
 @cache  # once; Python's own filter forgets where another module changes filters
@@ -166,10 +168,8 @@ class Training:
         """Return what picks are worth in learning; a change may put another function here.
 
         Args:
-            picks: of a step, ``observations``, ``actions``, ``rewards`` and so on, as
-                ``ReplayBuffer`` holds them.
-            distances: (num_envs,) float64, how far each item was lifted in m, NaN in a task
-                without lifts.
+            picks: of a step, as ``ReplayBuffer`` holds them.
+            distances: see ``Rollout.pick``.
         """
         return picks["rewards"]
 
@@ -186,7 +186,7 @@ class Training:
             "loads": settings.pop("stack") or "the paper's",
             "configuration": settings,
             "picks": self.rollout.picks,
-            "msr": {"at the end of its training": self.curve.table()["success_rate"].iloc[-1]},
+            "msr": {"at the end of its training": self.curve.points[-1].success_rate},
         }
         return Greedy(deepcopy(self.agent.network), config.equalize, config.ties, card)
 
@@ -212,7 +212,7 @@ class Training:
         self.agent.load_state(parts["agent"])
         self.replay.load_state(parts["replay"])
         self.rollout.resume(rest["steps"], parts["envs"])
-        self.curve.points, self.curve.sums = list(map(tuple, rest["points"])), rest["sums"]
+        self.curve.points, self.curve.sums = [Point(*each) for each in rest["points"]], rest["sums"]
         self.rng.bit_generator.state = rest["rng"]
 
 
@@ -378,14 +378,15 @@ def _go(
             try:
                 bar.update(config.num_envs)
                 if not run.curve.sums["picks"]:
-                    point = dict(zip(CURVE_COLUMNS, run.curve.points[-1]))
-                    msr, loss = point["success_rate"], point["loss"]
-                    bar.set_postfix(MSR=f"{msr:.1%}", loss=f"{loss:.3f}", refresh=False)
+                    point = run.curve.points[-1]
+                    bar.set_postfix(
+                        MSR=f"{point.success_rate:.1%}", loss=f"{point.loss:.3f}", refresh=False
+                    )
                     if time.monotonic() - shown > CURVE_INTERVAL:
                         folder.save_curve(run)
                         shown = time.monotonic()
                     if callback is not None:
-                        callback(point)
+                        callback(point._asdict())
                 if interrupts:
                     raise KeyboardInterrupt(
                         f"stopped after {rollout.picks} picks; call train again with "
@@ -400,11 +401,10 @@ def _go(
 
 @contextmanager
 def deferred_interrupts() -> Iterator[list[int]]:
-    """Note the first Ctrl-C of a run instead of raising; the second one stops at once.
+    """Note the first Ctrl-C, so that the run stops at a safe point; the second one stops at once.
 
     Yields:
-        The signals received so far. The caller polls them and stops at a safe point; if it has
-        not stopped since the first one, KeyboardInterrupt is raised at the end.
+        The signals received so far. If the block ends after one, KeyboardInterrupt is raised.
     """
     received: list[int] = []
 

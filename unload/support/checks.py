@@ -6,21 +6,24 @@ What is of another type is a TypeError, what has another value a ValueError.
 from collections.abc import Hashable, Iterable, Mapping
 from numbers import Integral
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 # Of an array: None on an axis admits any length, None alone any shape.
 Shape = tuple[int | None, ...] | None
+Option = TypeVar("Option")
 LARGEST = np.iinfo(np.int64).max
 
 
-def one_of(name: str, value: object, options: Iterable[object]) -> None:
-    """Raise ValueError unless ``value`` is one of ``options``."""
+def one_of(name: str, value: object, options: Iterable[Option]) -> Option:
+    """Return the one of ``options`` that ``value`` is; raise ValueError if it is none."""
     options = list(options)
     single = isinstance(value, Hashable) and getattr(value, "shape", ()) == ()  # no array or tensor
     if not (single and value in options):
         known = ", ".join(repr(option) for option in options)
         raise ValueError(f"{name} is {value!r}; expected one of {known}")
+    return options[options.index(value)]  # type: ignore[arg-type]
 
 
 def boolean(name: str, value: object) -> bool:
@@ -38,10 +41,9 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
     wanted = f"expected an integer >= {low}" + ("" if high is None else f" and <= {high}")
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} is {value!r}; {wanted}")
-    value = int(value)
-    if not low <= value <= (LARGEST if high is None else high):
+    if not low <= int(value) <= (LARGEST if high is None else high):
         raise ValueError(f"{name} is {value!r}; {wanted}")
-    return value
+    return int(value)
 
 
 def jobs(name: str, value: object) -> int:

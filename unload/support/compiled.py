@@ -30,15 +30,11 @@ VERSIONS = sys.version, numba.__version__, llvmlite.__version__, np.__version__
 
 
 def compiled(function: Callable | None = None, **options) -> Callable:
-    """``numba.njit`` of a function of this package, with a cache that follows all its sources.
+    """``numba.njit`` of a function in one of ``SOURCES``, with a cache that follows all of them.
 
-    The first function that a process has to compile is logged, because a fresh installation
-    compiles for ten seconds. Where no folder can be written, compiled code is kept in memory, with
-    a warning.
-
-    Args:
-        function: of a module that is one of ``SOURCES``, compiled at its first call.
-        **options: of ``numba.njit`` except ``cache``, as in ``@compiled(nogil=True)``.
+    ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. A fresh installation
+    compiles for ten seconds, which the first function that has to be compiled logs. Where no
+    folder can be written, compiled code is kept in memory, with a warning.
     """
     if function is None:
         return partial(compiled, **options)

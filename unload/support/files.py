@@ -44,7 +44,8 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, path)
-        _sync_folder(path.parent)
+        with suppress(OSError):  # some file systems refuse it; the file itself is on disk
+            _sync(path.parent)
     except OSError as error:
         reason = f"cannot write this file: {error.strerror or error}"
         raise OSError(error.errno, reason, str(path)) from error
@@ -52,14 +53,13 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
         partial.unlink(missing_ok=True)  # of a write that failed
 
 
-def _sync_folder(folder: Path) -> None:
-    """Let the new name of a file outlast a power cut, where the file system can do that."""
-    with suppress(OSError):  # some refuse it with EINVAL; the file itself is on disk
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+def _sync(folder: Path) -> None:
+    """Let the new name of a file outlast a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -70,10 +70,7 @@ def write_text(path: str | Path, text: str) -> None:
 def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
     """Write a value as indented JSON in one atomic step.
 
-    Args:
-        path: of the file.
-        value: what JSON can hold; an object if ``checked``.
-        checked: add a last entry, ``digest``, by which ``read_json`` notices any change.
+    If ``checked``, an object gets a last entry, ``digest``, by which ``read_json`` notices changes.
     """
     if checked:
         value = value | {"digest": _digest_of(value)}
@@ -81,16 +78,7 @@ def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
 
 
 def read_json(path: str | Path, checked: bool = False) -> dict:
-    """Read a JSON file that holds an object; without the ``digest`` that ``write_json`` added.
-
-    Args:
-        path: of the file.
-        checked: whether it must have such a digest.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is damaged, holds something else or lacks its digest.
-    """
+    """Read a JSON file that holds an object; without its ``digest``, needed if ``checked``."""
     try:
         value = json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError, MemoryError) as error:  # RecursionError: of deep nesting
@@ -163,8 +151,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock; not if
             ``wait``.
-        OSError: ``folder/lock`` is a link to a file elsewhere, which would be overwritten; the
-            folder's file system has no locks, or its disk is full.
+        OSError: ``folder/lock`` is a link, or the file system has no locks, or no room.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -175,10 +162,14 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
 
         # Others hold such a lock for moments; who does so for longer may have been stopped.
         patience = time.monotonic() + (PATIENCE if wait else 0)
-        while not _taken(file):
-            if time.monotonic() < patience:
-                time.sleep(0.05)
-                continue
+        while True:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if time.monotonic() < patience:
+                    time.sleep(0.05)
+                    continue
             file.seek(0)
             owner = file.read().decode().strip() or "another process"
             if not wait:
@@ -190,15 +181,6 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         file.truncate(0)
         file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
         yield
-
-
-def _taken(file: BinaryIO) -> bool:
-    """Take the lock of a file, unless another process holds it."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    return True
 
 
 def _open_no_link(path: str, flags: int) -> int:
