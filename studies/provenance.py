@@ -41,12 +41,7 @@ def write_provenance(
 
 
 def read_provenance(folder: str | Path, name: str) -> dict:
-    """Return the content of ``folder/name.provenance.json``.
-
-    Raises:
-        FileNotFoundError: the data has no provenance.
-        ValueError: the file is damaged.
-    """
+    """Return the content of ``folder/name.provenance.json``."""
     return files.read_json(Path(folder) / f"{name}.provenance.json")
 
 

@@ -65,7 +65,6 @@ def run_sweep(
         or empty), ``folder`` of the run, and the configuration's fields.
 
     Raises:
-        TypeError, ValueError: an argument is not as described.
         TimeoutError: the cluster has no worker, and gets none within joblib's
             ``wait_for_workers_timeout``.
         BrokenProcessPool: a process has died, for want of memory, say; call it again to go on.

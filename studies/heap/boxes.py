@@ -32,9 +32,6 @@ class Heap:
         orientations: (n, 4) float64, quaternions x, y, z, w of length 1.
         sizes: (n, 3) float64, edge lengths in m along the box's own axes.
         packages: (n,) int64, package number 0–12.
-
-    Raises:
-        TypeError, ValueError: a field is not as described.
     """
 
     positions: np.ndarray
@@ -106,12 +103,7 @@ class Heap:
 
 
 def check_heap(name: str, heap: object) -> None:
-    """Refuse what no pick can begin with.
-
-    Raises:
-        TypeError: ``heap`` is no ``Heap``.
-        ValueError: it holds no box, or one whose centre is beyond ``FARTHEST_EDGE``.
-    """
+    """Refuse what no pick can begin with."""
     if not isinstance(heap, Heap):
         raise TypeError(f"{name} is {heap!r}; expected a Heap")
     if not len(heap):

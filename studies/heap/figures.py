@@ -157,14 +157,7 @@ def expected_fates(
 
 @styled
 def policies(folder: str | Path = paths.DATA) -> Figure:
-    """Boxes, falls and their balance for each policy at λ = 1, with 95 % intervals.
-
-    Args:
-        folder: of ``heap/table.csv``.
-
-    Raises:
-        FileNotFoundError: the table is missing; the message names the command.
-    """
+    """Boxes, falls and their balance for each policy at λ = 1, with 95 % intervals."""
     table = read_heap_table(folder)
     rows = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
     places = np.arange(len(rows))[::-1]
@@ -181,14 +174,7 @@ def policies(folder: str | Path = paths.DATA) -> Figure:
 
 @styled
 def throughput_falls(folder: str | Path = paths.DATA) -> Figure:
-    """Boxes and falls per pick on unseen heaps: a point for each rule, a curve over λ for others.
-
-    Args:
-        folder: of ``heap/table.csv``.
-
-    Raises:
-        FileNotFoundError: the table is missing; the message names the command.
-    """
+    """Boxes and falls per pick on unseen heaps: a point for each rule, a curve over λ for others."""
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
     for name, rows in read_heap_table(folder).groupby("policy", sort=False):
         rows = rows.sort_values("falls_weight")

@@ -70,9 +70,6 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
         picks: the data.
         seed: of weights and batches.
         steps: of the optimizer, a batch each.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
     checks.integer("steps", steps, 1)
     if not len(picks):
@@ -130,9 +127,6 @@ class Learned:
     Args:
         networks: their answers are averaged.
         falls_weight: λ.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, networks: Sequence[FateNetwork], falls_weight: float = 1.0) -> None:
@@ -185,12 +179,7 @@ def save_networks(networks: Sequence[FateNetwork], path: str | Path) -> None:
 
 
 def load_networks(path: str | Path) -> list[FateNetwork]:
-    """Read what ``save_networks`` wrote.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is damaged or holds something else.
-    """
+    """Read what ``save_networks`` wrote."""
     return read_weights(path, "heap networks", _networks)
 
 

@@ -31,11 +31,7 @@ def best(score: Score) -> Callable:
 
 
 def linear(weights: Mapping[str, float]) -> Score:
-    """The score that is a weighted sum of columns of the observation.
-
-    Raises:
-        ValueError: a name is no column.
-    """
+    """The score that is a weighted sum of columns of the observation."""
     for name in weights:
         checks.one_of("a column", name, COLUMNS)
     vector = np.array([weights.get(name, 0.0) for name in COLUMNS])

@@ -117,9 +117,6 @@ class Rake:
         physics: ``"whole"``, PyBullet's default of 240 Hz and 50 iterations of the solver, or
             ``"coarse"``, 120 Hz and 20 iterations.
         mass: kg, of each box.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, physics: str = "whole", mass: float = task.MASS) -> None:
@@ -129,12 +126,7 @@ class Rake:
         self._world = World(time_step, iterations=iterations)
 
     def pick(self, heap: Heap, box: int) -> Outcome:
-        """Drag one box and see what comes.
-
-        Raises:
-            TypeError, ValueError: ``heap`` is as ``check_heap`` refuses it, or ``box`` none of
-                its boxes.
-        """
+        """Drag one box and see what comes."""
         check_heap("heap", heap)
         box = checks.integer("box", box, 0, len(heap) - 1)
         world, edge = self._world, heap.edge()

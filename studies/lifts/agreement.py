@@ -75,8 +75,6 @@ def agreement_data(
     A run that was stopped goes on with the answers of ``full`` that it has.
 
     Args:
-        folder: of the data.
-        runs_dir: where the answers of ``full`` are kept.
         n_jobs: processes for ``full``, as in joblib.
     """
     collected = measured(partial(collect_lifts, LIFT_COUNT, FIRST_SEED))

@@ -101,9 +101,6 @@ def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray],
         points: (n, 2) float, where the items are on ``axes``.
         groups: meaning → item numbers.
         **style: of the dots, such as ``ms``.
-
-    Raises:
-        ValueError: a group's name is not in ``unload.load.picture.COLOURS``.
     """
     for meaning, items in groups.items():
         checks.one_of("a group's name", meaning, COLOURS)
@@ -125,9 +122,6 @@ def wall_view(
         wall: its number.
         groups: meaning → item numbers, as in ``draw_items``; items in no group are "unseen".
         present: (n,) bool, which boxes to draw; all if None.
-
-    Raises:
-        ValueError: a group's name is not in ``unload.load.picture.COLOURS``.
     """
     groups = {"unseen": np.arange(len(load)), **groups}
     for meaning in groups:

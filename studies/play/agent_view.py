@@ -60,9 +60,6 @@ class AgentView(widgets.VBox):
 
     Attributes:
         canvas: the drawing of the container.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, seed: int = 0, agent: str = "the paper's agent", picks: int = 60) -> None:

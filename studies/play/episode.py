@@ -67,9 +67,6 @@ class Episode:
     Attributes:
         load: the items.
         picks: those made so far, ``Pick`` each.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, load: Load, seed: int = 0) -> None:
@@ -100,11 +97,7 @@ class Episode:
         return self._now[1]["action_mask" if mask else "item_mask"]
 
     def pick(self, item: int) -> Pick:
-        """Lift a visible item.
-
-        Raises:
-            ValueError: the item is not visible.
-        """
+        """Lift a visible item."""
         item = checks.integer("item", item, 0, len(self.load) - 1)
         rows = np.flatnonzero(self._env.visible == item)
         if not rows.size:
@@ -118,11 +111,7 @@ class Episode:
         return self.picks[-1]
 
     def back_to(self, count: int) -> None:
-        """Take back all picks but the first ``count``, which are made again.
-
-        Raises:
-            ValueError: there are fewer.
-        """
+        """Take back all picks but the first ``count``, which are made again."""
         made = self.picks[: checks.integer("count", count, 0, len(self.picks))]
         self._begin()
         for pick in made:

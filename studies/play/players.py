@@ -23,11 +23,7 @@ PLAYERS = (*RULES, *AGENTS)
 
 @cache
 def policy_of(player: str) -> Callable:
-    """The policy of a player, see ``unload.policies``.
-
-    Raises:
-        ValueError: an unknown player.
-    """
+    """The policy of a player, see ``unload.policies``."""
     checks.one_of("player", player, PLAYERS)
     if player in RULES:
         return RULES[player]
@@ -44,9 +40,6 @@ class Run(Episode):
 
     Attributes:
         mask: as given; may be set anew between picks.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, player: str, load: Load, seed: int = 0, mask: bool = True) -> None:

@@ -37,9 +37,6 @@ class Playground(widgets.VBox):
         you: your ``Episode``; PyBullet has lifted each box that you click, see ``TablePhysics``.
         runs: player → ``Run``.
         canvas: the drawing of the container, whose boxes can be clicked.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(

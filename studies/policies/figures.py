@@ -36,16 +36,9 @@ NOT_PLAYED = "–"  # with every box simulated: without the mask, and restored b
 def read_comparison(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """Every container that a policy has unloaded.
 
-    Args:
-        folder: of the data.
-
     Returns:
         One row per container: ``policy``, ``mask``, ``condition`` (one of ``CONDITIONS``) and
         ``success_rate``.
-
-    Raises:
-        FileNotFoundError: a table is missing; the message says how to compute it.
-        ValueError: a table lacks a column.
     """
     place, command = Path(folder) / "policies", f"{COMMAND} policies"
     columns = ["policy", "mask", "condition", "success_rate"]
@@ -60,12 +53,6 @@ def comparison_msr(folder: str | Path = paths.DATA) -> Figure:
     """MSR of every policy: a panel for each condition, dots with 95 % intervals.
 
     Hollow dots are played without the mask.
-
-    Args:
-        folder: of the data.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_comparison``.
     """
     table = read_comparison(folder)
     figure, panels = plt.subplots(

@@ -102,9 +102,6 @@ def variants_data(
 
     Args:
         grids: names in ``GRIDS``.
-        folder: of the data.
-        runs_dir: where the runs are kept.
-        n_jobs: processes, see ``run_sweep``.
         shipped: folder of the policy.
 
     Raises:
@@ -125,11 +122,6 @@ def read_variants(grid: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
 
     Args:
         grid: a name in ``GRIDS``.
-        folder: of the data.
-
-    Raises:
-        ValueError: an unknown grid.
-        FileNotFoundError: it has not been published.
     """
     checks.one_of("grid", grid, GRIDS)
     rows = read_measures(GRIDS[grid], folder)

@@ -16,12 +16,7 @@ COLUMNS = ["what", "how", "value", "unit", "ratio"]
 
 
 def read_speeds(folder: str | Path = FOLDER) -> pd.DataFrame:
-    """The table of the benchmarks, a row per way of doing a thing.
-
-    Raises:
-        FileNotFoundError: it is missing; the message says how to measure it.
-        ValueError: a column is missing.
-    """
+    """The table of the benchmarks, a row per way of doing a thing."""
     return read_table(Path(folder) / "speeds.csv", "python -m studies.speed.run", COLUMNS)
 
 
@@ -32,14 +27,7 @@ def three_digits(value: float) -> str:
 
 @styled
 def speed_ratios(folder: str | Path = FOLDER) -> Figure:
-    """Speed ratio of each implementation to the first one.
-
-    Args:
-        folder: of the table.
-
-    Raises:
-        FileNotFoundError, ValueError: see ``read_speeds``.
-    """
+    """Speed ratio of each implementation to the first one."""
     table = read_speeds(folder)
     groups = table.groupby("what", sort=False)
     figure, panels = plt.subplots(
