@@ -71,7 +71,7 @@ class AgentView(widgets.VBox):
         self._moment, self._liftable = run.moment(), run.liftable()
         # The environment's blur is drawn once per load. We change its size, not its direction.
         self._offsets = run.observed_positions() - self._load.positions
-        self.canvas = Canvas(self._load, height=420)
+        self.canvas = Canvas(self._load)
         self._make_controls(agent)
         rows = [widgets.HBox(row) for row in self._controls]
         super().__init__([*rows, self.message, self.canvas])

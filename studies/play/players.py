@@ -44,7 +44,7 @@ class Run(Episode):
 
     def __init__(self, player: str, load: Load, seed: int = 0, mask: bool = True) -> None:
         self._policy = policy_of(player)
-        self.mask = checks.boolean("mask", mask)
+        self.mask = mask
         super().__init__(load, seed)
 
     def play_to(self, count: int) -> int:
@@ -52,7 +52,6 @@ class Run(Episode):
 
         They are fewer if the container is empty before, or all visible items have failed.
         """
-        checks.integer("count", count, 0)
         while len(self.picks) < count and self.allowed(self.mask).any():
             self.pick(self.choose())
         return min(count, len(self.picks))

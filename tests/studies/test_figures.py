@@ -57,14 +57,6 @@ FIGURES = FROM_DATA | {
     "over_steps": lambda: learning_curves.over_steps(RUNS, "MSR"),
     "lift_sequences": lambda: sequences.lift_sequences({"a": (np.ones((2, 2)), POSES)}, [0, 0.3]),
     "speed_ratios": speed_ratios,
-    "learning": lambda: policies.learning(
-        pd.DataFrame({"picks": LINE, "success_rate": 0.5, "epsilon": 1.0, "loss": 0.1}),
-        pd.Series(LINE / 3),
-    ),
-    "preferences": lambda: policies.preferences(
-        LINE, {"front": LINE}, LINE, np.add.outer(LINE, LINE)
-    ),
-    "steps": lambda: policies.steps(np.full((2, 2), 0.3), 0.4, np.ones((3, 3))),
     "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
     "laboratory_runs": lambda: falls.laboratory_runs(
         {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}

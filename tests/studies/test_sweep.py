@@ -73,13 +73,6 @@ def test_own_loads_are_trained_on_with_one_file_of_lifts(tmp_path):
     assert_same(tmp_path / "run", tmp_path / "alone")
 
 
-def test_progress_bar_is_on_stdout(configs, tmp_path, capsys):
-    sweep.run_sweep(configs, tmp_path, n_jobs=1)
-    captured = capsys.readouterr()
-    assert "2/2" in captured.out
-    assert captured.err == ""
-
-
 def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "run_0").write_text("a file where the run's folder should be")
@@ -96,14 +89,6 @@ def test_an_error_in_own_code_is_traced_in_the_runs_log(tmp_path):
     report = sweep.run_sweep({"run": config}, tmp_path, 1, progress=False, stack=leaning_stack)
     assert report["error"].item() == "RuntimeError: it fell over"
     assert "in leaning_stack" in (tmp_path / "run" / "log.txt").read_text()
-
-
-def test_a_run_in_anothers_folder_is_reported(configs, tmp_path):
-    other = tuning_config(8, 1e-3, 0, steps=4, n_features=5)
-    train(other, tmp_path / "set" / "run_0", progress=False)
-    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
-    assert "n_features (5, not 4)" in report["error"].iloc[0]
-    assert report["error"].iloc[1] == ""
 
 
 @pytest.mark.slow
@@ -132,14 +117,6 @@ def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
     }
     assert used == workers
     assert len(used) == 2
-
-
-def test_a_cluster_without_workers_is_waited_for_so_long_only(configs, tmp_path):
-    distributed = pytest.importorskip("distributed")
-    cluster = distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None)
-    with cluster, distributed.Client(cluster), pytest.raises(TimeoutError, match="has no worker"):
-        with parallel_config("dask", wait_for_workers_timeout=0.2):
-            sweep.run_sweep(configs, tmp_path, progress=False)
 
 
 def test_runs_that_do_not_fit_the_memory_are_warned_of(configs, tmp_path, monkeypatch):

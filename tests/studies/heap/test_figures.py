@@ -45,31 +45,6 @@ def test_corners_are_those_of_turned_boxes(heap):
     assert corners.mean(axis=1) == pytest.approx(heap.positions)
 
 
-def test_an_expected_fate_is_the_share_of_its_colour(heap, outcome):
-    """Box 0 is dragged, 3 hidden; 1 falls for certain, and 2 comes in half of the cases."""
-    chances = np.array([[1.0, 0], [0, 1], [0.5, 0]])
-    figure = figures.expected_fates(heap, 0, np.array([0, 1, 2]), chances, outcome)
-    left, right = (
-        {tuple(np.round(c[:3] / c[:3].max(), 2)) for c in axes.collections[0].get_facecolors()}
-        for axes in figure.axes[:2]
-    )
-
-    def tint(colour):
-        return tuple(np.round(colour / colour.max(), 2))
-
-    stays, comes, falls, dragged = map(np.array, figures.MEANINGS.values())
-    assert left == {tint(c) for c in (dragged, falls, (stays + comes) / 2, stays)}
-    assert right == {tint(c) for c in (dragged, falls, comes, stays)}
-    names = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert names == list(figures.MEANINGS)
-
-
-def test_episodes_are_drawn_before_their_first_middle_and_last_pick(heap, outcome):
-    one = [heap, outcome.heap], np.array([0]), [outcome]
-    titles = [panel.get_title() for panel in figures.episodes({"lowest": one}).axes]
-    assert titles == ["lowest, pick 1: 0 unloaded, 0 fallen"] * 3
-
-
 def test_nearer_boxes_are_painted_later(heap):
     """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
     axes = plt.figure().add_subplot()

@@ -5,8 +5,6 @@ from studies.heap.boxes import Heap
 from studies.heap.observation import (
     COLUMN,
     COLUMNS,
-    PIXELS_HIGH,
-    PIXELS_WIDE,
     ROWS,
     SEEN,
     Camera,
@@ -39,13 +37,6 @@ def observed(camera):
 
 def column(rows: np.ndarray, name: str) -> np.ndarray:
     return rows[:, COLUMN[name]]
-
-
-def test_pixels_are_counted_by_box(camera, pile):
-    pixels = camera.pixels(pile)
-    assert len(pixels) == len(pile) and 0 < pixels.sum() < PIXELS_WIDE * PIXELS_HIGH
-    alone = camera.pixels(pile.only(np.array([3])))
-    assert alone[0] >= pixels[3], "others hide it"
 
 
 def test_a_box_behind_another_is_not_visible(camera, cubes):

@@ -21,18 +21,6 @@ def committed():
     return agreement.read_agreement()
 
 
-def test_lifts_are_asked_about_in_the_state_they_name():
-    states, frame = agreement.collect_lifts(100, 3)
-    for state, rows in frame.groupby("state"):
-        named = states[state]
-        assert (rows["picks"] == named.picks).all() and (rows["seed"] == named.seed).all()
-        assert named.present[named.visible].all()
-        assert set(rows["item"]) <= set(named.visible)
-        assert not rows["item"].duplicated().any()
-        assert (np.bincount(np.minimum(rows["on_top"], 3), minlength=4) <= agreement.WANTED).all()
-    assert [state.present.all() for state in states] == [state.picks == 0 for state in states]
-
-
 def test_choice_for_full():
     """A few lifts of each state drawn, others of three and more on top, and all close ones."""
     rng = np.random.default_rng(0)
@@ -134,18 +122,6 @@ def state():
     present[rng.choice(free, len(free) // 3, replace=False)] = False
     visible = rng.choice(np.flatnonzero(present), 30, replace=False)
     return agreement.State("random", 4, 0, load, present, visible)
-
-
-def test_boxes_left_are_those_of_the_walls_around(monkeypatch, state):
-    monkeypatch.setattr(agreement, "NEAR_WALLS", 1)
-    left, items = agreement.boxes_left(state, 1, 1)
-    assert set(left.walls) == {1}
-    assert (items == np.flatnonzero(state.present & (state.load.walls == 1))).all()
-    assert (left.positions == state.load.positions[items]).all()
-    monkeypatch.setattr(agreement, "NEAR_WALLS", 3)
-    assert set(agreement.boxes_left(state, 0, 3)[0].walls) == {0, 1}
-    left, items = agreement.boxes_left(state, 0, agreement.WALLS)
-    assert (items == np.flatnonzero(state.present)).all()
 
 
 def test_a_fresh_world_lifts_the_item_it_was_asked_about(monkeypatch, state):

@@ -101,10 +101,3 @@ def test_what_can_be_lifted_is_lifted(episode):
 def test_a_pick_is_explained(pick, words):
     assert words in explain(pick)
     assert ("failed" in explain(pick)) == (not pick.success)
-
-
-def test_a_pick_that_is_refused_changes_nothing(episode):
-    unseen = next(i for i in range(len(episode.load)) if i not in episode.visible)
-    with pytest.raises(ValueError, match=f"item is {unseen}; expected one of the visible"):
-        episode.pick(unseen)
-    assert episode.picks == []
