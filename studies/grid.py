@@ -20,7 +20,7 @@ import torch
 from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.provenance import joined, read_provenance, write_provenance
-from studies.results import COMMAND, read_table, write_table
+from studies.results import read_table, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
@@ -232,16 +232,12 @@ def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
 
 def read_policies(path: str | Path) -> dict[str, Greedy]:
     """The policies of ``write_policies``, by name."""
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; {COMMAND} makes it")
-    return read_weights(path, "policies", _policies)
 
+    def policies(settings: dict, tensors: dict[str, torch.Tensor]) -> dict[str, Greedy]:
+        of_run: dict[str, dict] = {name: {} for name in settings}
+        for name, tensor in tensors.items():
+            run, _, part = name.rpartition("/")
+            of_run[run][part] = tensor
+        return {name: policy_of(each, of_run[name]) for name, each in settings.items()}
 
-def _policies(settings: dict, tensors: dict[str, torch.Tensor]) -> dict[str, Greedy]:
-    """The policies of a file."""
-    of_run: dict[str, dict] = {name: {} for name in settings}
-    for name, tensor in tensors.items():
-        run, _, part = name.rpartition("/")
-        of_run[run][part] = tensor
-    return {name: policy_of(each, of_run[name]) for name, each in settings.items()}
+    return read_weights(path, "policies", policies)

@@ -13,7 +13,7 @@ from studies import paths
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.policies import RULES
 from studies.heap.rake import Outcome
-from studies.heap.table import LEARNED, MEASURES, ORACLE, REFERENCE, SHOWN_WEIGHT, read_heap_table
+from studies.heap.table import LEARNED, ORACLE, REFERENCE, read_heap_table
 from studies.style import COLOURS as RULE_COLOURS
 from studies.style import styled
 from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
@@ -105,23 +105,6 @@ def _room(edge: float) -> list[np.ndarray]:
 def add_legend(figure: Figure) -> None:
     handles = [Patch(facecolor=c, edgecolor="0.5", label=name) for name, c in MEANINGS.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(MEANINGS), frameon=False)
-
-
-@styled
-def policies(folder: str | Path = paths.DATA) -> Figure:
-    """Boxes, falls and their balance for each policy at λ = 1, with 95 % intervals."""
-    table = read_heap_table(folder)
-    rows = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
-    places = np.arange(len(rows))[::-1]
-    figure, grid = plt.subplots(1, len(MEASURES), figsize=(9, 3.0), sharey=True)
-    for axes, measure in zip(grid, MEASURES):
-        for place, (name, row) in zip(places, rows.iterrows()):
-            low, value, high = row[f"{measure}_low"], row[measure], row[f"{measure}_high"]
-            colour = LINES.get(name, "0.55")
-            axes.plot([low, high], [place, place], color=colour, lw=2)
-            axes.plot(value, place, "o", color=colour, ms=5)
-        axes.set(yticks=places, yticklabels=list(rows.index), xlabel=UNITS[measure])
-    return figure
 
 
 @styled

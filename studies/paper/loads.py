@@ -23,7 +23,6 @@ from unload.load.substacks import (
     ROWS_HIGH,
     package_colour,
 )
-from unload.support import checks
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
 INK = "#333333"
@@ -110,8 +109,6 @@ def wall_view(
         present: (n,) bool, which boxes to draw; all if None.
     """
     groups = {"unseen": np.arange(len(load)), **groups}
-    for meaning in groups:
-        checks.one_of("a group's name", meaning, COLOURS)
     meaning_of = {item: meaning for meaning, items in groups.items() for item in items}
     in_wall = load.walls == wall if present is None else (load.walls == wall) & present
     figure, axes = plt.subplots(figsize=(4.68, 3.6))

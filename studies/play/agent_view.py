@@ -4,7 +4,7 @@ import ipywidgets as widgets
 import numpy as np
 
 from studies.play.canvas import ABSENT, Canvas
-from studies.play.players import AGENTS, Run, policy_of
+from studies.play.episode import AGENTS, Run, policy_of
 from unload.agent.greedy import Greedy, greedy_actions
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import POSITION_NOISE, drift, scaled
@@ -55,7 +55,7 @@ class AgentView(widgets.VBox):
 
     Args:
         seed: of the load and of the noise.
-        agent: one of ``studies.play.players.AGENTS``, who has made the picks before.
+        agent: one of ``studies.play.episode.AGENTS``, who has made the picks before.
         picks: that it has made, without the mask.
 
     Attributes:

@@ -6,8 +6,7 @@ import ipywidgets as widgets
 import numpy as np
 
 from studies.play.canvas import ABSENT, Canvas
-from studies.play.episode import Episode, Moment, explain
-from studies.play.players import PLAYERS, Run
+from studies.play.episode import PLAYERS, Episode, Moment, Run, explain
 from studies.play.replay import replay
 from unload import task
 from unload.load.picture import COLOURS
@@ -27,7 +26,7 @@ class Playground(widgets.VBox):
 
     Args:
         seed: of the load, of the blur of its observed positions, and of random picks.
-        player: who picks first, ``"you"`` or one of ``studies.play.players.PLAYERS``.
+        player: who picks first, ``"you"`` or one of ``studies.play.episode.PLAYERS``.
         mask: whether the players' masks exclude items that failed since the last success.
         picks: that a player who is watched may make.
 

@@ -100,13 +100,6 @@ def variants_data(
 
     The recommended agent's first run also leaves ``policies/recommended.safetensors``.
 
-    Args:
-        grids: names in ``GRIDS``.
-        shipped: folder of the policy.
-
-    Raises:
-        ValueError: an unknown grid.
-        RuntimeError: runs failed; the message says which and why.
     """
     for name in grids:
         checks.one_of("grids", name, GRIDS)

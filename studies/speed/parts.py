@@ -1,4 +1,4 @@
-"""What the parts take: lifts and picks per second, and milliseconds per update."""
+"""What the parts take: lifts and picks per second, milliseconds per update; and their table."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -6,18 +6,33 @@ from unittest import mock
 
 import gymnasium
 import numpy as np
+import pandas as pd
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 import unload
+from studies import paths
+from studies.results import read_table
 from unload import task
 from unload.agent import learner
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
+FOLDER = paths.DATA / "benchmarks"
+COLUMNS = ["what", "how", "value", "unit", "ratio"]
 CONTAINER = "unload/Container-v0"
 ROUNDS = 4  # in which each call is timed
+
+
+def read_speeds() -> pd.DataFrame:
+    """The table that ``studies.speed.run`` has published, a row per way of doing a thing."""
+    return read_table(FOLDER / "speeds.csv", "python -m studies.speed.run", COLUMNS)
+
+
+def three_digits(value: float) -> str:
+    """A positive number rounded to three digits, without a power of ten: 1,230,000."""
+    return f"{float(f'{value:.3g}'):,.10g}"
 
 
 def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:

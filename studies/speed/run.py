@@ -17,8 +17,7 @@ import torch
 
 import unload
 from studies.results import measured, publish
-from studies.speed.figures import FOLDER, three_digits
-from studies.speed.parts import lift_rates, pick_rates, update_times
+from studies.speed.parts import FOLDER, lift_rates, pick_rates, three_digits, update_times
 from studies.speed.training import training_rates
 
 COMMAND = "python -m studies.speed.run"

@@ -9,10 +9,8 @@ import pytest
 from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
-from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train_changed
-from unload.load.substacks import stack_load
 
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
@@ -70,13 +68,6 @@ def test_only_what_is_stored_is_changed():
     assert (remembered(plain) == seen).all()
 
 
-def test_the_setting_shuffles_as_the_change_does():
-    changed, seen = run_of(changes.shuffled)
-    configured, _ = run_of(lambda run: None, config=replace(SMALL, shuffle_places=True))
-    assert (remembered(changed) == remembered(configured)).all()
-    assert (remembered(changed) != seen).any()
-
-
 def test_what_is_seen_is_changed_in_choosing_and_learning():
     run = Training(SMALL)
     asked = note_what_is_asked(run)
@@ -119,15 +110,6 @@ def test_choices_see_other_signs_than_the_memory_holds():
     assert set(np.unique(signs)) == {-1, 1} and (signs == signs[:, :1]).all()
     assert (asked[0][..., [0, 2]] == seen[..., [0, 2]]).all()
     assert (remembered(run) == seen).all()
-
-
-def test_loads_are_dug_to_the_preferred_side():
-    (load,) = changes.dug_loads(0.4, count=1, seed=2)
-    plain = stack_load(np.random.default_rng(2))
-    assert len(plain) - changes.DEEPEST <= len(load) < len(plain)
-    near = load.positions[:, 0] > task.CONTAINER[0] / 2
-    side = load.positions[near, 1] > task.CONTAINER[1] / 2
-    assert side.mean() < 0.45  # more boxes are left on the other side
 
 
 def test_dug_loads_come_from_the_second_episode_on(monkeypatch):

@@ -63,13 +63,6 @@ def test_what_is_published_says_where_it_comes_from(tmp_path):
     assert not more["reduced"]
 
 
-def test_a_table_that_cannot_be_written_has_no_provenance(tmp_path):
-    (tmp_path / "a.csv").mkdir()
-    with pytest.raises(OSError, match="a.csv"):
-        publish(tmp_path, "tea", {"a": pd.DataFrame()}, "make tea", {}, [])
-    assert not (tmp_path / "tea.provenance.json").exists()
-
-
 def test_a_table_is_read_and_another_one_refused(tmp_path):
     path = tmp_path / "t.csv"
     with pytest.raises(FileNotFoundError, match="t.csv is missing; make tea makes it"):

@@ -75,22 +75,3 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
         ("print(f'{a + 1}') -> pass", "pass"),
     ]
-
-
-def test_a_mutant_is_killed_by_the_first_test_that_fails_or_by_its_time(tmp_path, monkeypatch):
-    own = "tests/room/test_module.py"
-    (tmp_path / own).parent.mkdir(parents=True)
-    (tmp_path / "module.py").write_text("X = 1")
-    (tmp_path / own).write_text(
-        "from module import X\ndef test_x():\n    while X == 2: pass\n    assert X == 1"
-    )
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow")
-    monkeypatch.setattr(mutants, "ROOMS", {"room": "tests/room"})
-    trees = mutants.SimpleQueue()
-    trees.put(tmp_path)
-    outcomes = [
-        mutants.killed_by(trees, "room", mutants.ROOT / "module.py", code, limit=10)
-        for code in (None, b"X = 3", b"X = 2", b"X =")
-    ]
-    assert outcomes == ["", f"{own}::test_x", "time limit", own]
-    assert (tmp_path / "module.py").read_text() == "X = 1"

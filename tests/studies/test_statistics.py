@@ -116,16 +116,6 @@ def test_the_rise_after_the_peak_of_the_loss():
     )  # fmt: skip
 
 
-def test_a_bootstrap_interval_holds_the_mean_about_as_often_as_it_says():
-    rng = np.random.default_rng(0)
-    inside = [
-        low < 3 < high
-        for low, high in map(statistics.bootstrap_interval, rng.normal(3, 1, (300, 40)))
-    ]
-    assert 0.90 < np.mean(inside) < 0.98
-    assert statistics.bootstrap_interval([0.25]) == (0.25, 0.25)
-
-
 def test_share_intervals_are_those_of_the_binomial_distribution():
     """At the ends of the interval, what was seen or more extreme has a probability of 2.5 %."""
     interval = statistics.share_interval

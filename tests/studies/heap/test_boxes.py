@@ -32,11 +32,5 @@ def test_the_edge_is_at_the_front_but_does_not_give_way_beyond_the_door(cubes):
     assert DOOR < FARTHEST_EDGE < 7.3
 
 
-def test_only_keeps_boxes_by_number_and_by_flag(cubes):
-    heap = cubes((4.5, 1, 0), (5, 1, 0), (5.5, 1, 0))
-    assert heap.only(np.array([2, 0])).positions[:, 0].tolist() == [5.5, 4.5]
-    assert len(heap.only(np.array([True, False, False]))) == 1
-
-
 def test_packages_have_the_sizes_of_the_neat_loads():
     assert package_sizes(np.array([0]))[0] == pytest.approx([7 / 12, 25 / 36, 15 / 36])

@@ -8,10 +8,10 @@ from gymnasium.utils.env_checker import check_env
 
 from studies.heap.env import HeapEnv
 from studies.heap.generate import SPLITS, read_heaps, settled_heap
-from studies.heap.learning import Learned, Picks, fit
+from studies.heap.learning import Learned, fit
 from studies.heap.network import FateNetwork
 from studies.heap.observation import ROWS
-from studies.heap.policies import Oracle, linear
+from studies.heap.policies import Oracle, Picks, linear
 
 
 def trace(env: HeapEnv, seed: int, picks: int = 4) -> list:

@@ -5,21 +5,13 @@ import numpy as np
 import pytest
 
 from studies.heap import figures
-from studies.heap.table import SHOWN_WEIGHT, read_heap_table
+from studies.heap.table import read_heap_table
 from unload.load.picture import COLOURS
 
 
-def test_every_figure_draws_its_data():
+def test_the_throughput_draws_its_data():
     """From data/ where it is read: dots at the values of the table, and all their names."""
     table = read_heap_table()
-    shown = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
-    axes = figures.policies().axes
-    assert [text.get_text() for text in axes[0].get_yticklabels()] == list(shown.index)
-    for panel, measure in zip(axes, ("boxes", "falls", "net")):
-        values = [line.get_xdata() for line in panel.lines]
-        assert [value[0] for value in values[1::2]] == shown[measure].tolist()
-        ends = shown[[f"{measure}_low", f"{measure}_high"]].to_numpy().tolist()
-        assert [list(value) for value in values[::2]] == ends
     (curves,) = figures.throughput_falls().axes
     named = {line.get_label(): line for line in curves.lines}
     learned = table[table["policy"] == "learned"].sort_values("falls_weight")
@@ -31,9 +23,8 @@ def test_every_figure_draws_its_data():
 
 
 def test_missing_data_names_the_command_that_makes_it(tmp_path):
-    for draw in (figures.policies, figures.throughput_falls):
-        with pytest.raises(FileNotFoundError, match="python -m studies heap makes it"):
-            draw(tmp_path)
+    with pytest.raises(FileNotFoundError, match="python -m studies heap makes it"):
+        figures.throughput_falls(tmp_path)
 
 
 def test_corners_are_those_of_turned_boxes(heap):

@@ -6,7 +6,6 @@ from studies.heap.learning import (
     Learned,
     Picks,
     batch_loss,
-    batches,
     fit,
     holds_box,
     load_networks,
@@ -71,12 +70,6 @@ def test_the_same_seed_gives_the_same_bits():
     assert not torch.equal(first["heads.weight"], other["heads.weight"])
 
 
-def test_each_pick_is_learned_from_equally_often_until_the_steps_are_done():
-    rows = [each.tolist() for each in batches(300, 4, torch.Generator().manual_seed(0))]
-    assert [len(each) for each in rows] == [128, 128, 44, 128]
-    assert sorted(sum(rows[:3], [])) == list(range(300))
-
-
 def test_what_is_learned_of_a_fall_is_its_likelihood(learned):
     """A fall changes that of their number, of the hidden ones among them, and of having any."""
     network, picks = learned
@@ -117,15 +110,6 @@ def test_policy_tells_the_fates_of_all_boxes_for_one_pick(learned):
     assert chances.shape == (100, ROWS, 2) and (chances[:, BOXES:] == 0).all()
     guessed, found = chances[:, :BOXES, 0] > 0.5, unseen.fates[:100, :BOXES] > 0
     assert (guessed == found).mean() > 0.9 and chances[..., 1].max() < 0.1
-
-
-def test_several_networks_are_averaged(learned):
-    network, unseen = learned
-    other = FateNetwork(8, torch.Generator().manual_seed(1))
-    both = Learned([network, other]).expected(unseen.observations)
-    single = [Learned([each]).expected(unseen.observations) for each in (network, other)]
-    for together, first, second in zip(both, *single):
-        assert together == pytest.approx((first + second) / 2, abs=1e-5)
 
 
 def test_stored_networks_are_the_same(tmp_path, learned):

@@ -80,11 +80,6 @@ def test_a_box_half_in_front_covers_half(observed, cubes):
     assert column(rows, "clear_in_front") == pytest.approx([1, 0.5])
 
 
-def test_boxes_outside_the_door_do_not_move_the_edge(observed, cubes):
-    _, rows = observed(cubes((6.0, 1.0, 0), (7.1, 2.0, 0)))
-    assert column(rows, "behind") == pytest.approx([0.1, 1.2])
-
-
 def test_only_the_foremost_boxes_get_a_row(cubes):
     count = ROWS + 10
     heap = cubes(*((x, 1, 0) for x in np.linspace(4, 7, count)))

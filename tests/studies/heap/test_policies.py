@@ -55,13 +55,6 @@ def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):
     assert np.array_equal(info["item_mask"], episode.observations[2].any(axis=1))
 
 
-def test_clear_above_is_a_box_of_which_at_most_a_tenth_is_covered(three_boxes, rng):
-    observations, masks = three_boxes
-    for share, row in ((0.89, 1), (0.91, 0)):
-        observations[0, 0, COLUMN["clear_above"]] = share
-        assert RULES["clear above"](observations, masks, rng).tolist() == [row]
-
-
 def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes, monkeypatch):
     """A first physics in which all boxes look alike leaves the choice to the second.
 

@@ -31,13 +31,6 @@ def test_a_box_comes_if_it_has_moved_by_nine_tenths_of_the_reach(
     assert outcome.came == came and outcome.unloaded.tolist() == [came, False]
 
 
-def test_a_pick_ends_when_nothing_moves(cubes, make_rake):
-    """A box falls for two seconds, longer than the drag of one that is too heavy and a rest."""
-    outcome = make_rake(mass=30.0).pick(cubes((4.5, 1, 0), (4.5, 2, 35)), 0)
-    assert not outcome.came and outcome.fallen.tolist() == [False, True]
-    assert outcome.heap.positions[1, 2] == pytest.approx(0.2, abs=0.02)
-
-
 def test_a_box_that_loses_its_support_falls(cubes, make_rake, set_friction):
     set_friction(0.05)
     tower = cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (5, 1, 3))

@@ -1,6 +1,5 @@
 """The paper's numbers beside ours."""
 
-import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,7 +7,6 @@ import pytest
 from studies.paper import numbers
 from unload import policies
 from unload.agent.evaluation import evaluate
-from unload.physics.situation import Surroundings
 
 
 def test_a_table_says_in_words_what_agrees():
@@ -35,20 +33,6 @@ def test_what_is_measured_agrees_where_it_should(monkeypatch):
     # Values instead of ranks do not agree.
     monkeypatch.setattr(numbers, "equalize", lambda values: values)
     assert numbers.measured(1, 1, 5).loc["Tab. I", "agrees"] == "no"
-
-
-def test_full_containers_are_counted():
-    (row,) = numbers.full_containers(1).itertuples()
-    env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
-    observed, _ = env.reset(seed=0)
-    load = env.physics.load
-    surroundings = Surroundings(load, np.ones(len(load), bool))
-    assert row.free == np.mean([not surroundings.on_top(item) for item in range(len(load))])
-    assert row.visible == env.liftable().mean() > row.free
-    # The items of one place along x differ by their blur, which is narrower than a bar.
-    assert row.bar == np.unique(observed[:, 0].round(2), return_counts=True)[1].max()
-    assert row.bar < row.bar_1
-    env.close()
 
 
 def run_of(msr):

@@ -6,8 +6,7 @@ import pytest
 
 from studies.play.agent_view import AgentView
 from studies.play.canvas import ABSENT
-from studies.play.episode import Episode
-from studies.play.players import Run
+from studies.play.episode import Episode, Run
 from studies.play.playground import SHOWN, Playground
 from unload import stack_load
 from unload.load.view import PLOTLY_MIMETYPE
@@ -97,13 +96,6 @@ def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
     assert not np.array_equal(game.you.observation, Episode(load, 0).observation)
 
 
-def test_hints_are_what_can_be_lifted(game):
-    game.hints.value = True
-    liftable = game.you.liftable()
-    green = [i for i in range(len(game.you.load)) if colour(game, i) == "liftable"]
-    assert green == sorted(liftable)
-
-
 def test_all_players_have_as_many_picks_as_you(game):
     liftable = game.you.liftable()
     for item in (*liftable[:2], np.setdiff1d(game.you.visible, liftable)[0]):
@@ -119,24 +111,6 @@ def test_all_players_have_as_many_picks_as_you(game):
     game.slider.value = 2
     assert game.standings()[0] == ("you", 2, game.you.unloaded(2))
     assert [row[1] for row in game.standings()] == [2] * 7
-
-
-def test_only_the_last_pick_is_seen_to_rise_and_only_when_it_is_made(game):
-    first, second = game.you.liftable()[:2]
-    click(game, first)
-    click(game, second)
-    rise = game.canvas.lift
-    assert rise["item"] == second and rise["number"] == 2
-    game.hints.value = True
-    game.undo.click()
-    click(game, np.setdiff1d(game.you.visible, game.you.liftable())[0])
-    game.player.value = "highest"
-    assert game.canvas.lift == rise, "shown, taken back, failed or another's"
-    game.slider.value = 1
-    assert game.canvas.lift["number"] == 3
-    for count in (3, 2):
-        game.slider.value = count
-    assert game.canvas.lift["number"] == 3, "a jump, and a step back"
 
 
 def test_a_player_is_watched_by_the_slider(game):
