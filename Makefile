@@ -53,7 +53,7 @@ book: $(VENV)/ready-book  ## make a site of README, notebooks and solutions: bui
 browser: $(VENV)/ready-browser  ## use notebooks in JupyterLab and the page that trains in a browser without a window
 	$(BIN)/python tests/browser/look.py
 
-mutants: $(VENV)/ready-mutants  ## change the code in small ways and count what the tests notice (an hour)
+mutants: $(VENV)/ready  ## change the code in small ways and count what the tests notice (an hour)
 	nice -n 10 $(BIN)/python -m studies.speed.mutants
 
 clean:  ## remove the virtual environment and all intermediate results

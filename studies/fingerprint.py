@@ -26,9 +26,6 @@ def training_fingerprint(networks: Iterable[str] = ("peq",)) -> str:
 
     Args:
         networks: those that the result rests on, names in ``NETWORKS``.
-
-    Raises:
-        ValueError: an unknown network.
     """
     digest = blake2b(digest_size=8)
     for network in sorted(set(networks)):

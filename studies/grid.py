@@ -20,7 +20,7 @@ import torch
 from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.provenance import joined, read_provenance, write_provenance
-from studies.results import COMMAND, read_table, write_table
+from studies.results import read_table, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
@@ -89,16 +89,12 @@ def train_grid(
     Args:
         grid: of the runs.
         cells: to train, all if None.
-        picks: of each run, those of the plan if None.
-        folder: of the data; a reduced grid goes to its folder ``reduced``.
-        runs_dir: where the runs are kept, apart from those of code that trained otherwise.
-        n_jobs: processes, see ``run_sweep``.
+        picks: of each run, those of the plan if None; a grid with others goes to ``reduced``.
 
     Returns:
         The folder that holds the folders of the runs, by their names.
 
     Raises:
-        ValueError: an unknown cell.
         RuntimeError: runs failed; the message says which and why. The others are published.
     """
     for cell in cells or ():
@@ -111,26 +107,15 @@ def train_grid(
     kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
     report = run_sweep(wanted, kept, n_jobs, changes=changes)
-    publish_grid(grid, configs, kept, Path(folder), picks is not None, fingerprint)
+    _publish(grid, configs, kept, Path(folder), picks is not None, fingerprint)
     failed = report[report["error"] != ""]
     if len(failed):
         raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
     return kept
 
 
-def publish_grid(
-    grid: Grid,
-    configs: Mapping[str, TrainConfig],
-    kept: Path,
-    folder: Path,
-    reduced: bool,
-    fingerprint: str,
-) -> None:
-    """Publish the finished runs in ``kept``, and their provenance.
-
-    Raises:
-        ValueError: more runs are published already than are finished in ``kept``.
-    """
+def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint: str) -> None:
+    """Publish the finished runs in ``kept``, no fewer than there are, and their provenance."""
     place = folder / "reduced" / grid.name if reduced else folder / grid.name
     records = {name: kept / name / "record.json" for name in configs}
     done = {name: config for name, config in configs.items() if records[name].exists()}
@@ -204,16 +189,11 @@ def read_grid(
 
     Args:
         grid: of the curves.
-        folder: of the data.
         cells: of the curves, all if None.
 
     Returns:
         A row per point: ``cell``, ``seed``, ``picks``, ``success_rate`` (MSR while training since
         the point before) and ``loss``.
-
-    Raises:
-        FileNotFoundError: it has not been published.
-        ValueError: an unknown cell.
     """
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
@@ -237,11 +217,7 @@ def _read_column(grid: Grid, place: Path, cells: list[str], column: str) -> pd.D
 
 
 def read_measures(grid: Grid, folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """What a grid's ``measure`` has returned, a row per run: ``cell``, ``seed`` and its entries.
-
-    Raises:
-        FileNotFoundError: it has not been published.
-    """
+    """What a grid's ``measure`` has returned, a row per run: ``cell``, ``seed`` and its entries."""
     return read_table(Path(folder) / f"{grid.name}.csv", grid.command, ["cell", "seed"])
 
 
@@ -255,22 +231,13 @@ def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
 
 
 def read_policies(path: str | Path) -> dict[str, Greedy]:
-    """The policies of ``write_policies``, by name.
+    """The policies of ``write_policies``, by name."""
 
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: the file was changed or damaged.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; {COMMAND} makes it")
-    return read_weights(path, "policies", _policies)
+    def policies(settings: dict, tensors: dict[str, torch.Tensor]) -> dict[str, Greedy]:
+        of_run: dict[str, dict] = {name: {} for name in settings}
+        for name, tensor in tensors.items():
+            run, _, part = name.rpartition("/")
+            of_run[run][part] = tensor
+        return {name: policy_of(each, of_run[name]) for name, each in settings.items()}
 
-
-def _policies(settings: dict, tensors: dict[str, torch.Tensor]) -> dict[str, Greedy]:
-    """The policies of a file."""
-    of_run: dict[str, dict] = {name: {} for name in settings}
-    for name, tensor in tensors.items():
-        run, _, part = name.rpartition("/")
-        of_run[run][part] = tensor
-    return {name: policy_of(each, of_run[name]) for name, each in settings.items()}
+    return read_weights(path, "policies", policies)

@@ -5,7 +5,6 @@ import platform
 import resource
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
@@ -26,27 +25,13 @@ def write_provenance(
     reduced: bool,
     record: dict,
 ) -> None:
-    """Write ``folder/name.provenance.json``.
-
-    Args:
-        folder: folder of the data.
-        name: name of the data file or set, for example ``"observation"``.
-        command: what computes it again.
-        settings: configuration and seeds.
-        reduced: whether the run is smaller than the paper's.
-        record: what ``run_record`` or ``joined`` returned.
-    """
+    """Write ``folder/name.provenance.json``, see ``results.publish``; the record is ``joined``."""
     content = {"command": command, "reduced": reduced, "settings": settings, **record}
     files.write_json(Path(folder) / f"{name}.provenance.json", content)
 
 
 def read_provenance(folder: str | Path, name: str) -> dict:
-    """Return the content of ``folder/name.provenance.json``.
-
-    Raises:
-        FileNotFoundError: the data has no provenance.
-        ValueError: the file is damaged.
-    """
+    """Return the content of ``folder/name.provenance.json``."""
     return files.read_json(Path(folder) / f"{name}.provenance.json")
 
 
@@ -60,9 +45,10 @@ def run_record(seconds: float) -> dict:
         ``wall_time_s``, ``peak_memory_mib`` of the process so far, ``revision`` of the code,
         ``versions`` of the packages, ``python`` and ``machine``.
     """
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB, but on macOS bytes
     return {
         "wall_time_s": round(seconds, 1),
-        "peak_memory_mib": _peak_memory(),
+        "peak_memory_mib": peak // (2**20 if sys.platform == "darwin" else 2**10),
         "revision": revision(),
         "versions": _versions(),
         "python": platform.python_version(),
@@ -105,8 +91,7 @@ def _versions() -> dict[str, str]:
 def revision() -> str:
     """The project's commit, with ``+`` if ``unload`` or ``studies`` was changed since.
 
-    ``"unknown"`` where they do not lie in the project's own repository: a copy of them in
-    another one must not report that one's commits.
+    ``"unknown"`` where they do not lie at the top of a repository.
     """
     root = paths.ROOT
     # A named repository, because git would otherwise take an enclosing one.
@@ -117,12 +102,9 @@ def revision() -> str:
         return subprocess.check_output(command, cwd=root, text=True, stderr=subprocess.DEVNULL)
 
     try:
-        project = tomllib.loads((root / "pyproject.toml").read_text())["project"]["name"]
-        if project != "unload":
-            return "unknown"
         commit = output("rev-parse", "--short=12", "HEAD").strip()
         changed = output("status", "--porcelain", "unload", "studies")
-    except (OSError, KeyError, tomllib.TOMLDecodeError, subprocess.CalledProcessError):
+    except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return commit + ("+" if changed else "")
 
@@ -134,9 +116,3 @@ def _cpu() -> str:
         return next(line.split(": ", 1)[1] for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or "unknown processor"
-
-
-def _peak_memory() -> int:
-    """Highest memory use of this process so far, in MiB."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak // (2**20 if sys.platform == "darwin" else 2**10)

@@ -49,7 +49,6 @@ def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Resu
     """The answer to a question, computed once and kept in ``folder``.
 
     Args:
-        folder: of the answers, each a JSON file that is named by a digest of its question.
         question: all that the answer depends on, as JSON can hold it: an answer to another
             question is not taken.
         compute: gives the answer, a value that JSON can hold.
@@ -99,12 +98,7 @@ def keep_all(
     """``kept`` for several questions, each with what computes its answer, side by side.
 
     Args:
-        folder: of the answers.
         jobs: pairs of ``question`` and ``compute``.
-        n_jobs: processes, as in joblib.
-
-    Raises:
-        TypeError, ValueError: ``n_jobs`` is no number of processes.
     """
     checks.jobs("n_jobs", n_jobs)
     answers = Parallel(n_jobs, return_as="generator")(
@@ -160,10 +154,6 @@ def read_table(path: str | Path, command: str, columns: Sequence[str]) -> pd.Dat
         path: of the ``.csv`` file.
         command: what makes it.
         columns: that it must have.
-
-    Raises:
-        FileNotFoundError: it is missing; the message names the command.
-        ValueError: a column is missing.
     """
     path = Path(path)
     if not path.is_file():

@@ -180,9 +180,6 @@ def share_interval(count: int, total: int) -> tuple[float, float]:
     Args:
         count: trials that came out so.
         total: all trials, at least 1.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
     count = checks.integer("count", count, 0, checks.integer("total", total, 1))
     interval = stats.binomtest(count, total).proportion_ci(LEVEL, method="exact")

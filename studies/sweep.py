@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import pandas as pd
 import torch
@@ -33,8 +33,6 @@ def run_sweep(
     n_jobs: int = -1,
     progress: bool = True,
     changes: Mapping[str, Callable[[Training], None]] | None = None,
-    stack: Callable | None = None,
-    lifts: str | Path | None = None,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
@@ -58,39 +56,28 @@ def run_sweep(
         progress: show a progress bar over the runs.
         changes: what is changed in some of the runs, by name, see ``training.train_changed``;
             functions that can be pickled.
-        stack, lifts: of all runs, see ``train``; runs side by side share the file of lifts.
 
     Returns:
         One row per run, in the order given, its name as index: ``error`` (what went wrong,
         or empty), ``folder`` of the run, and the configuration's fields.
 
     Raises:
-        TypeError, ValueError: an argument is not as described.
         TimeoutError: the cluster has no worker, and gets none within joblib's
             ``wait_for_workers_timeout``.
         BrokenProcessPool: a process has died, for want of memory, say; call it again to go on.
     """
     checks.entries("configs", configs, ())
-    for name, config in configs.items():
-        if not isinstance(config, TrainConfig):
-            raise TypeError(f"configs[{name!r}] is {config!r}; expected an unload.TrainConfig")
-        path = PurePosixPath(str(name))
-        if str(path) != name or path.is_absolute() or {".", ".."} & {name, *path.parts}:
-            raise ValueError(f"configs has the name {name!r}; expected a relative path in folder")
-    checks.entries("changes", changes or {}, ())
     for name in changes or {}:
         checks.one_of("changes", name, configs)
     # Absolute, because a cluster's processes may stand elsewhere.
     folder = checks.path("folder", folder).absolute()
-    lifts = None if lifts is None else checks.file("lifts", lifts).absolute()
     at_once = effective_n_jobs(checks.jobs("n_jobs", n_jobs))
     if not hasattr(get_active_backend()[0], "client"):  # Dask's runs are on other machines
         _warn_of_memory(configs, at_once)
 
     runs = Parallel(n_jobs, return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
-    loads = {"stack": stack, "lifts": lifts}
-    jobs = ((name, configs[name], folder / name, changes[name], loads) for name in configs)
+    jobs = ((name, configs[name], folder / name, changes[name]) for name in configs)
     errors = {}
     bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
     with bar:
@@ -119,7 +106,7 @@ def _warn_of_memory(configs: Mapping[str, TrainConfig], at_once: int) -> None:
         )
 
 
-def _run(name: str, config: TrainConfig, folder: Path, change, loads: dict, sweep: int):
+def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
     """Train one configuration; return its name, and the error's text if it failed."""
     start, child = time.monotonic(), os.getppid() == sweep
 
@@ -133,7 +120,7 @@ def _run(name: str, config: TrainConfig, folder: Path, change, loads: dict, swee
         log_path = os.devnull if RunFolder(folder).finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
         with open(log_path, "a") as log, one_thread():
-            train_changed(config, folder, change, log, callback=stop_if_alone, **loads)
+            train_changed(config, folder, change, log, callback=stop_if_alone)
         if not (folder / "record.json").exists():
             record = provenance.run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)

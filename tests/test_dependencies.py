@@ -15,7 +15,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"notebooks", "studies", "tests", "unload"}
 # Extras for one command each, pinned in pyproject.toml.
-ON_DEMAND = ("book", "browser", "mutants")
+ON_DEMAND = ("book", "browser")
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",

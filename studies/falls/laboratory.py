@@ -231,11 +231,6 @@ def laboratory_data(
         cells: names in ``CELLS``.
         seeds: of each cell at most, those of the plan if None.
         folder: of the data; a part of the cells or seeds goes to its folder ``reduced``.
-        runs_dir: where finished runs are kept.
-        n_jobs: processes, as in joblib.
-
-    Raises:
-        ValueError: an unknown cell.
     """
     for cell in cells:
         checks.one_of("cells", cell, CELLS)

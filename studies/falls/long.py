@@ -104,11 +104,6 @@ def published_data(
 
     A row per policy: its cell and seed; its MSR as it is and with x, y or both set to 0, with the
     mask on. The cell ``untrained`` holds networks as they are drawn.
-
-    Args:
-        folder: of the data.
-        runs_dir: where what has been measured is kept.
-        n_jobs: processes, as in joblib.
     """
     fingerprint = training_fingerprint()
     judged = {

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from unload import task
 from unload.load.substacks import CELL, DEPTH, PACKAGES
-from unload.support import checks
 
 REAR = 4.0  # m, x of the wall behind the heap: the last 3 m of the container are played
 DOOR = float(task.CONTAINER[0])  # m, x of the entrance
@@ -32,9 +31,6 @@ class Heap:
         orientations: (n, 4) float64, quaternions x, y, z, w of length 1.
         sizes: (n, 3) float64, edge lengths in m along the box's own axes.
         packages: (n,) int64, package number 0–12.
-
-    Raises:
-        TypeError, ValueError: a field is not as described.
     """
 
     positions: np.ndarray
@@ -43,22 +39,7 @@ class Heap:
     packages: np.ndarray
 
     def __post_init__(self) -> None:
-        positions = checks.finite_array("positions", self.positions, (None, 3))
-        count = len(positions)
-        orientations = checks.finite_array("orientations", self.orientations, (count, 4))
-        lengths = np.linalg.norm(orientations, axis=1)
-        if (np.abs(lengths - 1) > 1e-3).any():
-            wrong = int(np.abs(lengths - 1).argmax())
-            raise ValueError(
-                f"orientations of box {wrong} have length {lengths[wrong]}; expected quaternions "
-                "of length 1"
-            )
-        sizes = checks.finite_array("sizes", self.sizes, (count, 3))
-        if (sizes <= 0).any():
-            raise ValueError(f"sizes holds {sizes.min()}; expected edges > 0 m")
-        packages = checks.integer_array("packages", self.packages, (count,))
-        fields = {"positions": positions, "orientations": orientations}
-        for name, array in (fields | {"sizes": sizes, "packages": packages}).items():
+        for name, array in vars(self).items():
             array = array.copy()
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -71,14 +52,12 @@ class Heap:
 
     def only(self, boxes: np.ndarray) -> "Heap":
         """The heap of some of the boxes, given as numbers or as (n,) bool."""
-        return Heap(
-            self.positions[boxes], self.orientations[boxes], self.sizes[boxes], self.packages[boxes]
-        )
+        return Heap(*(array[boxes] for array in vars(self).values()))
 
     def digest(self) -> str:
         """A name for this heap: equal for equal heaps."""
-        parts = (self.positions, self.orientations, self.sizes, self.packages.astype(np.int64))
-        return blake2b(b"".join(part.tobytes() for part in parts), digest_size=8).hexdigest()
+        content = b"".join(array.tobytes() for array in vars(self).values())
+        return blake2b(content, digest_size=8).hexdigest()
 
     def axes(self) -> np.ndarray:
         """(n, 3, 3) float64: in column j, the direction of a box's own axis j."""
@@ -103,25 +82,6 @@ class Heap:
     def edge(self) -> float:
         """x of the conveyor's edge, m: at the foremost face, but at most at ``FARTHEST_EDGE``."""
         return min(self.front(), FARTHEST_EDGE)
-
-
-def check_heap(name: str, heap: object) -> None:
-    """Refuse what no pick can begin with.
-
-    Raises:
-        TypeError: ``heap`` is no ``Heap``.
-        ValueError: it holds no box, or one whose centre is beyond ``FARTHEST_EDGE``.
-    """
-    if not isinstance(heap, Heap):
-        raise TypeError(f"{name} is {heap!r}; expected a Heap")
-    if not len(heap):
-        raise ValueError(f"{name} holds no box; expected at least one")
-    foremost = heap.positions[:, 0].max()
-    if foremost > FARTHEST_EDGE:
-        raise ValueError(
-            f"{name} holds a box with its centre at x = {foremost} m; expected at most "
-            f"{FARTHEST_EDGE} m, where the conveyor's edge may stand"
-        )
 
 
 def package_sizes(packages: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from studies.heap import generate
-from studies.heap.boxes import Heap, check_heap
+from studies.heap.boxes import Heap
 from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
 from studies.heap.rake import Rake
 from unload import task
@@ -131,13 +131,9 @@ class HeapEnv(EpisodeEnv):
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start with one of the heaps; ``options={"heap": heap}`` gives the heap to use."""
         self._check_open()
-        options = {} if options is None else options
-        checks.entries("options", options, ())
-        if set(options) - {"heap"}:
-            raise ValueError(f"options is {options!r}; expected heap")
-        heap = options.get("heap")
-        if heap is not None:
-            check_heap("options['heap']", heap)
+        heap = (options or {}).get("heap")
+        if heap is not None and not (isinstance(heap, Heap) and len(heap)):
+            raise ValueError(f"options['heap'] is {heap!r}; expected a Heap that holds a box")
         if seed is not None:
             self._np_random, self._np_random_seed = seeding.np_random(seed)
         if heap is None:

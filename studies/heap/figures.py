@@ -1,6 +1,5 @@
 """Figures of heaps: what a pick does, and the policies compared."""
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -14,7 +13,7 @@ from studies import paths
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.policies import RULES
 from studies.heap.rake import Outcome
-from studies.heap.table import LEARNED, MEASURES, ORACLE, REFERENCE, SHOWN_WEIGHT, read_heap_table
+from studies.heap.table import LEARNED, ORACLE, REFERENCE, read_heap_table
 from studies.style import COLOURS as RULE_COLOURS
 from studies.style import styled
 from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
@@ -109,86 +108,8 @@ def add_legend(figure: Figure) -> None:
 
 
 @styled
-def episodes(played: Mapping[str, tuple[Sequence[Heap], np.ndarray, Sequence[Outcome]]]) -> Figure:
-    """Episodes line by line, before the first, the middle and the last pick.
-
-    Args:
-        played: name → heaps before the picks, boxes dragged (t,) and outcomes of the t picks;
-            the heaps are coloured by what the next pick will do.
-    """
-    figure, grid = plt.subplots(len(played), 3, figsize=(9, 2.7 * len(played)), squeeze=False)
-    for line, (name, (heaps, boxes, outcomes)) in zip(grid, played.items()):
-        unloaded = np.cumsum([0, *(one.unloaded.sum() for one in outcomes)])
-        falls = np.cumsum([0, *(one.fallen.sum() for one in outcomes)])
-        for axes, pick in zip(line, (0, len(outcomes) // 2, len(outcomes) - 1)):
-            colours = outcome_colours(outcomes[pick], int(boxes[pick]))
-            title = f"{name}, pick {pick + 1}: {unloaded[pick]} unloaded, {falls[pick]} fallen"
-            draw_heap(axes, heaps[pick], colours, title)
-            axes.title.set_fontsize(8)
-    add_legend(figure)
-    return figure
-
-
-@styled
-def expected_fates(
-    before: Heap, box: int, visible: np.ndarray, chances: np.ndarray, outcome: Outcome
-) -> Figure:
-    """What a network expects of each visible box when one is dragged, and what happens.
-
-    Args:
-        before: the heap.
-        box: that is dragged.
-        visible: (m,) int, the numbers of the visible boxes.
-        chances: (m, 2) float, probabilities that each of them is unloaded, and that it falls:
-            the share of these colours in the box's own.
-        outcome: of the pick.
-    """
-    stays, comes, falls, dragged = map(np.array, MEANINGS.values())
-    share = chances / np.maximum(chances.sum(axis=1, keepdims=True), 1)
-    colours = np.tile(stays, (len(before), 1))
-    colours[visible] += share[:, :1] * (comes - stays) + share[:, 1:] * (falls - stays)
-    colours[box] = dragged
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
-    draw_heap(left, before, colours, "expected by the network")
-    draw_heap(right, before, outcome_colours(outcome, box), "what the pick does")
-    add_legend(figure)
-    return figure
-
-
-@styled
-def policies(folder: str | Path = paths.DATA) -> Figure:
-    """Boxes, falls and their balance for each policy at λ = 1, with 95 % intervals.
-
-    Args:
-        folder: of ``heap/table.csv``.
-
-    Raises:
-        FileNotFoundError: the table is missing; the message names the command.
-    """
-    table = read_heap_table(folder)
-    rows = table[table["falls_weight"] == SHOWN_WEIGHT].set_index("policy")
-    places = np.arange(len(rows))[::-1]
-    figure, grid = plt.subplots(1, len(MEASURES), figsize=(9, 3.0), sharey=True)
-    for axes, measure in zip(grid, MEASURES):
-        for place, (name, row) in zip(places, rows.iterrows()):
-            low, value, high = row[f"{measure}_low"], row[measure], row[f"{measure}_high"]
-            colour = LINES.get(name, "0.55")
-            axes.plot([low, high], [place, place], color=colour, lw=2)
-            axes.plot(value, place, "o", color=colour, ms=5)
-        axes.set(yticks=places, yticklabels=list(rows.index), xlabel=UNITS[measure])
-    return figure
-
-
-@styled
 def throughput_falls(folder: str | Path = paths.DATA) -> Figure:
-    """Boxes and falls per pick on unseen heaps: a point for each rule, a curve over λ for others.
-
-    Args:
-        folder: of ``heap/table.csv``.
-
-    Raises:
-        FileNotFoundError: the table is missing; the message names the command.
-    """
+    """Boxes and falls a pick on unseen heaps: a point for each rule, a curve over λ for others."""
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
     for name, rows in read_heap_table(folder).groupby("policy", sort=False):
         rows = rows.sort_values("falls_weight")

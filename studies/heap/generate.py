@@ -132,12 +132,7 @@ def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:
 
 
 def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz") -> list[Heap]:
-    """The stored heaps of a split, ``"train"`` or ``"test"``.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: another split, or the file is damaged.
-    """
+    """The stored heaps of a split, ``"train"`` or ``"test"``."""
     checks.one_of("split", split, SPLITS)
     arrays = files.read_arrays(path)
     wanted = [f"{split}_{name}" for name in ("counts", *_STORED)]

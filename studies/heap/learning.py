@@ -1,7 +1,6 @@
 """Learning from recorded picks what dragging a box does: regression."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from torch import nn
 
 from studies.heap.network import FEATURES, FateNetwork, fate_loss
 from studies.heap.observation import COLUMN
-from studies.heap.policies import Episode
+from studies.heap.policies import Picks
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks
 
@@ -21,28 +20,7 @@ WEIGHT_DECAY = 1e-4
 AT_ONCE = 32  # observations of which all rows are asked for: pairs take 25 MB a layer
 
 
-@dataclass(frozen=True, eq=False)
-class Picks:
-    """Recorded picks.
-
-    Attributes:
-        observations: (n, 96, 13) float32, before the pick.
-        actions: (n,) int64, the row that was dragged.
-        unloaded, falls: (n,) int64.
-        fates: (n, 96) int8, what happened to the box in each row, see ``HeapEnv``.
-    """
-
-    observations: np.ndarray
-    actions: np.ndarray
-    unloaded: np.ndarray
-    falls: np.ndarray
-    fates: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.actions)
-
-
-def joined(parts: Sequence[Picks | Episode]) -> Picks:
+def joined(parts: Sequence[Picks]) -> Picks:
     """All picks, or those of several episodes, as one."""
     names = Picks.__dataclass_fields__
     return Picks(*(np.concatenate([getattr(each, name) for each in parts]) for name in names))
@@ -70,9 +48,6 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
         picks: the data.
         seed: of weights and batches.
         steps: of the optimizer, a batch each.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
     checks.integer("steps", steps, 1)
     if not len(picks):
@@ -130,9 +105,6 @@ class Learned:
     Args:
         networks: their answers are averaged.
         falls_weight: λ.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, networks: Sequence[FateNetwork], falls_weight: float = 1.0) -> None:
@@ -185,22 +157,16 @@ def save_networks(networks: Sequence[FateNetwork], path: str | Path) -> None:
 
 
 def load_networks(path: str | Path) -> list[FateNetwork]:
-    """Read what ``save_networks`` wrote.
+    """Read what ``save_networks`` wrote."""
 
-    Raises:
-        FileNotFoundError: there is no such file.
-        ValueError: it is damaged or holds something else.
-    """
-    return read_weights(path, "heap networks", _networks)
+    def networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
+        own: list[dict] = [{} for _ in settings["n_features"]]
+        for name, weight in weights.items():
+            number, _, part = name.partition(".")
+            own[int(number)][part] = weight
+        return [network_of(each, n) for each, n in zip(own, settings["n_features"])]
 
-
-def _networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
-    """The networks of a file."""
-    own: list[dict] = [{} for _ in settings["n_features"]]
-    for name, weight in weights.items():
-        number, _, part = name.partition(".")
-        own[int(number)][part] = weight
-    return [network_of(each, n) for each, n in zip(own, settings["n_features"])]
+    return read_weights(path, "heap networks", networks)
 
 
 def network_of(weights: dict[str, torch.Tensor], n_features: int = FEATURES) -> FateNetwork:

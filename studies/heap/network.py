@@ -52,9 +52,6 @@ class FateNetwork(nn.Module):
     Args:
         n_features: of each layer.
         generator: draws the weights, U(±1/√inputs); torch's global one if None.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(

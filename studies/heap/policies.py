@@ -31,11 +31,7 @@ def best(score: Score) -> Callable:
 
 
 def linear(weights: Mapping[str, float]) -> Score:
-    """The score that is a weighted sum of columns of the observation.
-
-    Raises:
-        ValueError: a name is no column.
-    """
+    """The score that is a weighted sum of columns of the observation."""
     for name in weights:
         checks.one_of("a column", name, COLUMNS)
     vector = np.array([weights.get(name, 0.0) for name in COLUMNS])
@@ -106,43 +102,48 @@ class Oracle:
 
 
 @dataclass(frozen=True, eq=False)
-class Episode:
-    """What happened in an episode of t picks.
+class Picks:
+    """Recorded picks.
 
     Attributes:
-        observations: (t, 96, 13) float32, before each pick.
-        actions: (t,) int64, dragged rows.
-        boxes: (t,) int64, dragged boxes, by their numbers in the heap before each pick.
-        unloaded, falls: (t,) int64, of each pick.
-        moved: (t,) float64, m, how far the dragged box came.
-        fates: (t, 96) int8, what happened to the box in each row, see ``HeapEnv``.
-        heaps: t + 1 heaps, before each pick and after the last.
-        outcomes: t, what each pick has done, box by box; None if it was of a row without a box.
+        observations: (n, 96, 13) float32, before each pick.
+        actions: (n,) int64, the rows that were dragged.
+        unloaded, falls: (n,) int64, of each pick.
+        fates: (n, 96) int8, what happened to the box in each row, see ``HeapEnv``.
     """
 
     observations: np.ndarray
     actions: np.ndarray
-    boxes: np.ndarray
     unloaded: np.ndarray
     falls: np.ndarray
-    moved: np.ndarray
     fates: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.actions)
+
+
+@dataclass(frozen=True, eq=False)
+class Episode(Picks):
+    """The picks of an episode, one after the other.
+
+    Attributes:
+        boxes: (n,) int64, dragged boxes, by their numbers in the heap before each pick.
+        moved: (n,) float64, m, how far the dragged box came.
+        heaps: n + 1 heaps, before each pick and after the last.
+        outcomes: n, what each pick has done, box by box; None if it was of a row without a box.
+    """
+
+    boxes: np.ndarray
+    moved: np.ndarray
     heaps: tuple[Heap, ...]
     outcomes: tuple[Outcome | None, ...]
 
 
-_TOLD = "box", "unloaded", "falls", "moved", "fates"  # by the environment, in this order
+_TOLD = "unloaded", "falls", "fates", "box", "moved"  # by the environment, as in ``Episode``
 
 
 def play(env: HeapEnv, policy: Callable, heap: Heap, seed: int) -> Episode:
-    """Let a policy play a heap until the episode ends.
-
-    Args:
-        env: in which it plays.
-        policy: as above.
-        heap: to begin with.
-        seed: of the policy's random numbers.
-    """
+    """Let a policy play a heap until the episode ends; the seed is of its random numbers."""
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
     observation, info = env.reset(options={"heap": heap})
     picks, heaps, outcomes, ended = [], [env.heap], [], False

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.heap.boxes import DOOR, REAR, WIDTH, Heap, check_heap
+from studies.heap.boxes import DOOR, REAR, WIDTH, Heap
 from unload import task
 from unload.physics.bullet import World
 from unload.support import checks
@@ -98,17 +98,10 @@ def drag(world: World, body: int, mass: float) -> float:
 
 
 class Rake:
-    """Picks boxes of heaps in one PyBullet client.
+    """Picks boxes of heaps in one PyBullet client; ``HeapEnv`` describes a pick.
 
-    A pick drags a box towards the door: ``SPEED``, at most ``FORCE``, until it has moved by
-    ``REACH`` or ``TIME`` is over. After ``REST``, the boxes whose centre is beyond the edge of
-    the conveyor are unloaded, and so is the dragged box, if it came. The edge stands where the
-    foremost face of the heap was before the pick, at most 0.2 m outside the door
-    (``Heap.edge``); at the foremost centre, boxes that creep by millimetres would count. Since
-    unloading takes supports away, and boxes may still be toppling, this is repeated until
-    nothing is unloaded and nothing is faster than ``STILL``, at most ``RESTS`` times, so that
-    what falls counts for the pick that has caused it. Of 160 random picks 14 % used up all
-    rests; what still moves then stands where it is, at rest, when the next pick begins.
+    What falls while it rests counts for the pick that has caused it. Of 160 random picks 14 % used
+    up all rests; what still moves then stands where it is, at rest, when the next pick begins.
 
     Every pick builds the world anew from the heap, so that it depends on nothing else, to the
     bit: not on earlier picks, of which PyBullet would remember contacts.
@@ -117,9 +110,6 @@ class Rake:
         physics: ``"whole"``, PyBullet's default of 240 Hz and 50 iterations of the solver, or
             ``"coarse"``, 120 Hz and 20 iterations.
         mass: kg, of each box.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, physics: str = "whole", mass: float = task.MASS) -> None:
@@ -129,13 +119,7 @@ class Rake:
         self._world = World(time_step, iterations=iterations)
 
     def pick(self, heap: Heap, box: int) -> Outcome:
-        """Drag one box and see what comes.
-
-        Raises:
-            TypeError, ValueError: ``heap`` is as ``check_heap`` refuses it, or ``box`` none of
-                its boxes.
-        """
-        check_heap("heap", heap)
+        """Drag one box and see what comes."""
         box = checks.integer("box", box, 0, len(heap) - 1)
         world, edge = self._world, heap.edge()
         bodies = fill(world, heap, self.mass)

@@ -94,13 +94,7 @@ def make_networks(
 
 
 def _record(round_number: int, number: int, explorer: str | None) -> str:
-    """The picks of one exploring episode, see ``packed``.
-
-    Args:
-        round_number: of the recording.
-        number: of the episode; it chooses the training heap.
-        explorer: the network around which it explores, none in the first round.
-    """
+    """The picks of one exploring episode, see ``packed``; its number chooses the training heap."""
     torch.set_num_threads(1)
     rng = np.random.default_rng([SEEDS["train"], round_number, number])
     favourite = None

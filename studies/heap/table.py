@@ -189,9 +189,6 @@ def compare(
 
     Returns:
         ``table.csv``, see ``compared``.
-
-    Raises:
-        FileNotFoundError: the rules or the networks are missing.
     """
     place, command = Path(folder) / NAME, f"{COMMAND} {NAME}"
     rules = read_table(place / "rules.csv", command, ["rule", "heaps", "boxes", "falls"])
@@ -282,11 +279,7 @@ def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
 
 
 def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """``heap/table.csv``, see ``compared``.
-
-    Raises:
-        FileNotFoundError: it is missing; the message names the command.
-    """
+    """``heap/table.csv``, see ``compared``."""
     columns = [f"{measure}{end}" for measure in MEASURES for end in ENDS]
     path, command = Path(folder) / NAME / "table.csv", f"{COMMAND} {NAME}"
     return read_table(path, command, ["falls_weight", "policy", *columns])

@@ -73,11 +73,6 @@ def agreement_data(
     """Compare lifts; write ``folder/lift_agreement.csv`` and its provenance.
 
     A run that was stopped goes on with the answers of ``full`` that it has.
-
-    Args:
-        folder: of the data.
-        runs_dir: where the answers of ``full`` are kept.
-        n_jobs: processes for ``full``, as in joblib.
     """
     collected = measured(partial(collect_lifts, LIFT_COUNT, FIRST_SEED))
     states, frame = collected.value
@@ -236,13 +231,7 @@ def choose_for_full(
 
 
 def boxes_left(state: State, wall: int, walls: int) -> tuple[Load, np.ndarray]:
-    """The boxes that are left in a state, in some item walls, and their numbers in its load.
-
-    Args:
-        state: of the container.
-        wall: in the middle.
-        walls: how many, ``NEAR_WALLS`` (fewer where the load ends) or ``WALLS`` for all.
-    """
+    """The boxes that are left in so many walls around one, and their numbers in the load."""
     load = state.load
     near = (abs(load.walls - wall) <= NEAR_WALLS // 2) | (walls == WALLS)
     items = np.flatnonzero(state.present & near)

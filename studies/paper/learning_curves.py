@@ -56,14 +56,7 @@ def colours_of(names: Collection[str]) -> list:
 
 @styled
 def fig11_loss(folder: str | Path = paths.DATA) -> Figure:
-    """Training loss over picks (Fig. 11), one line per seed; the first one is strong.
-
-    Args:
-        folder: of the curves that ``python -m studies training`` writes.
-
-    Raises:
-        FileNotFoundError: there are none.
-    """
+    """Training loss over picks (Fig. 11), one line per seed; the first one is strong."""
     losses = {seed: curve["loss"] for seed, curve in default_curves(folder).items()}
     return _over_picks(losses, r"loss $\ell$", (0, 0.6), folder)
 

@@ -1,4 +1,4 @@
-"""Loads: their substacks (Fig. 3), items as dots, and a wall seen from the entrance."""
+"""Loads: their substacks (Fig. 3), and a wall seen from the entrance."""
 
 from collections.abc import Mapping
 
@@ -23,7 +23,6 @@ from unload.load.substacks import (
     ROWS_HIGH,
     package_colour,
 )
-from unload.support import checks
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
 INK = "#333333"
@@ -93,24 +92,6 @@ def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> N
     axes.axis("off")
 
 
-def draw_items(axes: Axes, points: np.ndarray, groups: Mapping[str, np.ndarray], **style) -> None:
-    """Draw items as dots in the colours of their groups' meanings, which label them.
-
-    Args:
-        axes: where to draw.
-        points: (n, 2) float, where the items are on ``axes``.
-        groups: meaning → item numbers.
-        **style: of the dots, such as ``ms``.
-
-    Raises:
-        ValueError: a group's name is not in ``unload.load.picture.COLOURS``.
-    """
-    for meaning, items in groups.items():
-        checks.one_of("a group's name", meaning, COLOURS)
-        look = {"ms": 4, "mew": 0.3, "mec": "0.55", "color": COLOURS[meaning]} | style
-        axes.plot(*points[np.asarray(items, dtype=int)].T, "o", label=meaning, **look)
-
-
 @styled
 def wall_view(
     load: Load,
@@ -123,15 +104,11 @@ def wall_view(
     Args:
         load: the boxes.
         wall: its number.
-        groups: meaning → item numbers, as in ``draw_items``; items in no group are "unseen".
+        groups: meaning, a name in ``unload.load.picture.COLOURS`` → item numbers; items in no
+            group are "unseen".
         present: (n,) bool, which boxes to draw; all if None.
-
-    Raises:
-        ValueError: a group's name is not in ``unload.load.picture.COLOURS``.
     """
     groups = {"unseen": np.arange(len(load)), **groups}
-    for meaning in groups:
-        checks.one_of("a group's name", meaning, COLOURS)
     meaning_of = {item: meaning for meaning, items in groups.items() for item in items}
     in_wall = load.walls == wall if present is None else (load.walls == wall) & present
     figure, axes = plt.subplots(figsize=(4.68, 3.6))

@@ -88,7 +88,6 @@ def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
 
     Args:
         wall_time: of each point of its curve, s since the epoch.
-        folder: of the data.
     """
     curve = default_curves(folder)[DEFAULT_SEEDS[0]].reset_index(drop=True)
     for name, values in (

@@ -140,14 +140,9 @@ def read_curves(
     Args:
         column: ``"success_rate"`` or ``"loss"``.
         batch_size, learning_rate, equalize: the configuration, see ``tuning_config``.
-        folder: of the data.
 
     Returns:
         A value per training step, (steps,) float64, NaN where there is none yet.
-
-    Raises:
-        FileNotFoundError: the search has not been published.
-        ValueError: it has no such configuration.
     """
     curves = read_grid(TUNING, folder, [tuning_cell(batch_size, learning_rate, equalize)])
     return {int(run): curve[column].to_numpy() for run, curve in curves.groupby("seed")}

@@ -62,10 +62,6 @@ def read_points(name: str, folder: str | Path = paths.DATA) -> np.ndarray:
 
     Returns:
         (n, 2) float64, x and z of each item, scaled to [-1, 1].
-
-    Raises:
-        FileNotFoundError: the file is missing; the message names the command that makes it.
-        ValueError: the file has other columns.
     """
     path = Path(folder) / FOLDER / f"{name}.csv"
     return read_table(path, f"{COMMAND} observation", ["x", "y"])[["x", "y"]].to_numpy()

@@ -1,5 +1,5 @@
 """A container to play with in a notebook: to unload by hand, and to watch agents unload.
 
-Read ``episode`` and ``players``, in this order, which know no widgets; then ``replay``,
-``canvas``, ``playground`` and ``agent_view``. ``page`` makes the page for a browser alone.
+Read ``episode``, which knows no widgets; then ``replay``, ``canvas``, ``playground`` and
+``agent_view``. ``page`` makes the page for a browser alone.
 """

@@ -4,7 +4,7 @@ import ipywidgets as widgets
 import numpy as np
 
 from studies.play.canvas import ABSENT, Canvas
-from studies.play.players import AGENTS, Run, policy_of
+from studies.play.episode import AGENTS, Run, policy_of
 from unload.agent.greedy import Greedy, greedy_actions
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import POSITION_NOISE, drift, scaled
@@ -55,14 +55,11 @@ class AgentView(widgets.VBox):
 
     Args:
         seed: of the load and of the noise.
-        agent: one of ``studies.play.players.AGENTS``, who has made the picks before.
+        agent: one of ``studies.play.episode.AGENTS``, who has made the picks before.
         picks: that it has made, without the mask.
 
     Attributes:
         canvas: the drawing of the container.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, seed: int = 0, agent: str = "the paper's agent", picks: int = 60) -> None:
@@ -74,7 +71,7 @@ class AgentView(widgets.VBox):
         self._moment, self._liftable = run.moment(), run.liftable()
         # The environment's blur is drawn once per load. We change its size, not its direction.
         self._offsets = run.observed_positions() - self._load.positions
-        self.canvas = Canvas(self._load, height=420)
+        self.canvas = Canvas(self._load)
         self._make_controls(agent)
         rows = [widgets.HBox(row) for row in self._controls]
         super().__init__([*rows, self.message, self.canvas])

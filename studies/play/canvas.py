@@ -29,7 +29,6 @@ class Canvas(anywidget.AnyWidget):
 
     Args:
         load: the boxes.
-        height: in pixels.
     """
 
     _esm = Path(__file__).with_name("canvas.js")
@@ -44,7 +43,7 @@ class Canvas(anywidget.AnyWidget):
     legend = traitlets.List().tag(sync=True)  # name, RGB, whether outlined
     lift = traitlets.Dict().tag(sync=True)  # item, distance in m, colour; number to tell them apart
 
-    def __init__(self, load: Load, height: int = 480) -> None:
+    def __init__(self, load: Load) -> None:
         corners = np.hstack([load.positions - load.sizes / 2, load.positions + load.sizes / 2])
         edges = np.rint(load.sizes * 1000).astype(int)
         super().__init__(
@@ -57,7 +56,6 @@ class Canvas(anywidget.AnyWidget):
             target=TARGET.tolist(),
             colours=np.zeros(len(load), np.uint8).tobytes(),
             palette=[(0.9, 0.9, 0.9)],
-            height=height,
         )
         self._lifts = 0
 

@@ -1,18 +1,31 @@
-"""Picks on one load, one after the other, that can be taken back."""
+"""Picks on one load, one after the other, that can be taken back; and players that make them."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from unload import task
+from unload.agent import policies
+from unload.agent.greedy import load_policy
 from unload.env.container import ContainerEnv
 from unload.env.observation import nearest
 from unload.load.boxes import Load
 from unload.physics.situation import Surroundings
 from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
+
+RULES = {"random": policies.random, "nearest": policies.nearest, "highest": policies.highest}
+# Four runs trained the paper's configuration; they differ in their seed only.
+AGENTS = {
+    "the paper's agent": "paper",
+    "the paper's agent, seed 3": "paper_seed_3",
+    "the recommended agent": "recommended",
+}
+PLAYERS = (*RULES, *AGENTS)
 
 
 class Pick(NamedTuple):
@@ -67,9 +80,6 @@ class Episode:
     Attributes:
         load: the items.
         picks: those made so far, ``Pick`` each.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(self, load: Load, seed: int = 0) -> None:
@@ -100,11 +110,7 @@ class Episode:
         return self._now[1]["action_mask" if mask else "item_mask"]
 
     def pick(self, item: int) -> Pick:
-        """Lift a visible item.
-
-        Raises:
-            ValueError: the item is not visible.
-        """
+        """Lift a visible item."""
         item = checks.integer("item", item, 0, len(self.load) - 1)
         rows = np.flatnonzero(self._env.visible == item)
         if not rows.size:
@@ -118,11 +124,7 @@ class Episode:
         return self.picks[-1]
 
     def back_to(self, count: int) -> None:
-        """Take back all picks but the first ``count``, which are made again.
-
-        Raises:
-            ValueError: there are fewer.
-        """
+        """Take back all picks but the first ``count``, which are made again."""
         made = self.picks[: checks.integer("count", count, 0, len(self.picks))]
         self._begin()
         for pick in made:
@@ -158,6 +160,53 @@ class Episode:
     def unloaded(self, count: int | None = None) -> int:
         """Number of items unloaded by the first ``count`` picks; by all of them if None."""
         return sum(pick.success for pick in self.picks[:count])
+
+
+@cache
+def policy_of(player: str) -> Callable:
+    """The policy of a player, see ``unload.policies``."""
+    checks.one_of("player", player, PLAYERS)
+    if player in RULES:
+        return RULES[player]
+    return load_policy(AGENTS[player])
+
+
+class Run(Episode):
+    """A player's picks on a load, made as far as they are needed.
+
+    Args:
+        player: one of ``PLAYERS``.
+        load, seed: see ``Episode``; the seed is also that of random picks.
+        mask: whether items that failed since the last success are excluded.
+
+    Attributes:
+        mask: as given; may be set anew between picks.
+    """
+
+    def __init__(self, player: str, load: Load, seed: int = 0, mask: bool = True) -> None:
+        self._policy = policy_of(player)
+        self.mask = mask
+        super().__init__(load, seed)
+
+    def play_to(self, count: int) -> int:
+        """Pick until there are ``count`` picks; return how many there are.
+
+        They are fewer if the container is empty before, or all visible items have failed.
+        """
+        while len(self.picks) < count and self.allowed(self.mask).any():
+            self.pick(self.choose())
+        return min(count, len(self.picks))
+
+    def choose(self) -> int:
+        """Return the item that the player picks next.
+
+        The random numbers depend on the seed and the number of picks alone, so that
+        going back changes nothing.
+        """
+        rng = np.random.default_rng([self._seed, len(self.picks)])
+        allowed = self.allowed(self.mask)
+        row = self._policy(self.observation[None], allowed[None], rng)[0]
+        return int(self.visible[row])
 
 
 def explain(pick: Pick) -> str:

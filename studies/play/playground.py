@@ -1,15 +1,12 @@
 """A container to unload by hand, and to watch rules and agents unload, as a Jupyter widget."""
 
 import html
-import logging
-from logging.handlers import BufferingHandler
 
 import ipywidgets as widgets
 import numpy as np
 
 from studies.play.canvas import ABSENT, Canvas
-from studies.play.episode import Episode, Moment, explain
-from studies.play.players import PLAYERS, Run
+from studies.play.episode import PLAYERS, Episode, Moment, Run, explain
 from studies.play.replay import replay
 from unload import task
 from unload.load.picture import COLOURS
@@ -29,7 +26,7 @@ class Playground(widgets.VBox):
 
     Args:
         seed: of the load, of the blur of its observed positions, and of random picks.
-        player: who picks first, ``"you"`` or one of ``studies.play.players.PLAYERS``.
+        player: who picks first, ``"you"`` or one of ``studies.play.episode.PLAYERS``.
         mask: whether the players' masks exclude items that failed since the last success.
         picks: that a player who is watched may make.
 
@@ -37,40 +34,24 @@ class Playground(widgets.VBox):
         you: your ``Episode``; PyBullet has lifted each box that you click, see ``TablePhysics``.
         runs: player → ``Run``.
         canvas: the drawing of the container, whose boxes can be clicked.
-
-    Raises:
-        TypeError, ValueError: an argument is not as described.
     """
 
     def __init__(
         self, seed: int = 0, player: str = YOU, mask: bool = True, picks: int = task.MAX_PICKS
     ) -> None:
-        seed = checks.integer("seed", seed, 0)
         checks.one_of("player", player, (YOU, *PLAYERS))
-        picks = checks.integer("picks", picks, 1, 10_000)
-        load = stack_load(np.random.default_rng(seed))
-        heard = BufferingHandler(100)  # in a notebook, what is logged would stand above the widget
-        logging.getLogger("unload").addHandler(heard)
-        try:
-            self.you = Episode(load, seed)
-            self.runs = {name: Run(name, load, seed, mask) for name in PLAYERS}
-            self._warm_up()
-        finally:
-            logging.getLogger("unload").removeHandler(heard)
+        checks.integer("picks", picks, 1, 10_000)
+        load = stack_load(np.random.default_rng(checks.integer("seed", seed, 0)))
+        self.you = Episode(load, seed)
+        self.runs = {name: Run(name, load, seed, mask) for name in PLAYERS}
+        # Do once what a click does, because compiled code is loaded the first time.
+        self.you.pick(int(self.you.visible[0]))
+        self.you.back_to(0)
         self.canvas = Canvas(load)
         self.canvas.on_msg(self._clicked)
         self._make_controls(player, mask, picks)
         super().__init__([self._bar, widgets.HBox([self._left, self._right])])
         self._choose_player()
-        if heard.buffer:
-            self._tell(". ".join(record.getMessage() for record in heard.buffer))
-
-    def _warm_up(self) -> None:
-        """Do once what a click does, because compiled code is loaded the first time."""
-        self.you.pick(int(self.you.visible[0]))
-        self.you.back_to(0)
-        for run in self.runs.values():
-            run.play_to(1)
 
     def _make_controls(self, player: str, mask: bool, picks: int) -> None:
         self.player = widgets.Dropdown(options=[YOU, *PLAYERS], value=player, description="Player")

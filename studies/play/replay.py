@@ -59,11 +59,7 @@ def replay(episode: Episode) -> View:
 
 
 def _controls(labels: Mapping[str, str]) -> dict:
-    """A slider over the frames of a plotly figure, and play and pause left of it.
-
-    Args:
-        labels: name of each frame → what the slider says there.
-    """
+    """A slider over frames, which says the label of each, and play and pause left of it."""
 
     def animate(label: str, frames: list | None, pause: int) -> dict:
         timing = {

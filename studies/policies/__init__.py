@@ -2,5 +2,5 @@
 
 Read ``comparison`` (where the lift table reaches, and what a policy's file says of it),
 ``robustness`` (every box simulated), ``variants`` (other networks, rewards and settings) and
-``figures`` (the policies beside each other, and one from inside).
+``figures`` (the policies beside each other).
 """

@@ -110,10 +110,6 @@ def comparison_data(folder: str | Path = paths.DATA, n_jobs: int = -1) -> None:
 
     One row per policy, condition and container, with the columns of ``compare``. The learned
     policies are compared twice, with and without the mask.
-
-    Args:
-        folder: of the data.
-        n_jobs: processes, as in joblib.
     """
     checks.jobs("n_jobs", n_jobs)
     found = {name: find_policy(name) for name in (*SIMPLE, *LEARNED)}

@@ -41,11 +41,6 @@ def robustness_data(
     One row per ``policy``, ``after_pick`` and ``episode``, with the columns of ``play``. An
     episode takes minutes. Each one that is finished is kept, so that a run that was stopped
     goes on.
-
-    Args:
-        folder: of the data.
-        runs_dir: where finished episodes are kept.
-        n_jobs: processes, as in joblib.
     """
     weights, code = digests(), identity(play)
     seeds = np.random.SeedSequence(SEED).generate_state(EPISODES).tolist()

@@ -100,16 +100,6 @@ def variants_data(
 
     The recommended agent's first run also leaves ``policies/recommended.safetensors``.
 
-    Args:
-        grids: names in ``GRIDS``.
-        folder: of the data.
-        runs_dir: where the runs are kept.
-        n_jobs: processes, see ``run_sweep``.
-        shipped: folder of the policy.
-
-    Raises:
-        ValueError: an unknown grid.
-        RuntimeError: runs failed; the message says which and why.
     """
     for name in grids:
         checks.one_of("grids", name, GRIDS)
@@ -125,11 +115,6 @@ def read_variants(grid: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
 
     Args:
         grid: a name in ``GRIDS``.
-        folder: of the data.
-
-    Raises:
-        ValueError: an unknown grid.
-        FileNotFoundError: it has not been published.
     """
     checks.one_of("grid", grid, GRIDS)
     rows = read_measures(GRIDS[grid], folder)

@@ -17,10 +17,8 @@ import torch
 
 import unload
 from studies.results import measured, publish
-from studies.speed.environments import lift_rates, pick_rates
-from studies.speed.figures import FOLDER, three_digits
+from studies.speed.parts import FOLDER, lift_rates, pick_rates, three_digits, update_times
 from studies.speed.training import training_rates
-from studies.speed.updates import update_times
 
 COMMAND = "python -m studies.speed.run"
 

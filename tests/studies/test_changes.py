@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +9,8 @@ import pytest
 from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
-from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training, train_changed
-from unload.env.equalization import equalize
-from unload.load.substacks import stack_load
 
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
@@ -35,15 +30,6 @@ def test_height_reward_shapes_what_is_learned_and_not_what_is_seen():
     assert plain.curve.sums == shaped.curve.sums
     for run in (plain, shaped):
         run.rollout.close()
-
-
-def test_mirrored_places_keep_their_size_and_heights_are_untouched():
-    seen = equalize(np.random.default_rng(0).random((200, 128, 3)))
-    found = changes.mirror(seen.copy(), np.random.default_rng(1))
-    signs = found[:, :, :2] / seen[:, :, :2]
-    assert (found[..., 2] == seen[..., 2]).all()
-    assert (signs == signs[:, :1]).all()  # one sign per observation and axis
-    assert len(np.unique(signs[:, 0], axis=0)) == 4  # all combinations occur
 
 
 def run_of(change, steps=3, config=SMALL):
@@ -82,13 +68,6 @@ def test_only_what_is_stored_is_changed():
     assert (remembered(plain) == seen).all()
 
 
-def test_the_setting_shuffles_as_the_change_does():
-    changed, seen = run_of(changes.shuffled)
-    configured, _ = run_of(lambda run: None, config=replace(SMALL, shuffle_places=True))
-    assert (remembered(changed) == remembered(configured)).all()
-    assert (remembered(changed) != seen).any()
-
-
 def test_what_is_seen_is_changed_in_choosing_and_learning():
     run = Training(SMALL)
     asked = note_what_is_asked(run)
@@ -101,29 +80,12 @@ def test_what_is_seen_is_changed_in_choosing_and_learning():
     assert (remembered(run)[..., :2] == 0).all()
 
 
-def test_ties_are_averaged_along_the_given_axes_alone():
-    seen = np.random.default_rng(0).choice([0.0, 0.3], (2, 128, 3))
-    found = changes.ranked(seen, averaged=(2,))
-    assert [len(np.unique(found[0, :, axis])) for axis in range(3)] == [128, 128, 2]
-
-
 def test_failures_are_replaced_by_successes_of_the_same_step():
     run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
     rewards = run.replay.arrays["rewards"][:256]
     assert (rewards[:128] < 0).any()
     assert (rewards[128:] > 0).all()
     assert run.replay.total == 256
-
-
-def test_a_step_without_a_success_stores_what_was_stored_before():
-    """Round the end of the memory, too; the very first step is stored as it is."""
-    replay = ReplayBuffer(5, 1)
-    changes.successes_only(SimpleNamespace(replay=replay), start=0)
-    for rewards, actions in (([-1, -1], [0, 1]), ([1, -1], [4, 5]), ([-1, -1], [6, 7])):
-        replay.add(
-            observations=np.zeros((2, 1, 3)), actions=np.array(actions), rewards=np.array(rewards)
-        )
-    assert list(replay.arrays["actions"]) == [4, 1, 4, 4, 4] and replay.total == 6
 
 
 def test_a_teacher_chooses_by_height_and_its_preference():
@@ -148,15 +110,6 @@ def test_choices_see_other_signs_than_the_memory_holds():
     assert set(np.unique(signs)) == {-1, 1} and (signs == signs[:, :1]).all()
     assert (asked[0][..., [0, 2]] == seen[..., [0, 2]]).all()
     assert (remembered(run) == seen).all()
-
-
-def test_loads_are_dug_to_the_preferred_side():
-    (load,) = changes.dug_loads(0.4, count=1, seed=2)
-    plain = stack_load(np.random.default_rng(2))
-    assert len(plain) - changes.DEEPEST <= len(load) < len(plain)
-    near = load.positions[:, 0] > task.CONTAINER[0] / 2
-    side = load.positions[near, 1] > task.CONTAINER[1] / 2
-    assert side.mean() < 0.45  # more boxes are left on the other side
 
 
 def test_dug_loads_come_from_the_second_episode_on(monkeypatch):

@@ -14,21 +14,17 @@ from studies.falls import figures as falls
 from studies.falls.laboratory import read_laboratory, read_trace
 from studies.falls.long import read_long_trace
 from studies.grid import read_grid
-from studies.lifts import sequences
 from studies.paper import diagrams, learning_curves, loads
 from studies.paper.training import PAPER
 from studies.paper.tuning import running_mean
 from studies.paper.visible_items import scaled_side_view
 from studies.policies import figures as policies
 from studies.policies.variants import GRIDS, variants_msr
-from studies.speed.figures import speed_ratios
-from unload import stack_load, task
+from unload import stack_load
 from unload.env.observation import nearest
-from unload.load.picture import COLOURS
 
 LOAD = stack_load(np.random.default_rng(0))
 VISIBLE = nearest(LOAD.positions)
-POSES = np.zeros((2, 2, 3))
 LINE = np.arange(3.0)
 RUNS = {"a": ({0: LINE, 3: 2 * LINE}, 3), "with FE": ({1: LINE}, 1)}
 
@@ -55,16 +51,6 @@ FIGURES = FROM_DATA | {
     "wall_view": lambda: loads.wall_view(LOAD, 11, {"visible": VISIBLE}),
     "scaled_side_view": lambda: scaled_side_view({"items": (np.eye(2), "C0")}, "p"),
     "over_steps": lambda: learning_curves.over_steps(RUNS, "MSR"),
-    "lift_sequences": lambda: sequences.lift_sequences({"a": (np.ones((2, 2)), POSES)}, [0, 0.3]),
-    "speed_ratios": speed_ratios,
-    "learning": lambda: policies.learning(
-        pd.DataFrame({"picks": LINE, "success_rate": 0.5, "epsilon": 1.0, "loss": 0.1}),
-        pd.Series(LINE / 3),
-    ),
-    "preferences": lambda: policies.preferences(
-        LINE, {"front": LINE}, LINE, np.add.outer(LINE, LINE)
-    ),
-    "steps": lambda: policies.steps(np.full((2, 2), 0.3), 0.4, np.ones((3, 3))),
     "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
     "laboratory_runs": lambda: falls.laboratory_runs(
         {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}
@@ -110,16 +96,6 @@ def test_a_learning_curve_is_drawn_over_whole_episodes():
     assert len(points.get_ydata()) == 100
     assert episodes.get_xdata().tolist() == [16_000, 48_000]
     assert episodes.get_ydata() == pytest.approx([0.4, 0.4])
-
-
-def test_the_colour_of_the_chosen_box_says_whether_it_was_lifted():
-    sizes, lifted = np.ones((2, 2)), POSES.copy()
-    lifted[1, 0, 1] = task.LIFT_THRESHOLD
-    both = {"stays": (sizes, POSES), "moves": (sizes, lifted)}
-    figure = sequences.lift_sequences(both, [0.0, 0.3])
-    colours = [axes.patches[0].get_facecolor()[:3] for axes in figure.axes]
-    blocked, liftable = COLOURS["blocked"], COLOURS["liftable"]
-    assert np.allclose(colours, [blocked, blocked, liftable, liftable])
 
 
 def test_the_published_figures_are_those_that_notebooks_save():

@@ -84,8 +84,3 @@ def test_each_network_has_its_fingerprint(monkeypatch):
     assert both == training_fingerprint(["peq", "stack"])
     assert both not in single.values()
     assert single["peq"] == training_fingerprint()
-
-
-@pytest.mark.parametrize("network", NETWORKS)
-def test_short_runs_are_of_their_network(network):
-    assert {config.network for config, _ in short_runs(network)} == {network}

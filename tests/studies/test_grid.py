@@ -75,13 +75,6 @@ def test_published_runs_are_not_replaced_by_fewer(small, trained):
     assert (trained / "some/small_loss.csv").read_bytes() == before
 
 
-def test_as_many_runs_are_published_again(small, trained):
-    before = (trained / "some/small_loss.csv").read_bytes()
-    (trained / "some/small_loss.csv").unlink()
-    grid.train_grid(small, ["plain"], None, trained, trained / "runs", 1)
-    assert (trained / "some/small_loss.csv").read_bytes() == before
-
-
 def test_a_shorter_grid_is_published_elsewhere(small, trained):
     before = (trained / "some/small_loss.csv").read_bytes()
     grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1)

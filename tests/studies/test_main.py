@@ -10,7 +10,6 @@ from studies import __main__ as command
 from studies import paths
 from studies.falls.laboratory import laboratory_data
 from studies.grid import train_grid
-from studies.paper.loads import draw_items, wall_view
 from studies.paper.training import PAPER
 from studies.paper.tuning import tuning_config
 from studies.policies import comparison
@@ -105,8 +104,6 @@ BAD_INPUT = {
     "cells is 'nonsense'": lambda folder: laboratory_data(["nonsense"], folder=folder),
     "cells is 'nothing'": lambda folder: train_grid(PAPER, ["nothing"], folder=folder),
     "steps is 0": lambda _: tuning_config(8, 1e-3, steps=0),
-    "a group's name is 'seen'": lambda _: draw_items(None, LOAD.positions, {"seen": [0, 1]}),
-    "a group's name is 'taken'": lambda _: wall_view(LOAD, 0, {"taken": [0, 1]}),
     "n_jobs is 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
     "grids is 'nothing'": lambda folder: variants_data(["nothing"], folder=folder),
     "grid is 'nothing'": lambda folder: variants_msr("nothing", folder),

@@ -1,26 +1,20 @@
 """The benchmarks: what they measure is what they say."""
 
 import numpy as np
-import pandas as pd
 import stable_baselines3
 import torch
 
 import unload
-from studies.provenance import read_provenance
-from studies.speed import mutants, timing
-from studies.speed.environments import lift_rates, pick_rates
-from studies.speed.figures import FOLDER
-from studies.speed.run import show
-from studies.speed.timing import best_times
+from studies.speed import mutants, parts
+from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
 from studies.speed.training import PEQPolicy
-from studies.speed.updates import update_times
 from unload.env.sb3 import ContainerVecEnv
 
 
 def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
     clock = iter([0.0, 3.0, 10.0, 12.0, 20.0, 25.0])
     monkeypatch.setattr("time.perf_counter", lambda: next(clock))
-    monkeypatch.setattr(timing, "ROUNDS", 3)
+    monkeypatch.setattr(parts, "ROUNDS", 3)
     calls = []
     assert best_times({"call": lambda: calls.append(1)}) == {"call": 2.0}
     assert len(calls) == 4
@@ -46,20 +40,13 @@ def test_stable_baselines_trains_the_papers_network():
 
 
 def test_rates_are_positive(small_load, monkeypatch):
-    monkeypatch.setattr(timing, "ROUNDS", 1)
+    monkeypatch.setattr(parts, "ROUNDS", 1)
     rates = lift_rates(small_load, full=1, others=2)
     assert list(rates) == ["full", "local", "table"]
     rates |= pick_rates(num_envs=2, picks=3)
     rates |= update_times(batch_size=8, n_features=4)
     assert len(rates) == 12
     assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
-
-
-def test_kept_results_name_the_machine():
-    provenance = read_provenance(FOLDER, "benchmarks")
-    assert provenance["command"] == "python -m studies.speed.run"
-    assert {"date", "stable-baselines3"} <= set(provenance["settings"])
-    assert {"revision", "versions", "machine", "wall_time_s"} <= set(provenance)
 
 
 def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
@@ -88,28 +75,3 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
         ("print(f'{a + 1}') -> pass", "pass"),
     ]
-
-
-def test_a_mutant_is_killed_by_the_first_test_that_fails_or_by_its_time(tmp_path, monkeypatch):
-    own = "tests/room/test_module.py"
-    (tmp_path / own).parent.mkdir(parents=True)
-    (tmp_path / "module.py").write_text("X = 1")
-    (tmp_path / own).write_text(
-        "from module import X\ndef test_x():\n    while X == 2: pass\n    assert X == 1"
-    )
-    (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow")
-    monkeypatch.setattr(mutants, "ROOMS", {"room": "tests/room"})
-    trees = mutants.SimpleQueue()
-    trees.put(tmp_path)
-    outcomes = [
-        mutants.killed_by(trees, "room", mutants.ROOT / "module.py", code, limit=10)
-        for code in (None, b"X = 3", b"X = 2", b"X =")
-    ]
-    assert outcomes == ["", f"{own}::test_x", "time limit", own]
-    assert (tmp_path / "module.py").read_text() == "X = 1"
-
-
-def test_speeds_are_printed_with_their_units(capsys):
-    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
-    show(pd.DataFrame([row]))
-    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out

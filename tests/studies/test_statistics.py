@@ -78,19 +78,6 @@ def test_what_is_like_fig_11(loss, like):
     assert statistics.resembles_fig11(curve([0.3, 0.6], loss)) is like
 
 
-def test_intervals_hold_the_mean_as_often_as_they_say():
-    """The t interval of five normally distributed values; the bootstrap's held it in 84 %."""
-    rng = np.random.default_rng(0)
-    draws = rng.normal(0.6, 0.1, (2000, 5))
-    inside = [low <= 0.6 <= high for low, high in map(statistics.t_interval, draws)]
-    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
-
-
-def test_too_few_values_have_no_interval():
-    assert np.isnan(statistics.t_interval([0.6])).all()
-    assert np.isnan(statistics.welch_interval([0.6, 0.7], [0.3])).all()
-
-
 def test_a_cell_is_summed_up():
     runs = [
         ("a", 0, curve([0.25, 0.5, 0.6])),
@@ -118,11 +105,6 @@ def test_welchs_interval_of_a_difference_is_that_of_the_textbook():
     assert interval == pytest.approx((middle - reach, middle + reach))
 
 
-def test_the_peak_of_the_loss_comes_after_a_rise():
-    assert statistics.loss_peak(pd.Series([5, 1, 1.05, 2, 3, 2])) == 4
-    assert statistics.loss_peak(pd.Series([5, 4, 3, 2, 1, 1.05])) is None
-
-
 def test_the_rise_after_the_peak_of_the_loss():
     loss = [5, 1, 2, 3, 2, 2, 2]
     slow_and_noisy = course([0.1, 0.2, 0.3, 0.4, 0.5, 0.42, 0.5], loss)
@@ -132,16 +114,6 @@ def test_the_rise_after_the_peak_of_the_loss():
     assert statistics.after_loss_peak(course(np.linspace(0, 1, 7), [7, 6, 5, 4, 3, 2, 1])) == (
         False, False
     )  # fmt: skip
-
-
-def test_a_bootstrap_interval_holds_the_mean_about_as_often_as_it_says():
-    rng = np.random.default_rng(0)
-    inside = [
-        low < 3 < high
-        for low, high in map(statistics.bootstrap_interval, rng.normal(3, 1, (300, 40)))
-    ]
-    assert 0.90 < np.mean(inside) < 0.98
-    assert statistics.bootstrap_interval([0.25]) == (0.25, 0.25)
 
 
 def test_share_intervals_are_those_of_the_binomial_distribution():

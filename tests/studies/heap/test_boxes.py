@@ -25,27 +25,11 @@ def test_tilt_is_measured_from_the_nearest_axis(angle, tilt):
     assert turned(angle, 2).tilts()[0] == pytest.approx(0, abs=1e-6)
 
 
-def test_front_is_the_foremost_face_not_the_foremost_centre(cubes):
-    assert cubes((5, 1, 0), (6, 1, 0)).front() == pytest.approx(6.2)
-    assert cubes((5, 1, 0)).only(np.array([], int)).front() == REAR
-
-
 def test_the_edge_is_at_the_front_but_does_not_give_way_beyond_the_door(cubes):
     assert cubes((5, 1, 0), (6, 1, 0)).edge() == pytest.approx(6.2)
     assert cubes((5, 1, 0), (7.1, 1, 0)).edge() == FARTHEST_EDGE
+    assert cubes((5, 1, 0)).only(np.array([], int)).edge() == REAR
     assert DOOR < FARTHEST_EDGE < 7.3
-
-
-def test_only_keeps_boxes_by_number_and_by_flag(cubes):
-    heap = cubes((4.5, 1, 0), (5, 1, 0), (5.5, 1, 0))
-    assert heap.only(np.array([2, 0])).positions[:, 0].tolist() == [5.5, 4.5]
-    assert len(heap.only(np.array([True, False, False]))) == 1
-
-
-def test_a_heap_cannot_be_changed(cubes):
-    heap = cubes((5, 1, 0))
-    with pytest.raises(ValueError, match="read-only"):
-        heap.positions[0, 0] = DOOR
 
 
 def test_packages_have_the_sizes_of_the_neat_loads():

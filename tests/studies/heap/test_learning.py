@@ -2,16 +2,13 @@ import numpy as np
 import pytest
 import torch
 
-from studies.heap import learning
 from studies.heap.learning import (
     Learned,
     Picks,
     batch_loss,
-    batches,
     fit,
     holds_box,
     load_networks,
-    mirrored,
     save_networks,
 )
 from studies.heap.network import FateNetwork
@@ -73,19 +70,6 @@ def test_the_same_seed_gives_the_same_bits():
     assert not torch.equal(first["heads.weight"], other["heads.weight"])
 
 
-def test_each_pick_is_learned_from_equally_often_until_the_steps_are_done():
-    rows = [each.tolist() for each in batches(300, 4, torch.Generator().manual_seed(0))]
-    assert [len(each) for each in rows] == [128, 128, 44, 128]
-    assert sorted(sum(rows[:3], [])) == list(range(300))
-
-
-def test_half_of_the_batches_are_mirrored(monkeypatch):
-    seen = []
-    monkeypatch.setattr(learning, "mirrored", lambda each: seen.append(each) or mirrored(each))
-    fit(made_up_picks(np.random.default_rng(1), 128), 0, steps=40)
-    assert 10 < len(seen) < 30
-
-
 def test_what_is_learned_of_a_fall_is_its_likelihood(learned):
     """A fall changes that of their number, of the hidden ones among them, and of having any."""
     network, picks = learned
@@ -105,13 +89,6 @@ def test_what_is_learned_of_a_fall_is_its_likelihood(learned):
     assert abs(any_fall) > 0.1
 
 
-def test_mirrored_changes_the_side_only():
-    observations = torch.rand((2, 3, len(COLUMNS)))
-    mirror = mirrored(observations)
-    assert torch.equal(mirror[..., COLUMN["y"]], -observations[..., COLUMN["y"]])
-    assert torch.equal(mirrored(mirror), observations)
-
-
 def test_policy_weighs_falls(learned):
     """Without λ it takes the box with most before it, with a large one none above 0.5 m."""
     network, unseen = learned
@@ -121,13 +98,6 @@ def test_policy_weighs_falls(learned):
         rows = Learned([network], weight)(unseen.observations, masks, np.random.default_rng(0))
         heights[weight] = unseen.observations[np.arange(len(rows)), rows, COLUMN["z"]]
     assert (heights[50.0] < 0.5).mean() > 0.95 > (heights[0.0] < 0.5).mean()
-
-
-def test_policy_picks_only_what_is_allowed(learned, rng):
-    network, unseen = learned
-    masks = np.zeros((len(unseen), ROWS), bool)
-    masks[:, 4] = True
-    assert (Learned([network])(unseen.observations, masks, rng) == 4).all()
 
 
 def test_policy_tells_the_fates_of_all_boxes_for_one_pick(learned):
@@ -142,15 +112,6 @@ def test_policy_tells_the_fates_of_all_boxes_for_one_pick(learned):
     assert (guessed == found).mean() > 0.9 and chances[..., 1].max() < 0.1
 
 
-def test_several_networks_are_averaged(learned):
-    network, unseen = learned
-    other = FateNetwork(8, torch.Generator().manual_seed(1))
-    both = Learned([network, other]).expected(unseen.observations)
-    single = [Learned([each]).expected(unseen.observations) for each in (network, other)]
-    for together, first, second in zip(both, *single):
-        assert together == pytest.approx((first + second) / 2, abs=1e-5)
-
-
 def test_stored_networks_are_the_same(tmp_path, learned):
     network, unseen = learned
     several = [network, *(FateNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 1))]
@@ -159,21 +120,3 @@ def test_stored_networks_are_the_same(tmp_path, learned):
     assert [each.n_features for each in read] == [64, 8, 8]
     before, after = (Learned(each).expected(unseen.observations) for each in (several, read))
     assert np.array_equal(before, after)
-
-
-def test_damaged_networks_are_refused(tmp_path, rng):
-    """154 of 200 flipped bits, and weights that are not a number, were once loaded."""
-    path = tmp_path / "networks.safetensors"
-    save_networks([FateNetwork(8)], path)
-    whole = path.read_bytes()
-    for place in rng.choice(len(whole), 200, replace=False):
-        damaged = bytearray(whole)
-        damaged[place] ^= 1 << int(rng.integers(8))
-        path.write_bytes(damaged)
-        with pytest.raises(ValueError, match="networks.safetensors"):
-            load_networks(path)
-    network = FateNetwork(8)
-    torch.nn.init.constant_(network.own.bias, float("nan"))
-    save_networks([network], path)
-    with pytest.raises(ValueError, match="holds no heap networks .*: a weight is not finite"):
-        load_networks(path)

@@ -2,8 +2,8 @@ import pytest
 import torch
 
 from studies.heap.learning import holds_box
-from studies.heap.network import FateNetwork, fate_loss, pair_columns
-from studies.heap.observation import COLUMN, COLUMNS
+from studies.heap.network import FateNetwork, fate_loss
+from studies.heap.observation import COLUMNS
 
 
 @pytest.fixture
@@ -75,12 +75,3 @@ def test_the_loss_is_least_for_what_has_happened(network, observations):
     empty[1, :, 3:] += 5
     same = fate_loss(fates._replace(logits=empty), present, found, boxes, falls)
     assert same == losses[1], "rows without a box do not count"
-
-
-def test_pair_columns_are_distances_and_gaps():
-    rows = torch.zeros((1, 2, len(COLUMNS)))
-    rows[0, :, COLUMN["behind"]] = torch.tensor([1.0, 0.25])
-    rows[0, :, COLUMN["z"]] = torch.tensor([0.2, 0.5])
-    rows[0, :, COLUMN["extent_x"] : COLUMN["extent_z"] + 1] = 0.4
-    first_to_second = pair_columns(rows, rows)[0, 0, 1]
-    assert first_to_second.tolist() == pytest.approx([-0.75, 0, 0.3, 0.35, -0.4, -0.1])

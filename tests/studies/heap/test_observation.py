@@ -5,8 +5,6 @@ from studies.heap.boxes import Heap
 from studies.heap.observation import (
     COLUMN,
     COLUMNS,
-    PIXELS_HIGH,
-    PIXELS_WIDE,
     ROWS,
     SEEN,
     Camera,
@@ -39,13 +37,6 @@ def observed(camera):
 
 def column(rows: np.ndarray, name: str) -> np.ndarray:
     return rows[:, COLUMN[name]]
-
-
-def test_pixels_are_counted_by_box(camera, pile):
-    pixels = camera.pixels(pile)
-    assert len(pixels) == len(pile) and 0 < pixels.sum() < PIXELS_WIDE * PIXELS_HIGH
-    alone = camera.pixels(pile.only(np.array([3])))
-    assert alone[0] >= pixels[3], "others hide it"
 
 
 def test_a_box_behind_another_is_not_visible(camera, cubes):
@@ -87,11 +78,6 @@ def test_a_box_half_in_front_covers_half(observed, cubes):
     numbers, rows = observed(cubes((5.0, 1.0, 0), (5.5, 1.2, 0)))
     assert numbers.tolist() == [1, 0]
     assert column(rows, "clear_in_front") == pytest.approx([1, 0.5])
-
-
-def test_boxes_outside_the_door_do_not_move_the_edge(observed, cubes):
-    _, rows = observed(cubes((6.0, 1.0, 0), (7.1, 2.0, 0)))
-    assert column(rows, "behind") == pytest.approx([0.1, 1.2])
 
 
 def test_only_the_foremost_boxes_get_a_row(cubes):

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from studies.heap import policies
 from studies.heap.observation import COLUMN, COLUMNS, ROWS
 from studies.heap.policies import RULES, Oracle, best, linear, play
 
@@ -37,11 +36,6 @@ def test_no_rule_picks_what_is_masked(three_boxes, rng, name):
     assert RULES[name](observations, masks, rng).tolist() == [2]
 
 
-def test_random_picks_every_allowed_box_alike(three_boxes, rng):
-    picks = [int(RULES["random"](*three_boxes, rng)[0]) for _ in range(300)]
-    assert np.bincount(picks, minlength=3) == pytest.approx([100, 100, 100], abs=30)
-
-
 def test_linear_weighs_columns(three_boxes, rng):
     observations, masks = three_boxes
     score = linear({"z": -1, "behind": -1})(observations)[0, :3]
@@ -59,38 +53,6 @@ def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):
     observation, info = env.reset(options={"heap": episode.heaps[2]})
     assert observation.tobytes() == episode.observations[2].tobytes()
     assert np.array_equal(info["item_mask"], episode.observations[2].any(axis=1))
-
-
-def test_outcomes_of_an_episode_are_what_the_rake_does(make_heap_env, make_rake, pile):
-    episode = play(make_heap_env(max_picks=3), RULES["lowest"], pile, 0)
-    rake = make_rake("coarse")
-    for heap, box, outcome, after in zip(
-        episode.heaps, episode.boxes.tolist(), episode.outcomes, episode.heaps[1:]
-    ):
-        again = rake.pick(heap, box)
-        assert after is outcome.heap
-        assert again.heap.positions.tobytes() == after.positions.tobytes()
-        assert again.unloaded.tolist() == outcome.unloaded.tolist()
-    for name, picks in (("unloaded", episode.unloaded), ("fallen", episode.falls)):
-        assert [getattr(each, name).sum() for each in episode.outcomes] == picks.tolist()
-
-
-def test_clear_above_is_a_box_of_which_at_most_a_tenth_is_covered(three_boxes, rng):
-    observations, masks = three_boxes
-    for share, row in ((0.89, 1), (0.91, 0)):
-        observations[0, 0, COLUMN["clear_above"]] = share
-        assert RULES["clear above"](observations, masks, rng).tolist() == [row]
-
-
-def test_the_oracle_tries_the_best_boxes_again(make_heap_env, cubes, monkeypatch):
-    """With one of them left after the first physics, that is the choice: it brings all three."""
-    monkeypatch.setattr(policies, "TRIED_AGAIN", 1)
-    heap = cubes((5.62, 2.0, 0), (4.8, 0.5, 0), (5.21, 0.5, 0), (5.62, 0.5, 0))
-    env = make_heap_env(heap)
-    oracle = Oracle(env, falls_weight=1.0, physics="coarse")
-    episode = play(env, oracle, heap, 0)
-    oracle.close()
-    assert int(episode.boxes[0]) == 1 and episode.unloaded[0] == 3
 
 
 def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes, monkeypatch):

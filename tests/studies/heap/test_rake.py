@@ -1,46 +1,7 @@
 import numpy as np
 import pytest
 
-from studies.heap.rake import FALL, FORCE, PHYSICS, REACH, add_walls, drag
-from unload import task
-from unload.physics.bullet import World
-
-
-@pytest.fixture
-def dragged():
-    """``dragged(mass)``: how far a box alone is dragged, and where it has slid to 0.5 s later."""
-    world = World()
-
-    def drag_one(mass: float) -> tuple[float, float]:
-        world.clear()
-        add_walls(world)
-        box = world.add_box((5, 1, 0.2), (0.4, 0.4, 0.4), mass)
-        moved = drag(world, box, mass)
-        world.step(0.5)
-        return moved, world.pose(box)[0][0] - 5
-
-    yield drag_one
-    world.close()
-
-
-def test_a_dragged_box_stops_behind_its_reach(dragged):
-    moved, slid = dragged(mass=1.0)
-    assert REACH <= moved < REACH + 0.01
-    assert slid == pytest.approx(moved, abs=0.002)
-
-
-def test_a_drag_weaker_than_friction_moves_nothing(dragged):
-    """Friction of 0.5 on both sides holds a quarter of the weight."""
-    heaviest = FORCE / (0.25 * task.GRAVITY)
-    assert dragged(1.2 * heaviest)[0] < 0.002
-    assert 0.02 < dragged(0.8 * heaviest)[0] < REACH
-
-
-@pytest.mark.parametrize("physics", PHYSICS)
-def test_a_free_box_comes_alone(cubes, make_rake, physics):
-    outcome = make_rake(physics).pick(cubes((5, 1, 0)), 0)
-    assert outcome.came and outcome.moved == pytest.approx(REACH, abs=0.02)
-    assert outcome.unloaded.tolist() == [True] and len(outcome.heap) == 0
+from studies.heap.rake import FALL, PHYSICS
 
 
 @pytest.mark.parametrize(
@@ -68,13 +29,6 @@ def test_a_box_comes_if_it_has_moved_by_nine_tenths_of_the_reach(
     outcome = make_rake(mass=mass).pick(cubes((4.5, 1, 0), (6, 2, 0)), 0)
     assert outcome.moved == pytest.approx(moved, abs=0.03)
     assert outcome.came == came and outcome.unloaded.tolist() == [came, False]
-
-
-def test_a_pick_ends_when_nothing_moves(cubes, make_rake):
-    """A box falls for two seconds, longer than the drag of one that is too heavy and a rest."""
-    outcome = make_rake(mass=30.0).pick(cubes((4.5, 1, 0), (4.5, 2, 35)), 0)
-    assert not outcome.came and outcome.fallen.tolist() == [False, True]
-    assert outcome.heap.positions[1, 2] == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_box_that_loses_its_support_falls(cubes, make_rake, set_friction):

@@ -8,10 +8,9 @@ from studies.heap.boxes import Heap
 from studies.heap.env import stored_heaps
 from studies.heap.generate import read_heaps
 from studies.heap.learning import load_networks
-from studies.heap.recording import exploring, make_heaps, make_networks
+from studies.heap.recording import make_heaps, make_networks
 from studies.provenance import read_provenance
 from studies.results import unpacked
-from unload.agent.identity import identity
 
 
 @pytest.fixture
@@ -47,19 +46,6 @@ def test_heaps_are_those_of_their_seeds(quick_heaps, tmp_path, monkeypatch):
     assert not np.array_equal(train.positions, test.positions)
     provenance = read_provenance(few / "heap", "heaps")
     assert provenance["settings"]["heaps"] == {"train": 2, "test": 1}
-
-
-def test_exploring_picks_half_at_random_and_half_as_its_favourite(rng):
-    observations = np.ones((1, 96, 13))
-    masks = np.ones((1, 96))
-
-    def favourite(observations, masks, rng):
-        return np.array([5])
-
-    policy = exploring(rng, favourite)
-    rows = np.array([policy(observations, masks, rng)[0] for _ in range(400)])
-    assert 0.4 < (rows == 5).mean() < 0.6
-    assert len(np.unique(rows)) > 60
 
 
 def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
@@ -98,17 +84,3 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
     make_networks(tmp_path, tmp_path)
     assert len(learned) == 12 and published.read_bytes() != written, "another question"
     assert len(list((tmp_path / "heap" / "picks").glob("*.json"))) == 6, "other explorers, too"
-
-
-def test_other_code_is_another_question(monkeypatch):
-    """Seeds and heaps do not say how a rake picks, or how a network learns."""
-
-    def codes() -> list[str]:
-        return [identity(getattr(recording, name)) for name in ("_new_heap", "_record", "_learn")]
-
-    before = codes()
-    monkeypatch.setattr("studies.heap.rake.CAME", 0.6)
-    monkeypatch.setattr("studies.heap.learning.WEIGHT_DECAY", 0.1)
-    assert [one == other for one, other in zip(before, codes())] == [True, False, False]
-    monkeypatch.setattr("studies.heap.generate.FASTEST", 0.2)
-    assert codes()[0] != before[0]

@@ -12,25 +12,11 @@ from studies.provenance import read_provenance
 from studies.statistics import share_interval
 from unload import policies
 from unload.load.substacks import front_walls, stack_load
-from unload.physics.local import LocalPhysics
-from unload.physics.situation import Surroundings
 
 
 @pytest.fixture(scope="module")
 def committed():
     return agreement.read_agreement()
-
-
-def test_lifts_are_asked_about_in_the_state_they_name():
-    states, frame = agreement.collect_lifts(100, 3)
-    for state, rows in frame.groupby("state"):
-        named = states[state]
-        assert (rows["picks"] == named.picks).all() and (rows["seed"] == named.seed).all()
-        assert named.present[named.visible].all()
-        assert set(rows["item"]) <= set(named.visible)
-        assert not rows["item"].duplicated().any()
-        assert (np.bincount(np.minimum(rows["on_top"], 3), minlength=4) <= agreement.WANTED).all()
-    assert [state.present.all() for state in states] == [state.picks == 0 for state in states]
 
 
 def test_choice_for_full():
@@ -122,45 +108,3 @@ def test_committed_lifts_can_be_computed_again(committed):
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
     assert (frame[columns] == first[columns]).all(axis=None)
     assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
-
-
-@pytest.fixture(scope="module")
-def state():
-    """A container of three walls from which a third of the free boxes has been taken."""
-    load, rng = stack_load(np.random.default_rng(4), 3), np.random.default_rng(0)
-    present = np.ones(len(load), bool)
-    surroundings = Surroundings(load, present)
-    free = [item for item in range(len(load)) if not surroundings.on_top(item)]
-    present[rng.choice(free, len(free) // 3, replace=False)] = False
-    visible = rng.choice(np.flatnonzero(present), 30, replace=False)
-    return agreement.State("random", 4, 0, load, present, visible)
-
-
-def test_boxes_left_are_those_of_the_walls_around(monkeypatch, state):
-    monkeypatch.setattr(agreement, "NEAR_WALLS", 1)
-    left, items = agreement.boxes_left(state, 1, 1)
-    assert set(left.walls) == {1}
-    assert (items == np.flatnonzero(state.present & (state.load.walls == 1))).all()
-    assert (left.positions == state.load.positions[items]).all()
-    monkeypatch.setattr(agreement, "NEAR_WALLS", 3)
-    assert set(agreement.boxes_left(state, 0, 3)[0].walls) == {0, 1}
-    left, items = agreement.boxes_left(state, 0, agreement.WALLS)
-    assert (items == np.flatnonzero(state.present)).all()
-
-
-def test_a_fresh_world_lifts_the_item_it_was_asked_about(monkeypatch, state):
-    """With fewer walls around, the item has another number; its distance is that of ``local``."""
-    monkeypatch.setattr(agreement, "NEAR_WALLS", 1)
-    local = LocalPhysics()
-    local.reset(state.load)
-    for item in np.flatnonzero(~state.present):
-        local.remove(item)
-    blocked = {item: bool(local.surroundings.on_top(item)) for item in state.visible.tolist()}
-    for wanted in (True, False):
-        item = next(item for item, is_so in blocked.items() if is_so == wanted)
-        question, compute = agreement.fresh_job(state, item, 1)
-        assert set(question) == {"settings", "boxes", "item"}
-        assert compute() == pytest.approx(local.lift(item), abs=0.01)
-    local.close()
-    another, _ = agreement.fresh_job(state, item, agreement.WALLS)
-    assert another != question

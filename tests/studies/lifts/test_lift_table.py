@@ -1,7 +1,5 @@
 """The data of the lift table."""
 
-import numpy as np
-
 from studies.lifts import lift_table as lifts
 from studies.provenance import read_provenance
 from unload import policies, task
@@ -23,14 +21,3 @@ def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
     lifts.lift_data(tmp_path / "c", tmp_path / "a/runs")
     again = read_provenance(tmp_path / "c", "lifts")
     assert again["wall_time_s"] == provenance["wall_time_s"]
-
-
-def test_policies_that_fill_the_table_only_pick_what_the_mask_allows(rng):
-    observations = rng.uniform(-1, 1, (50, 128, 3)).astype(np.float32)
-    masks = rng.random((50, 128)) < 0.2
-    masks[:, 0] = True
-    filling = lifts._filling_policies(rng)
-    assert len(filling) == 20 + lifts.RANDOM_SHARE
-    for policy in filling:
-        actions = policy(observations, masks, rng)
-        assert np.take_along_axis(masks, actions[:, None], axis=1).all()

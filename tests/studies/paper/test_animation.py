@@ -9,7 +9,6 @@ from studies.paper import animation
 from tests.agent.networks import lowest
 from unload import policies
 from unload.load import picture
-from unload.load.picture import COLOURS
 from unload.load.substacks import front_walls, stack_load
 
 
@@ -73,19 +72,6 @@ def _noting(draw_half, texts):
         texts.extend(text.get_text() for text in half.texts)
 
     return draw
-
-
-def test_picked_boxes_rise_in_the_colours_of_what_became_of_them(episodes):
-    empty, stuck = episodes["empty"], episodes["stuck"]
-    low, high, colours = animation._boxes(empty, 0, 1)
-    rising = (colours == COLOURS["liftable"]).all(axis=1)
-    item = empty.items[0]
-    assert rising.sum() == 1 and len(low) == len(empty.load)
-    middle = empty.load.positions[item] + (0, 0, animation.RISE)
-    assert (low[rising] + high[rising])[0] / 2 == pytest.approx(middle)
-    assert len(animation._boxes(empty, 1, 1)[0]) == len(empty.load) - 1
-    *_, colours = animation._boxes(stuck, 0, 1)
-    assert (colours[-1] == COLOURS["failed"]).all()
 
 
 def test_committed_picture_is_small_enough_for_a_readme():

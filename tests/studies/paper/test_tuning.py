@@ -99,8 +99,3 @@ def test_greedy_msr_is_found_again_in_that_of_the_exploring_agent():
     reached = tuning.greedy_reached([mixed, mixed])
     assert reached["step"] == pytest.approx(1750, abs=10)
     assert reached["low"] == reached["high"] == reached["step"]
-
-
-def test_a_level_is_reached_where_the_msr_stays_above_it():
-    msr = np.array([[np.nan, 0.95, 0.5, 0.9, 1], [1, 1, 1, 1, 0.5], [1, 1, 1, 1, 1]])
-    assert np.array_equal(tuning.reached_at(msr), [3, np.nan, 0], equal_nan=True)

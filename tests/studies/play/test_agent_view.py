@@ -6,8 +6,7 @@ import pytest
 import unload
 from studies.play.agent_view import LEVELS, AgentView, look
 from studies.play.canvas import ABSENT
-from studies.play.players import policy_of
-from unload.load.view import PLOTLY_MIMETYPE
+from studies.play.episode import policy_of
 
 
 @pytest.fixture
@@ -49,19 +48,6 @@ def test_colours_are_ranks_and_the_choice_is_outlined(stuck):
     assert stuck.canvas.outlined == [ranks_and_item(stuck)[1]]
 
 
-def test_epsilon_changes_the_chance(stuck):
-    def chance():
-        return float(re.findall(r"<b>([\d.]+)</b>", stuck.message.value)[-1])
-
-    assert chance() == 0
-    stuck.epsilon.value = 1
-    assert 0.1 < chance() < 0.6
-
-
-def test_a_view_stands_beside_the_widget(stuck):
-    assert {PLOTLY_MIMETYPE, "image/png"} <= set(stuck._repr_mimebundle_())
-
-
 @pytest.fixture
 def seen(full_load):
     """Positions of visible items, and which can be lifted, in the order of height."""
@@ -69,21 +55,6 @@ def seen(full_load):
     env.reset(seed=0, options={"load": full_load})
     yield full_load.positions[env.visible], env.liftable()
     env.close()
-
-
-def test_ranks_are_the_order_along_each_axis(seen, rng):
-    positions = seen[0] + rng.normal(0, 0.0005, seen[0].shape)
-    ranks, *_ = look(positions, seen[1], policy_of("the paper's agent"), 0, "noise")
-    order = np.argsort(np.argsort(positions, axis=0), axis=0)
-    assert ranks == pytest.approx(order, abs=1e-4)
-
-
-@pytest.mark.parametrize("player", ["the paper's agent", "the recommended agent"])
-def test_greedy_is_what_the_agent_picks(seen, player):
-    agent = policy_of(player)
-    observation = unload.env.observation.scaled(seen[0])[None]
-    picked = agent(observation, np.ones((1, 128)), np.random.default_rng(0))
-    assert look(*seen, agent, 0, agent.ties)[1] == picked[0]
 
 
 def test_chance_mixes_the_greedy_and_a_random_pick(seen):

@@ -4,13 +4,12 @@ from studies.play.canvas import ABSENT, Canvas
 
 
 def test_boxes_and_labels_are_those_of_the_load(full_load):
-    canvas = Canvas(full_load, height=300)
+    canvas = Canvas(full_load)
     corners = np.frombuffer(canvas.boxes, np.float32).reshape(-1, 2, 3)
     assert np.allclose(corners.mean(axis=1), full_load.positions, atol=1e-5)
     assert np.allclose(np.ptp(corners, axis=1), full_load.sizes, atol=1e-5)
     x, y, z = np.rint(full_load.sizes[7] * 1000).astype(int)
     assert canvas.labels[7] == f"item 7, package {full_load.packages[7]}: {x} × {y} × {z} mm"
-    assert canvas.height == 300
 
 
 def test_a_pick_is_one_small_message(full_load, monkeypatch):
@@ -33,9 +32,3 @@ def test_the_same_lift_twice_is_seen_twice(small_load):
     for _ in range(2):
         canvas.show(np.zeros(len(small_load)), {}, {}, (3, 0.46, (0, 1, 0)))
     assert seen == [1, 2]
-
-
-def test_an_empty_group_has_no_line_in_the_legend(small_load):
-    canvas, palette = Canvas(small_load), {"visible": (0, 0, 1), "failed": (1, 0, 0)}
-    canvas.show(np.zeros(len(small_load)), palette, {"on it": np.array([], int)})
-    assert [line[0] for line in canvas.legend] == ["visible"]

@@ -1,5 +1,4 @@
 import html
-import logging
 import re
 
 import numpy as np
@@ -7,8 +6,7 @@ import pytest
 
 from studies.play.agent_view import AgentView
 from studies.play.canvas import ABSENT
-from studies.play.episode import Episode
-from studies.play.players import Run
+from studies.play.episode import Episode, Run
 from studies.play.playground import SHOWN, Playground
 from unload import stack_load
 from unload.load.view import PLOTLY_MIMETYPE
@@ -84,11 +82,6 @@ def test_what_is_not_visible_may_not_be_picked(game):
     assert score(game) == [0, 0] and "not among the 128 nearest" in game.message.value
 
 
-def test_what_the_browser_sends_is_shown_as_text(game):
-    game.canvas._handle_custom_msg({"item": "<b>box</b>"}, [])
-    assert "Item &lt;b&gt;box&lt;/b&gt; is not" in game.message.value
-
-
 def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
     load, run = stack_load(np.random.default_rng(4)), game.runs["random"]
     alone, other = (Run("random", load, seed) for seed in (4, 0))
@@ -101,13 +94,6 @@ def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
     assert run.picks == alone.picks != other.picks
     assert np.array_equal(game.you.observation, Episode(load, 4).observation)
     assert not np.array_equal(game.you.observation, Episode(load, 0).observation)
-
-
-def test_hints_are_what_can_be_lifted(game):
-    game.hints.value = True
-    liftable = game.you.liftable()
-    green = [i for i in range(len(game.you.load)) if colour(game, i) == "liftable"]
-    assert green == sorted(liftable)
 
 
 def test_all_players_have_as_many_picks_as_you(game):
@@ -127,24 +113,6 @@ def test_all_players_have_as_many_picks_as_you(game):
     assert [row[1] for row in game.standings()] == [2] * 7
 
 
-def test_only_the_last_pick_is_seen_to_rise_and_only_when_it_is_made(game):
-    first, second = game.you.liftable()[:2]
-    click(game, first)
-    click(game, second)
-    rise = game.canvas.lift
-    assert rise["item"] == second and rise["number"] == 2
-    game.hints.value = True
-    game.undo.click()
-    click(game, np.setdiff1d(game.you.visible, game.you.liftable())[0])
-    game.player.value = "highest"
-    assert game.canvas.lift == rise, "shown, taken back, failed or another's"
-    game.slider.value = 1
-    assert game.canvas.lift["number"] == 3
-    for count in (3, 2):
-        game.slider.value = count
-    assert game.canvas.lift["number"] == 3, "a jump, and a step back"
-
-
 def test_a_player_is_watched_by_the_slider(game):
     game.player.value = "highest"
     run = game.runs["highest"]
@@ -157,11 +125,6 @@ def test_a_player_is_watched_by_the_slider(game):
     assert "choose the player" in game.message.value and not game.you.picks
     game.player.value = "you"
     assert score(game) == [0, 0]
-
-
-def test_play_moves_the_slider_in_the_browser(game):
-    assert (game.link.source, game.link.target) == ((game.play, "value"), (game.slider, "value"))
-    assert game.play.max == game.slider.max == 20
 
 
 def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
@@ -179,32 +142,6 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
     assert score(stuck)[0] == unloaded
 
 
-def test_the_mask_ends_a_deadlock_that_has_lasted_to_the_end(stuck):
-    """Also where all picks have been watched: those from the first deadlocked one are made anew."""
-    stuck.mask.value = False
-    stuck.slider.value = 120
-    run = stuck.runs["the paper's agent"]
-    first = [pick.deadlocked for pick in run.picks].index(True)
-    before = run.picks[:first]
-    stuck.mask.value = True
-    assert run.picks[:first] == before and len(run.picks) == 120
-    stuck.slider.value = first + 5
-    assert not any(pick.deadlocked for pick in run.picks)
-    assert "deadlock" not in stuck.message.value
-
-
-def test_what_is_logged_while_it_starts_stands_in_its_own_line(monkeypatch):
-    def warm_up(playground):
-        logging.getLogger("unload.fast").warning("compiling <this> for ten seconds")
-
-    monkeypatch.setattr(Playground, "_warm_up", warm_up)
-    game = Playground(seed=4)
-    assert "compiling &lt;this&gt; for ten seconds" in game.message.value
-    game.slider.value = 1
-    game._show()
-    assert "compiling" not in game.message.value and not logging.getLogger("unload").handlers
-
-
 def test_a_replay_stands_beside_the_widget(game):
     bundle = game._repr_mimebundle_()
     assert {WIDGET, PLOTLY_MIMETYPE, "image/png", "text/plain"} == set(bundle)
@@ -216,13 +153,11 @@ BAD_INPUT = {
     "agent is 'random'; expected one of": lambda load: AgentView(agent="random"),
     "picks is -1": lambda load: AgentView(picks=-1),
     "load is 'load'; expected an unload.Load": lambda load: Episode("load"),
+    "item is 0; expected one of the visible": lambda load: Episode(load).pick(0),
     "count is 1; expected an integer >= 0 and <= 0": lambda load: Episode(load).back_to(1),
     "player is 'chess'; expected one of 'random'": lambda load: Run("chess", load),
-    "mask is 1; expected True or False": lambda load: Run("random", load, mask=1),
-    "count is -1": lambda load: Run("random", load).play_to(-1),
     "seed is -1": lambda load: Playground(seed=-1),
     "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
-    "mask is None": lambda load: Playground(mask=None),
     "picks is 0": lambda load: Playground(picks=0),
 }
 

@@ -1,7 +1,6 @@
 import numpy as np
 
-from studies.play.episode import Episode
-from studies.play.players import Run
+from studies.play.episode import Episode, Run
 from studies.play.replay import PAUSE, STOPS, replay
 
 

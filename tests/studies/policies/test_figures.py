@@ -1,10 +1,8 @@
-"""Figures of the policies, and those of the speeds."""
+"""Figures of the policies."""
 
-import numpy as np
 import pytest
 
 from studies.policies import comparison, figures, robustness
-from studies.speed import figures as speed
 
 
 def test_every_condition_has_its_panel():
@@ -26,10 +24,3 @@ def test_dots_are_the_means_over_the_containers():
         ]
         assert [line.get_xdata()[0] for line in axes.lines[1::2]] == pytest.approx(means)
         assert len(axes.texts) == len(figures.ROWS) - len(means)
-
-
-def test_bars_are_the_measured_ratios():
-    table = speed.read_speeds()
-    bars = [bar.get_width() for axes in speed.speed_ratios().axes for bar in axes.patches]
-    grouped = [ratio for _, group in table.groupby("what", sort=False) for ratio in group["ratio"]]
-    assert np.allclose(bars, grouped)

@@ -51,11 +51,6 @@ def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, fre
     assert row["success_rate"] == (distance > 0.2)
 
 
-def test_a_box_is_free_once_all_on_it_is_unloaded(monkeypatch):
-    monkeypatch.setattr(World, "pull", lambda world, body: 0.4)
-    assert robustness.play(policies.highest, "restore", 0, 200, piles)["free"] == 1
-
-
 def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(robustness, "PLAYED", (("highest", "keep"), ("highest", "restore")))
     monkeypatch.setattr(robustness, "EPISODES", 2)

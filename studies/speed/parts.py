@@ -1,20 +1,56 @@
-"""Lifts per second of each physics, and picks per second of each environment."""
+"""What the parts take: lifts and picks per second, milliseconds per update; and their table."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
+from unittest import mock
 
 import gymnasium
 import numpy as np
+import pandas as pd
+import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 import unload
-from studies.speed.timing import best_times
+from studies import paths
+from studies.results import read_table
 from unload import task
-from unload.physics.base import Physics
+from unload.agent import learner
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
+FOLDER = paths.DATA / "benchmarks"
+COLUMNS = ["what", "how", "value", "unit", "ratio"]
 CONTAINER = "unload/Container-v0"
+ROUNDS = 4  # in which each call is timed
+
+
+def read_speeds() -> pd.DataFrame:
+    """The table that ``studies.speed.run`` has published, a row per way of doing a thing."""
+    return read_table(FOLDER / "speeds.csv", "python -m studies.speed.run", COLUMNS)
+
+
+def three_digits(value: float) -> str:
+    """A positive number rounded to three digits, without a power of ten: 1,230,000."""
+    return f"{float(f'{value:.3g}'):,.10g}"
+
+
+def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """The least wall time of each call, in s.
+
+    Each is made once without counting. Then all are made in turn, ``ROUNDS`` times, so that
+    whatever else the machine does meets all of them alike. The least time is that of the
+    round which was disturbed least.
+    """
+    for call in calls.values():
+        call()
+    best = dict.fromkeys(calls, float("inf"))
+    for _ in range(ROUNDS):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
 
 
 def lift_rates(load: unload.Load, full: int = 2, others: int = 100) -> dict[str, float]:
@@ -34,19 +70,14 @@ def lift_rates(load: unload.Load, full: int = 2, others: int = 100) -> dict[str,
     for physics in answering.values():
         physics.reset(load)
     times = best_times(
-        {name: _lifts(physics, items[: counts[name]]) for name, physics in answering.items()}
+        {
+            name: lambda name=name, physics=physics: list(map(physics.lift, items[: counts[name]]))
+            for name, physics in answering.items()
+        }
     )
     for physics in answering.values():
         physics.close()
     return {name: counts[name] / seconds for name, seconds in times.items()}
-
-
-def _lifts(physics: Physics, items: list[int]) -> Callable[[], None]:
-    def lift_all() -> None:
-        for item in items:
-            physics.lift(item)
-
-    return lift_all
 
 
 def pick_rates(num_envs: int = task.NUM_ENVS, picks: int = 500) -> dict[str, float]:
@@ -99,3 +130,43 @@ def _episode(env: gymnasium.Env | VectorEnv, picks: int) -> Callable[[], None]:
             env.step(action)
 
     return play
+
+
+def update_times(batch_size: int = 2048, n_features: int = 64) -> dict[str, float]:
+    """Time of one ``DQN.update``: gradients of a batch, and a step of Adam.
+
+    Args:
+        batch_size: b.
+        n_features: n.
+
+    Returns:
+        ms, by how it is done.
+    """
+    rng = np.random.default_rng(0)
+    batch = {
+        "observations": rng.uniform(-1, 1, (batch_size, task.N_VISIBLE, 3)).astype(np.float32),
+        "actions": rng.integers(task.N_VISIBLE, size=batch_size),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), batch_size),
+    }
+
+    def update(fused: bool, threads: int, rows: int = learner.ROWS_PER_PASS) -> Callable:
+        network = unload.PEQNetwork(n_features, torch.Generator().manual_seed(0))
+        agent = unload.DQN(network, fused_update=fused)
+
+        def call() -> float:
+            torch.set_num_threads(threads)
+            with mock.patch.object(learner, "ROWS_PER_PASS", rows):
+                return agent.update(batch)
+
+        return call
+
+    times = best_times(
+        {
+            "PyTorch, whole batch": update(False, 1, batch_size),
+            f"PyTorch, chunks of {learner.ROWS_PER_PASS}": update(False, 1),
+            "fused": update(True, 1),
+            "fused, 2 threads": update(True, 2),
+        }
+    )
+    torch.set_num_threads(1)
+    return {name: seconds * 1e3 for name, seconds in times.items()}
