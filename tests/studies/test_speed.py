@@ -1,12 +1,14 @@
 """The benchmarks: what they measure is what they say."""
 
 import numpy as np
+import pandas as pd
 import stable_baselines3
 import torch
 
 import unload
 from studies.speed import mutants, parts
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
+from studies.speed.run import show
 from studies.speed.training import PEQPolicy
 from unload.env.sb3 import ContainerVecEnv
 
@@ -75,3 +77,9 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
         ("print(f'{a + 1}') -> pass", "pass"),
     ]
+
+
+def test_speeds_are_printed_with_their_units(capsys):
+    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
+    show(pd.DataFrame([row]))
+    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
