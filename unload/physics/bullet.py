@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,18 +25,16 @@ def _quiet_stderr():
     except OSError:  # stderr is closed: there is nothing to hide
         yield
         return
-    null = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(null)
+    with open(os.devnull, "wb") as null, open(saved, "wb"):
+        os.dup2(null.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(saved, 2)
 
 
 @cache
-def _pybullet() -> ModuleType:
+def _pybullet() -> Any:
     """PyBullet, imported when it is first needed."""
     with _quiet_stderr():
         try:
@@ -119,9 +116,6 @@ class World:
         maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
             2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
         iterations: of the contact solver per time step; 50 is PyBullet's default.
-
-    Raises:
-        ModuleNotFoundError: PyBullet is not installed.
     """
 
     def __init__(
@@ -158,8 +152,7 @@ class World:
         """Create a box and return its body number; mass 0 makes it immovable.
 
         Args:
-            position: (3,) centre in m.
-            size: (3,) edge lengths in m.
+            position, size: (3,) centre and edge lengths in m.
             mass: kg.
             orientation: (4,) quaternion x, y, z, w.
             friction: of its surface; Bullet multiplies it with the other body's.
@@ -203,15 +196,12 @@ class World:
     def pull(
         self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
     ) -> float:
-        """Pull a body upwards at its centre of mass (Sec. III-C).
+        """Pull a body upwards at its centre of mass; return how far it moved, in m (Sec. III-C).
 
         Args:
             body: which one.
             force: N.
             seconds: how long, rounded to whole time steps.
-
-        Returns:
-            How far the body moved, in m.
         """
         start = np.array(self.pose(body)[0])
         for _ in range(round(seconds / self.time_step)):

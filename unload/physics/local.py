@@ -39,17 +39,10 @@ class LocalPhysics(Physics):
 
 
 def lift(world: World, situation: Situation) -> float:
-    """Pull the chosen box of a situation; return how far it moved, in m.
+    """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
 
-    The chosen box and all that rests on it are free to move, the rest is fixed. The world
-    is left empty, and what was lifted in it before makes no difference, not in one bit.
-
-    Args:
-        world: an empty one.
-        situation: the box and its surroundings.
-
-    Returns:
-        Distance in m, rounded to whole micrometres.
+    The chosen box and all that rests on it are free to move, the rest is fixed. The world is
+    empty before and after, and what was lifted in it before makes no difference, not in one bit.
     """
     bodies: list[int] = []
     try:
