@@ -46,7 +46,7 @@ class FullPhysics(Physics):
             self._add_box(position, size, task.MASS)
             for position, size in zip(load.positions, sizes)
         ]
-        self._poses = [(tuple(position), UPRIGHT) for position in load.positions.tolist()]
+        self._poses: list[tuple] = [(place, UPRIGHT) for place in load.positions.tolist()]
 
     def _make_world(self) -> World:
         # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,

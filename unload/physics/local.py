@@ -16,10 +16,8 @@ class LocalPhysics(Physics):
 
     The chosen box and all that rests on it are free to move; what they stand on, their
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
-    A failed lift has no effect on the container (Sec. III-D).
-
-    Attributes:
-        surroundings: the situations of the load's items.
+    A failed lift has no effect on the container (Sec. III-D). ``surroundings`` holds the
+    situations of the load's items.
     """
 
     def simulate(self, situation: Situation) -> float:

@@ -46,9 +46,8 @@ def _free_lift() -> float:
 
 
 # How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
-# whatever the box's size and neighbours: a load's boxes overlap by a micrometre at most, and
-# physics makes them a millimetre narrower. It would not hold for neighbours that overlap by more
-# than this millimetre: they would rub, and hold the box.
+# whatever its size and neighbours, because physics makes boxes a millimetre narrower. Neighbours
+# that overlap by more than that, as those of no load do, would rub, and hold the box.
 FREE_LIFT = _free_lift()
 
 
@@ -153,7 +152,7 @@ class LiftTable:
         return table
 
     def check(self, path: str | Path) -> None:
-        """Simulate the samples of ``path`` again, if PyBullet is there; ValueError if they differ."""
+        """Simulate the samples of ``path`` again, where PyBullet is; ValueError if they differ."""
         with closing(LocalPhysics()) as local, suppress(ModuleNotFoundError):
             for situation in self.samples.values():
                 known, distance = self.find(situation), local.simulate(situation)
@@ -183,9 +182,8 @@ class LiftTable:
                 stored = LiftTable.load(path) if path.exists() else LiftTable()
                 stored.check(path)
                 with self._adding:
-                    digests, micrometres = map(
-                        np.concatenate, zip(self.entries(), stored.entries())
-                    )
+                    both = zip(self.entries(), stored.entries())
+                    digests, micrometres = map(np.concatenate, both)
                     digests, first = np.unique(digests, return_index=True)
                     self._hold(digests, micrometres[first])
                     self._take_samples(stored.samples)
