@@ -153,7 +153,6 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
         (batch,) int64.
 
     Raises:
-        ValueError: an array's shape or dtype is another.
         FloatingPointError: a row has no allowed action of a finite value.
     """
     size, items = _check(observations)

@@ -176,7 +176,7 @@ def back_to_front(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
         # Draw those that have nothing left behind them, until none is left.
         while len(left):
-            free = ~behind.any(axis=0)
+            free = np.asarray(~behind.any(axis=0))
             if not free.any():  # boxes that hide each other in a circle: the farthest first
                 free[np.linalg.norm(low[left] - EYE, axis=1).argmax()] = True
             order.append(left[free])
