@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
 from unload import view
-from unload.load.picture import COLOURS, CORNERS, EYE, TRIANGLES
+from unload.load.picture import COLOURS, EYE
 from unload.load.view import PLOTLY_MIMETYPE
 
 
@@ -123,9 +123,3 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
 def test_bad_input_is_refused(small_load, kwargs, error, message):
     with pytest.raises(error, match=message):
         view(**({"load": small_load} | kwargs))
-
-
-def test_triangles_lie_in_the_sides_of_a_box():
-    """Twelve different ones."""
-    assert len({frozenset(triangle) for triangle in TRIANGLES.tolist()}) == 12
-    assert (np.sort(np.ptp(CORNERS[TRIANGLES], axis=1), axis=1) == [0, 1, 1]).all()

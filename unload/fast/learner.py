@@ -18,9 +18,6 @@ class FusedLearner:
     threads while the caller does something else. It takes tanh in double precision, where its
     slope does not become 0 so soon, and the choice compares what stands before it, which never
     ties.
-
-    Args:
-        network, learning_rate, beta: see ``PlainLearner``.
     """
 
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
