@@ -20,14 +20,14 @@ LIBRARIES = {
     "PIL": ("unload/load/", "studies/paper/"),
     "anywidget": ("studies/play/",),
     "gymnasium": (
-        "unload/__init__.py", "unload/env/", "unload/agent/", "studies/heap/", "studies/lifts/",
+        "unload/__init__.py", "unload/env/", "unload/agent/", "studies/heap/", 
         "studies/paper/",
     ),
     "ipywidgets": ("studies/play/",),
     "joblib": ("studies/results.py", "studies/sweep.py", "studies/policies/"),
     "llvmlite": ("unload/fast/kernel.py", "unload/support/compiled.py"),
     "matplotlib": (
-        "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", "studies/lifts/",
+        "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", 
         "studies/paper/", "studies/policies/", "studies/seamless/",
     ),
     "numba": ("unload/fast/kernel.py", "unload/support/compiled.py"),
@@ -43,7 +43,7 @@ LIBRARIES = {
         "studies/falls/", "studies/heap/",
     ),
     "tqdm": (
-        "unload/agent/training.py", "studies/results.py", "studies/sweep.py", "studies/lifts/",
+        "unload/agent/training.py", "studies/results.py", "studies/sweep.py", 
     ),
     "traitlets": ("studies/play/",),
 }  # fmt: skip

@@ -10,6 +10,7 @@ PIXELS_WIDE, PIXELS_HIGH = 128, 96
 ANGLE = 50.0  # degrees, from the lower to the upper edge
 EYE = (DOOR + 2.0, WIDTH / 2, 2.4)  # m: outside, so that a heap that reaches the door fits in
 TARGET = (5.4, WIDTH / 2, 0.8)  # m
+NEAR_PLANE, FAR_PLANE = 0.1, 50.0  # m
 SEEN = 4  # pixels that make a box visible
 ROWS = 96  # about 55 boxes are visible; if more are, those farthest from the door are left out
 COLUMNS = (
@@ -30,10 +31,16 @@ class Camera:
     def pixels(self, heap: Heap) -> np.ndarray:
         """(n,) int64, how many of the 128 × 96 pixels show each box."""
         bodies = list(fill(self._world, heap, mass=0).values())
-        _, shown = self._world.scan(EYE, TARGET, PIXELS_WIDE, PIXELS_HIGH, ANGLE)
+        client, shape = self._world.client, (PIXELS_WIDE, PIXELS_HIGH)
+        *_, shown = client.getCameraImage(
+            *shape,
+            client.computeViewMatrix(EYE, TARGET, (0, 0, 1)),
+            client.computeProjectionMatrixFOV(ANGLE, shape[0] / shape[1], NEAR_PLANE, FAR_PLANE),
+            renderer=client.ER_TINY_RENDERER,
+        )
         boxes = np.full(max(bodies, default=0) + 2, -1)  # -1: walls, and nothing at all
         boxes[bodies] = np.arange(len(heap))
-        owners = boxes[shown]
+        owners = boxes[np.ravel(shown)]
         return np.bincount(owners[owners >= 0], minlength=len(heap))
 
     def close(self) -> None:

@@ -90,10 +90,11 @@ def drag(world: World, body: int, mass: float) -> float:
         if world.pose(body)[0][0] - start >= REACH:
             break
         # What would bring the body to its speed within this step, if nothing resisted.
-        wanted = mass * (SPEED - world.velocity(body)[0]) / world.time_step
+        wanted = mass * (SPEED - world.client.getBaseVelocity(body)[0][0]) / world.time_step
         world.push(body, (min(max(wanted, -FORCE), FORCE), 0, 0))
     moved = world.pose(body)[0][0] - start
-    world.stop(body)
+    linear, angular = world.client.getBaseVelocity(body)
+    world.client.resetBaseVelocity(body, (0, *linear[1:]), angular)
     return moved
 
 
@@ -134,7 +135,8 @@ class Rake:
             gone = positions[:, 0] > edge
             gone[box] |= came  # the rake holds it, wherever it lies
             gone &= ~unloaded
-            speeds = [np.linalg.norm(world.velocity(body)) for body in bodies.values()]
+            velocities = [world.client.getBaseVelocity(body)[0] for body in bodies.values()]
+            speeds = [np.linalg.norm(velocity) for velocity in velocities]
             if not gone.any() and max(speeds, default=0) < STILL:
                 break
             unloaded |= gone

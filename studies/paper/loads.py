@@ -11,18 +11,8 @@ from matplotlib.patches import Patch, Rectangle
 from studies.style import styled
 from unload import task
 from unload.load.boxes import Load
-from unload.load.picture import COLOURS
-from unload.load.substacks import (
-    CELL,
-    CELLS_WIDE,
-    COLUMNS,
-    LEFT,
-    MID,
-    PACKAGES,
-    RIGHT,
-    ROWS_HIGH,
-    package_colour,
-)
+from unload.load.picture import COLOURS, package_colour
+from unload.load.substacks import CELL, CELLS_WIDE, COLUMNS, LEFT, MID, PACKAGES, RIGHT, ROWS_HIGH
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
 INK = "#333333"

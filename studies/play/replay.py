@@ -52,7 +52,8 @@ def replay(episode: Episode) -> View:
     ]
     middle = episode.moment(stops[len(stops) // 2])
     still = view(load, middle.present, middle.groups(), HEIGHT)
-    figure = View(traces, layout(HEIGHT), frames, picture=still.picture)
+    figure = View(traces, layout(HEIGHT), frames)
+    figure.picture = still.picture
     labels = {str(stop): f"{stop} picks, {episode.unloaded(stop)} unloaded" for stop in stops}
     figure.update_layout(_controls(labels))
     return figure

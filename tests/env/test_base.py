@@ -252,7 +252,7 @@ def test_a_call_whose_stack_fails_needs_a_reset(failing):
         envs.reset(seed=0)
         envs.step(np.zeros(2, int))
     for call in (lambda: envs.step(np.zeros(2, int)), envs.state, envs.action_masks):
-        with pytest.raises(ResetNeeded, match="the episodes are broken off; call reset first"):
+        with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
             call()
     assert_same(envs.reset(seed=0), other.reset(seed=0))
     assert_same(envs.step(np.zeros(2, int)), other.step(np.zeros(2, int)))

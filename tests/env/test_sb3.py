@@ -78,14 +78,6 @@ def test_what_single_environments_only_can_do_is_refused(adapter):
     assert adapter.env_is_wrapped(VecMonitor) == [False, False]
 
 
-def test_an_episode_that_ends_in_both_ways_is_done(few_items):
-    envs = ContainerVecEnv(1, max_picks=2, stack=lambda rng: few_items(rng, 2))
-    envs.reset()
-    dones = [envs.step(np.array([row]))[2][0] for row in (0, 0)]
-    assert dones == [False, True]
-    envs.close()
-
-
 def test_maskable_ppo_learns_on_64_containers():
     envs = VecMonitor(ContainerVecEnv(num_envs=64, max_picks=50))
     model = MaskablePPO(

@@ -176,7 +176,7 @@ def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch, boxes):
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("unload.physics.bullet.World.pull", interrupted)
         envs.step(np.array([1, 1]))  # the lower box, which is not known
-    with pytest.raises(ResetNeeded, match="the episodes are broken off; call reset first"):
+    with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
         envs.step(np.array([0, 0]))
     assert len(envs.table) == 0
     envs.reset(seed=0)

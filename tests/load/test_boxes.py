@@ -78,7 +78,7 @@ def test_a_load_does_not_change_with_the_arrays_it_was_made_from():
         ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
         ({"packages": [-1]}, ValueError, "packages holds -1"),
         ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
-        ({"ids": ["a", "b"]}, ValueError, r"ids is \['a', 'b'\]; expected 1 different names"),
+        ({"ids": ["a", "b"]}, ValueError, r"ids has shape \(2,\); expected \(1,\)"),
     ],
 )
 def test_bad_loads_are_refused(changes, error, message):

@@ -85,7 +85,7 @@ def test_a_load_that_is_written_is_read_again(written, rng):
         ),
         (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\): edges of"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: reaches from"),
-        ([], "has 0 rows and the columns id, x_min, .*; expected boxes with x, y, z or"),
+        ([], "has 0 rows and the columns id, x_min, .*; expected boxes with either"),
         (["a,0,0,0,1,1,1,5,5"], "has more cells in a row than names"),
     ],
 )
@@ -99,7 +99,7 @@ def test_files_that_are_no_lists_are_refused(written, tmp_path):
         ("id,x", "has 1 rows and the columns id, x; expected boxes"),
         ("ID,x", "has the column 'ID'; expected 'id', and once"),
         ("x,x", "has the column 'x.1'; expected 'x', and once"),
-        ("x,y_min", "has centres and corners, .*; expected either"),
+        ("x,y_min", "columns x, y_min; expected boxes with either x, y, z or x_min"),
     ):
         with pytest.raises(ValueError, match=message):
             read_load(written("a,1", columns=columns))

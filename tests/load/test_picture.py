@@ -11,7 +11,9 @@ from unload.load.picture import (
     EYE,
     FACES,
     INSIDES,
+    PACKAGE_COLOURS,
     back_to_front,
+    package_colour,
     snapshot,
     still,
 )
@@ -99,3 +101,9 @@ def test_faces_lie_in_the_sides_of_a_box():
         ring = CORNERS[list(corners)]
         assert (np.abs(np.roll(ring, 1, axis=0) - ring).sum(axis=1) == 1).all()
         assert sorted(np.ptp(ring, axis=0)) == [0, 1, 1]
+
+
+def test_colours_of_packages_are_their_codes_and_begin_again():
+    assert [round(255 * part) for part in package_colour(0)] == [0x1F, 0x3A, 0x5F]
+    assert [round(255 * part) for part in package_colour(12)] == [0xF6, 0xE2, 0x7F]
+    assert package_colour(13) == package_colour(0) and len(set(PACKAGE_COLOURS)) == 13

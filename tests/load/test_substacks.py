@@ -4,27 +4,20 @@ import numpy as np
 import pytest
 
 from unload import task
-from unload.env import observation
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
     COLUMNS,
     DEPTH,
-    FRONT_WALLS,
-    PACKAGE_COLOURS,
     PACKAGES,
     ROWS,
     ROWS_HIGH,
     WALLS,
     build_load,
-    front_walls,
-    package_colour,
     stack_load,
     substacks_that_fit,
     wall_cells,
 )
-
-FIELDS = ("positions", "sizes", "packages", "walls")
 
 
 @pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
@@ -79,12 +72,6 @@ def test_a_load_of_exactly_as_many_items_as_allowed_is_kept(monkeypatch, bound):
     assert len(stack_load(np.random.default_rng(5))) != len(first)
 
 
-def test_colours_of_packages_are_their_codes_and_begin_again():
-    assert [round(255 * part) for part in package_colour(0)] == [0x1F, 0x3A, 0x5F]
-    assert [round(255 * part) for part in package_colour(12)] == [0xF6, 0xE2, 0x7F]
-    assert package_colour(13) == package_colour(0) and len(set(PACKAGE_COLOURS)) == 13
-
-
 def test_build_load_places_the_walls_from_the_rear():
     load = build_load(np.zeros((2, 3, 4), dtype=int))
     assert np.unique(load.positions[:, 0]).tolist() == [1.75, 5.25]
@@ -122,33 +109,14 @@ def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
     assert load.sizes == pytest.approx(scale * expected)
 
 
-# --- the front ----------------------------------------------------------------------
-
-
-def test_front_walls_keep_their_place(full_load):
-    front = front_walls(full_load, 3)
-    kept = full_load.walls >= WALLS - 3
-    for name in FIELDS:
-        assert (getattr(front, name) == getattr(full_load, name)[kept]).all()
-    assert (front_walls(full_load, WALLS).positions == full_load.positions).all()
-    assert (front_walls(front, 2).positions == front_walls(full_load, 2).positions).all()
-
-
-def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
-    for _ in range(50):
-        load = stack_load(rng)
-        seen = observation.nearest(load.positions, task.N_VISIBLE + 100)
-        assert load.walls[seen].min() > WALLS - FRONT_WALLS
-
-
 # --- bad input ----------------------------------------------------------------------
 
 
 BAD_INPUT = {
     r"shape \(3, 4\); expected \(any, any, 4\)": lambda rng: build_load(np.zeros((3, 4), int)),
     r"expected \(any, any, 3\)": lambda rng: build_load(np.zeros((1, 3, 4), int), scale=1.2),
-    "variants has no walls": lambda rng: build_load(np.zeros((0, 3, 4), int)),
-    "variants has no rows": lambda rng: build_load(np.zeros((12, 0, 4), int)),
+    r"shape \(0, 3, 4\); expected a wall": lambda rng: build_load(np.zeros((0, 3, 4), int)),
+    r"shape \(12, 0, 4\); expected a wall": lambda rng: build_load(np.zeros((12, 0, 4), int)),
     "dtype float64; expected integers": lambda rng: build_load(np.zeros((1, 3, 4))),
     "variants holds 3 to 3; expected 0 to 2": lambda rng: build_load(np.full((1, 3, 4), 3)),
     "variants holds -1 to -1; expected 0 to 2": lambda rng: build_load(np.full((1, 3, 4), -1)),
@@ -157,7 +125,6 @@ BAD_INPUT = {
     "walls is 0": lambda rng: stack_load(rng, walls=0),
     r"scale is 0.1; expected .*\[0.5, 1.5\]": lambda rng: stack_load(rng, scale=0.1),
     "scale is '1'": lambda rng: stack_load(rng, scale="1"),
-    "count is 2": lambda rng: front_walls(stack_load(rng, walls=1), 2),
 }
 
 

@@ -5,11 +5,12 @@ import json
 import numpy as np
 import pytest
 from IPython.core.formatters import DisplayFormatter
+from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
 from unload import view
-from unload.load.picture import COLOURS, CORNERS, EYE
-from unload.load.view import PLOTLY_MIMETYPE, TRIANGLES, css
+from unload.load.picture import COLOURS, EYE
+from unload.load.view import PLOTLY_MIMETYPE
 
 
 def vertices(trace) -> np.ndarray:
@@ -70,7 +71,7 @@ def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
     rest = list(range(4, len(small_load)))
     assert shown == {"visible": [0, 1], "tried": [2, 3], "failed": [], "unseen": rest}
     for trace in figure.data:
-        assert trace.color == css(COLOURS[trace.name])
+        assert trace.color == to_hex(COLOURS[trace.name])
 
 
 def test_an_order_shows_its_first_ten_picks(full_load):
@@ -108,7 +109,6 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
     [
         ({"load": "walls"}, TypeError, "load is 'walls'; expected an unload.Load"),
         ({"present": np.ones(3, dtype=bool)}, ValueError, r"present has shape \(3,\)"),
-        ({"present": 1}, ValueError, "present has shape .* dtype int64; expected"),
         ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to"),
         ({"groups": {"a": [10**6]}}, ValueError, r"groups\['a'\] holds 1000000 to 1000000"),
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
@@ -123,9 +123,3 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
 def test_bad_input_is_refused(small_load, kwargs, error, message):
     with pytest.raises(error, match=message):
         view(**({"load": small_load} | kwargs))
-
-
-def test_triangles_lie_in_the_sides_of_a_box():
-    """Twelve different ones."""
-    assert len({frozenset(triangle) for triangle in TRIANGLES.tolist()}) == 12
-    assert (np.sort(np.ptp(CORNERS[TRIANGLES], axis=1), axis=1) == [0, 1, 1]).all()

@@ -3,7 +3,7 @@
 import numpy as np
 
 from unload import task
-from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, Load, floating
+from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, BoxError, Load, check_stacked
 
 # Drawn for each box: depth of its wall, width, height, in m.
 CONTINUOUS = ((0.3, 0.9), (0.1, 0.6), (0.08, 0.45))
@@ -35,10 +35,11 @@ def own_load(rng: np.random.Generator, kind: str) -> Load:
     walls = np.array(walls)
     while True:  # beyond the end of a layer below, boxes of the next one would float
         load = Load((low + high) / 2, high - low, np.zeros(len(low), int), walls)
-        kept = ~floating(low, load.contacts)
-        if kept.all():
+        try:
+            check_stacked(load)
             return load
-        low, high, walls = low[kept], high[kept], walls[kept]
+        except BoxError as error:
+            low, high, walls = (np.delete(each, error.boxes, axis=0) for each in (low, high, walls))
 
 
 def _cut(rng: np.random.Generator, kind: str, axis: int) -> list[tuple[float, float]]:

@@ -33,12 +33,3 @@ def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
     expected = [numpy_forward(peq, observation) for observation in batch]
     assert values.numpy() == pytest.approx(np.array(expected), abs=1e-6)
     assert values.abs().max() < 1
-
-
-def test_an_observation_without_items_has_no_global_features():
-    peq = network()
-    observations = torch.full((2, 7, 3), -1.0)
-    values = peq(observations, torch.zeros((2, 7), dtype=torch.bool))
-    own = torch.relu(peq.extractor(observations[0, 0]))
-    alone = torch.tanh(peq.scorer(torch.cat([own, torch.zeros(3 * len(own))])))
-    assert torch.allclose(values, alone.expand(2, 7), atol=1e-6)

@@ -136,10 +136,12 @@ def test_what_absent_rows_hold_has_no_influence(kind, items, content, training):
 
 @pytest.mark.parametrize("training", [True, False])
 def test_values_and_gradients_are_finite_where_there_is_no_item(kind, items, training):
-    network = make(kind).train(training)
+    """All rows count then."""
+    network, batch = make(kind).train(training), items(2, 6)
     present = torch.tensor([[False] * 6, [True] + [False] * 5])
-    values = network(items(2, 6), present)
+    values = network(batch, present)
     assert values.isfinite().all()
+    torch.testing.assert_close(values[0], network(batch)[0], atol=1e-6, rtol=1e-5)
     values.sum().backward()
     assert all(value.grad.isfinite().all() for value in network.parameters())
 

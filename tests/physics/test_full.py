@@ -1,7 +1,6 @@
 """Lifts in a simulation of every box."""
 
 import numpy as np
-import pybullet
 import pytest
 
 from tests.physics.kinds import lifts
@@ -68,15 +67,15 @@ def test_an_interrupted_lift_moves_no_box(make, boxes, after_pick, monkeypatch):
 
 def test_the_container_has_a_floor_and_three_walls(make, boxes):
     """Rays from its inside, also close to its corners, meet them where the container ends."""
-    client = make("full", boxes((0.4, 0.2)))._world._client
+    client = make("full", boxes((0.4, 0.2)))._world.client
     low, high = np.array([0.01, 0.01, 0.01]), task.CONTAINER - 0.01
     for start in (low, high, (low + high) / 2):
         for axis, end in ((0, 0), (1, 0), (1, task.CONTAINER[1]), (2, 0)):
             target = start.copy()
             target[axis] = 3 * (end or -1)
-            hit = pybullet.rayTest(start, target, physicsClientId=client)[0][3]
+            hit = client.rayTest(start, target)[0][3]
             assert hit == pytest.approx([*start[:axis], end, *start[axis + 1 :]], abs=1e-3)
-        assert pybullet.rayTest(start, (9, *start[1:]), physicsClientId=client)[0][0] == -1
+        assert client.rayTest(start, (9, *start[1:]))[0][0] == -1
 
 
 def test_a_removed_box_comes_to_lie_far_below(make, boxes):

@@ -12,7 +12,7 @@ episode there, whatever their own ``max_picks`` is.
 import json
 import sys
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -33,12 +33,7 @@ MOST_ENVS = 2**16  # several GB
 
 
 def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Load]:
-    """Return the options of a ``reset``, {} for None.
-
-    Raises:
-        TypeError, ValueError: ``options`` is no dict, has a name that is not in ``known``, or
-            holds something other than a ``Load`` without floating boxes.
-    """
+    """Return the options of a ``reset``, {} for None; raise unless they are known, and loads."""
     options = {} if options is None else options
     checks.entries("options", options, ())
     for name, value in options.items():
@@ -46,6 +41,13 @@ def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Loa
             raise ValueError(f"options is {options!r}; expected {', '.join(known) or 'none'}")
         check_stacked(value)
     return dict(options)
+
+
+def stacked(stack: Callable, rng: np.random.Generator) -> Load:
+    """A load of ``stack``; raise unless it is one."""
+    load = stack(rng)
+    check_stacked(load, "what stack returned")
+    return load
 
 
 class AllOrReset:
@@ -64,19 +66,14 @@ class AllOrReset:
             self._env._state = "broken off"
 
 
-class EpisodeEnv(gymnasium.Env):
-    """Base of environments that refuse calls out of order.
+class InOrder:
+    """What refuses calls out of order.
 
     Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``;
     ``AllOrReset`` sets it to ``"broken off"``.
     """
 
     _state = "not started"
-
-    def __reduce_ex__(self, protocol):
-        """Refuse to be copied or pickled, because both would step the same simulator."""
-        kind = type(self).__name__
-        raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
 
     def _check_open(self) -> None:
         if self._state == "closed":
@@ -91,6 +88,15 @@ class EpisodeEnv(gymnasium.Env):
         self._check_started()
         if self._state == "finished":
             raise ResetNeeded("the episode is finished; call reset first")
+
+
+class EpisodeEnv(InOrder, gymnasium.Env):
+    """Base of single environments."""
+
+    def __reduce_ex__(self, protocol):
+        """Refuse to be copied or pickled, because both would step the same simulator."""
+        kind = type(self).__name__
+        raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
 
 
 class Picking:
@@ -117,7 +123,6 @@ class Picking:
         self.max_picks = checks.integer("max_picks", max_picks, 1, sys.maxsize)
         self.position_noise = checks.real("position_noise", position_noise, 0, MOST_NOISE)
         self.render_mode = render_mode
-        self._state = "not started"
         self._set_spaces(
             gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32),
             gymnasium.spaces.Discrete(task.N_VISIBLE),
@@ -131,8 +136,7 @@ class Picking:
 class PickingEnv(Picking, EpisodeEnv):
     """Base of environments whose action picks one of the 128 visible items.
 
-    Subclasses set ``_state`` to ``"running"`` in ``reset`` and to ``"finished"`` at an
-    episode's end. What changes the episode stands in ``AllOrReset``.
+    What changes the episode stands in ``AllOrReset``.
     """
 
     def close(self) -> None:
@@ -140,10 +144,7 @@ class PickingEnv(Picking, EpisodeEnv):
         self._state = "closed"
 
     def _features(self, positions: np.ndarray) -> np.ndarray:
-        """The observation of up to 128 items at ``positions`` (n, 3) in m, nearest first.
-
-        Equalized if asked for, and padded.
-        """
+        """The observation of up to 128 items at ``positions`` (n, 3) in m, nearest first."""
         seen = np.full((task.N_VISIBLE, 3), task.PADDING, np.float32)
         seen[: len(positions)] = observation.scaled(positions)
         if not self.equalize:
@@ -157,7 +158,7 @@ class PickingEnv(Picking, EpisodeEnv):
         return checks.integer("action", action, 0, task.N_VISIBLE - 1)
 
 
-class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
+class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
     """Base of environments in which each action picks one of 128 visible items.
 
     Args:
@@ -202,23 +203,21 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         options = check_options(options, self.options)
 
         # One seed or None for each environment; None lets a generator go on that there is.
-        if seed is None:
-            seeds: Sequence[int | None] = [None] * self.num_envs
-        elif isinstance(seed, Sequence):
+        if isinstance(seed, Sequence):
             seeds = [None if one is None else checks.integer("seed", one, 0) for one in seed]
             if len(seeds) != self.num_envs:
                 raise ValueError(f"seed holds {len(seeds)} seeds; expected {self.num_envs}")
+        elif seed is None:
+            seeds = [None] * self.num_envs
         else:
-            first = checks.integer("seed", seed, 0)
-            seeds = range(first, first + self.num_envs)
-        old = self._rngs or [None] * self.num_envs
-        return self._restart(
-            [
-                rng if one is None and rng is not None else seeding.np_random(one)[0]
-                for one, rng in zip(seeds, old)
-            ],
-            **options,
-        )
+            seeds = [checks.integer("seed", seed, 0) + env for env in range(self.num_envs)]
+        rngs = [
+            rng if one is None and rng is not None else seeding.np_random(one)[0]
+            for one, rng in zip(seeds, self._rngs or [None] * self.num_envs)
+        ]
+        self._begin(np.arange(self.num_envs), rngs, **options)
+        self._rngs, self._state = rngs, "running"
+        return self._shown()
 
     def step(self, actions: np.ndarray):
         """Pick row ``actions[i]``, (num_envs,) int, in environment i.
@@ -252,15 +251,13 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
     def _begin_next(self, ended: np.ndarray, last: np.ndarray, last_infos: dict[str, np.ndarray]):
         """Begin the next episode where one has ended; return ``step``'s observations and infos.
 
-        Args:
-            ended: (num_envs,) bool.
-            last, last_infos: observations and infos after the pick in every environment.
+        ``last`` and ``last_infos`` are those after the pick in every environment.
         """
         envs = np.flatnonzero(ended)
         self._begin(envs, [self._rngs[env] for env in envs])
 
         # The infos are the reset's where an episode has begun, and the pick's elsewhere.
-        infos: dict[str, Any] = _flagged(self._infos(), np.ones(self.num_envs, bool))
+        observations, infos = self._shown()
         if not ended.all():  # a reset has no infos about a pick
             picks = {name: each for name, each in last_infos.items() if name not in infos}
             infos |= _flagged(_masked(picks, ~ended), ~ended)
@@ -272,7 +269,7 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         infos |= {"final_obs": final, "_final_obs": ended}
         final_infos = _flagged(_masked(last_infos, ended), ended)
         infos |= {"final_info": final_infos, "_final_info": ended}
-        return self._look(), infos
+        return observations, infos
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of the arrays that ``load_state`` needs to go on from here."""
@@ -293,16 +290,16 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         self._check_open()
         with AllOrReset(self):
             rest = dict(arrays)
-            self._rngs = [_generator(state) for state in rest.pop("generators")]
+            self._rngs = [np.random.default_rng() for _ in range(self.num_envs)]
+            for rng, state in zip(self._rngs, rest.pop("generators"), strict=True):
+                rng.bit_generator.state = json.loads(str(state))
             self._picks = rest.pop("picks")
             self._hold(rest)
         self._state = "running"
-        return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
+        return self._shown()
 
-    def _restart(self, rngs: list[np.random.Generator], **options):
-        """Begin an episode in every environment; return ``reset``'s observations and infos."""
-        self._begin(np.arange(self.num_envs), rngs, **options)
-        self._rngs, self._state = rngs, "running"
+    def _shown(self) -> tuple[np.ndarray, dict[str, Any]]:
+        """The observations and infos of ``reset``."""
         return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
 
     def _begin(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
@@ -311,23 +308,13 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
             self._picks[envs] = 0
             self._fill(envs, rngs, **options)
 
-    def _check_open(self) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError("the environment is closed; make a new one")
-
-    def _check_started(self) -> None:
-        self._check_open()
-        if self._state != "running":
-            raise ResetNeeded(f"the episodes are {self._state}; call reset first")
+    def close_extras(self, **kwargs) -> None:
+        """Free what the environments hold."""
+        self._state = "closed"
 
     @abstractmethod
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
-        """Put fresh items into environments, (k,) int64, drawn from the generator of each.
-
-        Args:
-            envs, rngs: which environments, and their generators.
-            **options: what ``reset`` was given of the names in ``self.options``.
-        """
+        """Put fresh items into some environments, (k,) int64, drawn from the generator of each."""
 
     @abstractmethod
     def _pick(self, actions: np.ndarray) -> np.ndarray:
@@ -342,20 +329,20 @@ class PickingVectorEnv(Picking, gymnasium.vector.VectorEnv):
         """The observations as a fresh array, (num_envs, 128, 3) float32."""
 
     @abstractmethod
-    def _arrays(self) -> dict[str, np.ndarray]:
-        """What a subclass holds of its episodes, by name."""
-
-    @abstractmethod
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        """Replace what ``_arrays`` returns."""
-
-    @abstractmethod
     def _infos(self) -> dict[str, np.ndarray]:
         """The infos of ``reset`` and ``step``, without Gymnasium's flags."""
 
     def _pick_infos(self) -> dict[str, np.ndarray]:
         """The infos of ``step`` only."""
         return {}
+
+    @abstractmethod
+    def _arrays(self) -> dict[str, np.ndarray]:
+        """What a subclass holds of its episodes, by name."""
+
+    @abstractmethod
+    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        """Replace what ``_arrays`` returns."""
 
 
 def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
@@ -369,10 +356,3 @@ def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.nda
     for values in infos.values():
         values[~where] = 0
     return infos
-
-
-def _generator(state: object) -> np.random.Generator:
-    """A generator in a state that is given as JSON."""
-    rng = np.random.default_rng()
-    rng.bit_generator.state = json.loads(str(state))
-    return rng

@@ -6,9 +6,9 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import AllOrReset, PickingEnv, check_options
+from unload.env.base import AllOrReset, PickingEnv, check_options, stacked
 from unload.env.observation import POSITION_NOISE
-from unload.load.boxes import Load, check_stack, check_stacked
+from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
 from unload.physics.full import AFTER_PICK, FullPhysics
@@ -128,10 +128,7 @@ class ContainerEnv(PickingEnv):
         options = check_options(options, self.options)
         super().reset(seed=seed)
         with AllOrReset(self):
-            load = options.get("load")
-            if load is None:
-                load = self.stack(self.np_random)
-                check_stacked(load, "what stack returned")
+            load = options.get("load") or stacked(self.stack, self.np_random)
             self._blur = observation.drift(len(load), self.position_noise, self.np_random)
             self.physics.reset(load)
             self._failed = np.zeros(len(load), dtype=bool)
@@ -160,7 +157,8 @@ class ContainerEnv(PickingEnv):
             if success or not self.physics.exact:
                 self._look()
 
-            terminated, truncated = self._ends()
+            terminated = self._unloaded == len(self.physics.load)
+            truncated = self._picks == self.max_picks
             if terminated or truncated:
                 self._state = "finished"
         info = self._info() | {"item": np.int64(item), "distance": np.float64(distance)}
@@ -174,9 +172,8 @@ class ContainerEnv(PickingEnv):
     def liftable(self) -> np.ndarray:
         """(128,) bool, which rows of the observation can be unloaded now.
 
-        Raises:
-            ValueError: the physics is not restored after a pick, so that asking would
-                change the container.
+        Where the physics is not restored after a pick, asking would change the container, and is a
+        ValueError.
         """
         self._check_started()
         if not self.physics.exact:
@@ -211,10 +208,6 @@ class ContainerEnv(PickingEnv):
         self.visible = np.full(task.N_VISIBLE, -1)
         self.visible[: len(rows)] = present[rows]
         self._observation = self._features(positions[rows])
-
-    def _ends(self) -> tuple[bool, bool]:
-        """Whether the episode is terminated, and whether it is truncated."""
-        return self._unloaded == len(self.physics.load), self._picks == self.max_picks
 
     def _info(self) -> dict:
         return {

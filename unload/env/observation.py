@@ -18,10 +18,7 @@ MOST_NOISE = 10.0  # m, more than the container is long
 
 
 def distance(positions: np.ndarray) -> np.ndarray:
-    """Weighted distance d of each item to the viewpoint.
-
-    Args:
-        positions: (n, 3) float, centres in m.
+    """Weighted distance d to the viewpoint of centres at ``positions``, (n, 3) float in m.
 
     Returns:
         (n,) float64: m, y not counting and z counting double.

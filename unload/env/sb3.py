@@ -24,12 +24,7 @@ except ModuleNotFoundError as error:
 
 
 class ContainerVecEnv(VecEnv):
-    """``ContainerVectorEnv`` for Stable-Baselines3, which takes environments of its own kind only.
-
-    Args:
-        num_envs: number of containers.
-        **settings: of ``ContainerVectorEnv``.
-    """
+    """``ContainerVectorEnv``, with its arguments, for Stable-Baselines3."""
 
     def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
         self.envs = ContainerVectorEnv(num_envs, **settings)
@@ -37,11 +32,7 @@ class ContainerVecEnv(VecEnv):
         super().__init__(num_envs, *spaces)
 
     def reset(self) -> np.ndarray:
-        """Start all episodes, with what ``seed`` and ``set_options`` were given before.
-
-        Raises:
-            ValueError: the environments were given different options.
-        """
+        """Start all episodes, with the seed and the options, one for all, that were set before."""
         options = self._options[0]
         if any(other is not options and other != options for other in self._options):
             raise ValueError(f"options is {self._options}; expected the same for all environments")

@@ -6,15 +6,15 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingVectorEnv
+from unload.env.base import PickingVectorEnv, stacked
 from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
 from unload.fast import containers
 from unload.fast.ranking import nearest_first
-from unload.load.boxes import Load, check_stack, check_stacked
+from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.situation import Surroundings
-from unload.physics.table import LiftTable, TablePhysics, shared_table
+from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
 
 
@@ -46,22 +46,13 @@ class ContainerVectorEnv(PickingVectorEnv):
         super().__init__(num_envs, **settings)
         checks.one_of("physics", physics, ("table",))
         check_stack(stack)
-        self.stack = stack
-        self._physics = TablePhysics(shared_table())
+        self.stack, self.table = stack, shared_table()
+        self._physics = TablePhysics(self.table)
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
-        """Free the simulator."""
         self._physics.close()
-
-    @property
-    def table(self) -> LiftTable:
-        return self._physics.table
-
-    @table.setter
-    def table(self, table: LiftTable) -> None:
-        self._physics.close()
-        self._physics = TablePhysics(table)
+        super().close_extras(**kwargs)
 
     @property
     def visible(self) -> np.ndarray:
@@ -84,10 +75,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = load
-            if load is None:
-                chosen = self.stack(rng)
-                check_stacked(chosen, "what stack returned")
+            chosen = stacked(self.stack, rng) if load is None else load
             self._put(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
@@ -127,7 +115,7 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
-        items, distances = containers.look_up(self._containers, actions, *self._physics.table.slots)
+        items, distances = containers.look_up(self._containers, actions, *self.table.slots)
         if distances.min() == containers.UNKNOWN:
             for env in np.flatnonzero(distances == containers.UNKNOWN):
                 distances[env] = self._lift(int(env), int(items[env]))
@@ -135,17 +123,13 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _lift(self, env: int, item: int) -> float:
         """Lift an item whose situation the table does not know; return the distance in m."""
-        return self._physics.simulate(Surroundings(*self._load(env)).situation(item))
-
-    def _load(self, env: int) -> tuple[Load, np.ndarray]:
-        """A container's load up to the last present item, and which items are present.
-
-        It is built again, because to keep those of all containers makes resets slower.
-        """
+        self._physics.table = self.table  # it may have been replaced
+        # The load is built again, because to keep those of all containers makes resets slower.
         count = np.flatnonzero(self._containers.present[env])[-1] + 1
         boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
         load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
-        return load, self._containers.present[env, :count]
+        around = Surroundings(load, self._containers.present[env, :count])
+        return self._physics.simulate(around.situation(item))
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0

@@ -184,9 +184,7 @@ def pick(containers, actions, distances, equalize, average, tolerance):
 def movers(containers, env, item, members):
     """How many boxes a lift moves: the item and all on top of it, at most ``HELD_DOWN + 1``.
 
-    Args:
-        containers, env, item: which item of which container.
-        members: (capacity,) int32, overwritten; these boxes come first.
+    They are written to the start of ``members``, (capacity,) int32.
     """
     starts, links = containers.starts[env], containers.links[env]
     members[0], dynamic, done = item, 1, 0
@@ -206,10 +204,7 @@ def movers(containers, env, item, members):
 def situation_digest(containers, env, members, dynamic):
     """The digest of ``Surroundings.situation``.
 
-    Args:
-        containers, env: which container.
-        members, dynamic: (capacity,) int32, which begins with all the boxes that ``movers``
-            found, and their number; the rest is overwritten.
+    ``members`` begins with the ``dynamic`` boxes that ``movers`` found; the rest is overwritten.
     """
     starts, links = containers.starts[env], containers.links[env]
     present, geometry, item = containers.present[env], containers.geometry[env], members[0]

@@ -74,7 +74,6 @@ def start_gradients(
     something else meanwhile. The result does not depend on their number.
 
     Args:
-        weights: of the network.
         observations: (batch, items, 3) float32.
         actions: (batch,) int64, in 0 … items-1.
         targets: (batch,) float32.
@@ -145,7 +144,6 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
     the item's own features decide.
 
     Args:
-        weights: of the network.
         observations: (batch, items, 3) float32.
         allowed: (batch, items) bool, at least one per row.
 
@@ -153,7 +151,6 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
         (batch,) int64.
 
     Raises:
-        ValueError: an array's shape or dtype is another.
         FloatingPointError: a row has no allowed action of a finite value.
     """
     size, items = _check(observations)
@@ -174,17 +171,13 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
 
 def _check(observations: np.ndarray) -> tuple[int, int]:
     """Batch size and number of items of (batch, items, 3) float32 observations."""
-    if (
-        observations.ndim != 3
-        or 0 in observations.shape
-        or observations.shape[2] != 3
-        or observations.dtype != np.float32
-    ):
+    shape, dtype = observations.shape, observations.dtype
+    if len(shape) != 3 or 0 in shape or shape[2] != 3 or dtype != np.float32:
         raise ValueError(
-            f"observations has shape {observations.shape} and dtype {observations.dtype}; "
+            f"observations has shape {shape} and dtype {dtype}; "
             "expected (batch, items, 3) float32, not empty"
         )
-    return observations.shape[:2]
+    return shape[:2]
 
 
 def _check_range(name: str, numbers: np.ndarray, end: int) -> None:

@@ -98,17 +98,7 @@ def long_vectors(typing_context):
 
 @compiled(nogil=True)
 def add_chunks(
-    counter,
-    rows,
-    observations,
-    actions,
-    targets,
-    beta,
-    weight,
-    bias,
-    score,
-    score_bias,
-    partial,
+    counter, rows, observations, actions, targets, beta, weight, bias, score, score_bias, partial
 ):
     """Sum the gradients and losses of each chunk into its row of ``partial``.
 

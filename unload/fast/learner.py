@@ -18,9 +18,6 @@ class FusedLearner:
     threads while the caller does something else. It takes tanh in double precision, where its
     slope does not become 0 so soon, and the choice compares what stands before it, which never
     ties.
-
-    Args:
-        network, learning_rate, beta: see ``PlainLearner``.
     """
 
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
@@ -34,14 +31,8 @@ class FusedLearner:
         self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
     ) -> Callable[[], float]:
         """See ``PlainLearner``; weights and arrays must stay as they are until the call."""
-        gradients = fused.start_gradients(
-            self.weights,
-            batch["observations"],
-            batch["actions"],
-            targets,
-            self.beta,
-            rows,
-        )
+        seen, actions = batch["observations"], batch["actions"]
+        gradients = fused.start_gradients(self.weights, seen, actions, targets, self.beta, rows)
 
         def finish() -> float:
             total = gradients()
@@ -73,18 +64,12 @@ class Adam:
         self, weights: Sequence[np.ndarray], learning_rate: float, epsilon: float = 1e-8
     ) -> None:
         self.weights = tuple(weights)
-        self.learning_rate, self.epsilon = learning_rate, epsilon
-        self.steps = 0
-        count = sum(map(len, self.weights))
+        self.learning_rate, self.epsilon, self.steps = learning_rate, epsilon, 0
         # Running means of the gradients and of their squares.
-        self.moments = np.zeros((2, count))
+        self.moments = np.zeros((2, sum(map(len, self.weights))))
 
     def step(self, gradients: np.ndarray) -> None:
-        """Change all weights once.
-
-        Args:
-            gradients: float64, of all weights, one array after the other.
-        """
+        """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - beta**self.steps for beta in BETAS]
         settings = self.learning_rate, self.epsilon, *corrections

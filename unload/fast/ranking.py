@@ -22,12 +22,7 @@ for _items in range(2, task.N_VISIBLE + 1):
 
 @compiled
 def rank(values, ranks):
-    """The rank of each item: how many are smaller, or equal and before it.
-
-    Args:
-        values: (items,) float.
-        ranks: (items,) int32, filled.
-    """
+    """Fill ``ranks``, int32, of items: how many are smaller, or equal and before each."""
     ranks[:] = 0
     for j in range(len(values)):
         value = values[j]
@@ -62,13 +57,7 @@ def remove(values, ranks, row):
 
 @compiled
 def twice_shared_ranks(values, ranks, tolerance, twice):
-    """Twice the mean rank of each run of sorted values at most ``tolerance`` apart.
-
-    Args:
-        values, ranks: (items,) float32 and int32.
-        tolerance: float32.
-        twice: (items,) int32, filled.
-    """
+    """Fill ``twice`` by twice the mean rank of each run of sorted values in ``tolerance``."""
     order = np.empty(len(values), np.int32)
     for i in range(len(values)):
         order[ranks[i]] = i

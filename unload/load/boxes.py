@@ -41,12 +41,7 @@ class Contacts(NamedTuple):
 
 
 class BoxError(ValueError):
-    """Boxes that no load can hold.
-
-    Attributes:
-        boxes: their numbers.
-        problem: what is wrong, of the first one in numbers, and what was expected.
-    """
+    """Boxes that no load can hold: ``boxes``, their numbers, and the ``problem`` of the first."""
 
     def __init__(self, boxes: Sequence[int] | np.ndarray, problem: str) -> None:
         super().__init__(boxes, problem)
@@ -70,9 +65,9 @@ class Load:
 
     Raises:
         TypeError: a field's dtype is not numeric.
-        ValueError: a field's shape or a value is wrong, or an id is given twice.
-        BoxError: a ValueError, too: an edge is too short, a box sticks out of the container, or
-            two boxes overlap by more than 1 µm.
+        ValueError: a field's shape or a value is wrong.
+        BoxError: a ValueError, too: an edge is too short, a box sticks out of the container, two
+            boxes overlap by more than 1 µm, or have the same id.
     """
 
     positions: np.ndarray
@@ -95,8 +90,11 @@ class Load:
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
         if self.ids is not None:
             labels["ids"] = np.array(self.ids, dtype=str)
-            if labels["ids"].shape != (count,) or len(np.unique(labels["ids"])) < count:
-                raise ValueError(f"ids is {self.ids!r}; expected {count} different names")
+            if labels["ids"].shape != (count,):
+                raise ValueError(f"ids has shape {labels['ids'].shape}; expected ({count},)")
+            _, which, times = np.unique(labels["ids"], return_inverse=True, return_counts=True)
+            if (repeated := np.flatnonzero(times[which] > 1)).size:
+                raise BoxError(repeated, "the same id; expected one for each box")
 
         # Where there are no thin boxes and none outside, contacts finds those that overlap.
         low, high = positions - sizes / 2, positions + sizes / 2
@@ -135,20 +133,15 @@ def check_stacked(load: Load, name: str = "load") -> None:
     """Raise unless ``load`` is a ``Load`` whose boxes stand on the floor or on each other.
 
     Where there is a gap between two boxes, the upper one would not hold the lower one down.
-
-    Raises:
-        TypeError: it is no ``Load``.
-        BoxError: boxes float.
     """
     check_load(load, name)
-    low = load.positions - load.sizes / 2
-    aloft = np.flatnonzero(floating(low, load.contacts))
+    bottom = load.positions[:, 2] - load.sizes[:, 2] / 2
+    unsupported = np.diff(load.contacts.starts[BELOW]) == 0
+    aloft = np.flatnonzero(unsupported & (bottom > CONTACT_TOLERANCE))
     if aloft.size:
-        raise BoxError(
-            aloft,
-            f"floats in {name}, its lower face at {low[aloft[0], 2]:.6g} m; expected it, within "
-            f"{CONTACT_TOLERANCE} m, on the floor or on another box",
-        )
+        wanted = f"expected it, within {CONTACT_TOLERANCE} m, on the floor or on another box"
+        place = f"floats in {name}, its lower face at {bottom[aloft[0]]:.6g} m"
+        raise BoxError(aloft, f"{place}; {wanted}")
 
 
 def check_stack(stack: object) -> None:
@@ -158,14 +151,7 @@ def check_stack(stack: object) -> None:
 
 
 def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Number groups of intervals between which there is no overlap, such as item walls.
-
-    Args:
-        low, high: (n,) start and end of each interval, for example along x.
-
-    Returns:
-        (n,) int64, each interval's group, 0 being the lowest.
-    """
+    """Number groups of intervals, (n,) int64 from 0, between which there is no overlap."""
     order = np.argsort(low, kind="stable")
     reach = np.maximum.accumulate(high[order])
     groups = np.empty(len(low), np.int64)
@@ -174,44 +160,31 @@ def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
-    """Find which boxes stand on each other, and which stand side by side.
+    """Find which boxes stand on each other, and which stand side by side; BoxError if two overlap.
 
     Boxes touch only where they share a stretch of depth, and of height or width.
-
-    Args:
-        low, high: (n, 3) float64, corners in m.
-
-    Raises:
-        BoxError: two boxes overlap.
     """
     groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
     left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
-    found, *pair = _find(low, high, left_to_right, np.cumsum(np.bincount(groups)))
+    # One row per axis: what is read next is near what was read last.
+    rows = (np.ascontiguousarray(each[left_to_right].T) for each in (low, high))
+    found, *pair = _find(*rows, left_to_right, np.cumsum(np.bincount(groups)))
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
         raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected at most {OVERLAP}")
     return Contacts(*_lists(found, len(low)))
 
 
-def floating(low: np.ndarray, touching: Contacts) -> np.ndarray:
-    """(n,) bool, which boxes stand neither on the floor nor on another box."""
-    return (np.diff(touching.starts[BELOW]) == 0) & (low[:, 2] > CONTACT_TOLERANCE)
-
-
 @compiled
 def _find(low, high, order, ends):
     """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
-    Args:
-        low, high: corners.
-        order: (n,) the boxes, slab by slab, from left to right in each.
-        ends: where in ``order`` each slab ends.
+    ``order`` is slab by slab, from left to right in each, and ``ends`` where in it each slab ends;
+    so are the corners ``low`` and ``high``, (3, n).
     """
     count, start = 0, 0
     found = np.empty((8 * len(order) + 4, 3), np.int32)
-    # One array each: what is read next is near what was read last.
-    x0, y0, z0 = _columns(low, order)
-    x1, y1, z1 = _columns(high, order)
+    (x0, y0, z0), (x1, y1, z1) = (low[0], low[1], low[2]), (high[0], high[1], high[2])
     # Boxes of different slabs share no depth. Within a slab, a sweep from left to right compares a
     # box with those only that begin before it ends.
     for end in ends:
@@ -245,15 +218,6 @@ def _find(low, high, order, ends):
                 count += 1
         start = end
     return found[:count], 0, 0
-
-
-@compiled
-def _columns(corners, order):
-    """x, y and z of corners in this order."""
-    x, y, z = np.empty(len(order)), np.empty(len(order)), np.empty(len(order))
-    for i, box in enumerate(order):
-        x[i], y[i], z[i] = corners[box]
-    return x, y, z
 
 
 @compiled

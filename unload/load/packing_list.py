@@ -11,9 +11,8 @@ from unload.load.boxes import OVERLAP, BoxError, Load, check_stacked, slabs
 from unload.support import checks, files
 
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
-CENTRE, CORNER, SIZES = (
-    tuple(name.format(axis) for axis in "xyz") for name in ("{}", "{}_min", "size_{}")
-)
+CENTRE, CORNER = ("x", "y", "z"), ("x_min", "y_min", "z_min")
+SIZES = "size_x", "size_y", "size_z"
 
 
 def read_load(path: str | Path = EXAMPLE) -> Load:
@@ -44,8 +43,7 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
             are both centres and corners; or a box has an edge that is no number or too short, has
             the id of another one, is not inside the container, overlaps another one, or floats: it
             stands neither on the floor nor, within 0.1 mm, on a box. The message names the first
-            rows, counted from 1 without the line of names, and the ids; of the first one also
-            what stands in it.
+            rows, counted from 1 without the line of names, and their ids.
     """
     path = checks.path("path", path)
     try:
@@ -67,9 +65,6 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
 
     # What concerns cells is refused here, what concerns boxes by the load.
     numbers = cells.apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
-    repeated = np.flatnonzero(pd.Series(ids).duplicated(keep=False))
-    if repeated.size:
-        refuse(repeated, "the same id; expected one for each box")
     unreadable = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
     if unreadable.size:
         refuse(unreadable, "a cell that is no number; expected lengths in m")
@@ -88,11 +83,7 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
 
 
 def _place_columns(path: Path, table: pd.DataFrame) -> tuple[str, ...]:
-    """``CENTRE`` or ``CORNER``, of which a packing list has the columns.
-
-    Raises:
-        ValueError: a column is missing, given twice or spelled otherwise, or it has both.
-    """
+    """``CENTRE`` or ``CORNER``, of which a packing list has the columns."""
     # A name that differs in case or space alone would silently count as another column.
     known = {"id", *CENTRE, *CORNER, *SIZES}
     for column in table.columns:
@@ -100,15 +91,10 @@ def _place_columns(path: Path, table: pd.DataFrame) -> tuple[str, ...]:
         if name in known and column not in known:
             raise ValueError(f"{path} has the column {column!r}; expected {name!r}, and once")
 
-    corners, centres = (set(names) & set(table.columns) for names in (CORNER, CENTRE))
-    if corners and centres:
-        raise ValueError(
-            f"{path} has centres and corners, {sorted(centres | corners)}; expected either"
-        )
-    place = CENTRE if centres else CORNER
-    if table.empty or not {*place, *SIZES} <= set(table.columns):
+    places = [place for place in (CENTRE, CORNER) if {*place} & {*table.columns}]
+    if table.empty or len(places) != 1 or not {*places[0], *SIZES} <= {*table.columns}:
         raise ValueError(
             f"{path} has {len(table)} rows and the columns {', '.join(table.columns)}; expected "
-            f"boxes with x, y, z or x_min, y_min, z_min, and with {', '.join(SIZES)}"
+            f"boxes with either x, y, z or x_min, y_min, z_min, and with {', '.join(SIZES)}"
         )
-    return place
+    return places[0]

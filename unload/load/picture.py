@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from PIL import Image
 
 from unload import task
 from unload.load.boxes import OVERLAP, Load, slabs
-from unload.load.substacks import package_colour
 
 # One colour for each meaning, in every picture of a load: Okabe and Ito's colours, which the
 # colour-blind tell apart as well; pale for what does not matter.
@@ -31,6 +31,11 @@ COLOURS: dict[str, tuple[float, float, float]] = {
     "on top of it": (0.00, 0.45, 0.70),  # of the chosen box
     "cannot move": (0.74, 0.74, 0.72),
 }
+# Packages 0–12: large packages dark, small ones light.
+PACKAGE_COLOURS = (
+    "#1f3a5f", "#2e6f95", "#5fa8d3", "#264d3b", "#3f8f63", "#7a3b69", "#c05299",
+    "#e07a5f", "#b5838d", "#f2b880", "#8d6a9f", "#d4a373", "#f6e27f",
+)  # fmt: skip
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
 # From outside, over the left edge of the entrance, which is the side of x = 7 m.
 EYE = np.array([11.6, -2.9, 4.4])  # m
@@ -40,19 +45,24 @@ CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
 # The insides of the container that are seen: corners, and brightness of the grey.
 INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
+# All faces, and their twelve triangles, whose corners go round as seen from outside.
+RINGS = [face for face, _ in FACES] + [face[::-1] for face, _ in INSIDES]
+TRIANGLES = np.array([(a, b, c, a, c, d) for a, b, c, d in RINGS]).reshape(12, 3)
 EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
 WIDTH = 8.0  # inches, at 100 pixels each
 LEGEND = 0.15  # share of the width at the left
 FILE_COLOURS = 128  # of a still picture
 
 
-def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Return (480, 640, 3) uint8, a picture of some items, coloured by package, all upright.
+def package_colour(package: int) -> tuple[float, float, float]:
+    """RGB in [0, 1] of a package; numbers above 12 start again from 0."""
+    return to_rgb(PACKAGE_COLOURS[package % len(PACKAGE_COLOURS)])
 
-    Args:
-        load: the items.
-        present: (n,) bool, which of them are drawn.
-        positions: (n, 3) float, where their centres are in m.
+
+def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Return (480, 640, 3) uint8, a picture of the present items, coloured by package, all upright.
+
+    Their centres are at ``positions``, (n, 3) float in m.
     """
     items = np.flatnonzero(present)
     moved = (positions - load.positions)[items]
@@ -71,8 +81,7 @@ def still(
     """Return a PNG picture of boxes in the container with a legend.
 
     Args:
-        low, high: (n, 3) float64, corners in m.
-        colours: (n, 3) float64, RGB in [0, 1].
+        low, high, colours: see ``draw``; in any order.
         legend: name → colour.
         height: of the picture in inches.
     """
@@ -85,13 +94,7 @@ def still(
     return file.getvalue()
 
 
-def _drawn(
-    low: np.ndarray,
-    high: np.ndarray,
-    colours: np.ndarray,
-    size: tuple[float, float],
-    left: float,
-) -> Figure:
+def _drawn(low, high, colours, size: tuple[float, float], left: float) -> Figure:
     """A figure of boxes in the container, of this size in inches, free in a share at the left."""
     figure = Figure(size, dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
     order = back_to_front(low, high)
@@ -125,7 +128,9 @@ def draw(axes: Axes, low: np.ndarray, high: np.ndarray, colours: np.ndarray) -> 
         )
     )
 
-    axes.set(aspect="equal", xlim=_wider(frame[:, 0]), ylim=_wider(frame[:, 1]))
+    margin = 0.04 * np.ptp(frame, axis=0)
+    xlim, ylim = zip(frame.min(axis=0) - margin, frame.max(axis=0) + margin)
+    axes.set(aspect="equal", xlim=xlim, ylim=ylim)
     axes.axis("off")
 
 
@@ -164,26 +169,16 @@ def back_to_front(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
     for group in range(groups.max(initial=-1) + 1):
         left = np.flatnonzero(groups == group)
-        low_left, high_left = low[left], high[left]
-        behind = _separated(low_left, high_left, 0) | _separated(low_left, high_left, 2)
-        behind |= _separated(low_left, high_left, 1).T
+        # Whether box i ends where box j begins, or before, on each axis: (n, n, 3).
+        apart = high[left][:, None] <= low[left] + OVERLAP
+        behind: np.ndarray = apart[..., 0] | apart[..., 2] | apart[..., 1].T
         behind &= ~behind.T  # separated both ways: neither hides the other
 
         # Draw those that have nothing left behind them, until none is left.
         while len(left):
-            free = ~behind.any(axis=0)
+            free = np.asarray(~behind.any(axis=0))
             if not free.any():  # boxes that hide each other in a circle: the farthest first
                 free[np.linalg.norm(low[left] - EYE, axis=1).argmax()] = True
             order.append(left[free])
             left, behind = left[~free], behind[np.ix_(~free, ~free)]
     return np.concatenate([*order, np.zeros(0, np.int64)])
-
-
-def _separated(low: np.ndarray, high: np.ndarray, axis: int) -> np.ndarray:
-    """(n, n) bool, whether box i ends where box j begins, or before."""
-    return high[:, None, axis] <= low[None, :, axis] + OVERLAP
-
-
-def _wider(values: np.ndarray, margin: float = 0.04) -> tuple[float, float]:
-    room = margin * np.ptp(values)
-    return values.min() - room, values.max() + room

@@ -5,8 +5,7 @@ its units; all numbers below count cells, so that every substack is exact. Neigh
 substacks interlock like the steps of a stair: the columns start at 0, 6, 16 and 26
 cells and together fill 36 cells of width, which we take to be the container's 2.5 m.
 
-Boxes of another scale, and the front of a load alone, are not in the paper: they show how
-a policy fares elsewhere, and make a simulation of all boxes affordable.
+Boxes of another scale are not in the paper: they show how a policy fares elsewhere.
 """
 
 from functools import cache
@@ -16,7 +15,6 @@ import numpy as np
 from unload import task
 from unload.load.boxes import Load
 from unload.support import checks
-from unload.support.compiled import compiled
 
 CELLS_WIDE = 36
 ROWS_HIGH = 10  # cells of height per row of substacks
@@ -24,7 +22,6 @@ CELL = task.CONTAINER[1] / CELLS_WIDE  # m
 ROWS = 3  # bottom, mid, top
 WALLS = 12  # not in the paper: gives 938 ± 40 items, in its range of 800–1000
 DEPTH = task.CONTAINER[0] / WALLS  # m, the same for every item
-FRONT_WALLS = 7  # hold the boxes seen during 100 picks, and a spare wall, see ``front_walls``
 
 # Width and height of packages 0–12, in cells (Fig. 3).
 PACKAGES = np.array(
@@ -32,15 +29,6 @@ PACKAGES = np.array(
         (10, 6), (6, 4), (4, 4), (6, 6), (7, 6), (3, 5), (3, 3),
         (3, 2), (6, 2), (4, 2), (6, 3), (5, 2), (2, 2),
     ]
-)  # fmt: skip
-
-# Packages 0–12 as RGB in [0, 1]: large packages dark, small ones light.
-PACKAGE_COLOURS = tuple(
-    (int(code[:2], 16) / 255, int(code[2:4], 16) / 255, int(code[4:], 16) / 255)
-    for code in (
-        "1f3a5f", "2e6f95", "5fa8d3", "264d3b", "3f8f63", "7a3b69", "c05299",
-        "e07a5f", "b5838d", "f2b880", "8d6a9f", "d4a373", "f6e27f",
-    )
 )  # fmt: skip
 
 # Variants 0, 1, 2 of each substack: (package, left edge, lower edge) in cells (Fig. 3).
@@ -64,29 +52,7 @@ RIGHT = (
 )  # fmt: skip
 # One row of a wall, from left to right: (left edge in cells, variants of the substack).
 COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
-MID_CELLS = 10  # width that each further mid substack adds to a row
-ENDS_CELLS = 16  # width of a row of a left and a right substack only
-SCALES = 0.5, 1.5  # smallest and largest scale of the boxes
-
-
-def package_colour(package: int) -> tuple[float, float, float]:
-    """RGB of a package; numbers above 12 start again from 0."""
-    return PACKAGE_COLOURS[package % len(PACKAGE_COLOURS)]
-
-
-def check_variants(variants: object, columns: int = len(COLUMNS)) -> np.ndarray:
-    """Return ``variants`` as a (rows, columns) int64 array.
-
-    Raises:
-        TypeError: it does not hold integers.
-        ValueError: another shape, no rows, or an unknown variant.
-    """
-    variants = checks.integer_array("variants", variants, (None, columns))
-    if not len(variants):
-        raise ValueError("variants has no rows; expected at least one")
-    if not (0 <= variants.min() and variants.max() <= 2):
-        raise ValueError(f"variants holds {variants.min()} to {variants.max()}; expected 0 to 2")
-    return variants
+LEFT_CELLS, OTHER_CELLS = 6, 10  # width of a left substack, and of each other one
 
 
 def wall_cells(variants: np.ndarray) -> np.ndarray:
@@ -98,61 +64,46 @@ def wall_cells(variants: np.ndarray) -> np.ndarray:
     Returns:
         (n, 3) int64: package number, left edge and lower edge of each item in cells.
     """
-    variants = check_variants(variants)
-    return _cells(variants[np.newaxis], *_row(len(COLUMNS)))[:, 1:]
+    return _cells([variants], len(COLUMNS))[:, 1:]
+
+
+def _cells(variants: object, columns: int) -> np.ndarray:
+    """Wall, package, left and lower edge of the items of (walls, rows, columns), (n, 4) int64."""
+    variants = checks.integer_array("variants", variants, (None, None, columns))
+    if not variants.size:
+        raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
+    if not (0 <= variants.min() and variants.max() <= 2):
+        raise ValueError(f"variants holds {variants.min()} to {variants.max()}; expected 0 to 2")
+    counts, cells = (each[np.arange(columns), variants] for each in _row(columns))
+    filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
+    wall, row, _, _ = np.nonzero(filled)
+    items = cells[filled]
+    items[:, 2] += row * ROWS_HIGH
+    return np.column_stack([wall, items])
 
 
 @cache
 def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
     """A row with one left substack, ``columns - 2`` mid ones and one right one, in arrays.
 
-    Returns:
-        (columns, 3) int64, the number of items of each variant; and (columns, 3, m, 3)
-        int64, each item's package, left edge in the row and lower edge, filled up with zeros.
+    (columns, 3) int64, the number of items of each variant; and (columns, 3, m, 3) int64, each
+    item's package, left edge in the row and lower edge, filled up with zeros.
     """
     substacks = (LEFT, *[MID] * (columns - 2), RIGHT)
     counts = np.array([[len(variant) for variant in variants] for variants in substacks])
     cells = np.zeros((*counts.shape, counts.max(), 3), np.int64)
     for column, variants in enumerate(substacks):
-        left = 0 if column == 0 else COLUMNS[1][0] + MID_CELLS * (column - 1)
+        left = 0 if column == 0 else LEFT_CELLS + OTHER_CELLS * (column - 1)
         for number, variant in enumerate(variants):
             cells[column, number, : len(variant)] = np.array(variant) + (0, left, 0)
     return counts, cells
 
 
-@compiled
-def _cells(variants, counts, cells):
-    """Items of (walls, rows, columns) variants, (n, 4) int64: wall, package, left and lower edge.
-
-    Args:
-        variants: of each substack.
-        counts, cells: what ``_row`` returned.
-    """
-    walls, rows, columns = variants.shape
-    found, total = np.empty((variants.size * cells.shape[2], 4), np.int64), 0
-    for wall in range(walls):
-        for row in range(rows):
-            for column in range(columns):
-                variant = variants[wall, row, column]
-                for number in range(counts[column, variant]):
-                    # One by one, here and below: a row at once takes two seconds more to compile.
-                    found[total, 0] = wall
-                    for part in range(3):
-                        found[total, 1 + part] = cells[column, variant, number, part]
-                    found[total, 3] += row * ROWS_HIGH
-                    total += 1
-    return found[:total].copy()
-
-
 def substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
-    """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1.
-
-    Args:
-        scale: of all edges of the boxes, 0.5 to 1.5.
-    """
-    cells = CELLS_WIDE / checks.real("scale", scale, *SCALES) + 1e-9  # the width; the height
-    mids = int((cells - ENDS_CELLS) / MID_CELLS)
-    return round(WALLS / scale), int(cells / ROWS_HIGH), 2 + mids
+    """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
+    cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # the width; the height
+    columns = 1 + int((cells - LEFT_CELLS) / OTHER_CELLS)
+    return round(WALLS / scale), int(cells / ROWS_HIGH), columns
 
 
 def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
@@ -160,44 +111,24 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
 
     Args:
         variants: (walls, rows, columns) int, variant 0–2 of each substack, rear wall and
-            bottom row first. The number of columns is that of ``substacks_that_fit``: 4
-            at scale 1.
-        scale: of the boxes' widths and heights. Their depth is that of the walls.
+            bottom row first. There are as many columns as fit, 4 at scale 1; the rows must fit
+            into the container's height, too.
+        scale: of the boxes' widths and heights, 0.5 to 1.5. Their depth is that of the walls.
 
     Returns:
         The load, its walls filling the container from the rear to the entrance. They begin
         at y = 0 and, except at scale 1, leave a gap at the other side wall.
 
     Raises:
-        TypeError, ValueError: see ``check_variants`` and ``substacks_that_fit``; there must
-            be a wall, too, and the rows must fit into the container's height.
+        TypeError, ValueError: an argument is not as described.
     """
-    columns = substacks_that_fit(scale)[2]
-    variants = checks.integer_array("variants", variants, (None, None, columns))
-    if not len(variants):
-        raise ValueError("variants has no walls; expected at least one")
-    check_variants(variants.reshape(-1, columns), columns)
-    cells = _cells(variants, *_row(columns))
-    positions, sizes = _boxes(cells, PACKAGES, task.CONTAINER[0] / len(variants), CELL * scale)
-    return Load(positions, sizes, cells[:, 1], cells[:, 0])
-
-
-@compiled
-def _boxes(cells, packages, depth, cell):
-    """Centres and edge lengths of items in m, both (n, 3) float64.
-
-    Args:
-        cells: what ``_cells`` returned.
-        packages: ``PACKAGES``.
-        depth, cell: of a wall and of a cell, in m.
-    """
-    positions, sizes = np.empty((len(cells), 3)), np.empty((len(cells), 3))
-    for item, (wall, package, left, lower) in enumerate(cells):
-        width, height = packages[package]
-        positions[item, 0], sizes[item, 0] = (wall + 0.5) * depth, depth
-        positions[item, 1], sizes[item, 1] = (left + width / 2) * cell, width * cell
-        positions[item, 2], sizes[item, 2] = (lower + height / 2) * cell, height * cell
-    return positions, sizes
+    cells = _cells(variants, substacks_that_fit(scale)[2])
+    walls, packages = cells[:, 0], cells[:, 1]
+    # In walls and cells, and in m: a wall is as deep as each of its boxes.
+    edges = np.insert(PACKAGES, 0, 1, axis=1)[packages]
+    units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL * scale, CELL * scale])
+    positions = (np.delete(cells, 1, axis=1) + edges / 2) * units
+    return Load(positions, edges * units, packages, walls)
 
 
 def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float = 1.0) -> Load:
@@ -214,8 +145,7 @@ def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float 
             0.33 m.
 
     Raises:
-        TypeError: ``rng`` is not a ``numpy.random.Generator``.
-        TypeError, ValueError: ``walls`` or ``scale`` is not as described.
+        TypeError, ValueError: an argument is not as described.
     """
     checks.generator("rng", rng)
     most, rows, columns = substacks_that_fit(scale)
@@ -225,15 +155,3 @@ def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float 
         of_the_paper = scale == 1 and walls == WALLS
         if not of_the_paper or task.MIN_ITEMS <= len(load) <= task.MAX_ITEMS:
             return load
-
-
-def front_walls(load: Load, count: int = FRONT_WALLS) -> Load:
-    """The ``count`` item walls nearest to the entrance, where they stand; no others.
-
-    Of a load of the paper, all boxes that are seen during the first 100 picks are in the
-    front 6 walls, whatever is picked: the nearest 228 are. With a seventh wall behind them,
-    ``full`` physics is nearly twice as fast as with all.
-    """
-    walls = np.unique(load.walls)
-    kept = load.walls >= walls[-checks.integer("count", count, 1, len(walls))]
-    return Load(load.positions[kept], load.sizes[kept], load.packages[kept], load.walls[kept])

@@ -6,7 +6,69 @@ from torch import nn
 from unload.support import checks
 
 
-class PEQNetwork(nn.Module):
+class ScoringNetwork(nn.Module):
+    """Base of networks that score each item by one linear unit, tanh.
+
+    A subclass takes the arguments of ``PEQNetwork``, makes its layers, among them ``scorer``, and
+    defines ``features``.
+    """
+
+    scorer: nn.Linear
+
+    def __init__(self, n_features: int) -> None:
+        super().__init__()
+        self.n_features = checks.integer("n_features", n_features, 1)
+
+    def reset_parameters(self, generator: torch.Generator | None = None) -> None:
+        """Draw the weights and biases from U(±1/√inputs), as ``nn.Linear`` does."""
+        for module in self.modules():
+            if isinstance(module, nn.Linear):
+                weights = (module.weight, module.bias)
+            elif isinstance(module, nn.MultiheadAttention):
+                weights = (module.in_proj_weight, module.in_proj_bias)
+            else:  # layer normalizations begin as ones and zeros: there is nothing to draw
+                continue
+            bound = weights[0].shape[1] ** -0.5
+            for weight in weights:
+                nn.init.uniform_(weight, -bound, bound, generator=generator)
+
+    def forward(
+        self, observations: torch.Tensor, present: torch.Tensor | None = None
+    ) -> torch.Tensor:
+        """Action values.
+
+        Args:
+            observations: (batch, items, 3) of the weights' dtype, float32.
+            present: (batch, items) bool, the rows that hold an item; all if None. The others have
+                no influence on these. In an observation without any item, all rows count.
+
+        Returns:
+            (batch, items), of the same dtype, in [-1, 1]. Where a row holds no item, the
+            value is finite but means nothing.
+
+        Raises:
+            TypeError, ValueError: no tensor, another dtype or shape, or no rows.
+        """
+        _check("observations", observations, next(self.parameters()).dtype)
+        if observations.ndim != 3 or observations.shape[1] == 0 or observations.shape[2] != 3:
+            raise ValueError(
+                f"observations has shape {tuple(observations.shape)}; "
+                "expected (batch, items, 3) with at least one item"
+            )
+        if present is not None:
+            _check("present", present, torch.bool)
+            shape, expected = tuple(present.shape), tuple(observations.shape[:2])
+            if shape != expected:
+                raise ValueError(f"present has shape {shape}; expected {expected}")
+            present = present | ~present.any(dim=1, keepdim=True)  # the maximum of none is infinite
+        return torch.tanh(self.scorer(self.features(observations, present))).squeeze(2)
+
+    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+        """Features of each item that the scorer reads, (batch, items, its inputs)."""
+        raise NotImplementedError
+
+
+class PEQNetwork(ScoringNetwork):
     """Scores each item from its own features and the features of all (Fig. 7).
 
     Learnable feature extractor: n features of each item, ReLU. Global relation extractor:
@@ -19,80 +81,29 @@ class PEQNetwork(nn.Module):
     last axis.
 
     Args:
-        n_features: n; the paper does not give it. 4 n + 4 n + 1 parameters.
+        n_features: n, at least 1; the paper does not give it. 4 n + 4 n + 1 parameters.
         generator: source of the initial weights, PyTorch's default one if None.
-
-    Raises:
-        TypeError: ``n_features`` is not an integer.
-        ValueError: ``n_features`` is less than 1.
     """
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
-        super().__init__()
-        self.n_features = checks.integer("n_features", n_features, 1)
+        super().__init__(n_features)
         self.extractor = nn.Linear(3, n_features)
         self.scorer = nn.Linear(4 * n_features, 1)
-        if generator is not None:
+        if generator is not None:  # PyTorch's own weights are drawn in the same way
             self.reset_parameters(generator)
 
-    def reset_parameters(self, generator: torch.Generator) -> None:
-        """Draw the weights as ``nn.Linear`` does, U(±1/√inputs), from ``generator``."""
-        for layer in (self.extractor, self.scorer):
-            bound = layer.in_features**-0.5
-            nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
-            nn.init.uniform_(layer.bias, -bound, bound, generator=generator)
-
-    def forward(
-        self, observations: torch.Tensor, present: torch.Tensor | None = None
-    ) -> torch.Tensor:
-        """Action values.
-
-        Args:
-            observations: (batch, items, 3) of the weights' dtype, float32.
-            present: (batch, items) bool, the rows that hold an item; all if None. The global
-                features are those of these rows alone, and 0 where there is none.
-
-        Returns:
-            (batch, items), of the same dtype, in [-1, 1]. Where a row holds no item, the
-            value is finite but means nothing.
-
-        Raises:
-            TypeError: no tensor, or another dtype.
-            ValueError: another shape, or no rows.
-        """
-        check_observations(observations, next(self.parameters()).dtype)
-        if present is not None:
-            check_present(present, observations)
-        features = torch.relu(self.extractor(observations))  # (batch, items, n)
-        context = torch.cat(pooled(features, present), dim=1)  # (batch, 3 n)
-        context = context.unsqueeze(1).expand(-1, features.shape[1], -1)
-        enhanced = torch.cat([features, context], dim=2)  # (batch, items, 4 n)
-        return torch.tanh(self.scorer(enhanced)).squeeze(2)
+    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
+        own = torch.relu(self.extractor(observations))  # (batch, items, n)
+        context = torch.cat(pooled(own, present), dim=1).unsqueeze(1)  # (batch, 1, 3 n)
+        return torch.cat([own, context.expand(-1, own.shape[1], -1)], dim=2)
 
 
-def check_observations(observations: torch.Tensor, dtype: torch.dtype) -> None:
-    """Raise unless ``observations`` is (batch, items, 3) of this ``dtype``, of some items."""
-    if not isinstance(observations, torch.Tensor):
-        raise TypeError(f"observations is a {type(observations).__name__}; expected a tensor")
-    if observations.dtype != dtype:
-        raise TypeError(f"observations has dtype {observations.dtype}; expected {dtype}")
-    if observations.ndim != 3 or observations.shape[1] == 0 or observations.shape[2] != 3:
-        raise ValueError(
-            f"observations has shape {tuple(observations.shape)}; "
-            "expected (batch, items, 3) with at least one item"
-        )
-
-
-def check_present(present: torch.Tensor, observations: torch.Tensor) -> None:
-    """Raise unless ``present`` is bool, one per row of ``observations``."""
-    if not isinstance(present, torch.Tensor):
-        raise TypeError(f"present is a {type(present).__name__}; expected a tensor")
-    if present.dtype != torch.bool:
-        raise TypeError(f"present has dtype {present.dtype}; expected torch.bool")
-    if present.shape != observations.shape[:2]:
-        raise ValueError(
-            f"present has shape {tuple(present.shape)}; expected {tuple(observations.shape[:2])}"
-        )
+def _check(name: str, value: object, dtype: torch.dtype) -> None:
+    """Raise TypeError unless ``value`` is a tensor of this dtype."""
+    if not isinstance(value, torch.Tensor):
+        raise TypeError(f"{name} is a {type(value).__name__}; expected a tensor")
+    if value.dtype != dtype:
+        raise TypeError(f"{name} has dtype {value.dtype}; expected {dtype}")
 
 
 def pooled(features: torch.Tensor, present: torch.Tensor | None) -> list[torch.Tensor]:
@@ -100,10 +111,8 @@ def pooled(features: torch.Tensor, present: torch.Tensor | None) -> list[torch.T
     if present is None:
         return [features.amin(dim=1), features.amax(dim=1), features.mean(dim=1)]
     absent = ~present.unsqueeze(2)  # (batch, items, 1)
-    count = present.sum(dim=1, keepdim=True)  # (batch, 1)
-    values = [
+    return [
         features.masked_fill(absent, torch.inf).amin(dim=1),
         features.masked_fill(absent, -torch.inf).amax(dim=1),
-        features.masked_fill(absent, 0).sum(dim=1) / count.clamp(min=1),
+        features.masked_fill(absent, 0).sum(dim=1) / present.sum(dim=1, keepdim=True),
     ]
-    return [each.masked_fill(count == 0, 0) for each in values]

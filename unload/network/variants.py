@@ -11,74 +11,21 @@ import torch
 from torch import nn
 from torch.nn.functional import linear
 
-from unload.network.peq import PEQNetwork, check_observations, check_present, pooled
-from unload.support import checks
+from unload.network.peq import PEQNetwork, ScoringNetwork, pooled
 
 HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 features
-
-
-class ScoringNetwork(nn.Module):
-    """Base of networks that score each item by one linear unit, tanh, on n features.
-
-    A subclass makes its layers, calls ``reset_parameters`` and defines ``features``. Its
-    arguments are ``n_features`` and ``generator``, the source of the initial weights
-    (PyTorch's default one if None).
-
-    Args:
-        n_features: n.
-
-    Raises:
-        TypeError: ``n_features`` is not an integer.
-        ValueError: ``n_features`` is less than 1.
-    """
-
-    def __init__(self, n_features: int) -> None:
-        super().__init__()
-        self.n_features = checks.integer("n_features", n_features, 1)
-        self.scorer = nn.Linear(n_features, 1)
-
-    def reset_parameters(self, generator: torch.Generator | None = None) -> None:
-        """Draw the weights and biases from U(±1/√inputs), as ``PEQNetwork`` does.
-
-        Layer normalizations begin as ones and zeros: there is nothing to draw.
-        """
-        for module in self.modules():
-            if isinstance(module, nn.Linear):
-                weights = (module.weight, module.bias)
-            elif isinstance(module, nn.MultiheadAttention):
-                weights = (module.in_proj_weight, module.in_proj_bias)
-            else:
-                continue
-            bound = weights[0].shape[1] ** -0.5
-            for weight in weights:
-                nn.init.uniform_(weight, -bound, bound, generator=generator)
-
-    def forward(
-        self, observations: torch.Tensor, present: torch.Tensor | None = None
-    ) -> torch.Tensor:
-        """Action values, see ``PEQNetwork``; rows without an item have no influence on others."""
-        check_observations(observations, next(self.parameters()).dtype)
-        if present is not None:
-            check_present(present, observations)
-            # Where there is no item at all, all rows count: the maximum of none is infinite.
-            present = present | ~present.any(dim=1, keepdim=True)
-        return torch.tanh(self.scorer(self.features(observations, present))).squeeze(2)
-
-    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
-        """Features of each item that the scorer reads, (batch, items, n)."""
-        raise NotImplementedError
 
 
 class TwoLayerScorer(ScoringNetwork):
     """The paper's network with a hidden layer in its relation scorer.
 
     In the paper's one linear unit, the global features shift the scores of all items by the
-    same amount, so the choice does not depend on them. With a hidden layer of n units, ReLU,
-    it does.
+    same amount, so the choice does not depend on them. With a hidden layer of n units, it does.
     """
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
         super().__init__(n_features)
+        self.scorer = nn.Linear(n_features, 1)
         self.extractor = nn.Linear(3, n_features)
         self.hidden = nn.Linear(4 * n_features, n_features)
         self.reset_parameters(generator)
@@ -98,6 +45,7 @@ class EquivariantStack(ScoringNetwork):
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
         super().__init__(n_features)
+        self.scorer = nn.Linear(n_features, 1)
         self.layers = nn.ModuleList(
             nn.Linear(2 * inputs, n_features) for inputs in (3, n_features, n_features)
         )
@@ -106,7 +54,8 @@ class EquivariantStack(ScoringNetwork):
     def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
         own = observations
         for layer in self.layers:
-            context = maximum_over_items(own, present)
+            there = own if present is None else own.masked_fill(~present.unsqueeze(2), -torch.inf)
+            context = there.amax(dim=1)
             own = torch.relu(linear_with_context(layer, own, context))  # type: ignore[arg-type]
         return own
 
@@ -115,17 +64,14 @@ class AttentionNetwork(ScoringNetwork):
     """Each item attends to all: two transformer blocks with layer normalization first.
 
     There is no positional encoding, because the order of the items means nothing, no dropout,
-    and 2 n hidden units per block.
-
-    Raises:
-        ValueError: ``n_features`` is odd; the two heads share the features.
+    and 2 n hidden units per block. Two heads share the n features: an odd n is a ValueError.
     """
 
     def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
         super().__init__(n_features)
         if n_features % HEADS:
             raise ValueError(f"n_features is {n_features}; expected a multiple of {HEADS}")
-        self.extractor = nn.Linear(3, n_features)
+        self.scorer, self.extractor = nn.Linear(n_features, 1), nn.Linear(3, n_features)
         self.blocks = nn.ModuleList(
             nn.TransformerEncoderLayer(
                 n_features, HEADS, 2 * n_features, dropout=0, batch_first=True, norm_first=True
@@ -159,8 +105,7 @@ def make_network(
     Args:
         network: a name in ``NETWORKS``, or a function ``(n_features, generator)`` that returns a
             module whose arguments and values are those of ``PEQNetwork.forward``.
-        n_features: n.
-        generator: source of the initial weights, PyTorch's default one if None.
+        n_features, generator: as of ``PEQNetwork``.
 
     Raises:
         TypeError: the function returns no module, or one with weights of another dtype.
@@ -170,49 +115,30 @@ def make_network(
     torch.set_default_dtype(torch.float32)
     try:
         with torch.device("cpu"):
-            if isinstance(network, str):
-                return NETWORKS[network](n_features, generator)
-            made = network(n_features, generator)
-            _check_own(made)
+            make = NETWORKS[network] if isinstance(network, str) else network
+            made = make(n_features, generator)
+            _check(made)
             return made
     finally:
         torch.set_default_dtype(default)
 
 
 @torch.no_grad()
-def _check_own(network: object) -> None:
+def _check(network: object) -> None:
     """Raise unless this is a network that can be trained and saved, before hours are spent."""
     if not isinstance(network, nn.Module):
         raise TypeError(f"network returned {network!r}; expected a torch.nn.Module")
     for name, value in network.state_dict().items():
         if value.dtype != torch.float32:
             raise TypeError(f"network has {name} of dtype {value.dtype}; expected torch.float32")
-    observations, present = torch.zeros(2, 3, 3), torch.ones(2, 3, dtype=torch.bool)
     # A copy, because a module may count its calls.
-    values = deepcopy(network).eval()(observations, present)
+    values = deepcopy(network).eval()(torch.zeros(2, 3, 3), torch.ones(2, 3, dtype=torch.bool))
     if values.shape != (2, 3):
         raise ValueError(f"network returned values of shape {tuple(values.shape)}; expected (2, 3)")
 
 
-def maximum_over_items(features: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
-    """The maximum of each feature over the items, (batch, features)."""
-    if present is not None:
-        features = features.masked_fill(~present.unsqueeze(2), -torch.inf)
-    return features.amax(dim=1)
-
-
 def linear_with_context(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) -> torch.Tensor:
-    """Apply ``layer`` to each item's own features concatenated with the context.
-
-    The context's share of the sum is computed once per observation instead of once per item.
-
-    Args:
-        layer: of own + context inputs.
-        own: (batch, items, own).
-        context: (batch, context), the features that all items of an observation share.
-
-    Returns:
-        (batch, items, outputs).
-    """
+    """Apply a layer to (batch, items, n) own features beside the (batch, m) that all share."""
+    # The context's share of the sum is computed once per observation instead of once per item.
     for_own, for_context = layer.weight.split([own.shape[2], context.shape[1]], dim=1)
     return linear(own, for_own, layer.bias) + linear(context, for_context).unsqueeze(1)

@@ -19,15 +19,8 @@ def write_weights(path: str | Path, kind: str, settings: dict, tensors: dict) ->
     """Write weights and how to use them, in one atomic step.
 
     Args:
-        path: of the file.
         kind: what the file holds, such as ``"policy"``.
-        settings: as JSON can hold them.
-        tensors: by name, float32.
-
-    Raises:
-        TypeError: ``path`` is none, or a tensor is not float32; the message says of what ``kind``.
-        ValueError: ``path`` is empty or a folder.
-        OSError: the file cannot be written.
+        settings, tensors: as JSON can hold them; by name, float32 or it is a TypeError.
     """
     path = checks.file("path", path)
     content = weights_file(kind, settings, tensors)
@@ -45,16 +38,10 @@ def weights_file(kind: str, settings: dict, tensors: dict) -> bytes:
 def read_weights(path: str | Path, kind: str, make: Callable[[dict, dict], Made]) -> Made:
     """Read what ``write_weights`` wrote.
 
-    Args:
-        path: of the file.
-        kind: as it was written.
-        make: is called with the settings and the tensors; what it raises is a fault of the file.
-
     Returns:
-        What ``make`` returns.
+        What ``make`` returns of settings and tensors; what it raises is a fault of the file.
 
     Raises:
-        TypeError: ``path`` is none.
         FileNotFoundError: there is no such file.
         ValueError: the file is damaged, of another kind, or not of this version.
     """
@@ -88,7 +75,6 @@ def _check_dtypes(name: str, tensors: dict[str, torch.Tensor]) -> None:
 
 
 def _digest(settings: dict, tensors: dict[str, torch.Tensor]) -> str:
-    """Digest of settings and weights."""
     digest = blake2b(json.dumps(settings, sort_keys=True).encode(), digest_size=16)
     for name in sorted(tensors):
         tensor = tensors[name]

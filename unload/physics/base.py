@@ -24,7 +24,8 @@ class Physics(ABC):
 
     Raises:
         RuntimeError: a method is called before ``reset`` or after ``close``.
-        TypeError: the load is not a ``Load``.
+        TypeError: the load is not a ``Load``, or the item is no integer.
+        ValueError: the item does not exist or has been removed.
     """
 
     exact = True
@@ -45,19 +46,11 @@ class Physics(ABC):
         self.load = load
 
     def lift(self, item: int) -> float:
-        """Try to lift an item; return how far it moved, in m (Sec. III-C, appendix).
-
-        Raises:
-            ValueError: the item does not exist or has been removed.
-        """
+        """Try to lift an item; return how far it moved, in m (Sec. III-C, appendix)."""
         return self._lift(self._check(item))
 
     def remove(self, item: int) -> None:
-        """Take an item out of the container.
-
-        Raises:
-            ValueError: the item does not exist or has been removed.
-        """
+        """Take an item out of the container."""
         item = self._check(item)
         self.present[item] = False
         self._remove(item)
@@ -65,7 +58,7 @@ class Physics(ABC):
     def positions(self) -> np.ndarray:
         """(n, 3) float64, the centre of each item in m; removed items keep their last one."""
         self._check_filled()
-        return self._positions()
+        return self.load.positions
 
     def close(self) -> None:
         """Free the simulator; may be called again."""
@@ -100,6 +93,3 @@ class Physics(ABC):
     def _lift(self, item: int) -> float: ...
 
     def _remove(self, item: int) -> None: ...
-
-    def _positions(self) -> np.ndarray:
-        return self.load.positions

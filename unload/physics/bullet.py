@@ -8,16 +8,13 @@ import os
 import weakref
 from collections.abc import Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from unload import task
-
-if TYPE_CHECKING:
-    import pybullet
 
 
 @contextmanager
@@ -28,24 +25,17 @@ def _quiet_stderr():
     except OSError:  # stderr is closed: there is nothing to hide
         yield
         return
-    null = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 2)
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(null)
+    with open(os.devnull, "wb") as null, open(saved, "wb"):
+        os.dup2(null.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(saved, 2)
 
 
 @cache
-def _import_pybullet() -> None:
-    """Import PyBullet.
-
-    Raises:
-        ModuleNotFoundError: it is not installed.
-    """
-    global pybullet
+def _pybullet() -> Any:
+    """PyBullet, imported when it is first needed."""
     with _quiet_stderr():
         try:
             import pybullet
@@ -54,6 +44,7 @@ def _import_pybullet() -> None:
                 "a lift that no table knows, a whole container or a heap has to be simulated; "
                 "expected PyBullet: pip install 'unload[pybullet]'"
             ) from error
+    return pybullet
 
 
 def _version() -> str:
@@ -85,9 +76,7 @@ SETTINGS = {
     "lift_time": task.LIFT_TIME,
 }
 
-
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)  # orientation of a box that is not turned
-NEAR_PLANE, FAR_PLANE = 0.1, 50.0  # m, what a camera sees
 ITERATIONS = 50
 
 
@@ -96,15 +85,29 @@ def slim(size: np.ndarray) -> np.ndarray:
     return size - np.array([GAP, GAP, 0.0])
 
 
+class Client:
+    """One PyBullet client: PyBullet's functions, called without its number, and constants.
+
+    It is disconnected by ``disconnect``, or when nothing refers to it any more.
+    """
+
+    def __init__(self) -> None:
+        self.number = _pybullet().connect(_pybullet().DIRECT)
+        self.disconnect = weakref.finalize(self, _pybullet().disconnect, self.number)
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(_pybullet(), name)
+        return partial(found, physicsClientId=self.number) if callable(found) else found
+
+
 class World:
     """One PyBullet client (about 28 MB) with gravity, holding boxes.
-
-    The client is disconnected by ``close``, or when nothing refers to the world any more.
 
     Bodies never fall asleep: PyBullet's external force does not wake a sleeping body,
     so that a free box would not move at all.
 
     Attributes:
+        client: see ``Client``.
         bodies: how many have been created since the world was new or cleared. PyBullet keeps 1 KB
             of each after it is removed, and 4 KB of each size.
 
@@ -113,9 +116,6 @@ class World:
         maximal_coordinates: plain rigid bodies instead of Featherstone multibodies; 1.6 to
             2 times as fast. A lift's answer is the same; left alone, boxes creep a fifth less.
         iterations: of the contact solver per time step; 50 is PyBullet's default.
-
-    Raises:
-        ModuleNotFoundError: PyBullet is not installed.
     """
 
     def __init__(
@@ -126,26 +126,20 @@ class World:
     ) -> None:
         self.time_step, self._iterations = time_step, iterations
         self._maximal = maximal_coordinates
-        _import_pybullet()
-        self._client = pybullet.connect(pybullet.DIRECT)
-        self._disconnect = weakref.finalize(self, pybullet.disconnect, self._client)
-        self._set_up()
-
-    def _set_up(self) -> None:
-        self._shapes: dict[tuple[float, ...], int] = {}
-        self.bodies = 0
-        pybullet.setGravity(0, 0, -task.GRAVITY, physicsClientId=self._client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.time_step,
-            numSolverIterations=self._iterations,
-            deterministicOverlappingPairs=1,
-            physicsClientId=self._client,
-        )
+        self.client = Client()
+        self.clear()
 
     def clear(self) -> None:
         """Take everything out; the next bodies behave, to the bit, as in a new world."""
-        pybullet.resetSimulation(physicsClientId=self._client)
-        self._set_up()
+        self._shapes: dict[tuple[float, ...], int] = {}
+        self.bodies = 0
+        self.client.resetSimulation()
+        self.client.setGravity(0, 0, -task.GRAVITY)
+        self.client.setPhysicsEngineParameter(
+            fixedTimeStep=self.time_step,
+            numSolverIterations=self._iterations,
+            deterministicOverlappingPairs=1,
+        )
 
     def add_box(
         self,
@@ -158,131 +152,69 @@ class World:
         """Create a box and return its body number; mass 0 makes it immovable.
 
         Args:
-            position: (3,) centre in m.
-            size: (3,) edge lengths in m.
+            position, size: (3,) centre and edge lengths in m.
             mass: kg.
             orientation: (4,) quaternion x, y, z, w.
             friction: of its surface; Bullet multiplies it with the other body's.
         """
         self.bodies += 1
-        body = pybullet.createMultiBody(
+        halves = tuple(float(edge) / 2 for edge in size)
+        if halves not in self._shapes:
+            shape = self.client.createCollisionShape(self.client.GEOM_BOX, halfExtents=halves)
+            self._shapes[halves] = shape
+        body = self.client.createMultiBody(
             mass,
-            self._shape(tuple(map(float, size))),
+            self._shapes[halves],
             basePosition=position,
             baseOrientation=orientation,
             useMaximalCoordinates=self._maximal,
-            physicsClientId=self._client,
         )
         # Friction and damping are stated, because PyBullet's own differ between kinds of bodies.
-        pybullet.changeDynamics(
-            body,
-            -1,
-            lateralFriction=friction,
-            linearDamping=DAMPING,
-            angularDamping=DAMPING,
-            physicsClientId=self._client,
+        self.client.changeDynamics(
+            body, -1, lateralFriction=friction, linearDamping=DAMPING, angularDamping=DAMPING
         )
         return body
 
-    def _shape(self, size: tuple[float, ...]) -> int:
-        if size not in self._shapes:
-            self._shapes[size] = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX,
-                halfExtents=[edge / 2 for edge in size],
-                physicsClientId=self._client,
-            )
-        return self._shapes[size]
-
     def remove(self, body: int) -> None:
         """Take a body out of the world; its number is not given again."""
-        pybullet.removeBody(body, physicsClientId=self._client)
+        self.client.removeBody(body)
 
     def place(self, body: int, position, orientation=UPRIGHT) -> None:
         """Put a body at rest at ``position`` (m) with ``orientation`` (quaternion x, y, z, w)."""
         # This call also sets the velocities to zero.
-        pybullet.resetBasePositionAndOrientation(
-            body, position, orientation, physicsClientId=self._client
-        )
+        self.client.resetBasePositionAndOrientation(body, position, orientation)
 
     def pose(self, body: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Position (m) and orientation (quaternion x, y, z, w) of a body."""
-        return pybullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
-
-    def velocity(self, body: int) -> tuple[float, float, float]:
-        """Velocity of a body's centre, m/s."""
-        return pybullet.getBaseVelocity(body, physicsClientId=self._client)[0]
+        return self.client.getBasePositionAndOrientation(body)
 
     def step(self, seconds: float) -> None:
         """Let time pass, rounded to whole time steps."""
-        for _ in range(self._steps(seconds)):
-            pybullet.stepSimulation(physicsClientId=self._client)
-
-    def _steps(self, seconds: float) -> int:
-        return round(seconds / self.time_step)
+        for _ in range(round(seconds / self.time_step)):
+            self.client.stepSimulation()
 
     def pull(
         self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
     ) -> float:
-        """Pull a body upwards at its centre of mass (Sec. III-C).
+        """Pull a body upwards at its centre of mass; return how far it moved, in m (Sec. III-C).
 
         Args:
             body: which one.
             force: N.
             seconds: how long, rounded to whole time steps.
-
-        Returns:
-            How far the body moved, in m.
         """
         start = np.array(self.pose(body)[0])
-        for _ in range(self._steps(seconds)):
+        for _ in range(round(seconds / self.time_step)):
             self.push(body, (0, 0, force))
         return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
 
     def push(self, body: int, force: tuple[float, float, float]) -> None:
         """Let one time step pass, in which ``force``, in N, acts at a body's centre of mass."""
         # PyBullet forgets the force after a step, therefore it is applied anew before each.
-        pybullet.applyExternalForce(
-            body,
-            -1,
-            force,
-            self.pose(body)[0],
-            pybullet.WORLD_FRAME,
-            physicsClientId=self._client,
-        )
-        pybullet.stepSimulation(physicsClientId=self._client)
-
-    def stop(self, body: int) -> None:
-        """Take from a body its velocity along x, and leave it all else."""
-        linear, angular = pybullet.getBaseVelocity(body, physicsClientId=self._client)
-        pybullet.resetBaseVelocity(body, (0, *linear[1:]), angular, physicsClientId=self._client)
-
-    def scan(
-        self, eye, target, width: int, height: int, angle: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """What a depth camera at ``eye`` (m) sees towards ``target`` (m).
-
-        Args:
-            eye, target: (3,) m.
-            width, height: pixels.
-            angle: of view from the lower to the upper edge, degrees.
-
-        Returns:
-            ``depth`` (height, width) float64, m along the optical axis, and ``bodies``
-            (height, width) int64, the body in each pixel, -1 where there is none.
-        """
-        _, _, _, depth, bodies = pybullet.getCameraImage(
-            width,
-            height,
-            pybullet.computeViewMatrix(eye, target, (0, 0, 1)),
-            pybullet.computeProjectionMatrixFOV(angle, width / height, NEAR_PLANE, FAR_PLANE),
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
-        )
-        depth = np.reshape(depth, (height, width)).astype(np.float64)
-        # The buffer holds the depth of a perspective lens, from 0 to 1.
-        depth = FAR_PLANE * NEAR_PLANE / (FAR_PLANE - (FAR_PLANE - NEAR_PLANE) * depth)
-        return depth, np.reshape(bodies, (height, width)).astype(np.int64)
+        place, frame = self.pose(body)[0], self.client.WORLD_FRAME
+        self.client.applyExternalForce(body, -1, force, place, frame)
+        self.client.stepSimulation()
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""
-        self._disconnect()
+        self.client.disconnect()

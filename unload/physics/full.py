@@ -21,9 +21,6 @@ class FullPhysics(Physics):
             back, ``"keep"`` leaves whatever the simulation made of them: they drift.
             ``"keep"`` simulates them as plain rigid bodies, ``"restore"`` as multibodies,
             see ``bullet.World``.
-
-    Raises:
-        ValueError: an unknown ``after_pick``.
     """
 
     def __init__(self, after_pick: str = "restore") -> None:
@@ -49,9 +46,7 @@ class FullPhysics(Physics):
             self._add_box(position, size, task.MASS)
             for position, size in zip(load.positions, sizes)
         ]
-        self._poses: list[tuple] = [
-            (tuple(position), UPRIGHT) for position in load.positions.tolist()
-        ]
+        self._poses: list[tuple] = [(place, UPRIGHT) for place in load.positions.tolist()]
 
     def _make_world(self) -> World:
         # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
@@ -71,26 +66,19 @@ class FullPhysics(Physics):
         self._world.place(body, (8.0 * row, 3.0 * column, DEPOT + task.CONTAINER[2] / 2))
 
     def settle(self, seconds: float) -> None:
-        """Let time pass without a pick, and take the poses reached for the load's own.
-
-        Raises:
-            TypeError, ValueError: ``seconds`` is no finite number >= 0.
-        """
+        """Let time pass without a pick, and take the poses reached for the load's own."""
         self._check_filled()
         self._world.step(checks.real("seconds", seconds, 0))
         self._keep()
 
     def _lift(self, item: int) -> float:
+        restore = True  # also when interrupted: no box may stay halfway
         try:
             distance = self._world.pull(self._bodies[item])
-        except BaseException:  # interrupted: no box may stay halfway
-            self._restore()
-            raise
-        if self.after_pick == "restore":
-            self._restore()
-        else:
-            self._keep()
-        return distance
+            restore = self.after_pick == "restore"
+            return distance
+        finally:
+            self._restore() if restore else self._keep()
 
     def _restore(self) -> None:
         present = np.flatnonzero(self.present)
@@ -109,5 +97,6 @@ class FullPhysics(Physics):
     def _remove(self, item: int) -> None:
         self._park(self._bodies[item])
 
-    def _positions(self) -> np.ndarray:
+    def positions(self) -> np.ndarray:
+        self._check_filled()
         return np.array([position for position, _ in self._poses])

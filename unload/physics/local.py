@@ -16,10 +16,8 @@ class LocalPhysics(Physics):
 
     The chosen box and all that rests on it are free to move; what they stand on, their
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
-    A failed lift has no effect on the container (Sec. III-D).
-
-    Attributes:
-        surroundings: the situations of the load's items.
+    A failed lift has no effect on the container (Sec. III-D). ``surroundings`` holds the
+    situations of the load's items.
     """
 
     def simulate(self, situation: Situation) -> float:
@@ -39,17 +37,10 @@ class LocalPhysics(Physics):
 
 
 def lift(world: World, situation: Situation) -> float:
-    """Pull the chosen box of a situation; return how far it moved, in m.
+    """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
 
-    The chosen box and all that rests on it are free to move, the rest is fixed. The world
-    is left empty, and what was lifted in it before makes no difference, not in one bit.
-
-    Args:
-        world: an empty one.
-        situation: the box and its surroundings.
-
-    Returns:
-        Distance in m, rounded to whole micrometres.
+    The chosen box and all that rests on it are free to move, the rest is fixed. The world is
+    empty before and after, and what was lifted in it before makes no difference, not in one bit.
     """
     bodies: list[int] = []
     try:

@@ -49,16 +49,12 @@ class Situation:
 class Surroundings:
     """The situations of all boxes of a load, while it is unloaded.
 
-    The load knows which boxes touch; picks only take boxes away.
-
-    Attributes:
-        load: the load.
-        present: (n,) bool, False for boxes that have been removed. Owned by the caller.
+    The load knows which boxes touch; picks only take boxes away: ``present``, (n,) bool and owned
+    by the caller, is False for those.
     """
 
     def __init__(self, load: Load, present: np.ndarray) -> None:
-        self.load = load
-        self.present = present
+        self.load, self.present = load, present
         self._geometry = np.hstack([load.positions, load.sizes])
         self._low = load.positions - load.sizes / 2
         self._high = load.positions + load.sizes / 2

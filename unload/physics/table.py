@@ -9,6 +9,8 @@ others on top is held down.
 import errno
 import json
 import logging
+from contextlib import closing, suppress
+from dataclasses import asdict
 from functools import cache
 from hashlib import blake2b
 from pathlib import Path
@@ -44,9 +46,8 @@ def _free_lift() -> float:
 
 
 # How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
-# whatever the box's size and neighbours: a load's boxes overlap by a micrometre at most, and
-# physics makes them a millimetre narrower. It would not hold for neighbours that overlap by more
-# than this millimetre: they would rub, and hold the box.
+# whatever its size and neighbours, because physics makes boxes a millimetre narrower. Neighbours
+# that overlap by more than that, as those of no load do, would rub, and hold the box.
 FREE_LIFT = _free_lift()
 
 
@@ -56,10 +57,9 @@ class LiftTable:
     A hash table in two arrays, so that compiled code can look into it, too. Among a
     million situations two share a 64-bit digest with a probability of 3e-8.
 
-    Any number of threads may find and add at the same time, as those of a Dask worker do. Only
-    adding takes a lock: a distance is written before the digest that leads to it, and arrays that
-    are too small are replaced, both at once, so that whoever still reads the old ones misses a new
-    entry at most.
+    Any number of threads may find and add at the same time. Only adding takes a lock: a distance
+    is written before the digest that leads to it, and arrays that are too small are replaced, both
+    at once, so that whoever still reads the old ones misses a new entry at most.
 
     Attributes:
         slots: digests, (n,) uint64, 0 in free slots, and their distances in micrometres,
@@ -84,12 +84,7 @@ class LiftTable:
         return int(micrometres[slot]) / 1e6 if digests[slot] == digest else None
 
     def add(self, situation: Situation, distance: float) -> None:
-        """Remember a lift. A situation that is known keeps its distance.
-
-        Args:
-            situation: of the box.
-            distance: how far it moved in m, kept in whole micrometres.
-        """
+        """Remember a distance in m, to the micrometre. A situation that is known keeps its own."""
         digest = _digest(situation)
         with self._adding:
             digests, micrometres = self.slots
@@ -124,34 +119,19 @@ class LiftTable:
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.entries()
-        samples = [
-            {
-                "boxes": each.boxes.tolist(),
-                "dynamic": each.dynamic,
-                "floor": each.floor,
-                "sides": each.sides,
-            }
-            for each in self.samples.values()
-        ]
+        samples = [asdict(situation) for situation in self.samples.values()]
         arrays = {
             "digests": digests,
             "micrometres": micrometres,
             "settings": np.array(json.dumps(SETTINGS)),
-            "samples": np.array(json.dumps(samples)),
+            "samples": np.array(json.dumps(samples, default=np.ndarray.tolist)),
         }
         # A link to a file that several runs share stays one.
         files.write_arrays(Path(path).resolve(), arrays | {"digest": _digest_of_file(arrays)})
 
     @classmethod
     def load(cls, path: str | Path) -> "LiftTable":
-        """Read a table that ``save`` wrote.
-
-        Raises:
-            FileNotFoundError: there is no such file.
-            ValueError: the file is damaged, or was made with other physics settings.
-        """
-        if Path(path).exists() and not Path(path).is_file():  # to read a pipe would take for ever
-            raise ValueError(f"{path} is no file; expected a lift table")
+        """Read a table that ``save`` wrote; ValueError if damaged or of other physics settings."""
         arrays = files.read_arrays(path)
         if set(arrays) != ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
@@ -167,19 +147,13 @@ class LiftTable:
         table = cls()
         table._hold(arrays["digests"], arrays["micrometres"])
         for each in json.loads(str(arrays["samples"])):
-            boxes, sides = np.array(each["boxes"], np.int32), tuple(each["sides"])
-            situation = Situation(boxes, each["dynamic"], each["floor"], sides)
+            situation = Situation(**each | {"boxes": np.array(each["boxes"], np.int32)})
             table._take_samples({int(_digest(situation)): situation})
         return table
 
     def check(self, path: str | Path) -> None:
-        """Simulate the samples again, where PyBullet is installed.
-
-        Raises:
-            ValueError: they move otherwise; the message names ``path``, from where they are.
-        """
-        local = LocalPhysics()
-        try:
+        """Simulate the samples of ``path`` again, where PyBullet is; ValueError if they differ."""
+        with closing(LocalPhysics()) as local, suppress(ModuleNotFoundError):
             for situation in self.samples.values():
                 known, distance = self.find(situation), local.simulate(situation)
                 if known is None or abs(known - distance) > CLOSE:
@@ -187,10 +161,6 @@ class LiftTable:
                         f"{path} says that a box moves by {known} m, PyBullet that it "
                         f"moves by {distance} m. Remove it to fill a new one"
                     )
-        except ModuleNotFoundError:
-            return
-        finally:
-            local.close()
 
     def exchange(self, path: str | Path) -> None:
         """Take in the lifts of a file, and write those that it lacks; it may be missing.
@@ -209,23 +179,20 @@ class LiftTable:
             raise ValueError(f"{path} is no name of a lift table; expected one that ends in .npz")
         try:
             with files.locked(f"{path}.lock", wait=True):
-                self._exchange(path)
+                stored = LiftTable.load(path) if path.exists() else LiftTable()
+                stored.check(path)
+                with self._adding:
+                    both = zip(self.entries(), stored.entries())
+                    digests, micrometres = map(np.concatenate, both)
+                    digests, first = np.unique(digests, return_index=True)
+                    self._hold(digests, micrometres[first])
+                    self._take_samples(stored.samples)
+                if len(self) > len(stored):
+                    self.save(path)
         except OSError as error:
             if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                 raise
             LOGGER.warning("lifts are kept in memory only: %s", error)
-
-    def _exchange(self, path: Path) -> None:
-        stored = LiftTable.load(path) if path.exists() else LiftTable()
-        stored.check(path)
-        with self._adding:
-            digests, micrometres = map(np.concatenate, zip(self.entries(), stored.entries()))
-            digests, first = np.unique(digests, return_index=True)
-            if len(digests) > self._count:
-                self._hold(digests, micrometres[first])
-            self._take_samples(stored.samples)
-        if len(digests) > len(stored):
-            self.save(path)
 
 
 class TablePhysics(LocalPhysics):
@@ -238,16 +205,11 @@ class TablePhysics(LocalPhysics):
     Args:
         table: filled as situations are met. Share one among environments to share their
             experience; one of its own if None.
-
-    Raises:
-        TypeError: ``table`` is something else.
     """
 
     def __init__(self, table: LiftTable | None = None) -> None:
         super().__init__()
         self.table = LiftTable() if table is None else table
-        if not isinstance(self.table, LiftTable):
-            raise TypeError(f"table is {table!r}; expected a LiftTable or None")
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
@@ -275,10 +237,8 @@ def _digest(situation: Situation) -> np.uint64:
 
 def _digest_of_file(arrays: dict[str, np.ndarray]) -> np.ndarray:
     """Digest of the arrays of a file, (32,) uint8, in the order of their names."""
-    found = blake2b(digest_size=32)
-    for name in sorted(arrays):
-        found.update(arrays[name].tobytes())
-    return np.frombuffer(found.digest(), np.uint8)
+    content = b"".join(arrays[name].tobytes() for name in sorted(arrays))
+    return np.frombuffer(blake2b(content, digest_size=32).digest(), np.uint8)
 
 
 @compiled

@@ -8,10 +8,11 @@ import pandas as pd
 import pytest
 
 from studies.lifts import agreement
+from studies.policies.robustness import front_walls
 from studies.provenance import read_provenance
 from studies.statistics import share_interval
 from unload import policies
-from unload.load.substacks import front_walls, stack_load
+from unload.load.substacks import stack_load
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,11 @@ from PIL import Image
 
 from studies import paths
 from studies.paper import animation
+from studies.policies.robustness import front_walls
 from tests.agent.networks import lowest
 from unload import policies
 from unload.load import picture
-from unload.load.substacks import front_walls, stack_load
+from unload.load.substacks import stack_load
 
 
 def small(rng):

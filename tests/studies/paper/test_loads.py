@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from studies.paper.loads import wall_view
+from studies.policies.robustness import front_walls
 from unload.load.picture import COLOURS
-from unload.load.substacks import front_walls, stack_load
+from unload.load.substacks import stack_load
 
 
 @pytest.fixture

@@ -7,12 +7,14 @@ import pandas as pd
 import pytest
 
 from studies.policies import robustness
+from studies.policies.robustness import FRONT_WALLS, front_walls
 from studies.provenance import read_provenance
 from tests.agent.networks import lowest
-from unload import policies
+from unload import policies, task
 from unload.agent.evaluation import evaluate
+from unload.env.observation import nearest
 from unload.load.boxes import Load
-from unload.load.substacks import front_walls, stack_load
+from unload.load.substacks import stack_load
 from unload.physics.bullet import World
 
 
@@ -69,3 +71,17 @@ def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(robustness, "play", other)
     with pytest.raises(pytest.fail.Exception, match="played again"):
         robustness.robustness_data(tmp_path, tmp_path / "runs")
+
+
+def test_front_walls_keep_their_place(full_load):
+    front, kept = front_walls(full_load, 3), full_load.walls >= 9
+    for name in ("positions", "sizes", "packages", "walls"):
+        assert (getattr(front, name) == getattr(full_load, name)[kept]).all()
+    assert (front_walls(front, 2).positions == front_walls(full_load, 2).positions).all()
+
+
+def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
+    for _ in range(50):
+        load = stack_load(rng)
+        seen = nearest(load.positions, task.N_VISIBLE + robustness.PICKS)
+        assert load.walls[seen].min() > 12 - FRONT_WALLS
