@@ -47,7 +47,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
     "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, fresh.OPTIONS),
-    "jams": ("jams in seamless walls, every box simulated", jam_tables.jams_data, JOBS),
+    "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
     "heap": ("heaps, of which a rake picks several boxes at once", heap, JOBS),

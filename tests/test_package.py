@@ -20,7 +20,7 @@ LIBRARIES = {
     "PIL": ("unload/load/", "studies/paper/"),
     "anywidget": ("studies/play/",),
     "gymnasium": (
-        "unload/__init__.py", "unload/env/", "unload/agent/", "studies/heap/", 
+        "unload/__init__.py", "unload/env/", "unload/agent/", "studies/heap/", "studies/lifts/",
         "studies/paper/",
     ),
     "ipywidgets": ("studies/play/",),
@@ -43,7 +43,7 @@ LIBRARIES = {
         "studies/falls/", "studies/heap/",
     ),
     "tqdm": (
-        "unload/agent/training.py", "studies/results.py", "studies/sweep.py", 
+        "unload/agent/training.py", "studies/results.py", "studies/sweep.py", "studies/lifts/",
     ),
     "traitlets": ("studies/play/",),
 }  # fmt: skip

@@ -9,11 +9,13 @@ import pandas as pd
 
 from studies import paths
 from studies.results import COMMAND, keep_all, publish, read_table
-from studies.seamless import jams
+from studies.seamless import episodes, jams
 from studies.seamless.jams import Case
 from unload import task
+from unload.agent.identity import identity
 
 PART = "jams"
+OUT_STEP = 25  # boxes taken out, between two rows of an episode
 # Of a case, by its column; ``moment`` counts the boxes that were taken out before the lifts.
 COLUMNS = {
     "walls": "walls", "load": "load", "friction": "friction", "gap": "gap", "spread": "spread",
@@ -87,6 +89,55 @@ def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
             "newly_jammed": int((~group["was"] & group["is"]).sum()),
         })  # fmt: skip
     return rows
+
+
+def episodes_data(
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
+) -> None:
+    """Play the episodes of ``episodes.cases``; write ``seamless/jam_episodes.csv``.
+
+    A row per episode and 25 boxes taken out: the load and its ``walls``, ``friction`` and ``gap``,
+    the ``policy``, ``after_pick``, ``out`` (0, 25, 50 …), and of the ``attempts`` at free boxes
+    those that ``jammed``.
+    """
+    cases, code = list(episodes.cases()), identity(episodes.episode)
+    jobs = []
+    for case, policy, after_pick in cases:
+        question = {"case": asdict(case), "policy": policy, "after_pick": after_pick, "code": code}
+        jobs.append((question, partial(episodes.episode, case, policy, after_pick)))
+    results = keep_all(Path(runs_dir) / "seamless/episodes", jobs, n_jobs)
+    rows = []
+    for each, result in zip(cases, results):
+        rows += episode_rows(*each, result.value)
+    tables, command = {"jam_episodes": pd.DataFrame(rows)}, f"{COMMAND} {PART}"
+    settings = {"episodes": len(cases)}
+    publish(Path(folder) / "seamless", "jam_episodes", tables, command, settings, results)
+
+
+def episode_rows(case: Case, policy: str, after_pick: str, attempts: list[dict]) -> list[dict]:
+    """The rows of an episode in ``jam_episodes.csv``."""
+    table = pd.DataFrame(attempts)
+    jammed = table["distance"] < task.LIFT_THRESHOLD
+    counts = jammed.groupby(table["out"] // OUT_STEP * OUT_STEP).agg(["size", "sum"])
+    about = {"load": case.load, "walls": case.walls, "friction": case.friction, "gap": case.gap}
+    about |= {"policy": policy, "after_pick": after_pick}
+    return [
+        {**about, "out": int(out), "attempts": int(size), "jammed": int(count)}
+        for out, size, count in counts.itertuples()
+    ]
+
+
+def read_episodes(folder: str | Path = paths.DATA) -> pd.DataFrame:
+    """Jams along episodes, see ``episodes_data``."""
+    columns = ["load", "walls", "friction", "gap", "policy", "after_pick"]
+    columns += ["out", "attempts", "jammed"]
+    return read_table(Path(folder) / "seamless/jam_episodes.csv", f"{COMMAND} {PART}", columns)
+
+
+def both_data(n_jobs: int = -1) -> None:
+    """Make the data of single lifts and of episodes."""
+    jams_data(n_jobs=n_jobs)
+    episodes_data(n_jobs=n_jobs)
 
 
 def read_jams(folder: str | Path = paths.DATA) -> pd.DataFrame:

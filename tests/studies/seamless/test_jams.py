@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from studies.seamless import jam_tables, jams
+from studies.seamless import episodes, jam_tables, jams
 from studies.seamless.jams import Case
 from unload import task
 from unload.load.boxes import ABOVE
@@ -99,3 +99,28 @@ def test_each_question_has_its_cases():
     assert len(found) == len(fresh) == wanted
     questions = [str(jams.question(*case)) for case in cases]
     assert len(set(questions)) == len(cases)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after_pick", episodes.AFTER_PICK)
+def test_an_episode_takes_out_what_is_lifted(monkeypatch, after_pick):
+    monkeypatch.setattr(episodes, "CONTAINER_ATTEMPTS", 15)
+    rows = episodes.episode(Case(0, walls=1, friction=0.64), "highest", after_pick)
+    lifted = np.array([row["distance"] >= task.LIFT_THRESHOLD for row in rows])
+    out = np.array([row["out"] for row in rows])
+    assert 0 < lifted.sum() < len(rows) == 15
+    assert (np.diff(out) == lifted[:-1]).all() and out[0] == 0
+    boxes = np.array([row["box"] for row in rows])
+    assert len(np.unique(boxes[lifted])) == lifted.sum()  # none twice
+    for success in np.flatnonzero(lifted):  # nor a jammed one before the next success
+        since = boxes[out == out[success]]
+        assert len(np.unique(since)) == len(since)
+
+
+def test_jams_of_an_episode_are_counted_by_what_was_taken_out():
+    attempts = [{"out": out, "distance": 0.3 * (out % 2)} for out in (0, 1, 24, 25, 49, 50)]
+    rows = jam_tables.episode_rows(Case(3, friction=1.0), "random", "keep", attempts)
+    assert [(row["out"], row["attempts"], row["jammed"]) for row in rows] == [
+        (0, 3, 2), (25, 2, 0), (50, 1, 1)
+    ]  # fmt: skip
+    assert (rows[0]["load"], rows[0]["friction"], rows[0]["policy"]) == (3, 1.0, "random")
