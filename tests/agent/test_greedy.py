@@ -122,6 +122,7 @@ def test_weights_of_others_are_refused(tmp_path, name):
         ("network", "n_features", 9),
         ("network", "n_features", "many"),
         ("network", "n_features", 0),
+        ("network", "n_features", 10**9),  # 28 GB, if it were built
         ("policy", "equalize", "maybe"),
         ("policy", "ties", "coin"),
     ],

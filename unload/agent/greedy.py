@@ -168,6 +168,9 @@ def policy_of(
         names = {kind.__name__: name for name, kind in NETWORKS.items()}
         if settings["network"] not in names:
             raise ValueError(f"it is of a {settings['network']}; expected one as network, too")
+        weights = sum(tensor.numel() for tensor in tensors.values())
+        if settings["n_features"] > weights:  # else a forged file is built until memory is full
+            raise ValueError(f"its n_features is {settings['n_features']}, of {weights} weights")
         network = make_network(names[settings["network"]], settings["n_features"])
     elif _kind(network) != settings["network"]:
         raise ValueError(f"it is of a {settings['network']}; expected one, not {_kind(network)}")

@@ -231,7 +231,8 @@ def train(
     from its last checkpoint. A finished run is not repeated. The same configuration gives the
     same bits on all x86-64 processors with AVX2, with AVX-512 or without; a run on another one
     warns. The updates use ``torch.get_num_threads()`` threads; with the paper's network they go
-    on while the environments step, and the result does not depend on the number of threads.
+    on while the environments step, and the result does not depend on the number of threads. With
+    another network it may, because PyTorch then adds up in another order (``"attention"`` does).
 
     A checkpoint is written every ``config.checkpoint_interval`` seconds, on Ctrl-C, which pressed
     again stops at once, and after an error in ``callback``. It holds all that the run is, also
