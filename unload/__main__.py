@@ -22,6 +22,8 @@ options are the fields of unload.TrainConfig, whose defaults are the paper's; * 
 those that are the package's own choice.
 """
 
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a formula in a spreadsheet begins with
+
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line with these arguments, those of the process if None."""
@@ -46,12 +48,18 @@ def print_order(arguments: list[str]) -> None:
     try:
         load = read_load(options.list)
         order = picking_order(load, options.policy)
+        order["id"] = order["id"].map(_as_text)
         order.to_csv(options.output, index=False, float_format="%.6f")
     except (ImportError, OSError, ValueError) as error:  # ImportError: of PyBullet
         parser.exit(1, f"{error}\n")
     left = len(load) - order["unloaded"].sum()
     if left:
         parser.exit(1, f"{left} boxes are left, of which none that is visible can be lifted\n")
+
+
+def _as_text(cell):
+    """An id that a spreadsheet would take for a formula, with an apostrophe before it."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
 
 
 def train_by(arguments: list[str]) -> None:

@@ -90,6 +90,14 @@ def test_the_command_line_prints_the_order_as_csv(capsys, tmp_path):
     assert capsys.readouterr() == ("", "")
 
 
+def test_no_id_becomes_a_formula_in_a_spreadsheet(capsys, tmp_path):
+    lines = ["id,x,y,z,size_x,size_y,size_z", "=HYPERLINK(0),1,1,0.5,1,1,1", "a-1,3,1,0.5,1,1,1"]
+    (tmp_path / "boxes.csv").write_text("\n".join(lines))
+    command.main([str(tmp_path / "boxes.csv"), "--policy", "highest"])
+    ids = pd.read_csv(io.StringIO(capsys.readouterr().out))["id"]
+    assert sorted(ids) == ["'=HYPERLINK(0)", "a-1"]
+
+
 def test_the_command_line_says_what_is_wrong(tmp_path, capsys, monkeypatch):
     (tmp_path / "boxes.csv").write_text("x_min,y_min,z_min,size_x,size_y,size_z\n0,0,1,1,1,1\n")
     done = subprocess.run(

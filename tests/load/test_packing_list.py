@@ -105,7 +105,10 @@ def test_files_that_are_no_lists_are_refused(written, tmp_path):
             read_load(written("a,1", columns=columns))
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\xff\xfe")
     (tmp_path / "empty.csv").write_bytes(b"")
-    for name in ("picture.csv", "empty.csv"):
+    archives = [f"boxes.csv{ending}" for ending in (".zip", ".gz", ".xz", ".zst", ".bz2")]
+    for name in archives:  # damaged: the beginning of one, and then nothing
+        (tmp_path / name).write_bytes(b"PK\x03\x04\x1f\x8b\xfd7zXZ\x00(\xb5/\xfd")
+    for name in ("picture.csv", "empty.csv", *archives):
         with pytest.raises(ValueError, match=f"{name} is not a readable CSV file"):
             read_load(tmp_path / name)
     with pytest.raises(FileNotFoundError):

@@ -47,7 +47,10 @@ def read_load(path: str | Path = EXAMPLE) -> Load:
     """
     path = checks.path("path", path)
     try:
-        table = pd.read_csv(path, dtype=str, skipinitialspace=True, keep_default_na=False)
+        # Nothing is unpacked by its ending: a damaged archive is no CSV file, like any other.
+        table = pd.read_csv(
+            path, dtype=str, skipinitialspace=True, keep_default_na=False, compression=None
+        )
     except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} is not a readable CSV file: {error}") from error
     if not isinstance(table.index, pd.RangeIndex):  # pandas takes what is too much for an index
