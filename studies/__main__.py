@@ -46,7 +46,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
-    "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, fresh.OPTIONS),
+    "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, JOBS),
     "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),

@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import torch
 
@@ -20,6 +19,7 @@ from studies.falls.laboratory import (
     AVERAGED,
     CONFIG,
     JUDGED,
+    SEEN,
     SLOPES,
     TAKEN_BACK,
     point,
@@ -27,7 +27,7 @@ from studies.falls.laboratory import (
 )
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, keep_all, publish, read_table
+from studies.results import COMMAND, keep_all, publish, read_table
 from studies.statistics import end_msr
 from unload.agent.config import TrainConfig
 from unload.agent.identity import identity, unchanged
@@ -97,11 +97,6 @@ CELLS: dict[str, Cell] = {
 COLUMNS = ["cell", "seed", "end", *JUDGED, "judged_averaged_x", *SLOPES]
 
 
-def averaged_x(observations: np.ndarray) -> np.ndarray:
-    """Ranks of positions, of which equal x share one."""
-    return changes.ranked(observations, (0,))
-
-
 def run_cell(cell: str, seed: int) -> dict:
     """Train and measure a run: a row of ``COLUMNS``."""
     config, points = replace(CELLS[cell].config, seed=seed), []
@@ -111,7 +106,7 @@ def run_cell(cell: str, seed: int) -> dict:
     for name, blank in zip(JUDGED, measures.BLANKED.values()):
         row[name] = measures.judged(network, config, blank)
     positions = replace(config, equalize=False)  # they are ranked after the environment
-    row["judged_averaged_x"] = measures.judged(network, positions, seen=averaged_x)
+    row["judged_averaged_x"] = measures.judged(network, positions, seen=SEEN["averaged_x"])
     return row | {name: points[-1][name] for name in SLOPES}
 
 
@@ -128,13 +123,13 @@ def fresh_data(
         runs_dir: where finished runs are kept.
         n_jobs: processes, as in joblib.
     """
-    fingerprint, jobs = training_fingerprint(), []
+    fingerprint, measured, jobs = training_fingerprint(), identity(run_cell), []
     for name, cell in CELLS.items():
         for seed in cell.seeds:
             question = {
                 "cell": name,
                 "change": identity(cell.change),
-                "measured": identity(run_cell),
+                "measured": measured,
                 "fingerprint": fingerprint,
                 **replace(cell.config, seed=seed).plain(),
             }
@@ -164,6 +159,3 @@ def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:
     along_x, along_y = THRESHOLDS
     side = along["slope_y"] > along_y
     return side if config.ties == "average" else side | (along["slope_x"] > along_x)
-
-
-OPTIONS = JOBS

@@ -3,7 +3,7 @@
     python -m studies jams
 
 A box is free if nothing rests on it; it jams if it is lifted by less than 0.2 m all the same. What
-a case varies stands in ``Case``, the cases in ``CASES``.
+a case varies stands in ``Case``, the cases in ``cases``.
 """
 
 from collections.abc import Callable, Iterator
