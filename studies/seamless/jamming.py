@@ -11,6 +11,7 @@ import numpy as np
 from unload import task
 from unload.agent.training import Training
 from unload.fast import containers
+from unload.load.boxes import BESIDE, CONTACT_TOLERANCE
 
 # The mixing constants of SplitMix64, which makes well-distributed numbers of counters.
 STEP, FIRST, SECOND = (
@@ -37,7 +38,8 @@ def jam(run: Training, share: float, lasts: int = 0) -> None:
 
     Args:
         run: in containers with loads.
-        share: j, of the boxes that a lift would unload.
+        share: j, of the boxes that a lift would unload; or (num_envs,) float64, one for the box
+            that is picked in each container, read at each attempt.
         lasts: successful picks of its container after which it is drawn again whether a box jams;
             each box has a moment of its own in that period. 1: until the next success. 0: it is
             drawn anew at each attempt.
@@ -61,6 +63,60 @@ def jam(run: Training, share: float, lasts: int = 0) -> None:
         return items, distances
 
     envs._look_up = look_up_jammed
+
+
+def jam_by_place(run: Training, shares: np.ndarray, lasts: int) -> None:
+    """Let free boxes jam as often as was measured where they stand, see ``jams.place``.
+
+    Args:
+        run: as in ``jam``.
+        shares: (2, 4) float64, by whether a box stands in front, and by the number of boxes that
+            touch the sides (3 or more are one).
+        lasts: as in ``jam``; in between a jam ends where the box has lost its neighbours.
+    """
+    envs = run.rollout.envs.unwrapped
+    share = np.zeros(run.config.num_envs)
+    jam(run, share, lasts)
+    look_up, rows = envs._look_up, np.arange(len(share))
+
+    def look_up_in_place(actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        items = np.maximum(envs._containers.visible[rows, actions], 0)  # -1 is nobody
+        covered, beside = neighbours(envs._containers, items)
+        share[:] = np.asarray(shares)[covered, np.minimum(beside, 3)]
+        return look_up(actions)
+
+    envs._look_up = look_up_in_place
+
+
+def neighbours(state: containers.Containers, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The present boxes that touch an item in each container.
+
+    Args:
+        state: of the containers.
+        items: (num_envs,) int64.
+
+    Returns:
+        (num_envs,) int64, 1 if one touches the face towards the door, otherwise 0; and (num_envs,)
+        int64, how many touch the two faces along y.
+    """
+    rows = np.arange(len(items))
+    present, own = state.present.astype(bool), state.geometry[rows, items]
+    # Few boxes begin at the depth where this one ends; only their other sides are looked at.
+    begin = state.geometry[..., 0] - state.geometry[..., 3] / 2
+    end = own[:, 0] + own[:, 3] / 2
+    envs, boxes = np.nonzero(present & (np.abs(begin - end[:, None]) <= CONTACT_TOLERANCE))
+    front = state.geometry[envs, boxes]
+    apart = np.abs(front[:, 1:3] - own[envs, 1:3])
+    reach = (front[:, 4:] + own[envs, 4:]) / 2
+    covered = np.zeros(len(items), np.int64)
+    covered[envs[(apart < reach - CONTACT_TOLERANCE).all(axis=1)]] = 1
+
+    first, stop = state.starts[rows, BESIDE, items], state.starts[rows, BESIDE, items + 1]
+    places = first[:, None] + np.arange((stop - first).max(initial=0))
+    listed = places < stop[:, None]
+    others = state.links[rows[:, None], np.where(listed, places, 0)]
+    beside = listed & present[rows[:, None], others]
+    return covered, beside.sum(axis=1)
 
 
 def weigh(run: Training, z: float, change: Callable[[Training], None] | None = None) -> None:

@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from studies.falls.laboratory import CONFIG
-from studies.seamless.jamming import jam, uniform, weigh
+from studies.seamless.jamming import jam, jam_by_place, neighbours, uniform, weigh
+from studies.seamless.jams import place
 from unload import task
 from unload.agent.training import Training, train_changed
 from unload.env.observation import nearest
+from unload.load.boxes import Load
 
 SMALL = replace(CONFIG, picks=64 * 500, log_interval=500, seed=3, mask=False)
 
@@ -156,3 +158,37 @@ def test_random_picks_succeed_less_often_with_weight_one(random_run):
     assert run.curve.table()["success_rate"].iloc[0] == pytest.approx(
         0.18, abs=0.01
     )  # 0.264 with the paper's 4
+
+
+def test_neighbours_are_those_of_the_measured_places(random_run):
+    run = random_run(lambda run: None)
+    for _ in range(40):
+        run.step()
+    envs = run.rollout.envs.unwrapped
+    state, seen = envs._containers, set()
+    for row in range(0, 128, 9):
+        items = state.visible[:, row].astype(np.int64)
+        covered, beside = neighbours(state, items)
+        for env in range(0, 64, 7):
+            count = int(np.flatnonzero(state.present[env])[-1]) + 1
+            boxes = state.geometry[env, :count]
+            walls = np.unique(boxes[:, 0] - boxes[:, 3] / 2, return_inverse=True)[1]
+            load = Load(boxes[:, :3], boxes[:, 3:], np.zeros(count, int), walls)
+            found = place(load, state.present[env, :count].astype(bool), int(items[env]))
+            assert (covered[env], beside[env]) == (found["covered"], found["beside"])
+            seen.add((found["covered"], found["beside"]))
+    assert len(seen) >= 6
+
+
+def test_boxes_jam_by_their_places(random_run):
+    shares = np.zeros((2, 4))
+    shares[1, 2] = 1.0
+    plain = random_run(lambda run: None)
+    jammed = random_run(partial(jam_by_place, shares=shares, lasts=20))
+    state = plain.rollout.envs.unwrapped._containers
+    for row in range(0, 128, 5):
+        covered, beside = neighbours(state, state.visible[:, row].astype(np.int64))
+        free = attempts(plain, row) >= task.LIFT_THRESHOLD
+        held = (covered == 1) & (beside == 2)
+        lifted = attempts(jammed, row) >= task.LIFT_THRESHOLD
+        assert (lifted == (free & ~held)).all()
