@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from studies.statistics import PAPER_MSR, end_msr
+from studies.statistics import PAPER_MSR
 from studies.style import styled
 
 PAPER_START = 0.15  # MSR at the start of its Fig. 12
@@ -92,28 +92,12 @@ def draw_run(
         axes.plot(picks, smooth, colour, linestyle=line, linewidth=1.8, label=name, zorder=3)
 
 
-def start_and_end(runs: pd.DataFrame) -> pd.DataFrame:
-    """MSR of each run over its first episode of all containers, and over its last tenth.
-
-    Args:
-        runs: of ``read_grid``.
-
-    Returns:
-        ``cell``, ``seed``, ``start`` and ``end``.
-    """
-    rows = [
-        {"cell": cell, "seed": seed, "start": run["success_rate"].iloc[0], "end": end_msr(run)}
-        for (cell, seed), run in runs.groupby(["cell", "seed"], sort=False)
-    ]
-    return pd.DataFrame(rows)
-
-
 @styled
 def draw_start_and_end(groups: Mapping[str, tuple[pd.DataFrame, dict]]) -> Figure:
     """Where runs start and end, the paper's point, and what a share of jammed boxes allows.
 
     Args:
-        groups: rows of ``start_and_end`` and the look of their dots, by their names.
+        groups: rows of ``verdicts.by_run`` and the look of their dots, by their names.
     """
     figure, axes = plt.subplots(figsize=(5.6, 4.2))
     shares = np.linspace(0, 0.8, 81)

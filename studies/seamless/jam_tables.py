@@ -23,6 +23,8 @@ COLUMNS = {
     "iterations": "iterations", "maximal": "maximal",
 }  # fmt: skip
 PLACE = ["friction", "wall", "edge", "covered", "beside"]
+FEW_BESIDE = 3  # so many neighbours or more are one class along episodes
+BETWEEN = (0, 1, 2, 4, 7, 13, 26)  # successes between two attempts at a jammed box, from
 
 
 def jams_data(
@@ -94,11 +96,15 @@ def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
 def episodes_data(
     folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
-    """Play the episodes of ``episodes.cases``; write ``seamless/jam_episodes.csv``.
+    """Play the episodes of ``episodes.cases``; write three tables in ``seamless/``.
 
-    A row per episode and 25 boxes taken out: the load and its ``walls``, ``friction`` and ``gap``,
-    the ``policy``, ``after_pick``, ``out`` (0, 25, 50 …), and of the ``attempts`` at free boxes
-    those that ``jammed``.
+    ``jam_episodes.csv`` has a row per episode and 25 boxes taken out: the load and its ``walls``,
+    ``friction`` and ``gap``, the ``policy``, ``after_pick``, ``out`` (0, 25, 50 …), and of the
+    ``attempts`` at free boxes those that ``jammed``. The others are of the seamless three walls
+    whose poses are restored. ``jam_first.csv`` counts the first attempts at each box by
+    ``friction``, ``covered`` and ``beside``, see ``jams.place``. ``jam_again.csv`` counts the
+    attempts of the random policy at boxes that have jammed, by ``friction`` and the successes
+    ``between``; ``neighbours`` is how many would jam by the table of first attempts alone.
     """
     cases, code = list(episodes.cases()), identity(episodes.episode)
     jobs = []
@@ -106,10 +112,19 @@ def episodes_data(
         question = {"case": asdict(case), "policy": policy, "after_pick": after_pick, "code": code}
         jobs.append((question, partial(episodes.episode, case, policy, after_pick)))
     results = keep_all(Path(runs_dir) / "seamless/episodes", jobs, n_jobs)
-    rows = []
-    for each, result in zip(cases, results):
-        rows += episode_rows(*each, result.value)
-    tables, command = {"jam_episodes": pd.DataFrame(rows)}, f"{COMMAND} {PART}"
+    rows, attempts = [], []
+    for (case, policy, after_pick), result in zip(cases, results):
+        rows += episode_rows(case, policy, after_pick, result.value)
+        if case.walls == 3 and case.gap == 0 and after_pick == "restore":
+            about = {"load": case.load, "friction": case.friction, "policy": policy}
+            attempts.append(pd.DataFrame(result.value).assign(**about))
+    attempts = prepared(pd.concat(attempts, ignore_index=True))
+    first = first_attempts(attempts)
+    tables = {
+        "jam_episodes": pd.DataFrame(rows), "jam_first": first,
+        "jam_again": again(attempts[attempts["policy"] == "random"], first),
+    }  # fmt: skip
+    command = f"{COMMAND} {PART}"
     settings = {"episodes": len(cases)}
     publish(Path(folder) / "seamless", "jam_episodes", tables, command, settings, results)
 
@@ -127,11 +142,59 @@ def episode_rows(case: Case, policy: str, after_pick: str, attempts: list[dict])
     ]
 
 
+def prepared(attempts: pd.DataFrame) -> pd.DataFrame:
+    """Attempts in the order of their episodes, with ``jammed`` and ``beside`` in few classes."""
+    return attempts.assign(
+        jammed=attempts["distance"] < task.LIFT_THRESHOLD,
+        beside=attempts["beside"].clip(upper=FEW_BESIDE),
+    )
+
+
+def first_attempts(attempts: pd.DataFrame) -> pd.DataFrame:
+    """``jam_first.csv``, see ``episodes_data``."""
+    first = attempts.drop_duplicates(["load", "friction", "policy", "box"])
+    groups = first.groupby(["friction", "covered", "beside"])["jammed"]
+    return groups.agg(free="size", jammed="sum").reset_index()
+
+
+def again(attempts: pd.DataFrame, first: pd.DataFrame) -> pd.DataFrame:
+    """``jam_again.csv``, see ``episodes_data``.
+
+    Args:
+        attempts: of one policy, see ``prepared``.
+        first: of ``first_attempts``.
+    """
+    share = (first["jammed"] / first["free"]).rename("neighbours")
+    share.index = pd.MultiIndex.from_frame(first[["friction", "covered", "beside"]])
+    table = attempts.join(share, on=share.index.names)
+    before = table.groupby(["load", "friction", "box"])[["out", "jammed"]].shift()
+    table["between"] = table["out"] - before["out"]
+    table = table[before["jammed"].eq(True)]
+    classes = pd.cut(table["between"], [*BETWEEN, np.inf], right=False, labels=BETWEEN)
+    groups = table.groupby(["friction", classes], observed=True)
+    counts = groups.agg(
+        attempts=("jammed", "size"), jammed=("jammed", "sum"), neighbours=("neighbours", "sum")
+    )
+    return counts.reset_index()
+
+
 def read_episodes(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """Jams along episodes, see ``episodes_data``."""
     columns = ["load", "walls", "friction", "gap", "policy", "after_pick"]
     columns += ["out", "attempts", "jammed"]
     return read_table(Path(folder) / "seamless/jam_episodes.csv", f"{COMMAND} {PART}", columns)
+
+
+def read_first(folder: str | Path = paths.DATA) -> pd.DataFrame:
+    """First attempts at each box along episodes by place, see ``episodes_data``."""
+    columns = ["friction", "covered", "beside", "free", "jammed"]
+    return read_table(Path(folder) / "seamless/jam_first.csv", f"{COMMAND} {PART}", columns)
+
+
+def read_again(folder: str | Path = paths.DATA) -> pd.DataFrame:
+    """Attempts at boxes that had jammed, see ``episodes_data``."""
+    columns = ["friction", "between", "attempts", "jammed", "neighbours"]
+    return read_table(Path(folder) / "seamless/jam_again.csv", f"{COMMAND} {PART}", columns)
 
 
 def both_data(n_jobs: int = -1) -> None:

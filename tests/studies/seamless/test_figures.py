@@ -6,7 +6,7 @@ import pytest
 
 from studies.grid import read_grid
 from studies.paper.training import PAPER
-from studies.seamless import figures
+from studies.seamless import figures, verdicts
 
 CELLS = {"with the mask": "paper_b2048_mask", "without the mask": "paper_b2048_no_mask"}
 
@@ -14,16 +14,6 @@ CELLS = {"with the mask": "paper_b2048_mask", "without the mask": "paper_b2048_n
 @pytest.fixture(scope="module")
 def curves() -> pd.DataFrame:
     return read_grid(PAPER, cells=CELLS.values())
-
-
-def test_a_run_starts_in_its_first_episode_and_ends_in_its_last_tenth():
-    msr = [0.2, *[0.5] * 8, 0.8]
-    run = pd.DataFrame({"picks": np.arange(1, 11) * 32_000, "success_rate": msr})
-    runs = pd.concat([run.assign(cell="a", seed=seed) for seed in (1, 2)])
-    rows = figures.start_and_end(runs)
-    assert rows.to_dict("list") == {
-        "cell": ["a", "a"], "seed": [1, 2], "start": [0.2, 0.2], "end": [0.8, 0.8]
-    }  # fmt: skip
 
 
 def test_runs_are_parted_by_the_mask(curves):
@@ -50,9 +40,7 @@ def test_the_papers_start_and_end_are_marked(curves):
 
 
 def test_the_line_of_jams_passes_the_papers_point(curves):
-    axes = figures.draw_start_and_end(
-        {"ours": (figures.start_and_end(curves), {"marker": "o"})}
-    ).axes[0]
+    axes = figures.draw_start_and_end({"ours": (verdicts.by_run(curves), {"marker": "o"})}).axes[0]
     bound, ours, paper = axes.lines
     at_start = np.interp(15, bound.get_xdata()[::-1], bound.get_ydata()[::-1])
     assert at_start == pytest.approx(57.7, abs=0.1) and paper.get_xydata().tolist() == [[15, 60]]

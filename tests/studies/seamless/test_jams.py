@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from studies.seamless import episodes, jam_tables, jams
@@ -124,3 +125,35 @@ def test_jams_of_an_episode_are_counted_by_what_was_taken_out():
         (0, 3, 2), (25, 2, 0), (50, 1, 1)
     ]  # fmt: skip
     assert (rows[0]["load"], rows[0]["friction"], rows[0]["policy"]) == (3, 1.0, "random")
+
+
+def attempt(load, box, out, jammed, covered=False, beside=1) -> dict:
+    """An attempt of the random policy at a friction of 1."""
+    about = {"load": load, "friction": 1.0, "policy": "random", "box": box, "out": out}
+    return about | {"covered": covered, "beside": beside, "distance": 0.0 if jammed else 0.4}
+
+
+def test_first_attempts_are_counted_by_place():
+    rows = [
+        attempt(0, 7, 0, True), attempt(0, 7, 3, False),  # the second one is no first one
+        attempt(1, 7, 0, False), attempt(0, 8, 0, True, True, 5), attempt(0, 9, 0, True, True, 3),
+    ]  # fmt: skip
+    first = jam_tables.first_attempts(jam_tables.prepared(pd.DataFrame(rows)))
+    assert first.to_dict("records") == [
+        {"friction": 1.0, "covered": False, "beside": 1, "free": 2, "jammed": 1},
+        {"friction": 1.0, "covered": True, "beside": 3, "free": 2, "jammed": 2},
+    ]
+
+
+def test_attempts_at_boxes_that_jammed_are_counted_by_the_successes_between():
+    rows = [
+        attempt(0, 7, 0, True), attempt(0, 8, 0, False), attempt(0, 7, 1, True),
+        attempt(0, 9, 1, False), attempt(0, 7, 30, False), attempt(0, 6, 31, True, True, 2),
+        attempt(1, 7, 31, True),
+    ]  # fmt: skip
+    attempts = jam_tables.prepared(pd.DataFrame(rows))
+    found = jam_tables.again(attempts, jam_tables.first_attempts(attempts))
+    assert found["between"].tolist() == [1, 26]
+    assert found["attempts"].tolist() == [1, 1] and found["jammed"].tolist() == [1, 0]
+    # Of the four first attempts with one neighbour two jammed.
+    assert found["neighbours"].tolist() == [0.5, 0.5]
