@@ -1,7 +1,6 @@
-"""Learning curves: of many runs over steps (Figs. 8–10) or picks (Figs. 11 and 12), or of one."""
+"""Learning curves: of many runs over steps (Figs. 8–10), or of one over picks."""
 
 from collections.abc import Collection, Mapping
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from studies import paths
-from studies.paper.training import PAPER, default_curves, episode_means
+from studies.paper.training import episode_means
 from studies.paper.tuning import running_mean
-from studies.style import COLOURS, mark_reduced, styled
+from studies.style import COLOURS, styled
 from unload import task
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
@@ -54,26 +52,6 @@ def colours_of(names: Collection[str]) -> list:
     return [FE_COLOURS.get(name, colour) for name, colour in zip(names, scale)]
 
 
-@styled
-def fig11_loss(folder: str | Path = paths.DATA) -> Figure:
-    """Training loss over picks (Fig. 11), one line per seed; the first one is strong."""
-    losses = {seed: curve["loss"] for seed, curve in default_curves(folder).items()}
-    return _over_picks(losses, r"loss $\ell$", (0, 0.6), folder)
-
-
-@styled
-def fig12_reward(folder: str | Path = paths.DATA) -> Figure:
-    """Mean reward per pick of the 64 environments over picks (Fig. 12).
-
-    Each point is a mean over an episode of all environments. Arguments, lines and errors as in
-    ``fig11_loss``.
-    """
-    rewards = {
-        seed: 2 * curve["success_rate"] - 1 for seed, curve in default_curves(folder).items()
-    }
-    return _over_picks(rewards, r"$r_\mathrm{mean}$", (-1, 1), folder)
-
-
 def draw_learning_curve(
     axes: Axes, curve: pd.DataFrame, name: str, color: str = COLOURS["ranks"]
 ) -> None:
@@ -91,18 +69,3 @@ def draw_learning_curve(
     axes.plot(middle, episodes["success_rate"], "o-", color=color, markersize=3.5, label=name)
     axes.set(xlabel="picks", ylabel="MSR while training", ylim=(0, 1.02), xlim=(0, None))
     axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
-
-
-def _over_picks(
-    curves: dict[int, pd.Series], label: str, limits: tuple[float, float], folder: str | Path
-) -> Figure:
-    figure, axes = plt.subplots()
-    for number, (seed, values) in enumerate(curves.items()):
-        style = {"linewidth": 0.8, "alpha": 0.8} if number else {"zorder": 3}
-        axes.plot(values, color=SEED_COLOURS[number], label=f"seed {seed}", **style)
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=4)
-    end = max(values.index[-1] for values in curves.values())
-    axes.set(xlabel="step $k$ (picks)", ylabel=label, ylim=limits, xlim=(0, end))
-    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
-    mark_reduced(figure, folder, PAPER.name)
-    return figure

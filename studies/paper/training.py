@@ -13,9 +13,8 @@ import pandas as pd
 
 from studies import paths
 from studies.grid import Cell, Grid, read_grid, read_policies, train_grid
-from studies.results import COMMAND, JOBS, write_table
+from studies.results import COMMAND, JOBS
 from unload import task
-from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, save_policy
 from unload.support import files
@@ -65,37 +64,16 @@ def training_data(
     n_jobs: int = -1,
     shipped: str | Path = files.SHIPPED,
 ) -> None:
-    """Train the paper's configuration, see ``train_grid``, and write some of it by other names.
+    """Train the paper's configuration, see ``train_grid``.
 
-    These are what the paper's plots read and, in the folder ``shipped``, the policies that play
-    elsewhere: ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
+    The policies that play elsewhere are written to ``shipped``, too:
+    ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
     """
-    kept = train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs)
+    train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs)
     if picks is None and (cells is None or DEFAULTS in cells):
-        config = replace(PAPER.cells[DEFAULTS].config, seed=DEFAULT_SEEDS[0])
-        run = RunFolder(kept / DEFAULTS / f"seed_{config.seed}")
-        export_training(run.result(config).curve["wall_time"], folder)
         for seed, name in PLAYERS.items():
             policy = default_policies(folder)[seed]
             save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
-
-
-def export_training(wall_time: Sequence[float], folder: str | Path) -> None:
-    """Write the first run as TensorBoard exports it: ``Wall time``, ``Step`` and ``Value``.
-
-    ``loss_function_agent.csv`` has the loss, ``total_rew_function_agent.csv`` the rewards summed
-    over an episode of 500 picks, a mean over the environments; both as they are published.
-
-    Args:
-        wall_time: of each point of its curve, s since the epoch.
-    """
-    curve = default_curves(folder)[DEFAULT_SEEDS[0]].reset_index(drop=True)
-    for name, values in (
-        ("loss_function_agent", curve["loss"]),
-        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
-    ):
-        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
-        write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
 
 
 def paper_runs(folder: str | Path = paths.DATA) -> list[tuple[str, int, pd.DataFrame]]:

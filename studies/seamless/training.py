@@ -10,10 +10,14 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import pandas as pd
+
 from studies import changes, paths
-from studies.grid import Cell, Grid, train_grid
-from studies.results import COMMAND, JOBS
+from studies.grid import Cell, Grid, read_grid, train_grid
+from studies.results import COMMAND, JOBS, write_table
 from studies.seamless.jamming import jam, weigh
+from unload import task
+from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training
 
@@ -61,6 +65,7 @@ CELLS: dict[str, Cell] = {
     "b2048_mask_order": _cell("mask", "order", ANEW, SEEDS, batch_size=2048),
     "b2048_no_mask_order": _cell("no_mask", "order", ANEW, SEEDS, batch_size=2048),
 }
+EXPORTED = "mask_order", 41  # a run that is like the paper's by the plan's measures
 SEAMLESS = Grid("seamless/runs", f"{COMMAND} seamless", CELLS)
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": CELLS},
@@ -76,5 +81,32 @@ def seamless_data(
     runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
 ) -> None:
-    """Train the cells, see ``train_grid``."""
-    train_grid(SEAMLESS, cells, picks, folder, runs_dir, n_jobs)
+    """Train the cells, see ``train_grid``; export the run ``EXPORTED``."""
+    kept = train_grid(SEAMLESS, cells, picks, folder, runs_dir, n_jobs)
+    cell, seed = EXPORTED
+    if picks is None and (cells is None or cell in cells):
+        config, change = replace(CELLS[cell].config, seed=seed), CELLS[cell].change
+        run = RunFolder(kept / f"{cell}/seed_{seed}").result(config, change=change)
+        export(run.curve["wall_time"], folder)
+
+
+def export(wall_time: Sequence[float], folder: str | Path = paths.DATA) -> None:
+    """Write a published run as TensorBoard exports it, which the paper's plots read.
+
+    ``loss_function_agent.csv`` has the loss, ``total_rew_function_agent.csv`` the rewards summed
+    over an episode of 500 picks, a mean over the environments; both have the columns ``Wall time``,
+    ``Step`` and ``Value``.
+
+    Args:
+        wall_time: of each point of its curve, s since the epoch.
+        folder: of the data.
+    """
+    cell, seed = EXPORTED
+    curves = read_grid(SEAMLESS, folder, [cell])
+    curve = curves[curves["seed"] == seed].reset_index(drop=True)
+    for name, values in (
+        ("loss_function_agent", curve["loss"]),
+        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
+    ):
+        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
+        write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")

@@ -30,8 +30,6 @@ RUNS = {"a": ({0: LINE, 3: 2 * LINE}, 3), "with FE": ({1: LINE}, 1)}
 
 # Figures that are drawn from data/, and take its folder.
 FROM_DATA = {
-    "fig11_loss": learning_curves.fig11_loss,
-    "fig12_reward": learning_curves.fig12_reward,
     **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
     "comparison": policies.comparison_msr,
     "why_60": lambda folder=paths.DATA: falls.four_cells(read_grid(PAPER, folder)),
