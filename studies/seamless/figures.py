@@ -9,13 +9,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
+from studies.seamless.training import CELLS
 from studies.statistics import PAPER_MSR
 from studies.style import styled
 
 PAPER_START = 0.15  # MSR at the start of its Fig. 12
 CHANCE = 0.26  # MSR of random picks with a gap of 1 mm
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
+ANEW_CELLS = ("mask", "no_mask", "b2048", "shuffled", "positions")  # drawn anew, with j = 0.4
 SMOOTH = 16  # episodes of all containers, about half a million picks
+
+# Cells of the grid whose runs have one look in ``draw_start_and_end``: name, cells, marker, colour.
+GROUPS = (
+    ("j = 0.4", [name for name in CELLS if name.startswith(ANEW_CELLS)], "s", "C0"),
+    ("j = 0.2", ["share_0.2_mask_order"], "^", "C2"),
+    ("j = 0.3", ["share_0.3_mask_order"], "v", "C2"),
+    ("jams as measured", [name for name in CELLS if name.startswith("measured")], "D", "C4"),
+    ("weight 1 for z", [name for name in CELLS if name.startswith("weight_1")], "P", "C3"),
+)
 
 # Curves of the runs of a panel, by whether the mask is on.
 Panel = Mapping[str, list[pd.DataFrame]]
@@ -61,7 +72,7 @@ def fig12_reward(panels: Mapping[str, Panel]) -> Figure:
     all_axes[-1].annotate(
         "the paper: steady …", (3e6, -0.58), (4.2e6, -0.85), fontsize=8, color="0.25"
     )
-    all_axes[-1].annotate("… then slower and noisier", (12e6, -0.2), fontsize=8, color="0.25")
+    all_axes[-1].annotate("… then slower and noisier", (10.2e6, -0.2), fontsize=8, color="0.25")
     all_axes[0].set(ylabel=r"$r_\mathrm{mean}$", ylim=(-1, 1))
     return figure
 
@@ -77,6 +88,7 @@ def _panels(panels: Mapping[str, Panel], value) -> tuple[Figure, np.ndarray]:
                 draw_run(axes, run["picks"], value(run), colour, MASK_LINES[name], not number, name)
         axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7), xticks=np.arange(5) * 5e6)
         axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+    figure.get_layout_engine().set(wspace=0.06)  # the last tick of a panel, the first of the next
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2)
     return figure, all_axes
@@ -110,7 +122,11 @@ def draw_start_and_end(groups: Mapping[str, tuple[pd.DataFrame, dict]]) -> Figur
             textcoords="offset points", fontsize=8, color="0.4",
         )  # fmt: skip
     for name, (rows, look) in groups.items():
-        axes.plot(100 * rows["start"], 100 * rows["end"], label=name, linestyle="", **look)
+        if rows.empty:  # none of them has been published
+            continue
+        axes.plot(
+            100 * rows["start"], 100 * rows["end"], label=name, linestyle="", alpha=0.7, **look
+        )
     axes.plot(100 * PAPER_START, 100 * PAPER_MSR, "k*", markersize=15, label="the paper")
     axes.set(
         xlabel="MSR over the first episode (%)", ylabel="MSR over the last tenth of the picks (%)",
