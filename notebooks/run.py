@@ -38,7 +38,7 @@ def notebooks() -> list[Path]:
 
 
 def key(notebook: Path) -> str:
-    """A notebook's name in reduced.toml, such as ``03_lifting`` or ``solutions/03_lifting``."""
+    """A notebook's name in reduced.toml, such as ``10_lifting`` or ``solutions/10_lifting``."""
     return notebook.relative_to(HERE).with_suffix("").as_posix()
 
 

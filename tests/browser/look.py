@@ -1,6 +1,6 @@
 """Use notebooks in JupyterLab, and the page that trains, in a browser without a window.
 
-    python tests/browser/look.py               00, 01, 07, 13 and the page
+    python tests/browser/look.py               00, 01, 04, 21 and the page
     python tests/browser/look.py 00 04         notebooks whose names start so
     python tests/browser/look.py page          the page alone
 
@@ -34,7 +34,7 @@ from notebooks import run  # noqa: E402
 
 BUILD = ROOT / "build" / "browser"
 COPIES = BUILD / "notebooks"
-NOTEBOOKS = ("00", "01", "07", "13")
+NOTEBOOKS = ("00", "01", "04", "21")
 PAGE = "page"
 PLAYGROUND = "00_playground"
 RUN_LIMIT = 400  # s, for all cells of a notebook

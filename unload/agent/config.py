@@ -47,7 +47,7 @@ class TrainConfig:
         position_noise: * m, see ``ContainerEnv``; 0 ranks equal coordinates in the items' order.
         mask: * whether failed items are masked in training's choices, too.
         shuffle_places: * whether x and y of each stored pick are permuted among its items, so that
-            no preference for a place can be learned (notebook 10); choices see them unpermuted.
+            no preference for a place can be learned (notebook 06); choices see them unpermuted.
             Only with gamma = 0, because values of next observations rest on their places.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
