@@ -10,6 +10,7 @@ import numpy as np
 
 from unload import task
 from unload.agent import policies
+from unload.agent.evaluation import Policy
 from unload.agent.greedy import load_policy
 from unload.env.container import ContainerEnv
 from unload.env.observation import nearest
@@ -175,7 +176,7 @@ class Run(Episode):
     """A player's picks on a load, made as far as they are needed.
 
     Args:
-        player: one of ``PLAYERS``.
+        player: one of ``PLAYERS``, or a policy, see ``unload.policies``.
         load, seed: see ``Episode``; the seed is also that of random picks.
         mask: whether items that failed since the last success are excluded.
 
@@ -183,8 +184,8 @@ class Run(Episode):
         mask: as given; may be set anew between picks.
     """
 
-    def __init__(self, player: str, load: Load, seed: int = 0, mask: bool = True) -> None:
-        self._policy = policy_of(player)
+    def __init__(self, player: str | Policy, load: Load, seed: int = 0, mask: bool = True) -> None:
+        self._policy = player if callable(player) else policy_of(player)
         self.mask = mask
         super().__init__(load, seed)
 

@@ -1,6 +1,7 @@
 """A container to unload by hand, and to watch rules and agents unload, as a Jupyter widget."""
 
 import html
+import logging
 
 import ipywidgets as widgets
 import numpy as np
@@ -9,11 +10,12 @@ from studies.play.canvas import ABSENT, Canvas
 from studies.play.episode import PLAYERS, Episode, Moment, Run, explain
 from studies.play.replay import replay
 from unload import task
+from unload.agent.evaluation import Policy
 from unload.load.picture import COLOURS
 from unload.load.substacks import stack_load
 from unload.support import checks
 
-YOU = "you"
+YOU, TRAINED = "you", "your agent"
 SHOWN = ("unseen", "visible", "liftable", "tried", "failed")  # later names are drawn over earlier
 PAUSE = 150  # ms between two picks while an agent plays
 
@@ -26,9 +28,11 @@ class Playground(widgets.VBox):
 
     Args:
         seed: of the load, of the blur of its observed positions, and of random picks.
-        player: who picks first, ``"you"`` or one of ``studies.play.episode.PLAYERS``.
+        player: who picks first, ``"you"``, ``"your agent"`` or one of
+            ``studies.play.episode.PLAYERS``.
         mask: whether the players' masks exclude items that failed since the last success.
         picks: that a player who is watched may make.
+        policy: plays as ``"your agent"``, see ``unload.policies``; without it there is none.
 
     Attributes:
         you: your ``Episode``; PyBullet has lifted each box that you click, see ``TablePhysics``.
@@ -37,24 +41,38 @@ class Playground(widgets.VBox):
     """
 
     def __init__(
-        self, seed: int = 0, player: str = YOU, mask: bool = True, picks: int = task.MAX_PICKS
+        self,
+        seed: int = 0,
+        player: str = YOU,
+        mask: bool = True,
+        picks: int = task.MAX_PICKS,
+        policy: Policy | None = None,
     ) -> None:
-        checks.one_of("player", player, (YOU, *PLAYERS))
+        players = dict(zip(PLAYERS, PLAYERS)) | ({TRAINED: policy} if policy else {})
+        checks.one_of("player", player, (YOU, *players))
         checks.integer("picks", picks, 1, 10_000)
         load = stack_load(np.random.default_rng(checks.integer("seed", seed, 0)))
         self.you = Episode(load, seed)
-        self.runs = {name: Run(name, load, seed, mask) for name in PLAYERS}
-        # Do once what a click does, because compiled code is loaded the first time.
+        self.runs = {name: Run(each, load, seed, mask) for name, each in players.items()}
+        # Do once what a click does, because compiled code is loaded the first time. What that
+        # says stands in the widget's own line, because a notebook shows it as an error above.
+        said = _Said()
+        logging.getLogger("unload").addHandler(said)
         self.you.pick(int(self.you.visible[0]))
         self.you.back_to(0)
+        logging.getLogger("unload").removeHandler(said)
         self.canvas = Canvas(load)
         self.canvas.on_msg(self._clicked)
         self._make_controls(player, mask, picks)
         super().__init__([self._bar, widgets.HBox([self._left, self._right])])
         self._choose_player()
+        if said.messages:
+            self._tell(f"Done for the first time: {said.messages[0]}")
 
     def _make_controls(self, player: str, mask: bool, picks: int) -> None:
-        self.player = widgets.Dropdown(options=[YOU, *PLAYERS], value=player, description="Player")
+        self.player = widgets.Dropdown(
+            options=[YOU, *self.runs], value=player, description="Player"
+        )
         self.undo = widgets.Button(description="Undo", icon="undo", disabled=True)
         self.hints = widgets.Checkbox(description="Show what can be lifted", indent=False)
         self.play = widgets.Play(max=picks, interval=PAUSE)
@@ -120,16 +138,20 @@ class Playground(widgets.VBox):
             self._show()
 
     def _change_mask(self) -> None:
-        """Go on from the pick that is shown, with the mask or without it.
+        """Go back to the first pick that would be another one now, and play on from there.
 
-        With the mask from the first deadlocked pick, if that was before: it forbids this one.
+        With the mask that is the first deadlocked pick; without it, the one after the first
+        failure. If there is none before the pick that is shown, go on from this one.
         """
         run = self._run
         if run and run.mask != self.mask.value:
             start = run.play_to(self.slider.value)
+            picks = run.picks[:start]
             if self.mask.value:
-                deadlocked = (pick.deadlocked for pick in run.picks[:start])
-                start = next((number for number, stuck in enumerate(deadlocked) if stuck), start)
+                others = [number for number, pick in enumerate(picks) if pick.deadlocked]
+            else:
+                others = [number for number, pick in enumerate(picks, 1) if not pick.success]
+            start = min([start, *others])
             run.back_to(start)
             run.mask = self.mask.value
         self._show()
@@ -197,3 +219,14 @@ class Playground(widgets.VBox):
         run = self._run or self.runs["the recommended agent"]
         run.play_to(self.slider.max)
         return replay(run)._repr_mimebundle_() | super()._repr_mimebundle_(**kwargs)
+
+
+class _Said(logging.Handler):
+    """What the package logs."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.messages: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.messages.append(record.getMessage())

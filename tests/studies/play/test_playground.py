@@ -1,4 +1,5 @@
 import html
+import logging
 import re
 
 import numpy as np
@@ -8,7 +9,7 @@ from studies.play.agent_view import AgentView
 from studies.play.canvas import ABSENT
 from studies.play.episode import Episode, Run
 from studies.play.playground import SHOWN, Playground
-from unload import stack_load
+from unload import policies, stack_load
 from unload.load.view import PLOTLY_MIMETYPE
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
@@ -136,10 +137,10 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
     assert "deadlock" not in stuck.message.value
     stuck.slider.value = 110
     assert score(stuck)[0] == unloaded + 15
-    stuck.slider.value = 94
-    stuck.mask.value = False
-    stuck.slider.value = 110
+    stuck.mask.value = False  # with 110 picks made: back to the one after the first failure
     assert score(stuck)[0] == unloaded
+    stuck.slider.value = 100
+    assert "this is a deadlock" in stuck.message.value
 
 
 def test_a_replay_stands_beside_the_widget(game):
@@ -167,3 +168,22 @@ def test_bad_input_is_refused(full_load, message):
     """In all modules of this room; the message names the argument and its value."""
     with pytest.raises((TypeError, ValueError), match=message):
         BAD_INPUT[message](full_load)
+
+
+def test_an_agent_of_ones_own_plays_with_the_others():
+    playground = Playground(seed=4, player="your agent", picks=5, policy=policies.highest)
+    playground.slider.value = 5
+    assert score(playground) == [5, 5]
+    assert [name for name, *_ in playground.standings()][-1] == "your agent"
+    with pytest.raises(ValueError, match="player is 'your agent'"):
+        Playground(player="your agent")
+
+
+def test_what_a_first_compilation_says_stands_in_the_widget(monkeypatch, capsys):
+    def pick(self, item):
+        logging.getLogger("unload.support.compiled").warning("compiling it for ten seconds")
+
+    monkeypatch.setattr(Episode, "pick", pick)
+    playground = Playground(seed=4, picks=5)
+    assert "compiling it for ten seconds" in playground.message.value
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,44 @@
+"""A figure under sliders and switches, as a Jupyter widget."""
+
+import base64
+from collections.abc import Callable
+
+import ipywidgets as widgets
+
+from studies.style import as_png, styled
+
+
+class Explore(widgets.VBox):
+    """A figure that is drawn anew whenever one of its controls has changed.
+
+    Where no kernel runs, the figure of the first settings stands in its place.
+
+    Args:
+        draw: is called with the values of the controls, by their names, and returns a figure
+            of Matplotlib. What it says in words, such as in a title, must hold for all of them.
+        controls: name → widget with a ``value``, such as ``ipywidgets.FloatSlider``.
+
+    Attributes:
+        picture: the figure as it is drawn now.
+    """
+
+    def __init__(self, draw: Callable, **controls: widgets.ValueWidget) -> None:
+        self._draw, self._controls = styled(draw), controls
+        self.picture = widgets.Image(format="png", layout={"max_width": "100%"})
+        for control in controls.values():
+            control.style.description_width = "initial"  # as wide as the text
+            if control.has_trait("continuous_update"):
+                control.continuous_update = False  # of a slider: draw when it is let go
+            control.observe(lambda _: self._show(), "value")
+        row = widgets.HBox(list(controls.values()), layout={"flex_flow": "row wrap"})
+        super().__init__([row, self.picture])
+        self._show()
+
+    def _show(self) -> None:
+        values = {name: control.value for name, control in self._controls.items()}
+        self.picture.value = as_png(self._draw(**values))
+
+    def _repr_mimebundle_(self, **kwargs) -> dict:
+        """The widget, and what is shown of it where no kernel runs."""
+        still = base64.b64encode(self.picture.value).decode()
+        return {"image/png": still} | super()._repr_mimebundle_(**kwargs)
