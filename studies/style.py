@@ -48,7 +48,7 @@ def as_png(figure: Figure) -> bytes:
     """Draw a figure as PNG and close it, so that no notebook shows it once more."""
     content = io.BytesIO()
     with plt.style.context(STYLE):
-        figure.savefig(content, format="png", metadata={"Software": None})
+        figure.savefig(content, dpi="figure", format="png", metadata={"Software": None})
     plt.close(figure)
     return content.getvalue()
 

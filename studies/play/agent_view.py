@@ -49,8 +49,8 @@ def look(
 class AgentView(widgets.VBox):
     """A container coloured by what an agent sees, and the item that it would pick.
 
-    Dark boxes rank high among the visible ones. The first draw of the noise is the one that
-    blurs the load in the environment. Where no kernel runs, a view of the visible items
+    Dark boxes rank high among the visible ones. The first draw of the noise is the
+    environment's. Where no kernel runs, a view of the visible items
     stands in its place.
 
     Args:
@@ -69,7 +69,7 @@ class AgentView(widgets.VBox):
         run = Run(agent, self._load, seed, mask=False)
         run.play_to(checks.integer("picks", picks, 0, 10_000))
         self._moment, self._liftable = run.moment(), run.liftable()
-        # The environment's blur is drawn once per load. We change its size, not its direction.
+        # The environment's noise is drawn once per load. We change its size, not its direction.
         self._offsets = run.observed_positions() - self._load.positions
         self.canvas = Canvas(self._load)
         self._make_controls(agent)

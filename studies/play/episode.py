@@ -76,7 +76,7 @@ class Episode:
 
     Args:
         load: the items.
-        seed: of the blur of their observed positions, see ``ContainerEnv``.
+        seed: of the noise of their observed positions, see ``ContainerEnv``.
 
     Attributes:
         load: the items.

@@ -27,7 +27,7 @@ class Playground(widgets.VBox):
     kernel runs, a replay stands in its place: of the chosen player, or of the recommended agent.
 
     Args:
-        seed: of the load, of the blur of its observed positions, and of random picks.
+        seed: of the load, of the noise of its observed positions, and of random picks.
         player: who picks first, ``"you"``, ``"your agent"`` or one of
             ``studies.play.episode.PLAYERS``.
         mask: whether the players' masks exclude items that failed since the last success.

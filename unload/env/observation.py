@@ -10,7 +10,7 @@ import numpy as np
 from unload import task
 from unload.support import checks
 
-# Drift of the boxes of a settled full simulation, measured in notebook 15: how far they
+# Drift of the boxes of a settled full simulation, measured in notebook 02: how far they
 # spread around the places they were put at, and how far they sink on average (m).
 POSITION_NOISE = 0.0005
 SINK = 0.001

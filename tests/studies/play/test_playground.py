@@ -83,7 +83,7 @@ def test_what_is_not_visible_may_not_be_picked(game):
     assert score(game) == [0, 0] and "not among the 128 nearest" in game.message.value
 
 
-def test_the_seed_is_that_of_the_load_the_blur_and_random_picks(game):
+def test_the_seed_is_that_of_the_load_the_noise_and_random_picks(game):
     load, run = stack_load(np.random.default_rng(4)), game.runs["random"]
     alone, other = (Run("random", load, seed) for seed in (4, 0))
     assert np.array_equal(alone.observation, game.you.observation)
