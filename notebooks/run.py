@@ -3,7 +3,7 @@
     python notebooks/run.py                    reduced counts, results in build/notebooks
     python notebooks/run.py --in-place         their own counts, results kept in them
     python notebooks/run.py 03 solutions/08    only those whose names start so
-    python notebooks/run.py --measure          words, figures and minutes to read; runs nothing
+    python notebooks/run.py --measure          words, figures, exercises and minutes; runs nothing
 
 The reduced counts stand in reduced.toml. A cell that fails ends the run with its error and
 a non-zero exit status.
@@ -11,6 +11,7 @@ a non-zero exit status.
 
 import argparse
 import logging
+import re
 import shutil
 import sys
 import time
@@ -27,7 +28,8 @@ HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
-WORDS_A_MINUTE, LONG_CELL = 180, 20  # a figure, or a cell of more lines, takes a minute
+# What a student takes: minutes for a figure or for a cell of more lines, and for an exercise.
+WORDS_A_MINUTE, FIGURE, EXERCISE, LONG_CELL = 180, 0.5, 2.0, 20
 UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
@@ -48,7 +50,7 @@ def reduced_parameters(notebook: Path) -> dict:
 
 
 def measured(notebook: Path) -> dict[str, float]:
-    """Count ``words``, ``figures``, ``long cells`` and the ``minutes`` to read a notebook."""
+    """Count ``words``, ``figures``, ``long cells``, ``exercises`` and the ``minutes`` they take."""
     cells = nbformat.read(notebook, as_version=4).cells
     text = [cell.source for cell in cells if cell.cell_type == "markdown"]
     code = [cell for cell in cells if cell.cell_type == "code"]
@@ -60,9 +62,12 @@ def measured(notebook: Path) -> dict[str, float]:
             for cell in code
             if not UNREAD & set(cell.metadata.get("tags", []))
         ),
+        "exercises": len(
+            re.findall(r"^\d+\. ", "\n".join(text).partition("\n## Exercises\n")[2], re.M)
+        ),
     }
-    minutes = counts["words"] / WORDS_A_MINUTE + counts["figures"] + counts["long cells"]
-    return counts | {"minutes": minutes}
+    minutes = counts["words"] / WORDS_A_MINUTE + EXERCISE * counts["exercises"]
+    return counts | {"minutes": minutes + FIGURE * (counts["figures"] + counts["long cells"])}
 
 
 def run(notebook: Path, output: Path, parameters: dict) -> None:

@@ -59,36 +59,33 @@ def four_cells(curves: pd.DataFrame) -> Figure:
 
 
 @styled
-def laboratory_runs(curves: Mapping[str, pd.DataFrame]) -> Figure:
-    """Learning curves of the laboratory, side by side in one panel.
+def dug(
+    profile: tuple[np.ndarray, np.ndarray],
+    preferences: tuple[float, float],
+    averaged: bool,
+    msr: float,
+) -> Figure:
+    """What a rule leaves of the loads, seen from the entrance, and its place among ``phase``.
 
     Args:
-        curves: name → curve of a run, see ``unload.agent.training``.
+        profile: what ``measures.surface`` returns.
+        preferences: of the rule, along x and y.
+        averaged: whether equal coordinates share one rank.
+        msr: of the rule, in [0, 1].
     """
-    figure, axes = plt.subplots()
-    for (name, curve), (_, colour) in zip(curves.items(), PUPIL_LOOKS):
-        msr = 100 * curve["success_rate"]
-        axes.plot(curve["picks"] / 1e6, msr, label=name, color=colour, lw=1)
-    axes.set(xlabel="million picks", ylabel="MSR while training (%)", ylim=(0, 102))
-    axes.legend()
-    return figure
-
-
-@styled
-def surfaces(profiles: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
-    """What policies leave of the loads, seen from the entrance.
-
-    Args:
-        profiles: name → what ``measures.surface`` returns.
-    """
-    figure, axes = plt.subplots(figsize=(5.2, 3.4))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6))
     width, _, height = task.CONTAINER[[1, 0, 2]]
-    for (name, (places, heights)), (_, colour) in zip(profiles.items(), PUPIL_LOOKS):
-        axes.plot(places, heights, color=colour, label=name)
-        axes.fill_between(places, heights, color=colour, alpha=0.1, lw=0)
-    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y, across the container (m)",
-             ylabel="mean height of the load (m)")  # fmt: skip
-    axes.legend(loc="lower left")
+    places, heights = profile
+    left.plot(places, heights, color=COLOURS["ranks"])
+    left.fill_between(places, heights, color=COLOURS["ranks"], alpha=0.1, lw=0)
+    left.set(xlim=(0, width), ylim=(0, height), xlabel="y, across the container (m)")
+    left.set(ylabel="mean height of the load (m)", title="what 300 picks leave")
+    point = dict(zip(("slope_x", "slope_y", "slope_z", "judged_as_is"), (*preferences, 1, msr)))
+    draw_phase(right, pd.DataFrame([point]), averaged)
+    (dot,) = (line for line in right.lines if line.get_xdata().size)
+    dot.set(markersize=12, alpha=1, clip_on=False)
+    errs = "errs" if msr < ERRS else "does not err"
+    right.set(ylabel="preference along y (across)", title=f"MSR {msr:.1%}: it {errs}")
     return figure
 
 
@@ -100,13 +97,12 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
         trace: see ``laboratory.read_trace``.
         runs: see ``laboratory.read_laboratory``.
     """
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9, 3.2))
+    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9, 3.5))
     for cell in ("ranks", "shuffled"):
         points = trace[trace["cell"] == cell]
         preference = points["slope_y"] / points["slope_z"].abs()
         left.plot(preference, points["tilt_y"], ".", color=COLOURS[cell], ms=3, label=NAMES[cell])
     left.set(xlabel="preference: slope across / upward", ylabel="tilt of the load", xlim=(-2, 2))
-    left.legend(markerscale=3)
     middle.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
     for pupil, (name, colour) in zip(PUPILS, PUPIL_LOOKS):
         cells = [f"{pupil}_{preference}" for preference in PREFERENCES]
@@ -117,7 +113,8 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
             success = [100 * group["mean"].mean() for group in groups]
             right.plot(PREFERENCES, success, "o-", ms=3, color=colour)
     middle.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
-    middle.legend(fontsize=8)
+    # Its colours are those of the other panels, whose data leave no room for a legend.
+    figure.legend(*middle.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     right.set(xlabel="preference of the teacher", ylabel="teacher's MSR (%)", ylim=(0, 102))
     return figure
 

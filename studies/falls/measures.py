@@ -11,6 +11,7 @@ from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
+from unload.env.equalization import equalize
 from unload.network.peq import PEQNetwork
 
 Seen = Callable[[np.ndarray], np.ndarray]
@@ -108,6 +109,22 @@ def judged(
 
     env = {"equalize": config.equalize, "ties": config.ties}
     return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
+
+
+def preferring(along_x: float, along_y: float, ties: str = "noise") -> Policy:
+    """The rule that picks the highest z + along_x · x + along_y · y of ranks.
+
+    Args:
+        along_x, along_y: its preferences.
+        ties: see ``unload.equalize``.
+    """
+    weights = np.array([along_x, along_y, 1], np.float32)
+
+    def policy(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        scores = np.array([equalize(seen, ties) for seen in observations]) @ weights
+        return np.where(masks.astype(bool), scores, -np.inf).argmax(axis=1)
+
+    return policy
 
 
 def surface(policy: Policy, picks: int = 300, containers: int = 8) -> tuple[np.ndarray, np.ndarray]:

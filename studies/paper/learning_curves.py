@@ -30,13 +30,7 @@ def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
     """
     figure, axes = plt.subplots()
     for (name, (runs, shown)), colour in zip(curves.items(), colours_of(curves)):
-        label_of_run = f"{name}, run {shown}" if len(runs) > 1 else name
-        for run, values in runs.items():
-            smooth = running_mean(values)
-            if run == shown:
-                axes.plot(smooth, color=colour, label=label_of_run, zorder=3)
-            else:
-                axes.plot(smooth, color=colour, linewidth=0.5, alpha=0.4)
+        _draw_runs(axes, name, runs, shown, colour)
     steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
     axes.set(xlabel="step $k$", ylabel=label, xlim=(0, steps))
     axes.set(ylim=(0, 0.6) if "loss" in label else (0, 1.02))
@@ -44,6 +38,29 @@ def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
     note = "thin: the other runs of the same configuration" if others else None
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, title=note, title_fontsize=8)
     return figure
+
+
+@styled
+def in_panels(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
+    """As ``over_steps``, in a panel for each configuration: for curves that coincide."""
+    figure, panels = plt.subplots(1, len(curves), figsize=(9.6, 2.9), sharex=True, sharey=True)
+    for axes, (name, (runs, shown)), colour in zip(panels, curves.items(), colours_of(curves)):
+        _draw_runs(axes, name, runs, shown, colour)
+        steps = max(len(values) for values in runs.values())
+        axes.set(title=f"{name}, run {shown}", xlabel="step $k$", xlim=(0, steps), ylim=(0, 1.02))
+    panels[0].set_ylabel(label)
+    return figure
+
+
+def _draw_runs(axes: Axes, name: str, runs: Curves, shown: int, colour) -> None:
+    """Draw the runs of a configuration, one of them as a strong line."""
+    for run, values in runs.items():
+        smooth = running_mean(values)
+        if run == shown:
+            label_of_run = f"{name}, run {shown}" if len(runs) > 1 else name
+            axes.plot(smooth, color=colour, label=label_of_run, zorder=3)
+        else:
+            axes.plot(smooth, color=colour, linewidth=0.5, alpha=0.4)
 
 
 def colours_of(names: Collection[str]) -> list:

@@ -1,6 +1,7 @@
 """Policies compared: rules, the paper's agent, and the recommended one.
 
-Read ``comparison`` (where the lift table reaches, and what a policy's file says of it),
-``robustness`` (every box simulated), ``variants`` (other networks, rewards and settings) and
-``figures`` (the policies beside each other).
+Read ``margin`` first (why many rules never fail in a neat load), then ``comparison`` (where the
+lift table reaches, and what a policy's file says of it), ``robustness`` (every box simulated),
+``variants`` (other networks, rewards and settings) and ``figures`` (the policies beside each
+other).
 """

@@ -1,12 +1,13 @@
 """Use notebooks in JupyterLab, and the page that trains, in a browser without a window.
 
-    python tests/browser/look.py               00, 01, 04, 21 and the page
+    python tests/browser/look.py               00, 01, 04, 06, 21 and the page
     python tests/browser/look.py 00 04         notebooks whose names start so
     python tests/browser/look.py page          the page alone
 
 Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
-nothing on stderr; formulas are typeset; 3D views hold pixels; in 00 a click changes the score
-and the play buttons move, with a kernel and without. Pictures of all are kept in build/browser/.
+nothing on stderr; formulas are typeset; 3D views hold pixels; figures under sliders change when
+one is moved; in 00 a click changes the score and the play buttons move, with a kernel and
+without. Pictures of all are kept in build/browser/.
 """
 
 import argparse
@@ -34,7 +35,7 @@ from notebooks import run  # noqa: E402
 
 BUILD = ROOT / "build" / "browser"
 COPIES = BUILD / "notebooks"
-NOTEBOOKS = ("00", "01", "04", "21")
+NOTEBOOKS = ("00", "01", "04", "06", "21")
 PAGE = "page"
 PLAYGROUND = "00_playground"
 RUN_LIMIT = 400  # s, for all cells of a notebook
@@ -119,6 +120,7 @@ def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
                 yield f"{name}: cell {output['number']} says {text[:300]!r}"
     yield from typeset(page, name)
     yield from drawn(page, name, pictures)
+    yield from sliders_answer(page, name, pictures)
     if name == PLAYGROUND and theme == "Light":
         yield from clicks_count(page, pictures)
         yield from play_moves(page, pictures)
@@ -192,6 +194,20 @@ def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:
     return True
 
 
+def sliders_answer(page: Page, name: str, pictures: Path) -> Iterator[str]:
+    """Yield which figures stay as they are when their first slider is moved by a key."""
+    figures = page.locator(".jp-OutputArea-output:has(img.widget-image)")
+    for number in range(figures.count()):
+        figure = figures.nth(number)
+        figure.scroll_into_view_if_needed()
+        image = figure.locator("img.widget-image")
+        before = image.get_attribute("src")
+        figure.locator(".noUi-handle").first.press("ArrowRight")
+        if not wait_until(lambda image=image, old=before: image.get_attribute("src") != old):
+            yield f"{name}: a slider does not change figure {number}"
+        shot(figure, pictures / f"{name}-slider-{number}.png")
+
+
 def replay_moves(page: Page, pictures: Path) -> Iterator[str]:
     """Yield whether the stored replay, which needs no kernel, stands still."""
     replay = page.locator(PLOTLY).first
@@ -233,7 +249,7 @@ def clicks_count(page: Page, pictures: Path) -> Iterator[str]:
 
 def play_moves(page: Page, pictures: Path) -> Iterator[str]:
     """Yield whether an agent who is watched picks nothing when play is pressed."""
-    output = page.locator(".jp-OutputArea-output:has(canvas.unload-canvas)").nth(1)
+    output = page.locator(".jp-OutputArea-output:has(canvas.unload-canvas)").nth(2)  # a deadlock
     score = output.locator("[data-picks]")
     before, pixels = score.text_content(), shot(output.locator("canvas"))
     output.locator(".jupyter-widgets.widget-play button").first.click()

@@ -49,10 +49,8 @@ FIGURES = FROM_DATA | {
     "wall_view": lambda: loads.wall_view(LOAD, 11, {"visible": VISIBLE}),
     "scaled_side_view": lambda: scaled_side_view({"items": (np.eye(2), "C0")}, "p"),
     "over_steps": lambda: learning_curves.over_steps(RUNS, "MSR"),
-    "surfaces": lambda: falls.surfaces({"level": (LINE, LINE + 1), "dug": (LINE, LINE)}),
-    "laboratory_runs": lambda: falls.laboratory_runs(
-        {"a run": pd.DataFrame({"picks": LINE, "success_rate": LINE / 2})}
-    ),
+    "in_panels": lambda: learning_curves.in_panels(RUNS, "MSR"),
+    "dug": lambda: falls.dug((LINE, LINE), (0.5, -0.2), False, 0.6),
 }
 
 

@@ -6,7 +6,7 @@ import torch
 
 from studies.falls import measures
 from studies.falls.laboratory import CONFIG
-from unload import policies
+from unload import evaluate, policies
 from unload.network.peq import PEQNetwork
 from unload.network.variants import NETWORKS
 
@@ -78,11 +78,16 @@ def test_judging_without_place_makes_height_decide(network):
 
 
 def test_the_surface_is_level_where_the_highest_is_taken():
-    def prefers_a_side(observations, masks, rng):
-        score = observations[..., 2] - observations[..., 1]
-        return np.where(masks, score, -np.inf).argmax(axis=1)
-
     places, level = measures.surface(policies.highest, picks=200, containers=2)
-    _, dug = measures.surface(prefers_a_side, picks=200, containers=2)
+    _, dug = measures.surface(measures.preferring(0, -1), picks=200, containers=2)
     assert places[0] == pytest.approx(0.0125) and len(places) == 100
     assert np.ptp(level) < 0.5 < dug[-1] - dug[0]
+
+
+def test_depth_misleads_only_where_ranks_are_random():
+    msr = {
+        (x, y, ties): evaluate(measures.preferring(x, y, ties), 2)["success_rate"].mean()
+        for x, y, ties in ((0, 0, "noise"), (1, 0, "noise"), (1, 0, "average"), (0, 1, "average"))
+    }
+    assert msr[0, 0, "noise"] == 1 == msr[1, 0, "average"]
+    assert msr[1, 0, "noise"] < 0.8 and msr[0, 1, "average"] < 0.8
