@@ -19,8 +19,13 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.provenance import joined, read_provenance, write_provenance
-from studies.results import read_table, write_table
+from studies.results import (
+    joined,
+    read_provenance,
+    read_table,
+    write_provenance,
+    write_table,
+)
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig

@@ -5,7 +5,7 @@ import pytest
 
 from studies import grid
 from studies.changes import shuffled
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from unload.agent.config import TrainConfig
 
 CONFIG = TrainConfig(

@@ -104,7 +104,7 @@ BAD_INPUT = {
     "cells is 'nonsense'": lambda folder: laboratory_data(["nonsense"], folder=folder),
     "cells is 'nothing'": lambda folder: train_grid(PAPER, ["nothing"], folder=folder),
     "steps is 0": lambda _: tuning_config(8, 1e-3, steps=0),
-    "n_jobs is 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
+    "n_jobs == 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
     "grids is 'nothing'": lambda folder: variants_data(["nothing"], folder=folder),
     "grid is 'nothing'": lambda folder: variants_msr("nothing", folder),
 }

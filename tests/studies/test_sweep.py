@@ -123,7 +123,7 @@ def test_runs_that_do_not_fit_the_memory_are_warned_of(configs, tmp_path, monkey
         ({"configs": [1]}, r"configs is \[1\]; expected a dict"),
         ({"folder": None}, "folder is None; expected a path"),
         ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
-        ({"n_jobs": 0}, "n_jobs is 0; expected a number of processes"),
+        ({"n_jobs": 0}, "n_jobs == 0"),
     ],
 )
 def test_bad_arguments_are_refused_before_anything_runs(configs, tmp_path, arguments, message):

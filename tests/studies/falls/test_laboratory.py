@@ -8,7 +8,7 @@ import torch
 
 from studies import changes
 from studies.falls import fresh, laboratory
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
 

@@ -4,7 +4,7 @@ from studies import paths
 from studies.falls import long
 from studies.grid import read_policies
 from studies.paper.training import PAPER
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 
 
 def test_runs_are_traced(tmp_path, monkeypatch):

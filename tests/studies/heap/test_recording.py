@@ -9,8 +9,7 @@ from studies.heap.env import stored_heaps
 from studies.heap.generate import read_heaps
 from studies.heap.learning import load_networks
 from studies.heap.recording import make_heaps, make_networks
-from studies.provenance import read_provenance
-from studies.results import unpacked
+from studies.results import read_provenance, unpacked
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from studies.heap.learning import save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.recording import HEAPS, WEIGHTS
 from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import pytest
 
 from studies.lifts import agreement
 from studies.policies.robustness import front_walls
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from studies.statistics import share_interval
 from unload import policies
 from unload.load.substacks import stack_load

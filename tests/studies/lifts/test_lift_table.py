@@ -1,7 +1,7 @@
 """The data of the lift table."""
 
 from studies.lifts import lift_table as lifts
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from unload import policies, task
 from unload.physics.table import LiftTable
 

@@ -5,7 +5,7 @@ import numpy as np
 from studies import paths
 from studies.paper import visible_items
 from studies.paper.visible_items import read_points
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 
 NAMES = ("all_items", "Observation", "Equalized_Observation")
 

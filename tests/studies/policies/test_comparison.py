@@ -12,7 +12,7 @@ from studies.policies.comparison import (
     comparison_data,
     digests,
 )
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from unload import evaluate, load_policy, policies
 from unload.support import files
 

@@ -8,7 +8,7 @@ import pytest
 
 from studies.policies import robustness
 from studies.policies.robustness import FRONT_WALLS, front_walls
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from tests.agent.networks import lowest
 from unload import policies, task
 from unload.agent.evaluation import evaluate
