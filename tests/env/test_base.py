@@ -3,6 +3,7 @@
 import copy
 import gc
 import pickle
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -224,22 +225,28 @@ def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
     assert_same(envs.unwrapped.state(), before)
 
 
+@pytest.mark.parametrize("make", [gymnasium.make, partial(gymnasium.make_vec, num_envs=2)])
 @pytest.mark.parametrize(
     ("env_id", "options", "error", "message"),
     [
         (CONTAINER, {"load": 1}, TypeError, "load is 1; expected an unload.Load"),
+        (CONTAINER, {"load": None}, TypeError, "load is None; expected an unload.Load"),
         (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
         (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
         (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
     ],
 )
-def test_bad_options_leave_the_episodes_as_they_were(env_id, options, error, message):
-    envs = gymnasium.make_vec(env_id, 2)
-    envs.reset(seed=0)
-    before = envs.unwrapped.state()
+def test_bad_options_leave_the_episodes_as_they_were(make, env_id, options, error, message):
+    """Both draw the same at the next reset, and were given the same picks before."""
+    physics = {"physics": "table"} if env_id == CONTAINER else {}
+    env, other = (make(env_id, **physics) for _ in range(2))
+    actions = 0 if make is gymnasium.make else np.zeros(2, int)
+    for each in (env, other):
+        each.reset(seed=0)
     with pytest.raises(error, match=message):
-        envs.reset(seed=3, options=options)
-    assert_same(envs.unwrapped.state(), before)
+        env.reset(seed=3, options=options)
+    assert_same(env.step(actions), other.step(actions))
+    assert_same(env.reset(), other.reset())
 
 
 @pytest.mark.parametrize("failing", [1, 3, 5])

@@ -10,10 +10,13 @@ from studies import __main__ as command
 from studies import paths
 from studies.falls.laboratory import laboratory_data
 from studies.grid import train_grid
+from studies.paper import visible_items
 from studies.paper.training import PAPER
 from studies.paper.tuning import tuning_config
+from studies.paper.visible_items import read_points
 from studies.policies import comparison
 from studies.policies.variants import variants_data, variants_msr
+from studies.results import read_provenance
 from unload import stack_load
 
 
@@ -114,3 +117,24 @@ BAD_INPUT = {
 def test_bad_input_is_refused_by_name(message, tmp_path):
     with pytest.raises(ValueError, match=message):
         BAD_INPUT[message](tmp_path)
+
+
+NAMES = ("all_items", "Observation", "Equalized_Observation")
+
+
+def test_committed_data_is_written_again_byte_for_byte(tmp_path):
+    visible_items.observation_data(tmp_path)
+    for name in NAMES:
+        again, committed = (
+            (folder / f"obs_hist_equal/{name}.csv").read_bytes()
+            for folder in (tmp_path, paths.DATA)
+        )
+        assert again == committed
+    assert read_provenance(tmp_path / "obs_hist_equal", "observation")["settings"] == {"seed": 0}
+
+
+def test_the_observed_items_are_equalized():
+    everything, observed, equalized = map(read_points, NAMES)
+    assert {tuple(point) for point in observed} <= {tuple(point) for point in everything}
+    ranks = np.linspace(-1, 1, 128)
+    assert np.allclose(np.sort(equalized, axis=0), ranks[:, None], atol=1e-6)

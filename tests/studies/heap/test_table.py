@@ -1,17 +1,20 @@
-"""Policies compared on heaps, at reduced size."""
+"""Policies compared on heaps, at reduced size, and the figures."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 
 from studies import paths
+from studies.heap import figures
 from studies.heap import table as study
 from studies.heap.learning import save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.recording import HEAPS, WEIGHTS
-from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan
+from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan, read_heap_table
 from studies.results import read_provenance
+from unload.load.picture import COLOURS
 
 
 @pytest.fixture
@@ -128,3 +131,43 @@ def test_data_of_heaps_are_those_that_are_read():
     assert names == {"heaps", "networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == HEAPS["test"]).all() and len(table) == 19
+
+
+def test_the_throughput_draws_its_data():
+    """From data/ where it is read: dots at the values of the table, and all their names."""
+    table = read_heap_table()
+    (curves,) = figures.throughput_falls().axes
+    named = {line.get_label(): line for line in curves.lines}
+    learned = table[table["policy"] == "learned"].sort_values("falls_weight")
+    assert named["learned"].get_xdata().tolist() == learned["falls"].tolist()
+    assert named["learned"].get_ydata().tolist() == learned["boxes"].tolist()
+    texts = {text.get_text() for text in curves.texts}
+    assert texts == {*figures.RULES, *(f"λ = {weight:g}" for weight in learned["falls_weight"])}
+    assert {text.get_text() for text in curves.get_legend().get_texts()} == set(figures.LINES)
+
+
+def test_missing_data_names_the_command_that_makes_it(tmp_path):
+    with pytest.raises(FileNotFoundError, match="python -m studies heap makes it"):
+        figures.throughput_falls(tmp_path)
+
+
+def test_corners_are_those_of_turned_boxes(heap):
+    corners = figures.corners(heap)
+    seam = figures.SEAM
+    assert np.ptp(corners[0], axis=0) == pytest.approx([0.4 - seam] * 3)
+    wide = (0.4 - seam) * 2**0.5
+    assert np.ptp(corners[3], axis=0) == pytest.approx([wide, wide, 0.4 - seam])
+    assert corners.mean(axis=1) == pytest.approx(heap.positions)
+
+
+def test_nearer_boxes_are_painted_later(heap):
+    """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
+    axes = plt.figure().add_subplot()
+    colours = np.array([figures.MEANINGS[name] for name in ("comes along", "is dragged")])
+    figures.draw_heap(axes, heap.only(np.array([2, 0])), colours)
+    painted = axes.collections[0].get_facecolors()[:, :3]
+    assert len(painted) == 6, "three faces of a box are turned to the eye"
+    dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))
+    own = [np.linalg.norm(face / face.max() - dragged / dragged.max()) < 0.02 for face in painted]
+    assert own == [True] * 3 + [False] * 3
+    assert painted[3:].max() <= along.max() + 1e-9
