@@ -126,6 +126,7 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
     done = {name: config for name, config in configs.items() if records[name].exists()}
     provenance = place.parent / f"{place.name}.provenance.json"
     there = read_provenance(place.parent, place.name)["runs"] if provenance.exists() else 0
+    # Of runs of hours none may be lost, because an older folder was published again.
     if len(done) < there:
         raise ValueError(
             f"{kept} holds {len(done)} finished runs; expected at least as many as the {there} "
@@ -133,6 +134,8 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
         )
     if not done:
         return
+
+    # All that is published is read back from the folders of the runs, whenever they were trained.
     policies, curves = {}, {}
     for name, config in done.items():
         policies[name], curves[name] = RunFolder(kept / name).result(
@@ -145,6 +148,8 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
     else:
         rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
         write_measures(place, rows)
+
+    # The first seed stands for the others of its cell: it rebuilds their configurations, too.
     first = {
         name: configs[f"{name}/seed_{cell.seeds[0]}"].plain() for name, cell in grid.cells.items()
     }
