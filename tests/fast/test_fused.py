@@ -242,12 +242,6 @@ def test_rule_of_where_it_applies(other):
         DQN(other, fused_update=True)
 
 
-def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
-    net, rows = network(16), rng.integers(BATCH, size=100)
-    expected = gradients(net, {name: array[rows] for name, array in batch.items()})
-    assert gradients(net, batch, 1.0, rows).tobytes() == expected.tobytes()
-
-
 @pytest.mark.parametrize(
     "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.zeros((2, 2), int)]
 )

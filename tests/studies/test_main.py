@@ -1,4 +1,4 @@
-"""The command line, the files that it has made in ``data/``, and what the room refuses."""
+"""The command line, the files it has made in ``data/``, what the room refuses; and exercises."""
 
 import sys
 from functools import partial
@@ -8,6 +8,7 @@ import pytest
 
 from studies import __main__ as command
 from studies import paths
+from studies.exercise import check
 from studies.falls.laboratory import laboratory_data
 from studies.grid import train_grid
 from studies.paper import visible_items
@@ -138,3 +139,17 @@ def test_the_observed_items_are_equalized():
     assert {tuple(point) for point in observed} <= {tuple(point) for point in everything}
     ranks = np.linspace(-1, 1, 128)
     assert np.allclose(np.sort(equalized, axis=0), ranks[:, None], atol=1e-6)
+
+
+def test_an_answer_is_awaited_right_or_wrong(capsys):
+    for answer in (None, 4, 5):
+        check("Exercise 1", answer, lambda value: value == 4, "count again")
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[:2] == ["Exercise 1: not yet", "Exercise 1: right"]
+    assert printed[2] == "Exercise 1: not yet: 5 is not right; count again"
+
+
+@pytest.mark.parametrize("answer", [None, 5])
+def test_a_wrong_answer_stops_a_solution(answer):
+    with pytest.raises(AssertionError, match="Exercise 1: not yet"):
+        check("Exercise 1", answer, lambda value: value == 4, "count again", strict=True)
