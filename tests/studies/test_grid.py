@@ -5,7 +5,6 @@ import os
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from joblib import parallel_config
 
@@ -13,7 +12,7 @@ from studies import grid, sweep
 from studies.changes import shuffled
 from studies.paper.tuning import tuning_config
 from studies.results import read_provenance
-from tests.agent.runs import CONTAINER
+from tests.agent.runs import CONTAINER, assert_same
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import train
@@ -89,10 +88,6 @@ def configs():
     return {f"set/run_{run}": tuning_config(8, 1e-3, run, steps=4, n_features=4) for run in (0, 1)}
 
 
-def without_times(path):
-    return pd.read_csv(path).drop(columns="wall_time").to_csv()
-
-
 def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
     assert list(report.index) == list(configs)
@@ -103,9 +98,7 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
         folder = tmp_path / "many" / name
         assert report.loc[name, "folder"] == str(folder)
         train(config, tmp_path / "alone" / name, progress=False)
-        assert without_times(folder / "curve.csv") == without_times(
-            tmp_path / "alone" / name / "curve.csv"
-        )
+        assert_same(folder, tmp_path / "alone" / name)
         record = files.read_json(folder / "record.json")
         assert '"digest"' in (folder / "record.json").read_text()
         assert record["peak_memory_mib"] > 50 and 0 <= record["wall_time_s"] < 60
@@ -162,10 +155,7 @@ def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
     assert (report["error"] == "").all()
     sweep.run_sweep(configs, tmp_path / "loky", n_jobs=2, progress=False)
     for name in configs:
-        curves = [
-            without_times(tmp_path / backend / name / "curve.csv") for backend in ("dask", "loky")
-        ]
-        assert curves[0] == curves[1]
+        assert_same(tmp_path / "dask" / name, tmp_path / "loky" / name)
     used = {
         files.read_json(tmp_path / "dask" / name / "record.json")["process"] for name in configs
     }
