@@ -126,7 +126,7 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
     done = {name: config for name, config in configs.items() if records[name].exists()}
     provenance = place.parent / f"{place.name}.provenance.json"
     there = read_provenance(place.parent, place.name)["runs"] if provenance.exists() else 0
-    # Of runs of hours none may be lost, because an older folder was published again.
+    # Runs take hours: none may be lost where a folder that holds fewer is published.
     if len(done) < there:
         raise ValueError(
             f"{kept} holds {len(done)} finished runs; expected at least as many as the {there} "

@@ -32,7 +32,7 @@ from unload.physics.table import shared_table
 from unload.support import checks
 
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
-SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")  # since a point of the curve
+SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 # PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
 INSTRUCTIONS = ("AVX2", "AVX512")
 
@@ -54,7 +54,7 @@ class Curve:
 
     Attributes:
         points: so far.
-        sums: of ``SUMS``.
+        sums: since the last point, by the names in ``SUMS``.
     """
 
     def __init__(self) -> None:

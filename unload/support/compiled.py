@@ -59,8 +59,8 @@ def folder() -> Path | None:
         if not place:
             continue
         found = Path(place, f"compiled-{digest(PACKAGE)}")
-        fresh = not found.exists()
         try:
+            fresh = not found.exists()
             found.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=found).close()
         except OSError:
