@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.agent.networks import lowest
+from tests.agent.runs import lowest
 from unload import evaluate, policies, success_rate
 from unload.env.vector import ContainerVectorEnv
 

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 import torch
 
-from tests.agent.networks import HeightNetwork
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
     Breakdown,
+    HeightNetwork,
     assert_same,
     at,
     at_step,

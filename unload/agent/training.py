@@ -32,6 +32,7 @@ from unload.physics.table import shared_table
 from unload.support import checks
 
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
+SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 # PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
 INSTRUCTIONS = ("AVX2", "AVX512")
 
@@ -53,16 +54,12 @@ class Curve:
 
     Attributes:
         points: so far.
-        sums: of ``picks``, ``rewards``, ``deadlocked``, ``updates`` and ``losses``.
+        sums: since the last point, by the names in ``SUMS``.
     """
 
     def __init__(self) -> None:
         self.points: list[Point] = []
-        self._start_point()
-
-    def _start_point(self) -> None:
-        names = ("picks", "rewards", "deadlocked", "updates", "losses")
-        self.sums = dict.fromkeys(names, 0.0)
+        self.sums = dict.fromkeys(SUMS, 0.0)
 
     def add(self, rewards: np.ndarray, deadlocked: np.ndarray, losses: Iterable[float]) -> None:
         """Count the picks of one step, (num_envs,) arrays, and the losses of its updates."""
@@ -82,7 +79,7 @@ class Curve:
         self.points.append(
             Point(picks, reward, (reward + 1) / 2, deadlocked, loss, epsilon, time.time())
         )
-        self._start_point()
+        self.sums = dict.fromkeys(SUMS, 0.0)
 
     def table(self) -> pd.DataFrame:
         """Return one row per point."""
