@@ -204,10 +204,11 @@ class ContainerEnv(PickingEnv):
         """Update which items are visible, and the observation of them."""
         present = np.flatnonzero(self.physics.present)
         positions = self.observed_positions()[present]
-        rows = observation.nearest(positions)
+        container = self.physics.load.container
+        rows = observation.nearest(positions, container=container)
         self.visible = np.full(task.N_VISIBLE, -1)
         self.visible[: len(rows)] = present[rows]
-        self._observation = self._features(positions[rows])
+        self._observation = self._features(positions[rows], container)
 
     def _info(self) -> dict:
         return {
