@@ -39,7 +39,7 @@ def reachable(load: Load, present: np.ndarray) -> tuple[np.ndarray, ...]:
     return ~load.behind(present), ~load.covered(present), foremost, highest
 
 
-NAMES = (reachable.__name__, *BY_NAME, *SHIPPED)
+NAMES = ("reachable", *BY_NAME, *SHIPPED)
 
 
 def picking_order(
@@ -59,8 +59,8 @@ def picking_order(
             ``"random"``, what ``unload.load_policy`` reads, or a function, see ``unload.policies``.
         seed: of the policy's random numbers; a greedy policy draws none.
         rule: instead of a policy, a function of the load and what is present that returns keys,
-            see ``unload.agent.order.reachable``. By stops, with the last one first:
-            ``lambda load, present: (load.extras["stop"], *reachable(load, present))``.
+            see ``unload.agent.order.reachable``. By stops, the first one first:
+            ``lambda load, present: (-load.extras["stop"], *reachable(load, present))``.
 
     Returns:
         A ``pandas.DataFrame`` with a row for each pick: ``pick``, counted from 1; ``id`` of the
@@ -77,13 +77,23 @@ def picking_order(
     """
     check_load(load)
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
-    if rule is None and isinstance(policy, str) and policy == reachable.__name__:
-        rule = reachable
-    elif rule is not None and (policy != reachable.__name__ or not callable(rule)):
-        raise TypeError(
-            f"rule is {rule!r}, policy {policy!r}; expected a function without a policy"
-        )
-    picks = _by_policy(load, _policy(policy), rng) if rule is None else _by_rule(load, rule)
+    if isinstance(policy, (str, Path)):
+        policy = str(policy)
+        if policy not in NAMES and not Path(policy).is_file():
+            raise FileNotFoundError(
+                f"policy is {policy!r}; expected a .safetensors file of a policy, or one of "
+                + ", ".join(map(repr, NAMES))
+            )
+        if policy != "reachable":
+            policy = BY_NAME.get(policy) or load_policy(policy)
+    elif not callable(policy):
+        raise TypeError(f"policy is {policy!r}; expected a name, a path or a function")
+    if rule is not None and not (policy == "reachable" and callable(rule)):
+        raise TypeError(f"rule is {rule!r}; expected a function, and no policy beside it")
+    if policy == "reachable":
+        picks = _by_rule(load, rule or reachable)
+    else:
+        picks = _by_policy(load, policy, rng)
 
     rows, present = [], np.ones(len(load), bool)
     for item, distance in picks:
@@ -95,20 +105,6 @@ def picking_order(
     table.insert(1, "id", table["item"] if load.ids is None else load.ids[table["item"]])
     extras = pd.DataFrame({name: each[table["item"]] for name, each in load.extras.items()})
     return table.join(extras, rsuffix=" in the list")
-
-
-def _policy(policy: str | Path | Policy) -> Policy:
-    """The function of a policy, which may be a name or a file."""
-    if isinstance(policy, (str, Path)):
-        if str(policy) not in NAMES and not Path(policy).is_file():
-            raise FileNotFoundError(
-                f"policy is {str(policy)!r}; expected a .safetensors file of a policy, or one of "
-                + ", ".join(map(repr, NAMES))
-            )
-        return BY_NAME.get(str(policy)) or load_policy(policy)
-    if not callable(policy):
-        raise TypeError(f"policy is {policy!r}; expected a name, a path or a function")
-    return policy
 
 
 def _by_policy(load: Load, policy: Policy, rng: np.random.Generator) -> Iterator[tuple[int, float]]:

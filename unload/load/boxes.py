@@ -91,7 +91,7 @@ class Load:
             raise ValueError("positions is empty; expected at least one box")
         sizes = checks.finite_array("sizes", self.sizes, (count, 3))
         container = task.CONTAINER if self.container is None else self.container
-        container = checks.finite_array("container", container, (3,))
+        container = checks.finite_array("container", np.array(container, np.float64), (3,))
         low, high = positions - sizes / 2, positions + sizes / 2
 
         labels = {"packages": self.packages, "walls": self.walls}

@@ -118,18 +118,17 @@ def read_load(
         return cells / [UNITS[unit_of[name] or default] for name in shown]
 
     # Nothing that the task leaves out is passed over: one mass, and boxes along the axes.
-    for name in column_of.get("weight", ()):
-        other = np.flatnonzero(np.abs(numbers([name], "kg")[:, 0] - 1) > 1e-6)
-        if other.size:
-            problem = f"a weight other than the task's 1 kg; expected it, or {name!r} in ignore"
-            refuse(other, problem, [name])
-    for name in column_of.get("rotation", ()):
-        angles = numbers([name], "deg")[:, 0]
-        other = np.flatnonzero(np.abs((angles + 45) % 90 - 45) > 0.01)
-        if other.size:
-            refuse(other, f"no quarter turn; expected it, or {name!r} in ignore", [name])
-        if np.abs(angles).max() > 1:
-            LOGGER.warning("%s: sizes are taken for those after the turns of %s", source, name)
+    for meaning, unit, problem in (
+        ("weight", "kg", "a weight other than 1 kg"),
+        ("rotation", "deg", "a rotation that is no quarter turn"),
+    ):
+        for name in column_of.get(meaning, ()):
+            cells = numbers([name], unit)[:, 0]
+            off = cells - 1 if meaning == "weight" else (cells + 45) % 90 - 45
+            if (other := np.flatnonzero(np.abs(off) > 1e-3)).size:
+                refuse(other, f"{problem}; expected none, or {name!r} in ignore", [name])
+            if meaning == "rotation" and cells.any():
+                LOGGER.warning("%s: sizes are taken for those after the turns", source)
     if rest:
         LOGGER.warning("%s: kept but not used: %s", source, ", ".join(rest))
 
@@ -151,9 +150,9 @@ def read_load(
     low = where - sizes / 2 if place is CENTRE else where
     found = settled(low, sizes, container, tolerance)
     moves = np.linalg.norm(found - low, axis=1)
-    centres = np.where(
-        found == low, where if place is CENTRE else low + sizes / 2, found + sizes / 2
-    )
+    centres = found + sizes / 2
+    if place is CENTRE:
+        centres = np.where(found == low, where, centres)
     extras = {
         name: pd.to_numeric(cells) if cells.str.fullmatch(NUMBER).all() else cells.astype(object)
         for name, cells in table.drop(columns=shown).items()
@@ -228,9 +227,9 @@ def _columns(
         else:
             column_of.setdefault(checks.one_of("columns", meaning, NAMES), []).append(name)
     # Of several that could be the id, one that the caller names, or else the first in ``NAMES``.
-    first = [*renamed, *NAMES["id"].split()]
-    known = {name if name in renamed else plain[name]: name for name in column_of.get("id", ())}
-    rest += [known[name] for name in sorted(known, key=first.index)][1:]
+    ids, ranks = column_of.get("id", []), [*renamed, *NAMES["id"].split()]
+    ids.sort(key=lambda name: ranks.index(name if name in renamed else plain[name]))
+    rest += ids[1:]
 
     places = [place for place in (CENTRE, CORNER) if {*place} & {*column_of}]
     needed = [*places[0], *SIZES] if len(places) == 1 else []

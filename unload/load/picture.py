@@ -79,7 +79,7 @@ def still(
     colours: np.ndarray,
     legend: Mapping[str, tuple[float, float, float]],
     height: float,
-    container: np.ndarray,
+    container: np.ndarray = task.CONTAINER,
 ) -> bytes:
     """Return a PNG picture of boxes in the container with a legend.
 

@@ -55,7 +55,7 @@ def settled(
         for box, others in zip(order[::-1], before[::-1]):
             last[others] = np.minimum(last[others], last[box] - edges[others])
         found[:, axis] = np.minimum(first, last)
-    return np.where(np.abs(found - low) > OVERLAP, found, low)
+    return np.where(np.abs(found - low) > OVERLAP / 2, found, low)
 
 
 def uncarried(load: Load) -> np.ndarray:
