@@ -103,8 +103,9 @@ def picking_order(
     table = pd.DataFrame(rows, columns=["item", "distance", "unloaded", "behind"])
     table.insert(0, "pick", np.arange(1, len(table) + 1))
     table.insert(1, "id", table["item"] if load.ids is None else load.ids[table["item"]])
-    extras = pd.DataFrame({name: each[table["item"]] for name, each in load.extras.items()})
-    return table.join(extras, rsuffix=" in the list")
+    for name, values in load.extras.items():
+        table[f"{name} in the list" if name in table else name] = values[table["item"]]
+    return table
 
 
 def _by_policy(load: Load, policy: Policy, rng: np.random.Generator) -> Iterator[tuple[int, float]]:

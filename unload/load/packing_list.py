@@ -96,7 +96,7 @@ def read_load(
     container = task.CONTAINER if container is None else container
     container = checks.finite_array("container", container, (3,))
     source, table, comma = _table(path)
-    unit_of, column_of, rest = _columns(source, table, dict(columns or {}), ignore)
+    scale_of, column_of, rest = _columns(source, table, dict(columns or {}), ignore)
 
     rows = pd.Series(range(1, len(table) + 1)).astype(str)
     ids = table.pop(column_of["id"][0]) if "id" in column_of else rows
@@ -109,21 +109,21 @@ def read_load(
         first = ", ".join(f"{name} {cell!r}" for name, cell in table.loc[items[0], shown].items())
         raise ValueError(f"{source}: {named}{more}: {problem} (the first has {first})")
 
-    def numbers(shown: list[str], default: str) -> np.ndarray:
-        """Columns in m, kg or degrees, (n, k) float64."""
+    def numbers(shown: list[str], scale: float = 1.0) -> np.ndarray:
+        """Columns in m, kg or degrees, (n, k) float64; ``scale`` is that of names without one."""
         cells = table[shown].apply(pd.to_numeric, errors="coerce").to_numpy(np.float64)
         unreadable = np.flatnonzero(~np.isfinite(cells).all(axis=1))
         if unreadable.size:
             refuse(unreadable, "a cell that is no number; expected one", shown)
-        return cells / [UNITS[unit_of[name] or default] for name in shown]
+        return cells / [scale_of[name] or scale for name in shown]
 
     # Nothing that the task leaves out is passed over: one mass, and boxes along the axes.
-    for meaning, unit, problem in (
-        ("weight", "kg", "a weight other than 1 kg"),
-        ("rotation", "deg", "a rotation that is no quarter turn"),
+    for meaning, problem in (
+        ("weight", "a weight other than 1 kg"),
+        ("rotation", "a rotation that is no quarter turn"),
     ):
         for name in column_of.get(meaning, ()):
-            cells = numbers([name], unit)[:, 0]
+            cells = numbers([name])[:, 0]
             off = cells - 1 if meaning == "weight" else (cells + 45) % 90 - 45
             if (other := np.flatnonzero(np.abs(off) > 1e-3)).size:
                 refuse(other, f"{problem}; expected none, or {name!r} in ignore", [name])
@@ -135,14 +135,16 @@ def read_load(
     # Lengths in m, and x from the rear.
     place = CENTRE if CENTRE[0] in column_of else CORNER
     shown = [column_of[name][0] for name in (*place, *SIZES)]
-    silent = [name for name in shown if not unit_of[name]]
-    stated = {unit_of[name] for name in shown} - {""}
+    silent = [name for name in shown if scale_of[name] is None]
+    stated = {scale_of[name] for name in shown} - {None}
+    scale = LENGTHS[units] if units else 1.0
     if silent and stated and units is None:
-        if len(stated) > 1:
+        scale = stated.pop()
+        if stated:
             raise ValueError(f"{source} says no unit of {', '.join(silent)}; expected units=...")
-        units = stated.pop()
-        LOGGER.warning("%s: taken to be in %s: %s", source, units, ", ".join(silent))
-    where, sizes = np.hsplit(numbers(shown, units or "m"), 2)
+        unit = [*UNITS][[*UNITS.values()].index(scale)]
+        LOGGER.warning("%s: taken to be in %s: %s", source, unit, ", ".join(silent))
+    where, sizes = np.hsplit(numbers(shown, scale), 2)
     if x_from == "door":
         where[:, 0] = container[0] - where[:, 0] - (sizes[:, 0] if place is CORNER else 0)
 
@@ -162,7 +164,7 @@ def read_load(
         check_stacked(load)
     except BoxError as error:
         problem = f"{error.problem}, tolerance {tolerance} m"
-        if not (units or stated) and sizes.max() > container.max():
+        if silent and units is None and sizes.max() > container.max():
             problem += "; lengths are taken to be in m, expected units='cm', 'mm' or 'in' otherwise"
         refuse(error.boxes, problem, shown)
     if (tipping := uncarried(load)).size:
@@ -201,14 +203,14 @@ def _table(path: str | Path | pd.DataFrame) -> tuple[str, pd.DataFrame, bool]:
 
 def _columns(
     source: str, table: pd.DataFrame, renamed: dict[str, str], ignore: Iterable[str]
-) -> tuple[dict[str, str], dict[str, list[str]], list[str]]:
-    """The unit in each name, "" if none; what columns there are of each meaning; and the rest."""
-    plain, unit_of = {}, {}
+) -> tuple[dict[str, float | None], dict[str, list[str]], list[str]]:
+    """The unit in each name, None if none; what columns there are of each meaning; and the rest."""
+    plain, scale_of = {}, {}
     for name in table.columns:
         words = re.sub(r"[\W_]+", "_", name.lower().replace('"', " in ")).strip("_")
         head, _, unit = words.rpartition("_")
-        unit_of[name] = unit if head and unit in UNITS else ""
-        plain[name] = head.removesuffix("_in") if unit_of[name] else words
+        scale_of[name] = UNITS.get(unit) if head else None
+        plain[name] = head.removesuffix("_in") if scale_of[name] else words
     twice = [name for name in plain if [*plain.values()].count(plain[name]) > 1]
     if twice or len(plain) < len(table.columns):
         raise ValueError(f"{source} has {[*table.columns]}; expected each column once")
@@ -239,4 +241,4 @@ def _columns(
             "with either x, y, z or x_min, y_min, z_min, and with size_x, size_y, size_z, each "
             "once; columns={...} says what other names mean"
         )
-    return unit_of, column_of, rest
+    return scale_of, column_of, rest
