@@ -192,13 +192,13 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
         read_load(path)
     assert read_load(path, units="m").sizes.tolist() == [[0.5, 0.4, 0.3]]
     read_load(written("a,600,10,0,50,40,30", columns=columns.replace("mm", "cm")))
-    assert "taken to be in cm: x_min, y_min, z_min\n" in caplog.text
+    assert "in the unit of the other lengths: x_min, y_min, z_min\n" in caplog.text
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"units": "yard"}, "units is 'yard'; expected one of 'm', 'cm', 'mm', 'in'"),
+        ({"units": "yard"}, "units is 'yard'; expected one of None, 'm', 'cm', 'mm', 'in'"),
         ({"tolerance": 1}, r"tolerance is 1; expected a number in \[0, 0.1\]"),
         ({"x_from": "front"}, "x_from is 'front'; expected one of 'rear', 'door'"),
         ({"container": (1, 2)}, "container has shape"),
@@ -224,7 +224,7 @@ def test_wrong_arguments_are_refused(written, arguments, message):
             r": row 2 \(id 'b'\): floats in load, its lower face at 1.01 m; .* z_min '1.01'",
         ),
         (["a,0,0,0,1,1,1", "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
-        (["a,0,0,0,350,450,300"], "lengths are taken to be in m, expected units='cm'"),
+        (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
         (
             ["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"],
             r"'b'\): reaches from .* x_min '6.5'",

@@ -6,13 +6,16 @@ import pytest
 from tests.load.walls import own_load
 from unload import Load, stack_load, task
 from unload.load.boxes import BoxError, check_stacked
-from unload.load.settling import settled, uncarried
+from unload.load.settling import settle as moves
+from unload.load.settling import uncarried
 
 TOLERANCE = 0.005
 
 
 def settle(low, sizes, tolerance=TOLERANCE):
-    return settled(np.array(low, float), np.array(sizes, float), task.CONTAINER, tolerance)
+    """The corners of boxes that have settled."""
+    low = np.array(low, float)
+    return low + moves(low, np.array(sizes, float), task.CONTAINER, tolerance)
 
 
 @pytest.mark.parametrize("kind", ["the paper's", "continuous sizes", "few sizes"])

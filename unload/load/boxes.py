@@ -149,23 +149,19 @@ class Load:
         return cls(corners + sizes / 2, sizes, **fields)
 
     def behind(self, present: np.ndarray) -> np.ndarray:
-        """Which boxes stand behind a present one, (n,) bool; ``present`` is (n,) bool.
+        """Which boxes stand behind one of the present ones, (n,) bool each.
 
         In front of a box is what stands nearer to the door and overlaps it in y and z.
         """
-        found = np.zeros(len(self), bool)
         box, front = self._fronts
-        found[box[present[front]]] = True
-        return found
+        return np.bincount(box[present[front]], minlength=len(self)) > 0
 
     def covered(self, present: np.ndarray) -> np.ndarray:
-        """Which boxes a present one lies on, (n,) bool; ``present`` is (n,) bool."""
+        """Which boxes lie under one of the present ones, (n,) bool each."""
         starts, boxes = self.contacts
-        ends = starts[ABOVE]
-        lower = np.repeat(np.arange(len(self)), np.diff(ends))
-        found = np.zeros(len(self), bool)
-        found[lower[present[boxes[ends[0] : ends[-1]]]]] = True
-        return found
+        lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
+        above = boxes[starts[ABOVE, 0] : starts[ABOVE, -1]]
+        return np.bincount(lower[present[above]], minlength=len(self)) > 0
 
     @cached_property
     def _fronts(self) -> tuple[np.ndarray, np.ndarray]:

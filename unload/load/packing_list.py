@@ -12,7 +12,7 @@ import pandas as pd
 
 from unload import task
 from unload.load.boxes import BoxError, Load, check_stacked
-from unload.load.settling import settled, uncarried
+from unload.load.settling import settle, uncarried
 from unload.support import checks, files
 
 LOGGER = logging.getLogger(__name__)
@@ -82,17 +82,15 @@ def read_load(
         The load in the order of the list, with its ``ids``.
 
     Raises:
-        TypeError: ``path`` or an argument is of another type.
+        TypeError: an argument is of another type.
         FileNotFoundError: there is no such file.
-        ValueError: an argument is not as described; the list cannot be read; a column is missing,
-            or there are two for the same. Or a box: a cell is no number, the weight another, the
-            turn no quarter, an edge too short, the id another box's; it is not inside the
-            container, overlaps another one, floats, or nothing carries its centre of mass. The
-            message names the first rows, counted from 1 without the line of names, and their ids.
+        ValueError: an argument is not as described; the list cannot be read, lacks a column or has
+            two for the same; or a box is refused. The message names the first rows, counted from 1
+            without the line of names, and their ids.
     """
-    units = units if units is None else checks.one_of("units", units, LENGTHS)
+    checks.one_of("units", units, (None, *LENGTHS))
+    checks.one_of("x_from", x_from, ("rear", "door"))
     tolerance = checks.real("tolerance", tolerance, 0, 0.1)
-    x_from = checks.one_of("x_from", x_from, ("rear", "door"))
     container = task.CONTAINER if container is None else container
     container = checks.finite_array("container", container, (3,))
     source, table, comma = _table(path)
@@ -137,42 +135,35 @@ def read_load(
     shown = [column_of[name][0] for name in (*place, *SIZES)]
     silent = [name for name in shown if scale_of[name] is None]
     stated = {scale_of[name] for name in shown} - {None}
-    scale = LENGTHS[units] if units else 1.0
-    if silent and stated and units is None:
-        scale = stated.pop()
-        if stated:
-            raise ValueError(f"{source} says no unit of {', '.join(silent)}; expected units=...")
-        unit = [*UNITS][[*UNITS.values()].index(scale)]
-        LOGGER.warning("%s: taken to be in %s: %s", source, unit, ", ".join(silent))
-    where, sizes = np.hsplit(numbers(shown, scale), 2)
+    if silent and units is None and len(stated) > 1:
+        raise ValueError(f"{source} says no unit of {', '.join(silent)}; expected units=...")
+    if silent and units is None and stated:
+        LOGGER.warning("%s: in the unit of the other lengths: %s", source, ", ".join(silent))
+    scale = LENGTHS[units] if units else max(stated, default=1.0)
+    centres, sizes = np.hsplit(numbers(shown, scale), 2)
+    centres += 0 if place is CENTRE else sizes / 2
     if x_from == "door":
-        where[:, 0] = container[0] - where[:, 0] - (sizes[:, 0] if place is CORNER else 0)
+        centres[:, 0] = container[0] - centres[:, 0]
 
-    # Boxes are settled as corners; those that stay keep the centres that the list gives.
-    low = where - sizes / 2 if place is CENTRE else where
-    found = settled(low, sizes, container, tolerance)
-    moves = np.linalg.norm(found - low, axis=1)
-    centres = found + sizes / 2
-    if place is CENTRE:
-        centres = np.where(found == low, where, centres)
+    # What fits stays, to the bit, where the list puts it.
+    moves = settle(centres - sizes / 2, sizes, container, tolerance)
     extras = {
         name: pd.to_numeric(cells) if cells.str.fullmatch(NUMBER).all() else cells.astype(object)
         for name, cells in table.drop(columns=shown).items()
     }
     try:
-        load = Load(centres, sizes, ids=ids, container=container, extras=extras)
+        load = Load(centres + moves, sizes, ids=ids, container=container, extras=extras)
         check_stacked(load)
     except BoxError as error:
-        problem = f"{error.problem}, tolerance {tolerance} m"
-        if silent and units is None and sizes.max() > container.max():
-            problem += "; lengths are taken to be in m, expected units='cm', 'mm' or 'in' otherwise"
-        refuse(error.boxes, problem, shown)
+        unit = "; in m, expected units='cm', 'mm' or 'in' otherwise" if scale == 1 else ""
+        large = unit if silent and sizes.max() > container.max() else ""
+        refuse(error.boxes, f"{error.problem}, tolerance {tolerance} m{large}", shown)
     if (tipping := uncarried(load)).size:
         refuse(tipping, "tips, because nothing carries its centre of mass", shown)
     if moves.any():
         LOGGER.warning(
             "%s: %d of %d boxes moved by up to %.1f mm, onto what is below and beside them",
-            source, np.count_nonzero(moves), len(moves), 1000 * moves.max(),
+            source, moves.any(axis=1).sum(), len(load), 1000 * np.linalg.norm(moves, axis=1).max(),
         )  # fmt: skip
     return load
 

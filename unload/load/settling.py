@@ -7,14 +7,14 @@ from unload.load.boxes import BELOW, CONTACT_TOLERANCE, OVERLAP, Load
 SLACK = 0.0005  # m, at each side of a face: physics makes boxes 1 mm narrower
 
 
-def settled(
+def settle(
     low: np.ndarray, sizes: np.ndarray, container: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """Move boxes onto what is below them, clear of what is beside them, and inside.
+    """How far boxes move until they lie on what is below, clear of what is beside, and inside.
 
     Two boxes that share more than ``tolerance`` of depth and of width lie one above the other;
-    others stand beside each other. A fault of more than ``tolerance`` is left as it is: a ``Load``
-    of such boxes is refused.
+    others stand side by side. A fault of more than ``tolerance`` is left as it is: a ``Load`` of
+    such boxes is refused.
 
     Args:
         low, sizes: (n, 3) float64, corners nearest to the origin and edge lengths in m.
@@ -22,7 +22,7 @@ def settled(
         tolerance: how far boxes may overlap each other or the walls, or float, in m.
 
     Returns:
-        (n, 3) float64, corners, those of boxes that fit as they were.
+        (n, 3) float64 in m, 0 where a box fits.
     """
     high, found = low + sizes, low.copy()
 
@@ -55,7 +55,7 @@ def settled(
         for box, others in zip(order[::-1], before[::-1]):
             last[others] = np.minimum(last[others], last[box] - edges[others])
         found[:, axis] = np.minimum(first, last)
-    return np.where(np.abs(found - low) > OVERLAP / 2, found, low)
+    return np.where(np.abs(found - low) > OVERLAP / 2, found - low, 0.0)
 
 
 def uncarried(load: Load) -> np.ndarray:
