@@ -229,7 +229,7 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
     found, *pair = _find(*rows, left_to_right, np.cumsum(np.bincount(groups)))
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
-        raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected none to")
+        raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected none")
     return Contacts(*_lists(found, len(low)))
 
 
