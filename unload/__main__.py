@@ -56,7 +56,7 @@ def print_order(arguments: list[str]) -> None:
     parser.add_argument("--policy", default="reachable", help=known)
     parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
     parser.add_argument("--units", help="of lengths: m, cm, mm or in")
-    size = {"type": float, "nargs": 3, "metavar": ("LENGTH", "WIDTH", "HEIGHT")}
+    size: dict = {"type": float, "nargs": 3, "metavar": ("LENGTH", "WIDTH", "HEIGHT")}
     parser.add_argument("--container", help="its inner size in m; the paper's is 7 2.5 2.5", **size)
     parser.add_argument("--x-from", default="rear", help="where x is 0: rear (the default) or door")
     text = "in m: gaps and overlaps up to this are closed (%(default)s)"

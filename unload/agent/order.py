@@ -72,7 +72,7 @@ def picking_order(
 
     Raises:
         TypeError, ValueError: an argument is not as described, or ``policy`` returns
-            something other than a row that its mask allows.
+            something other than a row that its mask allows, or ``rule`` other than keys.
         FileNotFoundError: there is no such policy; the message lists the names.
     """
     check_load(load)
@@ -93,7 +93,7 @@ def picking_order(
     if policy == "reachable":
         picks = _by_rule(load, rule or reachable)
     else:
-        picks = _by_policy(load, policy, rng)
+        picks = _by_policy(load, policy, rng)  # type: ignore[arg-type]
 
     rows, present = [], np.ones(len(load), bool)
     for item, distance in picks:

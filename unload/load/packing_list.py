@@ -17,7 +17,6 @@ from unload.support import checks, files
 
 LOGGER = logging.getLogger(__name__)
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
-TOLERANCE = 0.005  # m
 CENTRE, CORNER = ("x", "y", "z"), ("x_min", "y_min", "z_min")
 SIZES = "size_x", "size_y", "size_z"
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": 1 / 0.0254}  # of a unit in a metre
@@ -45,7 +44,7 @@ def read_load(
     path: str | Path | pd.DataFrame = EXAMPLE,
     units: str | None = None,
     columns: Mapping[str, str] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = 0.005,
     container: Sequence[float] | np.ndarray | None = None,
     x_from: str = "rear",
     ignore: Iterable[str] = (),
@@ -155,9 +154,10 @@ def read_load(
         load = Load(centres + moves, sizes, ids=ids, container=container, extras=extras)
         check_stacked(load)
     except BoxError as error:
-        unit = "; in m, expected units='cm', 'mm' or 'in' otherwise" if scale == 1 else ""
-        large = unit if silent and sizes.max() > container.max() else ""
-        refuse(error.boxes, f"{error.problem}, tolerance {tolerance} m{large}", shown)
+        problem = f"{error.problem}, tolerance {tolerance} m"
+        if scale == 1 and silent and sizes.max() > container.max():
+            problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
+        refuse(error.boxes, problem, shown)
     if (tipping := uncarried(load)).size:
         refuse(tipping, "tips, because nothing carries its centre of mass", shown)
     if moves.any():
@@ -205,7 +205,8 @@ def _columns(
     twice = [name for name in plain if [*plain.values()].count(plain[name]) > 1]
     if twice or len(plain) < len(table.columns):
         raise ValueError(f"{source} has {[*table.columns]}; expected each column once")
-    for name in {*renamed, *ignore} - {*plain, *plain.values()}:
+    ignored = {*ignore}
+    for name in ({*renamed} - {*plain}) | (ignored - {*plain, *plain.values()}):
         raise ValueError(f"{source} has no column {name!r}; expected one of {[*plain]}")
 
     # A column means what the caller says, or what its name says, or nothing here.
@@ -213,12 +214,13 @@ def _columns(
     rest = []
     for name in plain:
         meaning = renamed.get(name, MEANINGS.get(plain[name]))
-        if {name, plain[name]} & {*ignore}:
+        if {name, plain[name]} & ignored:
             continue
         if meaning is None:
             rest.append(name)
         else:
             column_of.setdefault(checks.one_of("columns", meaning, NAMES), []).append(name)
+
     # Of several that could be the id, one that the caller names, or else the first in ``NAMES``.
     ids, ranks = column_of.get("id", []), [*renamed, *NAMES["id"].split()]
     ids.sort(key=lambda name: ranks.index(name if name in renamed else plain[name]))

@@ -66,7 +66,7 @@ def uncarried(load: Load) -> np.ndarray:
     """
     low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
     found = []
-    for box in np.flatnonzero(low[:, 2] > CONTACT_TOLERANCE):
+    for box in np.flatnonzero(low[:, 2] > CONTACT_TOLERANCE).tolist():
         below, centre = load.contacts.of(BELOW, box), load.positions[box]
         start = np.maximum(low[below], low[box]) - centre + SLACK
         end = np.minimum(high[below], high[box]) - centre - SLACK
