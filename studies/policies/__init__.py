@@ -1,6 +1,6 @@
 """Policies compared: rules, the paper's agent, and the recommended one.
 
 Read ``comparison`` (where the lift table reaches, and what a policy's file says of it),
-``robustness`` (every box simulated), ``variants`` (other networks, rewards and settings) and
-``figures`` (the policies beside each other).
+``robustness`` (every box simulated), ``variants`` (other networks, rewards and settings),
+``figures`` (the policies beside each other) and ``orders`` (which of them a robot can carry out).
 """

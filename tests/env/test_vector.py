@@ -96,6 +96,23 @@ def test_fewer_boxes_may_have_more_contacts():
     play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])
 
 
+def test_containers_of_other_sizes_stand_side_by_side(few_items):
+    def stack(rng):
+        load = few_items(rng, 150)
+        container = load.container + rng.choice([0.0, 0.3, 5.0], 3)
+        return unload.Load(load.positions, load.sizes, container=container)
+
+    play_both(CONTAINER, 3, 60, seed=3, max_picks=20, stack=stack)
+    envs = ContainerVectorEnv(2, stack=stack)
+    envs.reset(seed=3)
+    state = envs.state()
+    assert {*state["sizes"].ravel()} > {7.0} and {*state["sizes"].ravel()} - {7.0, 2.5}
+    older = {name: array for name, array in state.items() if name != "sizes"}
+    envs.load_state(older)
+    assert (envs.state()["sizes"] == unload.task.CONTAINER).all()
+    envs.close()
+
+
 @settings(derandomize=True, deadline=None, max_examples=20)
 @given(
     env_id=st.sampled_from([CONTAINER, HIGHEST]),

@@ -143,10 +143,12 @@ class PickingEnv(Picking, EpisodeEnv):
         """Free what the environment holds; may be called again."""
         self._state = "closed"
 
-    def _features(self, positions: np.ndarray) -> np.ndarray:
+    def _features(
+        self, positions: np.ndarray, container: np.ndarray = task.CONTAINER
+    ) -> np.ndarray:
         """The observation of up to 128 items at ``positions`` (n, 3) in m, nearest first."""
         seen = np.full((task.N_VISIBLE, 3), task.PADDING, np.float32)
-        seen[: len(positions)] = observation.scaled(positions)
+        seen[: len(positions)] = observation.scaled(positions, container)
         if not self.equalize:
             return seen
         present = np.arange(task.N_VISIBLE) < len(positions)

@@ -93,8 +93,9 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env] = count
-        state.seen[env, :count] = scaled(positions)
-        state.by_distance[env, :count] = observation.nearest(positions, count)
+        state.sizes[env] = load.container
+        state.seen[env, :count] = scaled(positions, load.container)
+        state.by_distance[env, :count] = observation.nearest(positions, count, load.container)
         containers.start(state, env, *self._features)
 
     def _make_room(self, items: int, links: int) -> None:
@@ -127,7 +128,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         # The load is built again, because to keep those of all containers makes resets slower.
         count = np.flatnonzero(self._containers.present[env])[-1] + 1
         boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-        load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
+        container = self._containers.sizes[env]
+        load = Load(boxes[:, :3], boxes[:, 3:], labels, labels, container=container)
         around = Surroundings(load, self._containers.present[env, :count])
         return self._physics.simulate(around.situation(item))
 
@@ -148,6 +150,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         return self._containers._asdict()
 
     def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        # Older checkpoints know only the paper's container.
+        arrays.setdefault("sizes", np.tile(task.CONTAINER, (self.num_envs, 1)))
         self._containers = containers.Containers(**arrays)
 
     def _pick_infos(self) -> dict[str, np.ndarray]:
