@@ -16,7 +16,7 @@ from studies.heap.rake import Outcome
 from studies.heap.table import LEARNED, ORACLE, REFERENCE, read_heap_table
 from studies.style import COLOURS as RULE_COLOURS
 from studies.style import styled
-from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
+from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, pixels, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
 MEANINGS = {
@@ -92,6 +92,13 @@ def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray | None = None, title: 
         title=title,
     )
     axes.axis("off")
+
+
+def picture(heap: Heap) -> np.ndarray:
+    """(480, 640, 3) uint8, a heap as ``draw_heap`` draws it."""
+    figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")
+    draw_heap(figure.add_axes((0, 0, 1, 1)), heap)
+    return pixels(figure)
 
 
 def _room(edge: float) -> list[np.ndarray]:

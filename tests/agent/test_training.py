@@ -372,6 +372,22 @@ def test_a_point_holds_the_means_since_the_last_one():
     assert table["wall_time"].is_monotonic_increasing
 
 
+def test_a_callback_may_end_a_run(tmp_path):
+    """By False, not by None or 0; the policy and the curve until then are its result."""
+    config, points = TrainConfig(**CONTAINER), []
+
+    def callback(point):
+        points.append(point)
+        return False if len(points) == 4 else 0 if len(points) == 3 else None
+
+    result = train(config, tmp_path, progress=False, callback=callback)
+    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
+    assert len(points) == 4
+    assert result.policy.card["picks"] == points[-1]["picks"] < config.picks
+    again = train(config, tmp_path, progress=False, callback=callback)
+    assert len(points) == 4 and len(again.curve) == 4 and not (tmp_path / "checkpoint.npz").exists()
+
+
 @pytest.mark.parametrize("where", ["step", "callback"])
 def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
     """Nothing is written any more; the run goes on from the checkpoint before."""
