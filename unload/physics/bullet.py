@@ -42,7 +42,7 @@ def _pybullet() -> Any:
         except ModuleNotFoundError as error:
             raise ModuleNotFoundError(
                 "a lift that no table knows, a whole container or a heap has to be simulated; "
-                "expected PyBullet: pip install 'unload[pybullet]'"
+                "expected PyBullet: pip install pybullet (ready-made for Python 3.11 and lower)"
             ) from error
     return pybullet
 

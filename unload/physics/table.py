@@ -34,6 +34,7 @@ FEWEST_SLOTS = 1024
 ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
 SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
 CLOSE = 1e-5  # m, other processors may round otherwise
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
 FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
 PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
 
@@ -193,7 +194,7 @@ class LiftTable:
                 if len(self) > len(stored):
                     self.save(path)
         except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            if error.errno not in FULL:
                 raise
             LOGGER.warning("lifts are kept in memory only: %s", error)
 
