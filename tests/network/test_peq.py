@@ -35,12 +35,13 @@ def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
     assert values.abs().max() < 1
 
 
+@pytest.mark.filterwarnings("default::FutureWarning")  # PyTorch's own, of what it calls
 def test_a_network_can_be_exported(tmp_path):
     """To ONNX, for any number of observations and items, as the reference says."""
     pytest.importorskip("onnx")
     pytest.importorskip("onnxscript")
     runtime = pytest.importorskip("onnxruntime")
-    peq, path = network(), tmp_path / "policy.onnx"
+    peq, path = network().eval(), tmp_path / "policy.onnx"
     torch.onnx.export(
         peq, (torch.zeros(2, 128, 3),), path,
         input_names=["observations"], output_names=["values"],
