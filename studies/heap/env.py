@@ -189,7 +189,7 @@ class HeapEnv(EpisodeEnv):
         self._check_started()
         if self.render_mode is None:
             return None
-        from studies.heap.figures import picture  # here, because few look and Matplotlib is slow
+        from studies.heap.picture import picture  # here, because few look and Matplotlib is slow
 
         return picture(self.heap)
 

@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from studies.heap import figures
+from studies.heap import figures, picture
 from studies.heap.table import read_heap_table
 from unload.load.picture import COLOURS
 
@@ -28,8 +28,8 @@ def test_missing_data_names_the_command_that_makes_it(tmp_path):
 
 
 def test_corners_are_those_of_turned_boxes(heap):
-    corners = figures.corners(heap)
-    seam = figures.SEAM
+    corners = picture.corners(heap)
+    seam = picture.SEAM
     assert np.ptp(corners[0], axis=0) == pytest.approx([0.4 - seam] * 3)
     wide = (0.4 - seam) * 2**0.5
     assert np.ptp(corners[3], axis=0) == pytest.approx([wide, wide, 0.4 - seam])
@@ -39,8 +39,8 @@ def test_corners_are_those_of_turned_boxes(heap):
 def test_nearer_boxes_are_painted_later(heap):
     """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
     axes = plt.figure().add_subplot()
-    colours = np.array([figures.MEANINGS[name] for name in ("comes along", "is dragged")])
-    figures.draw_heap(axes, heap.only(np.array([2, 0])), colours)
+    colours = np.array([picture.MEANINGS[name] for name in ("comes along", "is dragged")])
+    picture.draw_heap(axes, heap.only(np.array([2, 0])), colours)
     painted = axes.collections[0].get_facecolors()[:, :3]
     assert len(painted) == 6, "three faces of a box are turned to the eye"
     dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))
