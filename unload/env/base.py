@@ -182,7 +182,7 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
         **settings,
     ) -> None:
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)

@@ -17,13 +17,14 @@ from unload.support.compiled import CONFIG
 COMMAND = (
     "from signal import *; signal(SIGINT, SIG_IGN); from unload.physics.pool import serve; serve()"
 )
+MOST = 8  # each takes 100 MB, and a step has few new lifts
 
 
 class Pool:
     """Processes that are started when they are first asked: one for each core, with this one.
 
-    These are as many as numba takes threads, which the environment's ``NUMBA_NUM_THREADS`` sets.
-    They end with the pool, or with this process, however that ends.
+    These are as many as numba takes threads, which the environment's ``NUMBA_NUM_THREADS`` sets,
+    but at most ``MOST``. They end with the pool, or with this process, however that ends.
     """
 
     def __init__(self) -> None:
@@ -34,10 +35,16 @@ class Pool:
         self, situations: list[Situation], simulate: Callable[[Situation], float]
     ) -> list[float]:
         """Return how far each chosen box moves, in m; ``simulate`` is for this process's share."""
-        count, distances = CONFIG.NUMBA_NUM_THREADS, [0.0] * len(situations)
+        count, distances = min(CONFIG.NUMBA_NUM_THREADS, MOST), [0.0] * len(situations)
         try:
             while len(self._workers) < count - 1:
-                self._workers.append(_start())
+                process = subprocess.Popen(
+                    [sys.executable, "-c", COMMAND],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+                )
+                self._workers.append(process)
             # Dealt one by one, because those of one container may take longer than others.
             for number, worker in enumerate(self._workers, 1):
                 worker.stdin.write(pickle.dumps(situations[number::count]))
@@ -51,15 +58,6 @@ class Pool:
             if isinstance(error, (EOFError, OSError)):
                 raise RuntimeError("a process that simulates lifts has died") from error
             raise
-
-
-def _start() -> subprocess.Popen:
-    return subprocess.Popen(
-        [sys.executable, "-c", COMMAND],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    )
 
 
 def _end(workers: list[subprocess.Popen]) -> None:
