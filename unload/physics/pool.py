@@ -73,9 +73,10 @@ def serve() -> None:
 
     What PyBullet has to say goes to stderr.
     """
-    with os.fdopen(os.dup(1), "wb") as answers, closing(LocalPhysics()) as physics:
-        os.dup2(2, 1)
-        while sys.stdin.buffer.peek():
-            situations = pickle.load(sys.stdin.buffer)
+    questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    with questions, answers, closing(LocalPhysics()) as physics:
+        while questions.peek():
+            situations = pickle.load(questions)
             pickle.dump([physics.simulate(each) for each in situations], answers)
             answers.flush()
