@@ -135,8 +135,8 @@ def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypat
     def refuse(path: Path) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
 
-    monkeypatch.setattr(Path, "unlink", refuse)
     with files.locked(finished):
+        monkeypatch.setattr(Path, "unlink", refuse)
         assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
 
 

@@ -219,7 +219,7 @@ def train(
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
-    callback: Callable[[dict[str, float]], None] | None = None,
+    callback: Callable[[dict[str, float]], bool | None] | None = None,
 ) -> TrainResult:
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
@@ -252,7 +252,8 @@ def train(
             else.
         callback: is called at each point of the curve with that point, a dict by the columns of
             ``TrainResult.curve``: ``picks``, ``success_rate``, ``loss`` and so on. A run that is
-            resumed calls it for new points only; an error in it ends the run.
+            resumed calls it for new points only; an error in it ends the run. So does False, with
+            a policy and a curve: what has been learned until then is the run's result.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
@@ -281,7 +282,7 @@ def train_changed(
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
-    callback: Callable[[dict[str, float]], None] | None = None,
+    callback: Callable[[dict[str, float]], bool | None] | None = None,
 ) -> TrainResult:
     """``train`` with something changed that no ``TrainConfig`` offers, such as the reward.
 
@@ -344,7 +345,7 @@ def _go(
     run: Training,
     folder: RunFolder,
     keep_lifts: Callable[[], None],
-    callback: Callable[[dict[str, float]], None] | None,
+    callback: Callable[[dict[str, float]], bool | None] | None,
     progress: bool | TextIO,
     interrupts: list[int],
 ) -> None:
@@ -383,8 +384,9 @@ def _go(
                     if time.monotonic() - shown > CURVE_INTERVAL:
                         folder.save_curve(run)
                         shown = time.monotonic()
-                    if callback is not None:
-                        callback(point._asdict())
+                    if callback is not None and callback(point._asdict()) is False:
+                        run.agent.check_finite()
+                        return
                 if interrupts:
                     raise KeyboardInterrupt(
                         f"stopped after {rollout.picks} picks; call train again with "

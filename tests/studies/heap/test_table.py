@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from studies import paths
-from studies.heap import figures, recording
+from studies.heap import figures, picture, recording
 from studies.heap import table as study
 from studies.heap.boxes import Heap
 from studies.heap.env import stored_heaps
@@ -150,8 +150,8 @@ def test_the_throughput_draws_its_data():
 
 
 def test_corners_are_those_of_turned_boxes(heap):
-    corners = figures.corners(heap)
-    seam = figures.SEAM
+    corners = picture.corners(heap)
+    seam = picture.SEAM
     assert np.ptp(corners[0], axis=0) == pytest.approx([0.4 - seam] * 3)
     wide = (0.4 - seam) * 2**0.5
     assert np.ptp(corners[3], axis=0) == pytest.approx([wide, wide, 0.4 - seam])
@@ -161,8 +161,8 @@ def test_corners_are_those_of_turned_boxes(heap):
 def test_nearer_boxes_are_painted_later(heap):
     """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
     axes = plt.figure().add_subplot()
-    colours = np.array([figures.MEANINGS[name] for name in ("comes along", "is dragged")])
-    figures.draw_heap(axes, heap.only(np.array([2, 0])), colours)
+    colours = np.array([picture.MEANINGS[name] for name in ("comes along", "is dragged")])
+    picture.draw_heap(axes, heap.only(np.array([2, 0])), colours)
     painted = axes.collections[0].get_facecolors()[:, :3]
     assert len(painted) == 6, "three faces of a box are turned to the eye"
     dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))
