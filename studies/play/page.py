@@ -14,6 +14,7 @@ import re
 from pathlib import Path
 
 from studies import paths
+from studies.falls.fresh import ERRS, THRESHOLDS
 from unload import task
 from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import POSITION_NOISE, SINK
@@ -22,7 +23,6 @@ from unload.support import files
 
 FOLDER = Path(__file__).with_name("page")
 PAGE = paths.ROOT / "figures" / "train_it_yourself.html"
-MODULES = ("network", "container", "measures", "training", "worker", "state", "drawing", "page")
 
 
 def task_numbers() -> dict:
@@ -47,6 +47,8 @@ def task_numbers() -> dict:
         "walls": substacks.WALLS,
         "packages": substacks.PACKAGES.tolist(),
         "columns": columns,
+        "thresholds": THRESHOLDS,
+        "errs": ERRS,
     }
 
 
@@ -63,6 +65,9 @@ def _content(name: str) -> str:
     """A file as it stands in the page; of a module without imports and exports, for all see all."""
     if name == "task":
         return json.dumps(task_numbers(), separators=(",", ":"))
+    if name.startswith("notebook:"):
+        (path,) = (paths.ROOT / "notebooks").glob(f"{name.removeprefix('notebook:')}.ipynb")
+        return path.relative_to(paths.ROOT).as_posix()
     text = (FOLDER / name).read_text().strip()
     return re.sub(r"^import .*\n|^export ", "", text, flags=re.MULTILINE)
 

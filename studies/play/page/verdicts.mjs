@@ -1,0 +1,74 @@
+// One line that says what the reader's picks or a run did, computed from what was measured.
+
+import { limits, preferences } from "./measures.mjs";
+
+const FELL = 0.2; // by how much a rate has sunk
+const STUCK = 0.5; // share of picks that repeat one that has just failed
+const MISLED = 0.1; // by how much a rate rises if x and y are blank
+const SIDES = [["the rear", "the front"], ["the left side", "the right side"]];
+
+export const percent = (share) => `${Math.round(100 * share)} %`;
+const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
+
+/** What no policy can exceed, because free boxes jam. */
+export const ceiling = ({ seamless, jam }) => (seamless ? 1 - jam : 1);
+
+/** What became of a pick of an item in the reader's container. */
+export function pickVerdict(container, item, success) {
+  const unloaded = container.present.filter((here) => !here).length;
+  const reason = container.liftable(item) ? "it jams, although no box lies on it" : "a box lies on it";
+  const how = success ? "Unloaded: no box lay on it." : `Failed: ${reason}.`;
+  return `${how} ${unloaded} of your ${container.picks} picks succeeded.`;
+}
+
+/**
+ * What a run did.
+ *
+ * @param {object} run its `points`, see training.mjs, `picks`, and `seconds` of training; whether it
+ *   is `running`; its `rates`, see policy.mjs, by whether x and y are blank.
+ * @param {object} config its settings.
+ * @param {object} task its numbers `thresholds` and `errs`.
+ */
+export function runVerdict({ points, picks, seconds, running, rates }, config, task) {
+  if (!points.length) return "";
+  const success = points.map((point) => point.success_rate);
+  if (running || picks < config.picks) return `${percent(success.at(-1))} of its latest picks succeeded.`;
+  const top = ceiling(config);
+  const [best, end] = [Math.max(...success), mean(success.slice(-Math.ceil(success.length / 10)))];
+  const judged = rates[config.blank];
+  const limit = top < 1 ? ` With these jams nothing ends above ${percent(top)}.` : "";
+
+  if (end >= task.errs * top) {
+    return `It learned: at the end ${percent(end)} of its picks succeeded, after ${seconds.toFixed(1)} s.${limit}`;
+  }
+  if (judged?.repeated > STUCK) {
+    return `It is stuck: ${percent(judged.repeated)} of its picks repeat one that has just failed.`;
+  }
+  const why = misled(points.at(-1).slopes, config, task);
+  if (best - end < FELL * top) return `It ended at ${percent(end)}, ${percent(best)} at best; it ${why}.${limit}`;
+  const fell = `It fell, from ${percent(best)} to ${percent(end)}`;
+  if (judged?.success_rate < task.errs * top) return `${fell}: it ${why}.${limit}`;
+  return judged ? `${fell}, and rose again: its last weights succeed in ${percent(judged.success_rate)} of fresh picks.` : `${fell}.`;
+}
+
+/** What a network prefers to height, by its slopes. */
+function misled(slopes, config, task) {
+  if (slopes[2] <= 0) return "prefers low boxes";
+  const along = preferences(slopes);
+  const beyond = limits(config, task.thresholds).map((limit, axis) => Math.abs(along[axis]) / limit);
+  const axis = beyond[1] > beyond[0] ? 1 : 0;
+  if (beyond[axis] <= 1) return "prefers no place to height";
+  return `prefers ${SIDES[axis][along[axis] > 0 ? 1 : 0]} to height`;
+}
+
+/** What frozen weights do in fresh containers, with x and y and without. */
+export function blankVerdict({ rates }, config, task) {
+  const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
+  if (blank === undefined) return "";
+  const without = `With z alone these weights succeed in ${percent(blank)} of fresh picks`;
+  if (seen === undefined) return `${without}.`;
+  const both = `${without}, with x and y in ${percent(seen)}`;
+  const good = blank >= task.errs * ceiling(config);
+  if (blank - seen < MISLED) return `${both}: ${good ? "no place misleads it" : "the place is not what misleads it"}.`;
+  return `${both}: ${good ? "it never forgot height; a place outweighed it" : "a place misled it, but not that alone"}.`;
+}
