@@ -4,8 +4,8 @@
 export const line = (points, name, end) =>
   points.map((point) => [(100 * point.picks) / end, 100 - 100 * point[name]]).join(" ");
 
-/** The point of the curve that is nearest to a share, 0 to 1, of the way to `end`. */
+/** The point nearest to a share, 0 to 1, of the way to `end`; undefined if there is none. */
 export function pointAt(points, share, end) {
   const away = ({ picks }) => Math.abs(picks - share * end);
-  return points.reduce((best, point) => (away(point) < away(best) ? point : best));
+  return points.toSorted((a, b) => away(a) - away(b))[0];
 }

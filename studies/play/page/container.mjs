@@ -44,7 +44,7 @@ export function stackLoad(generator, task) {
 }
 
 export class Container {
-  /** A full one; `generator` blurs where its boxes are seen, by `task.position_noise`, and jams them. */
+  /** A full one; `generator` blurs the places by `task.position_noise`, and jams boxes. */
   constructor(boxes, task, generator) {
     Object.assign(this, { boxes, task, generator, picks: 0 });
     this.present = new Uint8Array(boxes.length).fill(1);

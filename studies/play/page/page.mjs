@@ -2,7 +2,8 @@
 
 const element = (id) => document.getElementById(id);
 const task = JSON.parse(element("task").textContent);
-const [canvas, form, presets, steps, plot] = ["canvas", "settings", "presets", "steps", "plot"].map(element);
+const [canvas, form, presets] = ["canvas", "settings", "presets"].map(element);
+const [steps, plot] = ["steps", "plot"].map(element);
 const drawing = new Drawing(canvas, task);
 const network = new PEQNetwork(N_FEATURES, new Generator(0)); // its weights come from the worker
 const code = ["library", "worker"].map((id) => element(id).textContent);
@@ -19,7 +20,8 @@ const make = (kind, fields, ...content) => {
 };
 for (const [name, [text, options, title]] of Object.entries(CHOICES)) {
   if (name === "blank") continue; // stands beside its numbers
-  const select = make("select", { name }, ...Object.entries(options).map((option) => new Option(...option)));
+  const choices = Object.entries(options).map((option) => new Option(...option));
+  const select = make("select", { name }, ...choices);
   element("jams").before(make("label", { title }, text, select));
 }
 const tiles = Array.from({ length: N_FEATURES }, () => make("canvas", {}));
@@ -28,8 +30,9 @@ element("features").append(...tiles);
 // Files beside the page: in the repository, or in its site. A copy that stands alone names them.
 for (const link of document.querySelectorAll("a[data-file]")) {
   const { file } = link.dataset;
-  if (/\/figures\/[^/]*$/.test(location.pathname)) link.href = `../${file}`;
-  else if (/\/_downloads\//.test(location.pathname)) link.href = `../../${file.replace(/\.\w+$/, ".html")}`;
+  const inside = (folder) => location.pathname.includes(folder);
+  if (inside("/_downloads/")) link.href = `../../${file.replace(/\.\w+$/, ".html")}`;
+  else if (inside("/figures/")) link.href = `../${file}`;
   else link.title = `In the repository: ${file}`;
 }
 
@@ -44,7 +47,7 @@ function set(text, anew) {
   element("problems").hidden = !read.problems.length;
   history.replaceState(null, "", `#${toText(config)}`);
   for (const [name, value] of Object.entries(config)) form.elements[name].value = value;
-  for (const button of presets.children) button.ariaPressed = toText(preset(button.value)) === toText(config);
+  for (const button of presets.children) button.ariaPressed = button.value === named();
   const begin = anew || config.seed !== before?.seed;
   if (begin) {
     const generator = new Generator(config.seed);
@@ -62,7 +65,10 @@ function preset(name) {
 }
 
 /** The preset that the settings are, or "own". */
-const named = () => Object.keys(PRESETS).find((name) => toText(preset(name)) === toText(config)) ?? "own";
+function named() {
+  const names = Object.keys(PRESETS);
+  return names.find((name) => toText(preset(name)) === toText(config)) ?? "own";
+}
 
 /** Do what a step or preset says. */
 function begin(name) {
@@ -132,7 +138,9 @@ function showContainer() {
 }
 
 function showCurve(points, end) {
-  for (const name of ["success_rate", "epsilon"]) element(name).setAttribute("points", line(points, name, end));
+  for (const name of ["success_rate", "epsilon"]) {
+    element(name).setAttribute("points", line(points, name, end));
+  }
   const last = points.at(-1);
   element("rate").textContent = last ? percent(last.success_rate) : "";
   element("end").textContent = end.toLocaleString("en");
@@ -141,7 +149,8 @@ function showCurve(points, end) {
 
 function showPreferences(points) {
   const most = limits(config, task.thresholds);
-  const [along, across] = most.map((limit, axis) => (limit < Infinity ? `${limit} along ${"xy"[axis]}` : ""));
+  const known = most.map((limit, axis) => `${limit} along ${"xy"[axis]}`);
+  const above = known.filter((_, axis) => most[axis] < Infinity).join(" or ");
   element("region").setAttribute("d", region(most));
   element("trail").setAttribute("points", points.map((point) => place(point.slopes)).join(" "));
   const last = points.at(-1);
@@ -150,8 +159,8 @@ function showPreferences(points) {
   element("dot").setAttribute("transform", `translate(${right} ${down})`);
   element("dot").style.opacity = last ? 1 : 0;
   element("preferences").textContent = last ? `x ${signed(x)}, y ${signed(y)}` : "";
-  const known = [along, across].filter(Boolean).join(" or ");
-  element("limits").textContent = known ? `Shaded: runs err (above ${known}).` : "For positions no limit is known.";
+  const none = "For positions no limit is known.";
+  element("limits").textContent = above ? `Shaded: runs err (above ${above}).` : none;
 }
 
 const signed = (value) => value.toFixed(2).replace("-", "\u2212");
@@ -160,9 +169,10 @@ function showMaps() {
   const maps = featureMaps(network, Number(element("axis").value), config.blank, MAP_SIDE);
   const largest = Math.max(...maps.flatMap((map) => [...map].map(Math.abs)));
   maps.forEach((map, f) => {
-    const weights = [...network.extractor.subarray(4 * f, 4 * f + 3)].map((weight) => weight.toFixed(1));
+    const [x, y, z] = [...network.extractor.subarray(4 * f, 4 * f + 3)].map(signed);
+    const score = signed(network.scorer[f]);
     paint(tiles[f], map, largest);
-    tiles[f].title = `Feature ${f + 1}: weights of x, y, z are ${weights}; of it, ${network.scorer[f].toFixed(1)}`;
+    tiles[f].title = `Feature ${f + 1}: x ${x}, y ${y}, z ${z}; its weight in the score: ${score}`;
   });
   const sum = sumMap(maps);
   paint(element("sum"), sum, Math.max(...sum.map(Math.abs)));
@@ -193,10 +203,10 @@ element("train").onclick = () => watch(run?.running ? "pause" : "train");
 element("step").onclick = () => watch("step");
 element("reset").onclick = () => set(toText(config), true);
 plot.onpointermove = ({ offsetX }) => {
-  const { points, picks } = run;
-  const end = Math.max(config.picks, picks);
-  const at = points.length && pointAt(points, offsetX / plot.clientWidth, end);
-  if (at) element("readout").textContent = `${at.picks.toLocaleString("en")} picks: ${percent(at.success_rate)}`;
+  const end = Math.max(config.picks, run.picks);
+  const at = pointAt(run.points, offsetX / plot.clientWidth, end);
+  const says = at && `${at.picks.toLocaleString("en")} picks: ${percent(at.success_rate)}`;
+  element("readout").textContent = says || "";
 };
 plot.onpointerleave = () => (element("readout").textContent = "");
 canvas.onclick = ({ offsetX, offsetY }) => pick(drawing.boxAt(offsetX, offsetY));

@@ -12,7 +12,8 @@ export function compared(network, observation, { blank }) {
 
 /** The row of the highest score; with `mask`, of those that have not failed. */
 export function highest(scores, { visible, failed }, { mask }) {
-  const allowed = scores.map((score, row) => (mask && failed.has(visible[row]) ? -Infinity : score));
+  const masked = (row) => mask && failed.has(visible[row]);
+  const allowed = scores.map((score, row) => (masked(row) ? -Infinity : score));
   return allowed.indexOf(Math.max(...allowed));
 }
 

@@ -4,17 +4,19 @@
 /** Label of each choice, what it is, and the value of each option; the first is the default. */
 export const CHOICES = {
   equalize: ["Agent sees", { positions: false, ranks: true },
-    "Positions of the boxes, or, as in the paper, their ranks: numbers in the order along each axis"],
+    "Positions of the boxes, or, as in the paper, ranks: numbers in the order along each axis"],
   mask: ["Failed boxes", { masked: true, allowed: false },
     "Masked: a box that has failed is not chosen again before another one is unloaded"],
-  replay: ["Replay", { "as it is": "as_is", mirrored: "mirrored", "shuffled places": "shuffled" },
+  replay: ["Replay",
+    { "as it is": "as_is", mirrored: "mirrored", "shuffled places": "shuffled" },
     "What is remembered of a pick. Mirrored: x and y get random signs. Shuffled places: the boxes " +
     "exchange their places, left – right and rear – front, at random"],
   ties: ["Equal coordinates", { "noise decides": "noise", averaged: "average" },
-    "Boxes of equal coordinates are ranked by noise of half a millimetre, or share their mean rank"],
+    "Boxes of equal coordinates are ranked by noise of half a millimetre, or share a rank"],
   blank: ["Chooses by", { "x, y, z": false, "z alone": true },
     "With z alone, x and y count as 0 when the agent chooses; the weights stay as they are"],
-  picks: ["Picks", { "32,000": 32_000, "64,000": 64_000, "96,000": 96_000, "384,000": 384_000 },
+  picks: ["Picks",
+    { "32,000": 32_000, "64,000": 64_000, "96,000": 96_000, "384,000": 384_000 },
     "Length of a run; random picks end after half of it"],
   learning_rate: ["Learning rate", { 0.003: 0.003, 0.001: 0.001, 0.01: 0.01 }, "Of Adam"],
   batch_size: ["Batch", { "64 picks": 64, "16 picks": 16, "256 picks": 256 },
@@ -46,7 +48,8 @@ export const PRESETS = {
 export function fromText(text) {
   const given = new URLSearchParams(text);
   const [config, problems] = [{}, []];
-  const refuse = (name, what) => problems.push(`${name} is “${given.get(name)}”, which is not ${what}.`);
+  const refuse = (name, what) =>
+    problems.push(`${name} is “${given.get(name)}”, which is not ${what}.`);
   for (const [name, [, options]] of Object.entries(CHOICES)) {
     const values = Object.values(options);
     const value = values.find((each) => String(each) === given.get(name));
@@ -60,7 +63,9 @@ export function fromText(text) {
     if (!valid) refuse(name, what);
     config[name] = valid ? value : standard;
   }
-  for (const name of given.keys()) if (!(name in config)) problems.push(`No setting is named “${name}”.`);
+  for (const name of given.keys()) {
+    if (!Object.hasOwn(config, name)) problems.push(`No setting is named “${name}”.`);
+  }
   return { config, problems };
 }
 

@@ -41,6 +41,6 @@ function report() {
   const { network, points, picks } = training;
   const { boxes, present, visible, observation, failed } = training.containers[0];
   const container = { boxes, present, visible, observation, failed };
-  const run = { parameters: network.parameters, points, picks, running: picks < goal, seconds, rates };
-  postMessage({ container, ...run });
+  const run = { points, picks, running: picks < goal, seconds, rates };
+  postMessage({ container, parameters: network.parameters, ...run });
 }
