@@ -11,6 +11,7 @@ const worker = new Worker(URL.createObjectURL(new Blob(code)));
 const MAP_SIDE = 12; // pixels
 const done = new Set(); // steps
 let config, run, mine, chosen; // settings, the worker's last report, the reader's container, a box
+let number = 0; // of runs, because a report of an earlier one may come late
 let [step, said] = ["unload", ""]; // the step or preset that is told of, what the last pick did
 
 const make = (kind, fields, ...content) => {
@@ -36,7 +37,7 @@ for (const link of document.querySelectorAll("a[data-file]")) {
   else link.title = `In the repository: ${file}`;
 }
 
-const send = (command) => worker.postMessage({ command, config, task });
+const send = (command) => worker.postMessage({ command, config, task, number });
 
 /** Take over settings; begin from the first weights if the seed is another one, or if `anew`. */
 function set(text, anew) {
@@ -52,7 +53,8 @@ function set(text, anew) {
   if (begin) {
     const generator = new Generator(config.seed);
     mine = new Container(stackLoad(generator, task), task, generator);
-    [chosen, said] = [-1, ""];
+    [chosen, said, run] = [-1, "", undefined];
+    number++;
   }
   mine.show(config);
   send(begin ? "reset" : config.blank === before.blank ? "change" : "freeze");
@@ -78,7 +80,7 @@ function begin(name) {
     set(toText(preset(name)), true);
     watch("train");
   } else if (run?.picks) set(toText({ ...config, blank: true }), false);
-  if (run) render();
+  render();
 }
 
 function pick(item) {
@@ -99,6 +101,7 @@ function verdict() {
 }
 
 function render() {
+  if (!run) return; // a report will come
   const { parameters, picks, points, rates, running } = run;
   network.parameters.set(parameters);
   if (step === "blank" ? rates.true : !running && picks >= config.picks) done.add(step);
@@ -186,11 +189,12 @@ function watch(command) {
 }
 
 worker.onmessage = ({ data }) => {
+  if (data.number !== number) return;
   run = data;
   requestAnimationFrame(render);
 };
-onresize = element("axis").onchange = () => run && render();
-element("mine").onchange = element("agents").onchange = () => run && render();
+onresize = element("axis").onchange = render;
+element("mine").onchange = element("agents").onchange = render;
 onhashchange = () => set(location.hash.slice(1), true);
 form.onchange = ({ target }) => {
   set(new URLSearchParams(new FormData(form)), false);
@@ -203,6 +207,7 @@ element("train").onclick = () => watch(run?.running ? "pause" : "train");
 element("step").onclick = () => watch("step");
 element("reset").onclick = () => set(toText(config), true);
 plot.onpointermove = ({ offsetX }) => {
+  if (!run) return;
   const end = Math.max(config.picks, run.picks);
   const at = pointAt(run.points, offsetX / plot.clientWidth, end);
   const says = at && `${at.picks.toLocaleString("en")} picks: ${percent(at.success_rate)}`;

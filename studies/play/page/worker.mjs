@@ -3,10 +3,12 @@
 const FRAME = 30; // ms of training between two messages to the page
 const REST = 60; // ms without a command, after which frozen weights are judged
 let training, timer, goal = 0; // the run, what continues it, and after how many picks it pauses
+let number; // of the run, as the page counts
 let seconds = 0, rates = {}; // of training; of fresh picks, by whether x and y are blank
 
-onmessage = ({ data: { command, config, task } }) => {
+onmessage = ({ data: { command, config, task, ...run } }) => {
   clearTimeout(timer);
+  number = run.number;
   if (command === "reset") [training, seconds] = [new Training(config, task), 0];
   else training.change(config);
   const frozen = command === "freeze";
@@ -41,6 +43,6 @@ function report() {
   const { network, points, picks } = training;
   const { boxes, present, visible, observation, failed } = training.containers[0];
   const container = { boxes, present, visible, observation, failed };
-  const run = { points, picks, running: picks < goal, seconds, rates };
+  const run = { number, points, picks, running: picks < goal, seconds, rates };
   postMessage({ container, parameters: network.parameters, ...run });
 }

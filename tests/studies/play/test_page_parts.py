@@ -742,11 +742,11 @@ def worker(script: str, **changes) -> dict:
         const rest = () => some(10000);
         const tell = (command, settings = {}) => {
           const config = { ...given.defaults, ...settings };
-          context.onmessage({ data: { command, config, task: given.task } });
+          context.onmessage({ data: { command, config, task: given.task, number: 7 } });
           return answers();
         };
-        const brief = ({ picks, running, points, rates, parameters }) => ({ picks, running,
-          points: points.length, rates: Object.keys(rates), weights: [...parameters] });
+        const brief = ({ number, picks, running, points, rates, parameters }) => ({ number, picks,
+          running, points: points.length, rates: Object.keys(rates), weights: [...parameters] });
         """
         + script,
         code=code,
@@ -772,6 +772,7 @@ def test_the_worker_trains_until_its_goal_and_judges():
         """
     )
     (reset,) = got["reset"]
+    assert reset["number"] == got["judged"]["number"] == 7
     assert (reset["picks"], reset["running"], reset["points"]) == (0, False, 0)
     assert got["idle"] == 0  # weights that never learned are not judged
     assert 0 < got["begin"]["picks"] < 480 and got["begin"]["running"]
