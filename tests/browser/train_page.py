@@ -232,7 +232,8 @@ def jams(page: Page) -> Iterator[str]:
     if page.text_content("#share") != "0.5" or "jam=0.5" not in page.evaluate("location.href"):
         yield f"the slider says {page.text_content('#share')!r}"
     page.click("#train")
-    until(page, lambda: not page.evaluate("run.running") and judged(page))
+    until(page, lambda: page.text_content("#picks").startswith("32,0") and judged(page))
+    page.wait_for_timeout(200)  # what is judged is drawn in the next frame
     said = page.text_content("#verdict")
     if not re.match(r"It learned: (4\d|5\d) % .* nothing ends above 50 %\.", said):
         yield f"with jams the verdict is {said!r}"

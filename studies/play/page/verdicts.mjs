@@ -79,8 +79,9 @@ export function blankVerdict({ rates }, config, task) {
   if (seen === undefined) return `${without}.`;
   const both = `${without}, with x and y in ${percent(seen)}`;
   const good = blank >= task.errs * ceiling(config);
-  if (blank - seen < MISLED) {
-    return `${both}: ${good ? "no place misleads it" : "its mistakes are not those of a place"}.`;
-  }
-  return `${both}: ${good ? "it still knows height" : "a place misled it, but not that alone"}.`;
+  const [all, part] =
+    blank - seen < MISLED
+      ? ["no place misleads them", "their mistakes are not those of a place"]
+      : ["they know height, but a place outweighed it", "not only a place misled them"];
+  return `${both}: ${good ? all : part}.`;
 }

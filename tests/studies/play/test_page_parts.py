@@ -501,11 +501,21 @@ def test_a_run_that_is_stuck():
 @pytest.mark.parametrize(
     ("seen", "blank", "changes", "expected"),
     [
-        (0.34, 1.0, {}, "in 100 % of fresh picks, with x and y in 34 %: it still knows height."),
-        (0.34, 0.8, {}, "with x and y in 34 %: a place misled it, but not that alone."),
-        (0.34, 0.43, {}, "with x and y in 34 %: its mistakes are not those of a place."),
-        (0.99, 1.0, {}, "in 100 % of fresh picks, with x and y in 99 %: no place misleads it."),
-        (0.3, 0.58, {"seamless": True}, "with x and y in 30 %: it still knows height."),
+        (
+            0.34,
+            1.0,
+            {},
+            "with x and y in 34 %: they know height, but a place outweighed it.",
+        ),
+        (0.34, 0.8, {}, "with x and y in 34 %: not only a place misled them."),
+        (0.34, 0.43, {}, "with x and y in 34 %: their mistakes are not those of a place."),
+        (0.99, 1.0, {}, "in 100 % of fresh picks, with x and y in 99 %: no place misleads them."),
+        (
+            0.3,
+            0.58,
+            {"seamless": True},
+            "with x and y in 30 %: they know height, but a place outweighed it.",
+        ),
         (None, 0.96, {}, "With z alone these weights succeed in 96 % of fresh picks."),
     ],
 )
