@@ -12,6 +12,7 @@ const MAP_SIDE = 12; // pixels
 const done = new Set(); // steps
 let config, run, mine, chosen; // settings, the worker's last report, the reader's container, a box
 let number = 0; // of runs, because a report of an earlier one may come late
+let frame; // that will be drawn
 let [step, said] = ["unload", ""]; // the step or preset that is told of, what the last pick did
 
 const make = (kind, fields, ...content) => {
@@ -104,7 +105,7 @@ function render() {
   if (!run) return; // a report will come
   const { parameters, picks, points, rates, running } = run;
   network.parameters.set(parameters);
-  if (step === "blank" ? rates.true : !running && picks >= config.picks) done.add(step);
+  if (rates.true) done.add("blank");
   showSteps();
   showContainer();
   element("train").textContent = running ? "Pause" : "Train";
@@ -190,8 +191,10 @@ function watch(command) {
 
 worker.onmessage = ({ data }) => {
   if (data.number !== number) return;
+  if (run?.running && !data.running && data.picks >= config.picks) done.add(named());
   run = data;
-  requestAnimationFrame(render);
+  cancelAnimationFrame(frame); // one picture is drawn of all that came since the last
+  frame = requestAnimationFrame(render);
 };
 onresize = element("axis").onchange = render;
 element("mine").onchange = element("agents").onchange = render;

@@ -25,10 +25,11 @@ export const CHOICES = {
     "In seamless walls, a free box jams with a probability, drawn anew at each attempt"],
 };
 
-/** Numbers: default, highest, and how an invalid one is named; the lowest is 0. */
+/** Numbers: default, highest, form, and what a valid one is called. */
 export const NUMBERS = {
-  jam: [0.4, 0.8, "a number from 0 to 0.8"],
-  seed: [2, 2 ** 32 - 1, "a whole number from 0 to 4294967295"], // 2's run prefers one side
+  jam: [0.4, 0.8, /^0$|^0?\.\d\d?$/, "a number from 0 to 0.8 with two decimals at most"],
+  // The run of seed 2 prefers one side, so that one sees what is told.
+  seed: [2, 2 ** 32 - 1, /^\d+$/, "a whole number from 0 to 4294967295"],
 };
 
 /** What experiments change in the defaults. */
@@ -56,8 +57,7 @@ export function fromText(text) {
     if (given.has(name) && value === undefined) refuse(name, `one of ${values.join(", ")}`);
     config[name] = value ?? values[0];
   }
-  for (const [name, [standard, most, what]] of Object.entries(NUMBERS)) {
-    const form = name === "seed" ? /^\d+$/ : /^\d*\.?\d+$/;
+  for (const [name, [standard, most, form, what]] of Object.entries(NUMBERS)) {
     const value = given.has(name) ? Number(given.get(name)) : standard;
     const valid = !given.has(name) || (form.test(given.get(name)) && value <= most);
     if (!valid) refuse(name, what);

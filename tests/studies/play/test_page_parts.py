@@ -315,7 +315,7 @@ def test_the_address_holds_all_settings():
         *((f"seed={seed}", seed) for seed in ("x", "-1", "1.5", "", "4294967296", "1e3")),
         ("seed=1e21", "1e21"),
         ("seed=1000000000000000000000", "a whole number from 0 to 4294967295"),
-        *((f"jam={jam}", jam) for jam in ("0.81", "-0.1", "half", "")),
+        *((f"jam={jam}", jam) for jam in ("0.81", "1", "0.333", "-0.1", "half", "")),
         ("replay=gone", "as_is, mirrored, shuffled"),
         ("picks=5", "32000, 64000, 96000, 384000"),
         ("mask=1", "true, false"),
