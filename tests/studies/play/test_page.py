@@ -267,7 +267,7 @@ def test_presets_end_where_they_say():
 
 @pytest.mark.slow
 def test_a_browser_shows_it(tmp_path):
-    """Clicks pick, Train draws, Reset brings the first weights back, the address the settings."""
+    """The five steps do what they say for three seeds at three sizes, and the controls answer."""
     pytest.importorskip("playwright", reason="make browser installs it")
     from tests.browser.start import BROWSERS, browser
     from tests.browser.train_page import look_at_page
