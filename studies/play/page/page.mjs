@@ -164,7 +164,7 @@ function showPreferences(points) {
   element("dot").style.opacity = last ? 1 : 0;
   element("preferences").textContent = last ? `x ${signed(x)}, y ${signed(y)}` : "";
   const none = "For positions no limit is known.";
-  element("limits").textContent = above ? `Shaded: runs err (above ${above}).` : none;
+  element("limits").textContent = above ? `Shaded: nearly all runs err (above ${above}).` : none;
 }
 
 const signed = (value) => value.toFixed(2).replace("-", "\u2212");
