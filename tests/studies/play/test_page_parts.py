@@ -223,6 +223,19 @@ def test_a_run_explores_learns_and_fills_its_containers():
         assert point["success_rate"] in [k / 8 for k in range(9)] and len(point["slopes"]) == 3
 
 
+def test_each_seed_has_random_numbers_of_its_own():
+    script = """
+        const runs = [...Array(6).keys()].map((seed) =>
+          new Training({ ...given.defaults, seed }, given.task));
+        result.choices = runs.map((run) => run.choices.uniform());
+        result.loads = runs.map((run) => run.loads.uniform());
+        result.weights = runs.map((run) => run.network.parameters[0]);
+    """
+    got = run_js(script, task=SMALL, defaults=DEFAULTS)
+    for draws in got.values():
+        assert len(set(draws)) == 6
+
+
 def test_the_memory_keeps_the_latest_picks():
     got = run_js(
         """
@@ -748,6 +761,7 @@ def test_colours_show_the_order_and_lines_what_failed_and_is_chosen():
         + """
         result.plain = draw({}, [[0, 0], [1, 1]], -1);
         result.unseen = draw({}, [], -1);
+        for (const place of [0, 25, 50, 75, 100]) result[place] = draw({}, [[0, place / 100]], -1);
         result.failed = draw({ failed: new Set([1]) }, [], -1);
         result.chosen = draw({}, [], 1);
         const point = (...place) => drawing.project(place);
@@ -764,6 +778,12 @@ def test_colours_show_the_order_and_lines_what_failed_and_is_chosen():
     assert colours("plain")[4] == [253, 230, 34]  # the last one's top: yellow
     assert len(set(map(tuple, colours("unseen")[1::3]))) == 1
     assert colours("unseen")[1] == [186, 186, 182]
+
+    # The page explains them by a bar of five.
+    (bar,) = re.findall(r"#scale .*linear-gradient\(90deg, (.+?)\);", page.assemble())
+    bar = [list(map(int, each.split(","))) for each in re.findall(r"rgb\((.+?)\)", bar)]
+    for place, colour in zip(range(0, 101, 25), bar, strict=True):
+        assert np.allclose(colours(str(place))[1], colour, atol=1)
 
     def marked(name):
         return [stroke for stroke in got[name]["strokes"] if stroke[0].startswith("#")]
