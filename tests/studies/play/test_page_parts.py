@@ -613,10 +613,11 @@ def test_the_curve_and_what_it_says_at_a_place():
         const points = [{ picks: 10, rate: 0.25 }, { picks: 20, rate: 1 }, { picks: 40, rate: 0 }];
         result.line = line(points, "rate", 80);
         result.at = [0, 0.18, 0.2, 0.4, 1].map((share) => pointAt(points, share, 80).picks);
+        result.one = [line(points.slice(0, 1), "rate", 80), line([], "rate", 80)];
         result.none = pointAt([], 0.5, 80) ?? "none";
         """
     )
-    assert got["line"] == "12.5,75 25,0 50,100"
+    assert got["line"] == "12.5,75 12.5,75 25,0 50,100" and got["one"] == ["12.5,75 12.5,75", ""]
     assert got["at"] == [10, 10, 20, 40, 40] and got["none"] == "none"
 
 
