@@ -95,7 +95,7 @@ def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
     env, same = make(), make()
     env.reset(seed=0)
 
-    def interrupted(*arguments):
+    def interrupted(*arguments, **named):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
