@@ -4,7 +4,7 @@ This folder stands beside the package ``unload``, which knows nothing of it and 
 it; what is computed here is written to ``data/``, ``figures/`` and ``runs/`` of the checkout.
 
 Read ``grid`` first (an experiment of training runs, spread over processes by ``sweep``), then
-``results`` (what is kept, published and read) with its ``provenance`` and the folders in ``paths``,
+``results`` (what is kept, published and read, and where it comes from), the folders in ``paths``,
 ``statistics`` (how a run ends, and how sure a mean is) and ``style`` (the look of figures).
 ``changes`` holds what experiments change in a run, ``fingerprint`` says whether the code still
 trains as it did, ``exercise`` whether a reader's answer is right. ``__main__`` is the command line.

@@ -94,7 +94,8 @@ def main() -> None:
 
 def check(chosen: dict) -> None:
     """Raise a ValueError for a number that no part can run with, before anything starts."""
-    checks.jobs("--jobs", chosen.get("n_jobs", -1))
+    if chosen.get("n_jobs") == 0:
+        raise ValueError("--jobs is 0; expected a number of processes, or -1 for one per core")
     if chosen.get("seeds") is not None:
         checks.integer("--seeds", chosen["seeds"], 1)
     if chosen.get("picks") is not None:

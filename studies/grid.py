@@ -19,8 +19,13 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.provenance import joined, read_provenance, write_provenance
-from studies.results import read_table, write_table
+from studies.results import (
+    joined,
+    read_provenance,
+    read_table,
+    write_provenance,
+    write_table,
+)
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
@@ -121,6 +126,7 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
     done = {name: config for name, config in configs.items() if records[name].exists()}
     provenance = place.parent / f"{place.name}.provenance.json"
     there = read_provenance(place.parent, place.name)["runs"] if provenance.exists() else 0
+    # Runs take hours: none may be lost where a folder that holds fewer is published.
     if len(done) < there:
         raise ValueError(
             f"{kept} holds {len(done)} finished runs; expected at least as many as the {there} "
@@ -128,6 +134,8 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
         )
     if not done:
         return
+
+    # All that is published is read back from the folders of the runs, whenever they were trained.
     policies, curves = {}, {}
     for name, config in done.items():
         policies[name], curves[name] = RunFolder(kept / name).result(
@@ -140,6 +148,8 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
     else:
         rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
         write_measures(place, rows)
+
+    # The first seed stands for the others of its cell: it rebuilds their configurations, too.
     first = {
         name: configs[f"{name}/seed_{cell.seeds[0]}"].plain() for name, cell in grid.cells.items()
     }

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from studies import paths
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 
 # It warns of the date in the fonts that come with Matplotlib, at each PDF.
 logging.getLogger("fontTools").setLevel(logging.ERROR)

@@ -16,7 +16,7 @@ from joblib import Parallel, delayed, effective_n_jobs
 from joblib.parallel import get_active_backend
 from tqdm import tqdm
 
-from studies import provenance
+from studies.results import run_record
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
@@ -40,7 +40,7 @@ def run_sweep(
     ``with joblib.parallel_config("dask"):``, the cluster of the ``distributed.Client`` that you
     have made before. A run that fails is reported and does not stop the others. Each uses one
     thread, and leaves in its folder ``log.txt``, its progress and the traceback of an error, and
-    ``record.json``: the entries of ``studies.provenance.run_record`` (of its last part, if it had
+    ``record.json``: the entries of ``studies.results.run_record`` (of its last part, if it had
     been stopped), and ``process``. If this process is killed, those that it has started stop with
     a checkpoint at the next point of their curves.
 
@@ -71,7 +71,7 @@ def run_sweep(
         checks.one_of("changes", name, configs)
     # Absolute, because a cluster's processes may stand elsewhere.
     folder = checks.path("folder", folder).absolute()
-    at_once = effective_n_jobs(checks.jobs("n_jobs", n_jobs))
+    at_once = effective_n_jobs(n_jobs)
     if not hasattr(get_active_backend()[0], "client"):  # Dask's runs are on other machines
         _warn_of_memory(configs, at_once)
 
@@ -122,7 +122,7 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
         with open(log_path, "a") as log, one_thread():
             train_changed(config, folder, change, log, callback=stop_if_alone)
         if not (folder / "record.json").exists():
-            record = provenance.run_record(time.monotonic() - start) | {"process": os.getpid()}
+            record = run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)
         return name, ""
     except Exception as error:  # whatever it was, the other runs go on

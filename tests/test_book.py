@@ -54,6 +54,24 @@ def test_the_reference_has_each_public_name():
     assert sorted([*described, "__version__"]) == sorted(unload.__all__)
 
 
+def test_a_reference_that_describes_nothing_is_found(tmp_path):
+    page = tmp_path / links.REFERENCE
+    page.parent.mkdir(parents=True)
+    page.write_text("<h1 id='load'>Load</h1>")
+    missing = [f"{links.REFERENCE}: nothing about {name}" for name in ("Load", "policies")]
+    assert links.undescribed(tmp_path, ["Load", "policies"]) == missing
+    page.write_text("<dt id='unload.Load'></dt><dt id='unload.agent.policies.random'></dt>")
+    assert links.undescribed(tmp_path, ["Load", "policies"]) == []
+
+
+def test_a_command_says_what_it_does():
+    """With the fields of a configuration, whose stars mark the package's own choices."""
+    source = ["Before\n% help: unload train\nafter"]
+    pages.add_help(None, "reference", source)
+    assert source[0].startswith("Before\n```text\nusage: ") and source[0].endswith("```\nafter")
+    assert re.search(r"--seed SEED +\* of loads", source[0])
+
+
 def test_docstrings_are_shown_as_they_are_meant():
     lines = ["## Rewards", ":ivar seed: * of loads, and more.", ":param a, b: two, once"]
     pages.as_restructured_text(None, "class", "X", None, {}, lines)

@@ -1,8 +1,9 @@
-"""``python -m unload train``."""
+"""``unload train``, and what every command says without any work."""
 
 import re
 import subprocess
 import sys
+import tomllib
 from dataclasses import fields
 
 import pytest
@@ -11,6 +12,7 @@ from studies import paths
 from tests.agent.runs import CONTAINER, at_step, content, few_walls, interrupt
 from unload import TrainConfig, train
 from unload.__main__ import main
+from unload.task import VERSION
 
 OPTIONS = [
     f"--{name.replace('_', '-')}={value}" for name, value in CONTAINER.items() if name != "picks"
@@ -45,6 +47,27 @@ def test_every_field_is_an_option_that_is_explained_and_nothing_is_compiled(tmp_
         assert f"({field.default})" in line, field.name
     for text in ("--mask, --no-mask", "* whether failed items are masked", "μ, of Adam."):
         assert text in done.stdout
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_and_version_take_no_time(tmp_path, option):
+    """A script entry point calls ``command``; nothing is compiled, and little is imported."""
+    entry = tomllib.loads((paths.ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    module, _, name = entry["unload"].partition(":")
+    slow = "{'numba', 'torch', 'pandas', 'matplotlib'}"
+    program = f"import sys\nfrom {module} import {name}\ntry:\n    {name}()\nfinally:\n"
+    program += f"    print(*{slow} & {{*sys.modules}}, file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", program, option],
+        capture_output=True, text=True, cwd=paths.ROOT,
+        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path)},
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "\n") and not list(tmp_path.iterdir())
+    if option == "--version":
+        assert done.stdout == f"unload {VERSION}\n"
+    else:
+        for text in ("x_min", "size_z", "weight", "in m", "--units", "rear wall", "entrance"):
+            assert text in done.stdout
 
 
 @pytest.mark.parametrize(

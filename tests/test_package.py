@@ -19,6 +19,7 @@ PACKAGES = ("unload", "studies")
 LIBRARIES = {
     "PIL": ("unload/load/", "studies/paper/"),
     "anywidget": ("studies/play/",),
+    "filelock": ("unload/support/files.py",),
     "gymnasium": (
         "unload/__init__.py", "unload/env/", "unload/agent/", "studies/heap/", "studies/lifts/",
         "studies/paper/",
@@ -30,6 +31,7 @@ LIBRARIES = {
         "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", 
         "studies/paper/", "studies/policies/", "studies/seamless/",
     ),
+    "mujoco": ("studies/seamless/mujoco_jams.py",),
     "numba": ("unload/fast/kernel.py", "unload/support/compiled.py"),
     "numpy": ("unload/", "studies/"),
     "pandas": ("unload/load/packing_list.py", "unload/agent/", "studies/"),

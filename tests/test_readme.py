@@ -4,7 +4,10 @@ import re
 from pathlib import Path
 
 from studies.falls.long import read_published
+from studies.grid import read_grid
 from studies.paper.training import paper_runs
+from studies.seamless import verdicts
+from studies.seamless.training import SEAMLESS
 from studies.statistics import cell_table, end_msr, fell
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -60,3 +63,10 @@ def test_the_result_is_that_of_the_data():
     published = read_published()
     blanked = published[published["cell"].isin(order)]["judged_place"]
     assert (blanked == 1).all() and f"These {len(blanked)} networks" in text
+
+
+def test_the_runs_with_jams_are_those_of_the_data():
+    runs = verdicts.by_run(read_grid(SEAMLESS, cells=["mask_order", "no_mask_order"]))
+    text = " ".join(README.split())
+    assert f"{len(runs)} runs | on average {100 * runs['end'].mean():.0f} %" in text
+    assert f"only {runs['fig12'].sum()} of {len(runs)} runs rise as steadily" in text

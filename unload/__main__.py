@@ -1,4 +1,4 @@
-"""The command line: the order of picks for a packing list, and training."""
+"""The command line, ``unload``: the order of picks for a packing list, and training."""
 
 import argparse
 import re
@@ -9,12 +9,23 @@ from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 
+from unload.task import VERSION
+
 DESCRIPTION = """\
 Print in which order the boxes of a packing list are picked, as CSV: pick, id, item,
-distance (m) and unloaded (False for a pick that fails). unload.read_load describes the
-list, unload.picking_order the order.
+distance (m), unloaded (False for a pick that fails), behind (True if another box stands in
+front of it), and the list's other columns.
 
-"python -m unload train" trains an agent; "python -m unload train --help" says how.
+A line of the list is a box. Its columns, in any order; capitals make no difference:
+  x_min, y_min, z_min      corner nearest to the origin (pos_x, ...), or x, y, z, the centre
+  size_x, size_y, size_z   edges along the axes (length or depth, width, height)
+  id                       or label, name; optional
+  weight, rotation         optional: 1 kg, and quarter turns
+Lengths are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. The axes
+are x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance) and z
+(height, 0 at the floor). unload.read_load and unload.picking_order say more.
+
+"unload train" trains an agent; "unload train --help" says how.
 """
 TRAIN_DESCRIPTION = """\
 Train an agent, or go on with a run that was stopped, and print where its policy is. The
@@ -36,29 +47,48 @@ def main(arguments: list[str] | None = None) -> None:
 
 def print_order(arguments: list[str]) -> None:
     """Print the order of picks for a packing list."""
-    from unload.agent.order import NAMES, picking_order
+    from unload.support.files import SHIPPED  # nothing else, because help should take no time
+
+    parser = _parser("unload", DESCRIPTION)
+    shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("policies/*.safetensors")))
+    known = f"reachable (the default), highest, nearest, random, {shipped}, or a file of weights"
+    parser.add_argument("list", nargs="?", help="CSV file; an example if missing")
+    parser.add_argument("--policy", default="reachable", help=known)
+    parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
+    parser.add_argument("--units", help="of lengths: m, cm, mm or in")
+    size: dict = {"type": float, "nargs": 3, "metavar": ("LENGTH", "WIDTH", "HEIGHT")}
+    parser.add_argument("--container", help="its inner size in m; the paper's is 7 2.5 2.5", **size)
+    parser.add_argument("--x-from", default="rear", help="where x is 0: rear (the default) or door")
+    text = "in m: gaps and overlaps up to this are closed (%(default)s)"
+    parser.add_argument("--tolerance", type=float, default=0.005, help=text)
+    text = "a column to keep whatever it says, such as weight; may be repeated"
+    parser.add_argument("--ignore", action="append", default=[], metavar="COLUMN", help=text)
+    text = "what a column of another name means, such as Tiefe=size_x; may be repeated"
+    parser.add_argument("--column", action="append", default=[], metavar="NAME=MEANING", help=text)
+    parser.add_argument("--version", action="version", version=f"unload {VERSION}")
+    options = vars(parser.parse_args(arguments))
+
+    from unload.agent.order import picking_order
     from unload.load.packing_list import EXAMPLE, read_load
 
-    parser = _parser("python -m unload", DESCRIPTION)
-    parser.add_argument("list", nargs="?", default=EXAMPLE, help="CSV file; an example if missing")
-    known = f"{', '.join(NAMES)}, or a file of weights"
-    parser.add_argument("--policy", default="recommended", help=known)
-    parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
-    options = parser.parse_args(arguments)
+    path, policy, output = (options.pop(name) for name in ("list", "policy", "output"))
+    columns = dict(each.partition("=")[::2] for each in options.pop("column"))
     try:
-        load = read_load(options.list)
-        order = picking_order(load, options.policy)
-        order["id"] = order["id"].map(_as_text)
-        order.to_csv(options.output, index=False, float_format="%.6f")
+        load = read_load(EXAMPLE if path is None else path, columns=columns, **options)
+        order = picking_order(load, policy)
+        order = order.apply(lambda column: column.map(_as_text))
+        order.to_csv(output, index=False, float_format="%.6f")
     except (ImportError, OSError, ValueError) as error:  # ImportError: of PyBullet
         parser.exit(1, f"{error}\n")
+    failed, behind = (~order["unloaded"]).sum(), order["behind"].mean()
+    print(f"{len(order)} picks, {failed} failed, {behind:.0%} behind other boxes", file=sys.stderr)
     left = len(load) - order["unloaded"].sum()
     if left:
         parser.exit(1, f"{left} boxes are left, of which none that is visible can be lifted\n")
 
 
 def _as_text(cell):
-    """An id that a spreadsheet would take for a formula, with an apostrophe before it."""
+    """A text that a spreadsheet would take for a formula, with an apostrophe before it."""
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
 
 
@@ -66,7 +96,7 @@ def train_by(arguments: list[str]) -> None:
     """Train with the fields of ``TrainConfig`` as options."""
     from unload.agent.config import TrainConfig
 
-    parser = _parser("python -m unload train", TRAIN_DESCRIPTION)
+    parser = _parser("unload train", TRAIN_DESCRIPTION)
     parser.add_argument("--run-dir", required=True, help="folder of the run")
     parser.add_argument("--stack", type=_named, help="module:function that makes the loads")
     parser.add_argument("--lifts", help="file of lifts that PyBullet has computed")
@@ -117,6 +147,12 @@ def _explained(kind: type) -> dict[str, str]:
     return found
 
 
-if __name__ == "__main__":
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # "| head" ends it without an error
+def command() -> None:
+    """Run the command line as a program."""
+    if hasattr(signal, "SIGPIPE"):  # not on Windows
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # "| head" ends it without an error
     main()
+
+
+if __name__ == "__main__":
+    command()

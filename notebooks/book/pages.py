@@ -57,14 +57,14 @@ def as_restructured_text(app, what: str, name: str, thing, options, lines: list[
 
 
 def add_help(app, name: str, source: list[str]) -> None:
-    """Put what a command says of itself in the place of each comment ``% help: module``."""
+    """Put what a command says of itself in the place of each comment ``% help: module ...``."""
 
     def said(comment: re.Match) -> str:
-        command = [sys.executable, "-m", comment[1], "--help"]
+        command = [sys.executable, "-m", *comment[1].split(), "--help"]
         text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         return f"```text\n{text.strip()}\n```"
 
-    source[0] = re.sub(r"^% help: (\S+)$", said, source[0], flags=re.MULTILINE)
+    source[0] = re.sub(r"^% help: (.+)$", said, source[0], flags=re.MULTILINE)
 
 
 def add_contents(app, name: str, source: list[str]) -> None:

@@ -111,9 +111,12 @@ def published_data(
         for grid in (PAPER, LONG)
         for name, policy in read_policies(Path(folder) / f"{grid.name}.safetensors").items()
     }
+    # Networks as they are drawn say what those of the trained ones owe to their training.
     for seed in range(UNTRAINED):
         network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
         judged[f"untrained/seed_{seed}"] = PAPER.cells["paper_mask"].config, network
+
+    # The weights are part of the question: a policy that was trained again is judged again.
     measured, jobs = identity(_judge), []
     for name, (config, network) in judged.items():
         weights = {part: each.numpy() for part, each in network.state_dict().items()}

@@ -85,9 +85,8 @@ class HeapEnv(EpisodeEnv):
     - ``fates``: (96,) int8, what happened to the box in each row of the observation before the
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
-    ## Pictures and arrays
-    There is no render mode: ``studies.heap.figures`` draws recorded picks. There is no array
-    of heaps either, because nearly all of a pick is PyBullet's time;
+    ## Arrays
+    There is no array of heaps, because nearly all of a pick is PyBullet's time;
     ``gymnasium.make_vec(id, n, vectorization_mode="async")`` gives each heap a process.
 
     Args:
@@ -95,6 +94,7 @@ class HeapEnv(EpisodeEnv):
         physics: ``"whole"`` or ``"coarse"``, see ``Rake``.
         max_picks: greatest length of an episode.
         mass: kg, of each box.
+        render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
         heap: the ``Heap`` as it is.
@@ -105,11 +105,12 @@ class HeapEnv(EpisodeEnv):
     Raises:
         TypeError, ValueError: an argument or an action is not as described.
         FileNotFoundError: the stored heaps are missing.
-        gymnasium.error.ResetNeeded: ``step`` before ``reset``, or after an episode's end.
+        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step`` after an
+            episode's end.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
-    metadata = {"render_modes": []}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
 
     def __init__(
         self,
@@ -117,7 +118,10 @@ class HeapEnv(EpisodeEnv):
         physics: str = "whole",
         max_picks: int = MAX_PICKS,
         mass: float = task.MASS,
+        render_mode: str | None = None,
     ) -> None:
+        checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        self.render_mode = render_mode
         self.max_picks = checks.integer("max_picks", max_picks, 1)
         checks.one_of("split", split, generate.SPLITS)
         self.heaps = stored_heaps(split)
@@ -179,6 +183,15 @@ class HeapEnv(EpisodeEnv):
         if terminated or truncated:
             self._state = "finished"
         return self._observation.copy(), reward, terminated, truncated, self._info() | pick
+
+    def render(self) -> np.ndarray | None:
+        """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
+        self._check_started()
+        if self.render_mode is None:
+            return None
+        from studies.heap.picture import picture  # here, because few look and Matplotlib is slow
+
+        return picture(self.heap)
 
     def close(self) -> None:
         """Disconnect both clients; may be called again."""

@@ -58,6 +58,8 @@ def _dropped(rng: np.random.Generator) -> Heap:
     world = World(time_step, iterations=iterations)
     add_walls(world)
     world.add_box((BARRIER + 0.5, WIDTH / 2, 10), (1, WIDTH + 2, 20), 0)
+
+    # Each layer is dropped from just above the highest box so far.
     bodies: list[int] = []
     for first in range(0, BOXES, LAYER):
         top = max((world.pose(body)[0][2] for body in bodies), default=0.0)

@@ -10,6 +10,7 @@ from torch import nn
 from studies.heap.network import FEATURES, FateNetwork, fate_loss
 from studies.heap.observation import COLUMN
 from studies.heap.policies import Picks
+from unload.agent.learner import flat, grouped
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks
 
@@ -52,6 +53,8 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
     checks.integer("steps", steps, 1)
     if not len(picks):
         raise ValueError("picks is empty; expected at least one")
+
+    # One generator draws weights, batches and mirrors, so that the seed decides all of them.
     generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
     network = FateNetwork(generator=generator)
     data = {name: torch.from_numpy(array) for name, array in vars(picks).items()}
@@ -147,11 +150,7 @@ class Learned:
 
 def save_networks(networks: Sequence[FateNetwork], path: str | Path) -> None:
     """Write the weights of several networks into one file, see ``write_weights``."""
-    weights = {
-        f"{number}.{name}": weight
-        for number, network in enumerate(networks)
-        for name, weight in network.state_dict().items()
-    }
+    weights = flat({number: network.state_dict() for number, network in enumerate(networks)})
     settings = {"n_features": [network.n_features for network in networks]}
     write_weights(path, "heap networks", settings, weights)
 
@@ -160,11 +159,8 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
     """Read what ``save_networks`` wrote."""
 
     def networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
-        own: list[dict] = [{} for _ in settings["n_features"]]
-        for name, weight in weights.items():
-            number, _, part = name.partition(".")
-            own[int(number)][part] = weight
-        return [network_of(each, n) for each, n in zip(own, settings["n_features"])]
+        own = grouped(weights)
+        return [network_of(own[str(each)], n) for each, n in enumerate(settings["n_features"])]
 
     return read_weights(path, "heap networks", networks)
 

@@ -91,7 +91,8 @@ def drag(world: World, body: int, mass: float) -> float:
             break
         # What would bring the body to its speed within this step, if nothing resisted.
         wanted = mass * (SPEED - world.client.getBaseVelocity(body)[0][0]) / world.time_step
-        world.push(body, (min(max(wanted, -FORCE), FORCE), 0, 0))
+        force = (min(max(wanted, -FORCE), FORCE), 0.0, 0.0)
+        world.step(world.time_step, body, force)
     moved = world.pose(body)[0][0] - start
     linear, angular = world.client.getBaseVelocity(body)
     world.client.resetBaseVelocity(body, (0, *linear[1:]), angular)

@@ -70,6 +70,7 @@ def make_networks(
     learned: list[str] = []
     answers: list[Result] = []
     for round_number in range(ROUNDS):
+        # Each episode explores around one of the networks that were learned in the round before.
         question = {"round": round_number, "explorers": digest(learned), "code": identity(_record)}
         jobs = []
         for number in range(episodes):
@@ -79,6 +80,8 @@ def make_networks(
         found = keep_all(place / "picks", jobs, n_jobs)
         answers += found
         recorded += [answer.value for answer in found]
+
+        # All networks learn from the picks of all rounds so far.
         question = {"picks": digest(recorded), "steps": STEPS, "code": identity(_learn)}
         jobs = [
             (question | {"seed": seed}, partial(_learn, recorded, seed)) for seed in range(NETWORKS)

@@ -195,6 +195,8 @@ def compare(
     planned = plan(rules, place / "networks.safetensors")
     players = {cell: (player, TEST_HEAPS) for cell, player in planned.items()}
     played = _played(players, "test", PHYSICS, runs_dir, n_jobs)
+
+    # What a policy brings is weighed by the λ that it has played for.
     episodes = pd.DataFrame(
         {"falls_weight": weight, "policy": policy, "heap": number} | answer.value
         for (weight, policy), of in played.items()

@@ -78,6 +78,8 @@ def agreement_data(
     states, frame = collected.value
     rng = np.random.default_rng(FIRST_SEED)
     frame["asked_full"], frame["walls"] = choose_for_full(frame, FULL_COUNT, rng)
+
+    # Full takes seconds for each lift, so that answers are kept one by one.
     asked = frame.index[frame["asked_full"] != ""]
     columns = (frame.loc[asked, name] for name in ("state", "item", "walls"))
     jobs = [fresh_job(states[state], item, walls) for state, item, walls in zip(*columns)]

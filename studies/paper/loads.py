@@ -45,7 +45,9 @@ def fig03_substacks() -> Figure:
         _draw_substack(axes, variants[variant], column * CELL, lift)
     label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
     axes.text(CELLS_WIDE * CELL + 0.08, lift + ROWS_HIGH * CELL / 2, label, va="center")
-    _bare(axes, (-0.48, CELLS_WIDE * CELL + 1.1), (lift - 0.02, 4 * down + 0.02))
+    axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(lift - 0.02, 4 * down + 0.02))
+    axes.set_aspect("equal")
+    axes.axis("off")
     return figure
 
 
@@ -75,11 +77,6 @@ def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
     for column, row in np.argwhere(inside[:, 1:] != inside[:, :-1]):
         across, up = x + column * CELL, z + row * CELL
         axes.plot([across - CELL, across], [up, up], **style)
-
-
-def _bare(axes: Axes, xlim: tuple[float, float], zlim: tuple[float, float]) -> None:
-    axes.set(xlim=xlim, ylim=zlim, aspect="equal")
-    axes.axis("off")
 
 
 @styled

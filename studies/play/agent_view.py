@@ -110,6 +110,7 @@ class AgentView(widgets.VBox):
         visible = self._moment.visible
         all_ranks, greedy, chance = self._look(self.draw.value)
         ranks = all_ranks[:, HEIGHT]
+        # An eighth of the ranks has one colour, and the legend says which ranks these are.
         levels = np.minimum((ranks * LEVELS / len(ranks)).astype(int), LEVELS - 1)
         numbers = np.where(self._moment.present, LEVELS, ABSENT)
         numbers[visible] = levels
@@ -120,6 +121,8 @@ class AgentView(widgets.VBox):
         } | {"unseen": COLOURS["unseen"]}
         item = visible[greedy]
         self.canvas.show(numbers, palette, {"picked if greedy": [item]})
+
+        # One draw of the noise may be lucky; the mean over many says how good the choice is.
         others = np.mean([self._look(draw)[2] for draw in range(DRAWS)])
         can = "can" if item in self._liftable else "cannot"
         self.message.value = (

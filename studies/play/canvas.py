@@ -77,7 +77,7 @@ class Canvas(anywidget.AnyWidget):
         occur = np.isin(np.arange(len(palette)), numbers)
         legend = [(*line, False) for line, shown in zip(palette.items(), occur) if shown]
         boxes = {name: [int(item) for item in items] for name, items in outlined.items()}
-        with self.hold_sync():
+        with self.hold_sync():  # so that all that has changed is one message
             self.colours = np.asarray(numbers, np.uint8).tobytes()
             self.palette = [tuple(colour) for colour in palette.values()]
             self.outlined = sum(boxes.values(), [])

@@ -2,11 +2,12 @@
 
     python -m studies.play.page
 
-It is one file, which loads nothing, made of those in ``page/``. Read these in the order of
-``FILES``: the network, the container, what is measured and the training, which know nothing of
-the page and are the ones of this package in plain JavaScript; then the worker, in which the
-training runs, the page's state, the drawing, and the page. The numbers of the task are taken
-from the package.
+It is one file, which loads nothing, made of those in ``page/``. ``page.html`` names them in the
+order in which they are read best: the network, the container, what is measured, how boxes are
+chosen and the training, which know nothing of the page and are the ones of this package in plain
+JavaScript; then the worker, in which the training runs; the page's settings, its words, keys and
+pictures, of which none knows the page either; and the page. The numbers of the task are taken
+from the package. Comments stay in the sources.
 """
 
 import json
@@ -14,6 +15,7 @@ import re
 from pathlib import Path
 
 from studies import paths
+from studies.falls.fresh import ERRS, THRESHOLDS
 from unload import task
 from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import POSITION_NOISE, SINK
@@ -22,7 +24,6 @@ from unload.support import files
 
 FOLDER = Path(__file__).with_name("page")
 PAGE = paths.ROOT / "figures" / "train_it_yourself.html"
-MODULES = ("network", "container", "measures", "training", "worker", "state", "drawing", "page")
 
 
 def task_numbers() -> dict:
@@ -47,6 +48,8 @@ def task_numbers() -> dict:
         "walls": substacks.WALLS,
         "packages": substacks.PACKAGES.tolist(),
         "columns": columns,
+        "thresholds": THRESHOLDS,
+        "errs": ERRS,
     }
 
 
@@ -60,11 +63,18 @@ def assemble() -> str:
 
 
 def _content(name: str) -> str:
-    """A file as it stands in the page; of a module without imports and exports, for all see all."""
+    """What stands in the page for a name in ``page.html``.
+
+    Of a module that is its code without imports and exports, for all see all, and without comments.
+    """
     if name == "task":
         return json.dumps(task_numbers(), separators=(",", ":"))
+    if name.startswith("notebook:"):
+        (path,) = (paths.ROOT / "notebooks").glob(f"{name.removeprefix('notebook:')}.ipynb")
+        return path.relative_to(paths.ROOT).as_posix()
     text = (FOLDER / name).read_text().strip()
-    return re.sub(r"^import .*\n|^export ", "", text, flags=re.MULTILINE)
+    comments = r"^ *//.*\n|^ */\*\*[\s\S]*?\*/\n"
+    return re.sub(rf"^import .*\n|^export |{comments}", "", text, flags=re.MULTILINE)
 
 
 def main() -> None:

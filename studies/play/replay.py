@@ -30,6 +30,9 @@ def replay(episode: Episode) -> View:
         np.array([pick.item for pick in picks[start:stop] if pick.success], int)
         for start, stop in zip(stops, stops[1:])
     ]
+
+    # A mesh for each stretch between two stops, so that a frame hides whole meshes and no box is
+    # sent twice.
     ever = [pick.item for pick in picks if pick.success]
     rest = np.setdiff1d(np.arange(len(load)), np.array(ever, int))
     traces = [mesh(load, rest, "not unloaded", COLOURS["unseen"], legend=True)]
@@ -39,6 +42,8 @@ def replay(episode: Episode) -> View:
         name = names.get(number, "unloaded")
         traces.append(mesh(load, part, name, tuple(colour), legend=number in names))
     traces.append(_last_failure(episode, stops[0]))
+
+    # At a stop, what is unloaded later is still there, and the last pick's item is marked.
     frames = [
         go.Frame(
             name=str(stop),
@@ -50,6 +55,8 @@ def replay(episode: Episode) -> View:
         )
         for now, stop in enumerate(stops)
     ]
+
+    # Where plotly is not drawn, a picture stands for all frames.
     middle = episode.moment(stops[len(stops) // 2])
     still = view(load, middle.present, middle.groups(), HEIGHT)
     figure = View(traces, layout(HEIGHT), frames)

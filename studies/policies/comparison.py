@@ -19,8 +19,7 @@ from joblib import Parallel, delayed
 from studies import paths
 from studies.paper import training
 from studies.policies.variants import GRIDS, RECOMMENDED
-from studies.provenance import read_provenance
-from studies.results import COMMAND, measured, publish
+from studies.results import COMMAND, measured, publish, read_provenance
 from unload import task
 from unload.agent import policies
 from unload.agent.config import TrainConfig
@@ -28,7 +27,7 @@ from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import load_policy, save_policy, settings_of
 from unload.load.substacks import stack_load
 from unload.network.weights import weights_file
-from unload.support import checks, files
+from unload.support import files
 
 # Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
 CARD_LOADS, CARD_SEED = 200, 5000
@@ -111,7 +110,6 @@ def comparison_data(folder: str | Path = paths.DATA, n_jobs: int = -1) -> None:
     One row per policy, condition and container, with the columns of ``compare``. The learned
     policies are compared twice, with and without the mask.
     """
-    checks.jobs("n_jobs", n_jobs)
     found = {name: find_policy(name) for name in (*SIMPLE, *LEARNED)}
     results = Parallel(n_jobs)(
         delayed(measured)(partial(compare, name, found[name], mask, condition))

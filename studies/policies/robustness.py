@@ -94,6 +94,8 @@ def play(
     rewards, free = [], []
     env = ContainerEnv("full", after_pick, max_picks=picks, stack=stack)
     observation, info = env.reset(seed=seed)
+
+    # What rests on a box is asked of the neat load, because drifting boxes touch their neighbours.
     around = Surroundings(env.physics.load, env.physics.present)
     for _ in range(picks):
         allowed = info["action_mask"]

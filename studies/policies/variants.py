@@ -29,12 +29,12 @@ from unload.agent.evaluation import evaluate
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import checks, files
 
-CONFIG = TrainConfig(picks=1_000_000, batch_size=256)
+CONFIG = TrainConfig(picks=1_000_000, batch_size=256, log_interval=500)
 SEEDS = range(3)
-SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32)
+SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32, log_interval=500)
 LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
 SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
-RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False)
+RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False, log_interval=500)
 APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", "without the mask")}
 
 

@@ -10,12 +10,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from studies import changes, paths
 from studies.grid import Cell, Grid, read_grid, train_grid
 from studies.results import COMMAND, JOBS, write_table
-from studies.seamless.jamming import jam, weigh
+from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
@@ -38,6 +39,14 @@ def _cell(
 
 
 ANEW = partial(jam, share=SHARE)
+# Share of the free boxes that jam along episodes by the friction of a contact, by whether a box
+# stands in front, and by the number of those at the sides (``jam_tables.first_attempts``), when
+# 17 of 20 episodes had been played.
+BY_PLACE = {
+    0.64: np.array(((0.0, 0.05, 0.15, 0.52), (0.0, 0.12, 0.5, 0.68))),
+    1.0: np.array(((0.01, 0.13, 0.47, 0.78), (0.04, 0.38, 0.83, 0.98))),
+}
+LASTS = 20  # successes of others within which a jam is drawn again, see ``jam_tables.again``
 CELLS: dict[str, Cell] = {
     **{
         f"{mask}_{ties}": _cell(mask, ties, ANEW, SEEDS)
@@ -62,6 +71,13 @@ CELLS: dict[str, Cell] = {
         "mask", "noise", partial(changes.several, makes=(ANEW, changes.shuffled)), FEW_SEEDS
     ),
     "positions_mask_noise": _cell("mask", "noise", ANEW, FEW_SEEDS, equalize=False),
+    **{
+        f"measured_{friction}_{mask}_order": _cell(
+            mask, "order", partial(jam_by_place, shares=shares, lasts=LASTS), FEW_SEEDS
+        )
+        for friction, shares in BY_PLACE.items()
+        for mask in MASKS
+    },
     "b2048_mask_order": _cell("mask", "order", ANEW, SEEDS, batch_size=2048),
     "b2048_no_mask_order": _cell("no_mask", "order", ANEW, SEEDS, batch_size=2048),
 }

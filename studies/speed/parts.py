@@ -104,6 +104,7 @@ def pick_rates(num_envs: int = task.NUM_ENVS, picks: int = 500) -> dict[str, flo
     def arrays(equalize: bool) -> VectorEnv:
         return gymnasium.make_vec(CONTAINER, num_envs, max_picks=picks, equalize=equalize)
 
+    # From the plain to the fast: a row each of the table.
     envs = {
         "one container, local": one("local"),
         "one container, table": one("table"),
@@ -149,6 +150,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64) -> dict[str, floa
         "rewards": rng.choice(np.array([-1, 1], np.float32), batch_size),
     }
 
+    # Each way has an agent of its own, so that all take the same steps from the same weights.
     def update(fused: bool, threads: int, rows: int = learner.ROWS_PER_PASS) -> Callable:
         network = unload.PEQNetwork(n_features, torch.Generator().manual_seed(0))
         agent = unload.DQN(network, fused_update=fused)

@@ -1,4 +1,4 @@
-"""What the tests of training share: small runs, and ways to stop them."""
+"""What the tests of training share: small networks and runs, and ways to stop them."""
 
 import itertools
 import os
@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
+import torch
 
-from unload import TrainConfig, stack_load, train
+from unload import PEQNetwork, TrainConfig, stack_load, train
 from unload.agent.training import Training
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -115,3 +117,27 @@ def assert_same(one: Path, other: Path) -> None:
     (weights, curve), (other_weights, other_curve) = content(one), content(other)
     pd.testing.assert_frame_equal(curve, other_curve, check_exact=True)
     assert weights == other_weights
+
+
+class HeightNetwork(torch.nn.Module):
+    """Values each item by its z, times a weight."""
+
+    def __init__(self, weight: float | torch.Tensor = 1.0) -> None:
+        super().__init__()
+        self.weight = torch.nn.Parameter(torch.as_tensor(weight))
+
+    def forward(self, observations: torch.Tensor, present=None) -> torch.Tensor:
+        return observations[..., 2] * self.weight
+
+
+def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
+    return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
+
+
+def weights(network: torch.nn.Module) -> list[torch.Tensor]:
+    return [parameter.detach().clone() for parameter in network.parameters()]
+
+
+def lowest(observations: np.ndarray, masks: np.ndarray, rng) -> np.ndarray:
+    """A policy that goes for the lowest item, which has others on it."""
+    return np.where(masks, observations[..., 2], np.inf).argmin(axis=1)

@@ -17,6 +17,17 @@ def test_the_papers_configuration_is_the_default():
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 
 
+@pytest.mark.parametrize(
+    "picks, interval",
+    [(2112, 1), (64_000, 10), (1_000_000, 156), (3_200_000, 500), (20_000_000, 500)],
+)
+def test_a_curve_has_a_hundred_points_or_more(picks, interval):
+    config = TrainConfig(picks=picks)
+    assert config.log_interval == interval
+    assert config.plain() == TrainConfig(picks=picks, log_interval=interval).plain()
+    assert TrainConfig(picks=picks, log_interval=7).log_interval == 7
+
+
 def test_attention_needs_features_for_its_heads():
     with pytest.raises(ValueError, match="n_features is 33; expected a multiple of 2"):
         TrainConfig(network="attention", n_features=33)
@@ -62,7 +73,7 @@ def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
         ("mask", None, TypeError),
         ("gradient_steps", -1, ValueError),
         ("target_update_interval", 0, ValueError),
-        ("log_interval", 0, ValueError),
+        ("log_interval", -1, ValueError),
         ("checkpoint_interval", -1, ValueError),
     ],
 )

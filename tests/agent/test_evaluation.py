@@ -2,7 +2,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.agent.networks import lowest
+from tests.agent.runs import lowest
 from unload import evaluate, policies, success_rate
 from unload.env.vector import ContainerVectorEnv
 
@@ -106,7 +106,7 @@ def test_an_episode_that_is_stuck_is_given_up(few_items):
 def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(
     few_items, monkeypatch, max_picks
 ):
-    monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, actions: fail(envs, actions))
+    monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, *given: fail(envs, given[0]))
 
     def fail(envs, actions):
         envs._containers.masks[np.arange(len(actions)), actions] = 0

@@ -3,7 +3,8 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from unload import DQN, PEQNetwork
+from tests.agent.runs import peq
+from unload import DQN
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.fast.learner import FusedLearner
 
@@ -18,14 +19,10 @@ def batch_of(rng: np.random.Generator) -> tuple[dict[str, np.ndarray], np.ndarra
     return batch, rng.uniform(-1, 1, SIZE).astype(np.float32)
 
 
-def network() -> PEQNetwork:
-    return PEQNetwork(8, torch.Generator().manual_seed(0))
-
-
 def test_gradients_are_those_of_the_mean_loss(rng):
     """Adam hides a constant factor, so the gradients themselves are compared."""
     batch, targets = batch_of(rng)
-    learner, reference = PlainLearner(network(), 1e-3, 0.5), network()
+    learner, reference = PlainLearner(peq(), 1e-3, 0.5), peq()
     loss = learner.start(batch, targets)()
     values = reference(torch.from_numpy(batch["observations"]))
     chosen = values[torch.arange(SIZE), torch.from_numpy(batch["actions"])]
@@ -39,7 +36,7 @@ def test_gradients_are_those_of_the_mean_loss(rng):
 @pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
 def test_learners_have_one_interface(rng, kind):
     batch, targets = batch_of(rng)
-    one, other = kind(network(), 1e-3, 1.0), kind(network(), 1e-3, 1.0)
+    one, other = kind(peq(), 1e-3, 1.0), kind(peq(), 1e-3, 1.0)
     rows = rng.integers(SIZE, size=70)
     picked = {name: array[rows] for name, array in batch.items()}
     assert one.start(batch, targets, rows)() == other.start(picked, targets[rows])()
@@ -53,7 +50,7 @@ def test_learners_have_one_interface(rng, kind):
 @pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
 def test_the_fused_update_takes_tanh_in_double_precision(rng, kind):
     """Where the value is nearly 1, the slope of tanh in single precision is 0."""
-    saturated = network()
+    saturated = peq()
     with torch.no_grad():
         saturated.scorer.bias.fill_(12.0)
     batch, _ = batch_of(rng)
@@ -68,6 +65,6 @@ def test_plain_means_plain_everywhere(rng, monkeypatch):
     for name in ("start_gradients", "best_actions"):
         monkeypatch.setattr(f"unload.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain"))
     batch, targets = batch_of(rng)
-    agent = DQN(network(), fused_update=False)
+    agent = DQN(peq(), fused_update=False)
     agent.update(batch | {"rewards": targets})
     agent.choose(batch["observations"], np.ones((SIZE, ITEMS), bool), 0.0, rng)

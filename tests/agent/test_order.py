@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from tests.load.walls import KINDS, own_load
+from unload import Load, picking_order, policies, read_load
 from unload import __main__ as command
-from unload import picking_order, policies, read_load
+from unload.agent.order import NAMES, reachable
 from unload.load.packing_list import EXAMPLE
 from unload.physics.local import LocalPhysics
 from unload.task import LIFT_THRESHOLD
@@ -22,11 +23,11 @@ ROOT = Path(__file__).resolve().parents[2]
 STUBBORN = iter([127] * 999)
 
 
-@pytest.mark.parametrize("policy", ["recommended", "random", policies.highest])
+@pytest.mark.parametrize("policy", ["reachable", "recommended", "random", policies.highest])
 def test_every_pick_is_what_pybullet_says(policy):
     load = read_load()
     order = picking_order(load, policy)
-    assert order.columns.tolist() == ["pick", "id", "item", "distance", "unloaded"]
+    assert order.columns.tolist() == ["pick", "id", "item", "distance", "unloaded", "behind"]
     assert order["pick"].tolist() == list(range(1, len(order) + 1))
     assert order["id"].tolist() == load.ids[order["item"]].tolist()
     assert sorted(order.loc[order["unloaded"], "item"]) == list(range(len(load)))
@@ -37,9 +38,11 @@ def test_every_pick_is_what_pybullet_says(policy):
         held_down = len(physics.surroundings.on_top(row.item)) > 2
         assert row.distance == (0 if held_down else physics.lift(row.item))
         assert row.unloaded == (row.distance >= LIFT_THRESHOLD)
+        assert row.behind == load.behind(physics.present)[row.item]
         if row.unloaded:
             physics.remove(row.item)
     physics.close()
+    assert order["behind"].any() == (policy != "reachable")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -48,6 +51,56 @@ def test_own_loads_are_emptied_from_the_top_without_a_failure(kind, rng):
     order = picking_order(load, "highest")
     assert order["unloaded"].all() and len(order) == len(load)
     assert order["id"].tolist() == order["item"].tolist()  # this load has no ids
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "the paper's"])
+def test_the_default_can_be_carried_out_from_the_entrance(kind, rng, full_load):
+    load = full_load if kind == "the paper's" else own_load(rng, kind)
+    order = picking_order(load)
+    assert order["unloaded"].all() and not order["behind"].any() and len(order) == len(load)
+    pd.testing.assert_frame_equal(order, picking_order(load, rule=reachable))
+    # Of boxes that are free alike the foremost is picked, and of those the highest.
+    present, front = np.ones(len(load), bool), (load.positions + load.sizes / 2)[:, 0]
+    for item in order["item"]:
+        free = present & ~load.behind(present) & ~load.covered(present)
+        assert free[item] and front[item] >= front[free].max() - 1e-6
+        foremost = free & (front >= front[item] - 1e-6)
+        assert (
+            load.positions[item, 2] + load.sizes[item, 2] / 2
+            >= (load.positions[foremost, 2] + load.sizes[foremost, 2] / 2).max() - 2e-6
+        )
+        present[item] = False
+
+
+def test_a_rule_knows_the_load_and_what_is_present(boxes):
+    load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2), (1.8, 0.2))
+    load = Load(load.positions, load.sizes, ids=list("abcd"), extras={"stop": [2, 1, 2, 1]})
+    seen = []
+
+    def by_stop(load, present):
+        seen.append(present.copy())
+        present[:] = False  # a copy, too
+        return -load.extras["stop"], load.ids == "c"
+
+    order = picking_order(load, rule=by_stop)
+    assert order["id"].tolist() == ["b", "d", "c", "a"], "equal ones in the order of the list"
+    assert order["stop"].tolist() == [1, 1, 2, 2]
+    assert [each.sum() for each in seen] == [4, 3, 2, 1]
+
+
+def test_a_box_that_failed_waits_until_another_one_is_unloaded(boxes):
+    load = boxes((0.3, 0.2), (0.3, 0.6), (0.3, 1.0), (0.3, 1.4), (1.3, 0.2))
+    order = picking_order(load, rule=lambda load, present: [-load.positions[:, 2]])
+    assert order["item"].tolist()[:4] == [0, 4, 0, 1]  # the rule prefers the lowest one
+    assert order["unloaded"].tolist()[:3] == [False, True, False]
+    assert sorted(order.loc[order["unloaded"], "item"]) == [0, 1, 2, 3, 4]
+
+
+def test_columns_of_the_list_keep_their_names_beside_those_of_the_order(boxes):
+    load = boxes((0.3, 0.2))
+    load = Load(load.positions, load.sizes, extras={"item": ["x"], "lot": ["y"]})
+    order = picking_order(load)
+    assert order.iloc[0][["item", "item in the list", "lot"]].tolist() == [0, "x", "y"]
 
 
 def test_random_picks_are_drawn_from_the_seed():
@@ -79,21 +132,71 @@ def test_what_is_no_policy_is_refused(policy, error, message):
         picking_order(read_load(), policy)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"rule": "reachable"}, TypeError, "rule is 'reachable'; expected a function"),
+        ({"rule": reachable, "policy": "highest"}, TypeError, "and no policy beside it"),
+        (
+            {"rule": lambda load, present: load.sizes},
+            ValueError,
+            r"rule returned has shape \(136, 3",
+        ),
+        (
+            {"rule": lambda load, _: [load.sizes[:, 0] * np.nan]},
+            ValueError,
+            "rule returned holds nan",
+        ),
+    ],
+)
+def test_what_is_no_rule_is_refused(arguments, error, message):
+    with pytest.raises(error, match=message):
+        picking_order(read_load(), **arguments)
+
+
+def test_what_floats_is_not_unloaded(boxes):
+    with pytest.raises(ValueError, match="floats"):
+        picking_order(boxes((0.3, 0.9)))
+
+
 def test_the_command_line_prints_the_order_as_csv(capsys, tmp_path):
     command.main([str(EXAMPLE), "--policy", "highest"])
-    printed = capsys.readouterr().out
-    pd.testing.assert_frame_equal(
-        pd.read_csv(io.StringIO(printed)), picking_order(read_load(), "highest")
+    printed, summary = capsys.readouterr()
+    order = picking_order(read_load(), "highest")
+    pd.testing.assert_frame_equal(pd.read_csv(io.StringIO(printed)), order)
+    assert summary == f"136 picks, 0 failed, {order['behind'].mean():.0%} behind other boxes\n"
+    command.main(["--output", str(tmp_path / "order.csv")])
+    assert capsys.readouterr() == ("", "136 picks, 0 failed, 0% behind other boxes\n")
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "order.csv"), picking_order(read_load()))
+
+
+def test_the_command_line_reads_what_read_load_reads(tmp_path):
+    """Each option; what is said of columns and of boxes that were moved stands on stderr."""
+    (tmp_path / "boxes.csv").write_text(
+        "nr;x;y;z;length;width;height;weight;stop;note\n"
+        "a;50;50;50;100;100;100;5;2;=1\n"
+        "b;50;50;159;100;100;100;7;1;x\n"
     )
-    command.main(["--policy", "highest", "--output", str(tmp_path / "order.csv")])
-    assert (tmp_path / "order.csv").read_text() == printed
-    assert capsys.readouterr() == ("", "")
+    options = "--units cm --container 12 2 2.2 --x-from door --tolerance 0.1 --ignore weight"
+    done = subprocess.run(
+        [sys.executable, "-m", "unload", tmp_path / "boxes.csv", "--column", "nr=id",
+         *options.split()], capture_output=True, text=True, cwd=ROOT,
+    )  # fmt: skip
+    order = pd.read_csv(io.StringIO(done.stdout))
+    assert order["id"].tolist() == ["b", "a"] and order["weight"].tolist() == [7, 5]
+    assert order["stop"].tolist() == [1, 2] and order["note"].tolist() == ["x", "'=1"]
+    list_ = f"{tmp_path}/boxes.csv"
+    assert done.stderr.splitlines()[-3:] == [
+        f"{list_}: kept but not used: stop, note",
+        f"{list_}: 1 of 2 boxes moved by up to 90.0 mm, onto what is below and beside them",
+        "2 picks, 0 failed, 0% behind other boxes",
+    ]
 
 
 def test_no_id_becomes_a_formula_in_a_spreadsheet(capsys, tmp_path):
     lines = ["id,x,y,z,size_x,size_y,size_z", "=HYPERLINK(0),1,1,0.5,1,1,1", "a-1,3,1,0.5,1,1,1"]
     (tmp_path / "boxes.csv").write_text("\n".join(lines))
-    command.main([str(tmp_path / "boxes.csv"), "--policy", "highest"])
+    command.main([str(tmp_path / "boxes.csv")])
     ids = pd.read_csv(io.StringIO(capsys.readouterr().out))["id"]
     assert sorted(ids) == ["'=HYPERLINK(0)", "a-1"]
 
@@ -113,4 +216,5 @@ def test_the_command_line_says_what_is_wrong(tmp_path, capsys, monkeypatch):
     assert "136 boxes are left" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="0"):
         command.main(["-h"])
-    assert "highest, nearest, random, paper, " in " ".join(capsys.readouterr().out.split())
+    text = " ".join(capsys.readouterr().out.split())
+    assert all(name in text for name in NAMES)

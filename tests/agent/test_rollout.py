@@ -23,10 +23,10 @@ def test_the_bootstrap_maximum_obeys_the_mask(mask):
 def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
     fewest, pick = [], ContainerVectorEnv._pick
 
-    def watched(envs, actions):
+    def watched(envs, actions, playing):
         fewest.append((envs.visible >= 0).sum(axis=1).min())
         assert (envs.visible[np.arange(len(actions)), actions] >= 0).all()
-        return pick(envs, actions)
+        return pick(envs, actions, playing)
 
     monkeypatch.setattr(ContainerVectorEnv, "_pick", watched)
     config = TrainConfig(picks=800, num_envs=4, batch_size=32, n_features=4, mask=False)
@@ -38,8 +38,8 @@ def test_a_pick_says_how_far_it_has_lifted(monkeypatch):
     """Also where it was an episode's last one, whose infos stand apart; NaN without lifts."""
     lifted, pick = [], ContainerVectorEnv._pick
 
-    def watched(envs, actions):
-        rewards = pick(envs, actions)
+    def watched(envs, actions, playing):
+        rewards = pick(envs, actions, playing)
         lifted.append(envs._distances.copy())
         return rewards
 

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 import torch
 
-from tests.agent.networks import HeightNetwork
 from tests.agent.runs import (
     CONTAINER,
     RUNS,
     Breakdown,
+    HeightNetwork,
     assert_same,
     at,
     at_step,
@@ -41,7 +41,7 @@ def metres(run) -> None:
 
 
 HIGHEST = TrainConfig(**RUNS["highest item"])
-LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
+LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 
 
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
@@ -245,7 +245,7 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
             stack=lambda rng: own_load(rng, "continuous sizes"),
         )  # fmt: skip
         assert len(LiftTable.load(lifts)) == len(table) > 10
-        monkeypatch.setattr("unload.env.vector.ContainerVectorEnv._lift", None)
+        monkeypatch.setattr("unload.physics.table.TablePhysics.simulate_all", None)
     assert_same(tmp_path / "first", tmp_path / "second")
 
 
@@ -317,7 +317,8 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
-    assert {path.name for path in tmp_path.iterdir()} <= {"checkpoint.npz", "curve.csv", "lock"}
+    left = {"checkpoint.npz", "curve.csv", "lock", "owner"}
+    assert {path.name for path in tmp_path.iterdir()} <= left
     if interval == 0:
         stored = files.read_arrays(tmp_path / "checkpoint.npz")
         assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
@@ -370,6 +371,22 @@ def test_a_point_holds_the_means_since_the_last_one():
     assert np.isnan(table["loss"][0]) and table["loss"][1] == pytest.approx(0.25)
     assert table["epsilon"].tolist() == [1.0, 0.5]
     assert table["wall_time"].is_monotonic_increasing
+
+
+def test_a_callback_may_end_a_run(tmp_path):
+    """By False, not by None or 0; the policy and the curve until then are its result."""
+    config, points = TrainConfig(**CONTAINER), []
+
+    def callback(point):
+        points.append(point)
+        return False if len(points) == 4 else 0 if len(points) == 3 else None
+
+    result = train(config, tmp_path, progress=False, callback=callback)
+    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
+    assert len(points) == 4
+    assert result.policy.card["picks"] == points[-1]["picks"] < config.picks
+    again = train(config, tmp_path, progress=False, callback=callback)
+    assert len(points) == 4 and len(again.curve) == 4 and not (tmp_path / "checkpoint.npz").exists()
 
 
 @pytest.mark.parametrize("where", ["step", "callback"])

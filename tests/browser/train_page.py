@@ -1,58 +1,137 @@
 """The page that trains in a browser: what a reader does with it, and what is wrong then."""
 
 import re
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from playwright.sync_api import Browser, Page
 
 from studies.play.page import PAGE
 
-SIZES = {"wide": (1400, 900), "narrow": (420, 800)}
-TRAIN_LIMIT = 240  # s, for a run of 32,000 picks on a busy machine
+SIZES = {"desktop": (1400, 900), "tablet": (820, 1180), "phone": (390, 844)}
+SCHEMES = ("light", "dark")
+SEEDS = (0, 1, 2)
+TRAIN_LIMIT = 240  # s, for a run of 96,000 picks on a busy machine
+AT_ONCE = 10  # s, for fresh picks of frozen weights (0.3 s) on a busy machine
+FINGER = 44  # pixels, the height of what is touched
+STARTED = "#picks:has-text('0 picks')"
 
 
 def look_at_page(chromium: Browser, pictures: Path) -> Iterator[str]:
     """Yield what is wrong with the page; keep pictures of it before and after training."""
-    for scheme in ("light", "dark"):
-        for name, (width, height) in SIZES.items():
+    yield from without_scripts(chromium)
+    for scheme in SCHEMES:
+        for size, (width, height) in SIZES.items():
             context = chromium.new_context(
                 viewport={"width": width, "height": height}, color_scheme=scheme
             )
             page, errors, requests = context.new_page(), [], []
             page.on("pageerror", lambda error, to=errors: to.append(str(error)))
             page.on("request", lambda request, to=requests: to.append(request.url))
-            page.goto(PAGE.as_uri())
-            page.wait_for_selector("#picks:has-text('0 picks')")
-            stem = pictures / f"train-{scheme}-{name}"
-            page.screenshot(path=f"{stem}-before.png", full_page=True)
-            if (scheme, name) == ("light", "wide"):
-                yield from picks(page)
-                yield from settings(page)
-            yield from trains(page, f"{stem}-after.png")
-            yield from fits(page, f"{scheme}, {name}")
+            for seed in SEEDS if scheme == SCHEMES[0] else SEEDS[:1]:
+                name = f"{scheme}, {size}, seed {seed}"
+                stem = pictures / f"train-{scheme}-{size}-{seed}"
+                page.goto("about:blank")
+                page.goto(f"{PAGE.as_uri()}#seed={seed}")
+                page.wait_for_selector(STARTED)
+                yield from (f"{name}: {each}" for each in fits(page, size))
+                yield from (f"{name}: {each}" for each in five_steps(page, stem))
+                yield from (f"{name}: {each}" for each in fits(page, size))
+            if (scheme, size) == (SCHEMES[0], "desktop"):
+                for look in (keys, settings, bad_address, controls, jams):
+                    page.goto("about:blank")
+                    page.goto(PAGE.as_uri())
+                    page.wait_for_selector(STARTED)
+                    yield from look(page)
             yield from (f"the page says {error!r}" for error in errors)
-            others = [url for url in requests if not url.startswith((PAGE.as_uri(), "blob:"))]
+            known = (PAGE.as_uri(), "blob:", "about:")
+            others = [url for url in requests if not url.startswith(known)]
             if others:
                 yield f"the page asks for {others}"
             context.close()
 
 
-def picks(page: Page) -> Iterator[str]:
-    """Yield whether clicks and keys do not pick."""
-    canvas, status = page.locator("#canvas"), page.locator("#status")
-    box = canvas.bounding_box()
-    canvas.click(position={"x": box["width"] / 2, "y": box["height"] * 0.28})  # a top of a box
-    if "1 of 1 picks" not in status.text_content():
-        yield f"a click on a free box says {status.text_content()!r}"
-    canvas.click(position={"x": box["width"] / 2, "y": box["height"] * 0.95})  # out of sight
-    if "not among the 128" not in status.text_content():
-        yield f"a click on a box that is not seen says {status.text_content()!r}"
-    canvas.focus()
-    for key in ("ArrowDown", "ArrowDown", "ArrowLeft", "Enter"):
+def five_steps(page: Page, stem: Path) -> Iterator[str]:
+    """Yield whether a step does not do what it says; keep a picture of each."""
+
+    def ends(step: str, after: Callable[[], object], expected: str) -> Iterator[str]:
+        after()
+        if not until(page, lambda: "done" in (page.get_attribute(button(step), "class") or "")):
+            yield f"step {step} does not end"
+        until(page, lambda: not page.evaluate("run.running") and judged(page))
+        page.screenshot(path=f"{stem}-{step}.png", full_page=True)
+        said = page.text_content("#verdict")
+        if not re.match(expected, said):
+            yield f"the verdict of step {step} is {said!r}; expected {expected!r}"
+
+    page.screenshot(path=f"{stem}-start.png", full_page=True)
+    yield from ends("unload", lambda: click(page, 0.28), "Unloaded: .* 1 of your 1 picks")
+    train = lambda: page.click(button("positions"))  # noqa: E731
+    yield from ends("positions", train, r"It learned: 100 % of its last picks succeeded, after \d")
+    ranks = lambda: page.click(button("paper"))  # noqa: E731
+    yield from ends("paper", ranks, "It (fell, from|did not|learned)")
+    frozen, start = weights(page), time.monotonic()
+    page.click(button("blank"))
+    if not until(page, lambda: page.text_content("#rate-true")):
+        yield "z alone shows no number"
+    if time.monotonic() - start > AT_ONCE:
+        yield f"z alone shows its number after {time.monotonic() - start:.1f} s"
+    yield from ends("blank", lambda: None, r"With z alone .* in \d+ % .* with x and y in \d+ %: ")
+    if weights(page) != frozen:
+        yield "blank coordinates change the weights"
+    both = [page.text_content(f"#rate-{blank}") for blank in ("true", "false")]
+    if re.findall(r"\d+ %", page.text_content("#verdict")) != both:
+        yield f"the verdict {page.text_content('#verdict')!r} is not of {both}"
+    remedy = lambda: page.click(button("shuffled"))  # noqa: E731
+    yield from ends("shuffled", remedy, "It (learned|did not fall): ")
+
+
+def fits(page: Page, size: str) -> Iterator[str]:
+    """Yield whether the page is too wide, or hands and eyes do not find all in one view."""
+    wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+    if wide > 0:
+        yield f"the page is {wide} pixels too wide"
+    if size == "desktop":
+        return
+    page.evaluate("scrollTo(0, 0)")
+    for name in ("#canvas", "#train", "#plot"):
+        box = page.locator(name).bounding_box()
+        if box["y"] + box["height"] > SIZES[size][1]:
+            yield f"{name} ends at {box['y'] + box['height']}, below the view"
+    for each in page.locator("button, select, .choice label, #settings input").all():
+        box = each.bounding_box()
+        if box and box["height"] < FINGER:
+            yield f"{each.inner_text()!r} is {box['height']} pixels high"
+
+
+def keys(page: Page) -> Iterator[str]:
+    """Yield whether clicks and keys do not pick, also in a container that is nearly empty."""
+    click(page, 0.95)  # out of sight
+    if "not among the 128" not in page.text_content("#verdict"):
+        yield f"a click on a box that is not seen says {page.text_content('#verdict')!r}"
+    page.focus("#canvas")
+    for key in ("ArrowDown", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp", "Enter"):
         page.keyboard.press(key)
-    if "of 2 picks" not in status.text_content():
-        yield f"Enter on a box chosen by arrows says {status.text_content()!r}"
+    if "1 of your 1 picks" not in page.text_content("#verdict"):
+        yield f"Enter on a box chosen by arrows says {page.text_content('#verdict')!r}"
+    chosen = page.evaluate("chosen")
+    if not page.evaluate("mine.visible.includes(chosen)"):
+        yield f"after Enter unloads a box, {chosen} is chosen"
+    page.evaluate(
+        """() => {
+            for (let left = true; left; ) {
+                const free = mine.visible.filter((item) => mine.liftable(item));
+                for (const item of free) mine.pick(item);
+                left = free.length;
+            }
+        }"""
+    )
+    page.keyboard.press("Enter")
+    for key in ("ArrowUp", "ArrowLeft", "Enter"):
+        page.keyboard.press(key)
+    if page.evaluate("mine.visible.length"):
+        yield "the container is not empty"
 
 
 def settings(page: Page) -> Iterator[str]:
@@ -64,14 +143,18 @@ def settings(page: Page) -> Iterator[str]:
     address = page.evaluate("location.href")
     copy = page.context.new_page()
     copy.goto(address)
-    copy.wait_for_selector("#picks:has-text('0 picks')")
+    copy.wait_for_selector(STARTED)
     for name, value in {"replay": "shuffled", "mask": "false", "seed": "5"}.items():
         there = copy.input_value(f"[name={name}]")
         if there != value:
             yield f"{address} gives {name} as {there!r}; expected {value!r}"
     first = weights(copy)
-    for _ in range(3):
+    for number in (1, 2, 3):
         copy.click("#step")
+        if not until(copy, lambda count=number: copy.evaluate("run.points.length") == count):
+            yield f"step {number} adds no point"
+        if not until(copy, lambda: "%" in copy.text_content("#rate")):
+            yield f"after a step the rate is {copy.text_content('#rate')!r}"
     if not until(copy, lambda: copy.text_content("#picks") == "192 picks"):
         yield f"three steps make {copy.text_content('#picks')}"
     if weights(copy) == first:
@@ -84,44 +167,114 @@ def settings(page: Page) -> Iterator[str]:
     copy.close()
 
 
-def trains(page: Page, picture: str) -> Iterator[str]:
-    """Yield whether positions are not learned, the curve does not grow, or the page stutters."""
-    page.click("button[value=positions]")
-    if not until(page, lambda: points(page) >= 3):
+def bad_address(page: Page) -> Iterator[str]:
+    """Yield whether a value that is not valid is not named, or stays."""
+    page.goto("about:blank")
+    page.goto(f"{PAGE.as_uri()}#seed=1e21&replay=gone")
+    page.wait_for_selector(STARTED)
+    said = page.text_content("#problems")
+    if not page.is_visible("#problems") or "1e21" not in said or "gone" not in said:
+        yield f"of a bad address the page says {said!r}"
+    if page.input_value("[name=seed]") != "2" or "1e21" in page.evaluate("location.href"):
+        yield "a bad seed stays"
+    page.fill("input[name=seed]", "7")
+    page.keyboard.press("Enter")
+    if page.is_visible("#problems"):
+        yield "a mended seed is still named"
+
+
+def controls(page: Page) -> Iterator[str]:
+    """Yield whether training cannot be paused, or pictures and tooltips do not answer."""
+    page.click("#train")
+    if not until(page, lambda: page.evaluate("run.points.length") >= 3):
         yield "Train draws no curve"
-    early = points(page)
     page.click("#train")  # pause
     if not until(page, lambda: page.text_content("#train") == "Train"):
         yield "Pause does not pause"
+    early, at = page.get_attribute("#success_rate", "points"), dot(page)
     page.click("#train")
     if not until(page, lambda: page.text_content("#picks").startswith("32,0")):
         yield f"the run ends at {page.text_content('#picks')}"
-    page.wait_for_timeout(500)
-    if points(page) <= early or page.text_content("#rate") != "100 %":
-        yield f"a curve of {points(page)} points ends at {page.text_content('#rate')}"
-    page.screenshot(path=picture, full_page=True)
+    until(page, lambda: judged(page))
+    if page.text_content("#rate") != "100 %" or page.text_content("#rate-false") != "100 %":
+        yield f"a run on positions ends at {page.text_content('#rate')}"
+    if page.get_attribute("#success_rate", "points") == early or dot(page) == at:
+        yield "the curve or the dot in the phase diagram does not move"
+    if page.get_attribute("#region", "d"):
+        yield "the phase diagram shades a region for positions"
+    page.select_option("select[name=equalize]", "true")
+    if not until(page, lambda: page.get_attribute("#region", "d")):
+        yield "the phase diagram shades no region for ranks"
+    box = page.locator("#plot").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.99, box["y"] + 20)
+    if not re.fullmatch(r"3\d,\d+ picks: 100 %", page.text_content("#readout")):
+        yield f"at its end the curve says {page.text_content('#readout')!r}"
+    before = page.evaluate("tiles[0].toDataURL()")
+    page.select_option("#axis", "0")
+    if page.evaluate("tiles.length") != 16 or page.evaluate("tiles[0].toDataURL()") == before:
+        yield "the maps of 16 features do not change from y to x"
+    bare = page.evaluate("[...form.querySelectorAll('label:not([title])')].map((l) => l.innerText)")
+    if bare:
+        yield f"{bare} have no tooltip"
+    for link in page.locator("nav a").all():
+        target = link.evaluate("(link) => link.href")
+        path = Path(target.removeprefix("file://"))
+        if not (target.startswith("https:") or path.is_file()):
+            yield f"{link.inner_text()} leads to {target!r}"
 
 
-def fits(page: Page, name: str) -> Iterator[str]:
-    """Yield whether the page is wider than its window."""
-    wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
-    if wide > 0:
-        yield f"{name}: the page is {wide} pixels too wide"
+def jams(page: Page) -> Iterator[str]:
+    """Yield whether seamless walls do not jam as often as the slider says."""
+    if page.is_visible("[name=jam]"):
+        yield "there is a slider of jams where walls have a gap"
+    page.select_option("select[name=seamless]", "true")
+    page.fill("[name=jam]", "0.5")
+    if page.text_content("#share") != "0.5" or "jam=0.5" not in page.evaluate("location.href"):
+        yield f"the slider says {page.text_content('#share')!r}"
+    page.click("#train")
+    until(page, lambda: page.text_content("#picks").startswith("32,0") and judged(page))
+    page.wait_for_timeout(200)  # what is judged is drawn in the next frame
+    said = page.text_content("#verdict")
+    if not re.match(r"It learned: (4\d|5\d) % .* nothing ends above 50 %\.", said):
+        yield f"with jams the verdict is {said!r}"
+
+
+def without_scripts(chromium: Browser) -> Iterator[str]:
+    """Yield whether the page does not say what is missing where scripts are off."""
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(PAGE.as_uri())
+    if "JavaScript is switched off" not in page.locator("noscript").inner_text():
+        yield "without scripts the page does not say so"
+    context.close()
+
+
+def button(step: str) -> str:
+    return f"#steps button[value={step}]"
+
+
+def click(page: Page, down: float) -> None:
+    """Click in the middle of the canvas, some way down."""
+    box = page.locator("#canvas").bounding_box()
+    page.click("#canvas", position={"x": box["width"] / 2, "y": box["height"] * down})
+
+
+def judged(page: Page) -> bool:
+    return page.evaluate("!run.picks || config.blank in run.rates")
 
 
 def weights(page: Page) -> list[float]:
     return page.evaluate("[...run.parameters]")
 
 
-def points(page: Page) -> int:
-    """Number of points of the learning curve."""
-    return len(re.findall(r"\S+", page.get_attribute("#success_rate", "points") or ""))
+def dot(page: Page) -> str:
+    return page.get_attribute("#dot", "transform")
 
 
-def until(page: Page, holds) -> bool:
+def until(page: Page, holds: Callable[[], object]) -> bool:
     """Whether something holds within some time; the page's own rules forbid to ask from inside."""
-    for _ in range(10 * TRAIN_LIMIT):
+    for _ in range(20 * TRAIN_LIMIT):
         if holds():
             return True
-        page.wait_for_timeout(100)
+        page.wait_for_timeout(50)
     return False

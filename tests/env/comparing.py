@@ -11,18 +11,19 @@ import unload
 CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
 
 
-def make_pair(env_id: str, num_envs: int, **kwargs):
+def make_pair(env_id: str, num_envs: int, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs):
     """The array environment, and single ones side by side."""
     single = {"physics": "table"} if env_id == CONTAINER else {}
     side_by_side = gymnasium.make_vec(
         env_id,
         num_envs,
         vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP},
+        vector_kwargs={"autoreset_mode": autoreset_mode},
         **single,
         **kwargs,
     )
-    return gymnasium.make_vec(env_id, num_envs, **kwargs), side_by_side
+    array = gymnasium.make_vec(env_id, num_envs, autoreset_mode=autoreset_mode, **kwargs)
+    return array, side_by_side
 
 
 def assert_same(one, other) -> None:

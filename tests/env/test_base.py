@@ -3,6 +3,7 @@
 import copy
 import gc
 import pickle
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -94,7 +95,7 @@ def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
     env, same = make(), make()
     env.reset(seed=0)
 
-    def interrupted(*arguments):
+    def interrupted(*arguments, **named):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
@@ -178,20 +179,26 @@ def test_seeds():
 
 
 @pytest.mark.parametrize(
-    ("actions", "error", "message"),
+    ("name", "value", "error", "message"),
     [
-        ([0, 128], ValueError, "actions holds 0 to 128; expected 0 to 127"),
-        ([-1, 0], ValueError, "actions holds -1 to 0"),
-        ([0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
-        ([0.0, 1.0], TypeError, "actions has dtype float64"),
+        ("actions", [0, 128], ValueError, "actions holds 0 to 128; expected 0 to 127"),
+        ("actions", [-1, 0], ValueError, "actions holds -1 to 0"),
+        ("actions", [0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
+        ("actions", [0.0, 1.0], TypeError, "actions has dtype float64"),
+        ("seed", -1, ValueError, "seed is -1"),
+        ("seed", 0.5, TypeError, "seed is 0.5"),
+        ("seed", [1], ValueError, "seed holds 1 seeds; expected 2"),
+        ("seed", [1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
+        ("seed", [1, "2"], TypeError, "seed is '2'"),
+        ("seed", [1, -1], ValueError, "seed is -1; expected an integer >= 0"),
     ],
 )
-def test_bad_actions_change_nothing(actions, error, message):
+def test_bad_actions_and_seeds_change_nothing(name, value, error, message):
     envs = gymnasium.make_vec(CONTAINER, 2)
     envs.reset(seed=0)
     before = envs.unwrapped.state(), envs.unwrapped.visible
     with pytest.raises(error, match=message):
-        envs.step(actions)
+        envs.step(value) if name == "actions" else envs.reset(seed=value)
     assert_same((envs.unwrapped.state(), envs.unwrapped.visible), before)
 
 
@@ -204,42 +211,28 @@ def test_bad_numbers_of_environments_are_refused(make, num_envs, error):
         make(num_envs)
 
 
-@pytest.mark.parametrize(
-    ("seed", "error", "message"),
-    [
-        (-1, ValueError, "seed is -1"),
-        (0.5, TypeError, "seed is 0.5"),
-        ([1], ValueError, "seed holds 1 seeds; expected 2"),
-        ([1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
-        ([1, "2"], TypeError, "seed is '2'"),
-        ([1, -1], ValueError, "seed is -1; expected an integer >= 0"),
-    ],
-)
-def test_bad_seeds_leave_the_episodes_as_they_were(seed, error, message):
-    envs = gymnasium.make_vec(CONTAINER, 2)
-    envs.reset(seed=0)
-    before = envs.unwrapped.state()
-    with pytest.raises(error, match=message):
-        envs.reset(seed=seed)
-    assert_same(envs.unwrapped.state(), before)
-
-
+@pytest.mark.parametrize("make", [gymnasium.make, partial(gymnasium.make_vec, num_envs=2)])
 @pytest.mark.parametrize(
     ("env_id", "options", "error", "message"),
     [
         (CONTAINER, {"load": 1}, TypeError, "load is 1; expected an unload.Load"),
+        (CONTAINER, {"load": None}, TypeError, "load is None; expected an unload.Load"),
         (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
         (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
         (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
     ],
 )
-def test_bad_options_leave_the_episodes_as_they_were(env_id, options, error, message):
-    envs = gymnasium.make_vec(env_id, 2)
-    envs.reset(seed=0)
-    before = envs.unwrapped.state()
+def test_bad_options_leave_the_episodes_as_they_were(make, env_id, options, error, message):
+    """Both draw the same at the next reset, and were given the same picks before."""
+    physics = {"physics": "table"} if env_id == CONTAINER else {}
+    env, other = (make(env_id, **physics) for _ in range(2))
+    actions = 0 if make is gymnasium.make else np.zeros(2, int)
+    for each in (env, other):
+        each.reset(seed=0)
     with pytest.raises(error, match=message):
-        envs.reset(seed=3, options=options)
-    assert_same(envs.unwrapped.state(), before)
+        env.reset(seed=3, options=options)
+    assert_same(env.step(actions), other.step(actions))
+    assert_same(env.reset(), other.reset())
 
 
 @pytest.mark.parametrize("failing", [1, 3, 5])

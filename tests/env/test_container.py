@@ -264,25 +264,6 @@ def test_bad_actions_change_nothing(action, error):
     untouched.close()
 
 
-@pytest.mark.parametrize(
-    ("options", "error", "message"),
-    [
-        ({"lode": None}, ValueError, "options is {'lode': None}; expected load"),
-        ({"load": None}, TypeError, "load is None; expected an unload.Load"),
-        (["load"], TypeError, r"options is \['load'\]; expected a dict"),
-    ],
-)
-def test_bad_options_leave_the_episode_as_it_was(options, error, message):
-    env = ContainerEnv(physics="table")
-    first, _ = env.reset(seed=0)
-    env.step(0)
-    before = state_of(env)
-    with pytest.raises(error, match=message):
-        env.reset(seed=99, options=options)
-    assert_same(state_of(env), before)
-    env.close()
-
-
 @pytest.mark.parametrize("make", [ContainerEnv, partial(ContainerVectorEnv, 2)])
 def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
     tower = boxes((1.2, 0.2), (1.2, 0.6 + 2 * CONTACT_TOLERANCE))

@@ -3,7 +3,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from unload import stack_load
 from unload.env import observation
 from unload.env.highest_item import GRID
 
@@ -47,8 +46,3 @@ def test_items_are_blurred_and_nearest_first(make_env):
     for seen in (sharp, blurred):
         distances = observation.distance((seen + 1) / 2 * [7.0, 2.5, 2.5])
         assert (np.diff(distances) > -1e-5).all()
-
-
-def test_a_random_load_is_no_load_of_this_environment(make_env, rng):
-    with pytest.raises(ValueError, match="(?s)options is .*expected none"):
-        make_env(ENV_ID).unwrapped.reset(options={"load": stack_load(rng)})

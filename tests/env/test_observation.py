@@ -35,6 +35,15 @@ def test_scale_maps_the_container_to_the_cube():
     assert scaled.tolist() == [[-1, -1, -1], [1, 1, 1], [0, 0, -0.5]]
 
 
+def test_another_container_is_seen_from_its_own_entrance(rng):
+    container = np.array([12.0, 2.0, 3.0])
+    points = rng.uniform(0, container, (50, 3))
+    expected = np.hypot(12 - points[:, 0], 2 * (3 - points[:, 2]))
+    assert observation.distance(points, container) == pytest.approx(expected)
+    assert observation.nearest(points, 5, container).tolist() == np.argsort(expected)[:5].tolist()
+    assert observation.scale(container / 4, container).tolist() == [-0.5, -0.5, -0.5]
+
+
 @pytest.mark.parametrize("function", [observation.distance, observation.nearest])
 @pytest.mark.parametrize(
     ("positions", "error"),

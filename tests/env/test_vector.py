@@ -1,8 +1,11 @@
 """The array environments, against Gymnasium's loop over single ones."""
 
+import gymnasium
 import numpy as np
 import pytest
+from gymnasium import wrappers
 from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -30,6 +33,14 @@ def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -
         results = array.step(actions)
         assert_same(results, side_by_side.step(actions))
         ends.append(results[2:4])
+        over = np.logical_or(*ends[-1])
+        if array.metadata["autoreset_mode"] is AutoresetMode.DISABLED and over.any():
+            # The seed is for those that begin, and half of the time it is not given.
+            options = {"reset_mask": over}
+            given = {"seed": int(rng.integers(9))} if rng.random() < 0.5 else {}
+            begun = array.reset(**given, options=dict(options))
+            assert_same(begun, side_by_side.reset(**given, options=options))
+            results = begun
     array.close()
     side_by_side.close()
     return np.array(ends)
@@ -96,6 +107,23 @@ def test_fewer_boxes_may_have_more_contacts():
     play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])
 
 
+def test_containers_of_other_sizes_stand_side_by_side(few_items):
+    def stack(rng):
+        load = few_items(rng, 150)
+        container = load.container + rng.choice([0.0, 0.3, 5.0], 3)
+        return unload.Load(load.positions, load.sizes, container=container)
+
+    play_both(CONTAINER, 3, 60, seed=3, max_picks=20, stack=stack)
+    envs = ContainerVectorEnv(2, stack=stack)
+    envs.reset(seed=3)
+    state = envs.state()
+    assert {*state["sizes"].ravel()} > {7.0} and {*state["sizes"].ravel()} - {7.0, 2.5}
+    older = {name: array for name, array in state.items() if name != "sizes"}
+    envs.load_state(older)
+    assert (envs.state()["sizes"] == unload.task.CONTAINER).all()
+    envs.close()
+
+
 @settings(derandomize=True, deadline=None, max_examples=20)
 @given(
     env_id=st.sampled_from([CONTAINER, HIGHEST]),
@@ -129,7 +157,13 @@ def mixed_stack(few_items):
 
 @pytest.mark.parametrize(
     "kwargs",
-    [{}, {"equalize": True}, {"equalize": True, "ties": "average"}],
+    [
+        {},
+        {"equalize": True},
+        {"equalize": True, "ties": "average"},
+        {"autoreset_mode": AutoresetMode.NEXT_STEP},
+        {"autoreset_mode": AutoresetMode.DISABLED},
+    ],
     ids=str,
 )
 def test_episodes_that_end_at_different_steps(mixed_stack, kwargs):
@@ -140,11 +174,73 @@ def test_episodes_that_end_at_different_steps(mixed_stack, kwargs):
     assert {0, 1} < set(together.tolist())
 
 
-def test_episodes_that_end_at_once(few_items):
-    ends = play_both(CONTAINER, 3, 20, max_picks=2, stack=lambda rng: few_items(rng, 1))
+@pytest.mark.parametrize("mode", AutoresetMode)
+def test_episodes_that_end_at_once(few_items, mode):
+    settings = {"max_picks": 2, "autoreset_mode": mode}
+    ends = play_both(CONTAINER, 3, 20, **settings, stack=lambda rng: few_items(rng, 1))
     assert ends[:, 0].any() and ends[:, 1].any()
     together = ends.any(axis=1).sum(axis=1)
     assert 3 in together and {1, 2} & set(together.tolist())
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
+def test_other_modes_of_other_tasks(mode):
+    play_both(HIGHEST, 2, 12, max_picks=3, autoreset_mode=mode)
+
+
+def test_an_episode_that_is_over_waits_for_its_reset():
+    envs = gymnasium.make_vec(HIGHEST, 2, max_picks=2, autoreset_mode=AutoresetMode.DISABLED)
+    with pytest.raises(ResetNeeded):
+        envs.reset(options={"reset_mask": np.array([True, False])})
+    envs.reset(seed=0)
+    envs.step(np.zeros(2, int))
+    envs.reset(options={"reset_mask": np.array([True, False])})
+    assert envs.step(np.zeros(2, int))[3].tolist() == [False, True]
+    with pytest.raises(ResetNeeded, match="an episode is finished; call reset with a reset_mask"):
+        envs.step(np.zeros(2, int))
+    with pytest.raises(ValueError, match=r"options\['reset_mask'\] has shape \(3,\)"):
+        envs.reset(options={"reset_mask": np.ones(3, bool)})
+    assert envs.reset(options={"reset_mask": np.array([False, True])})[1]["_action_mask"].tolist()
+    envs.step(np.zeros(2, int))
+    envs.close()
+
+
+def test_a_state_is_that_between_two_episodes():
+    envs, others = (
+        gymnasium.make_vec(HIGHEST, 2, max_picks=2, autoreset_mode=AutoresetMode.NEXT_STEP)
+        for _ in range(2)
+    )
+    envs.reset(seed=0)
+    for _ in range(2):
+        envs.step(np.zeros(2, int))
+    others.unwrapped.load_state(envs.unwrapped.state())
+    for _ in range(3):
+        assert_same(envs.step(np.ones(2, int)), others.step(np.ones(2, int)))
+    envs.close()
+    others.close()
+
+
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast")  # of Gymnasium's, for float64
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
+@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
+def test_gymnasiums_wrappers(env_id, mode):
+    plain, wrapped = (gymnasium.make_vec(env_id, 2, autoreset_mode=mode) for _ in range(2))
+    wrapped = wrappers.vector.RescaleObservation(wrapped, np.float32(0), np.float32(1))
+    if mode is AutoresetMode.NEXT_STEP:  # the only one that it takes
+        wrapped = wrappers.vector.NormalizeObservation(wrapped)
+    wrapped = wrappers.vector.FlattenObservation(wrapped)
+    wrapped = wrappers.vector.DtypeObservation(wrapped, np.float64)
+    wrapped = wrappers.vector.RecordEpisodeStatistics(wrapped)
+    plain.reset(seed=0)
+    seen, _ = wrapped.reset(seed=0)
+    for _ in range(3):
+        expected, actions = plain.step(np.zeros(2, int))[0], np.zeros(2, int)
+        seen = wrapped.step(actions)[0]
+        assert seen.shape == (2, 384) and seen.dtype == np.float64
+    if mode is AutoresetMode.DISABLED:
+        assert np.allclose(seen, (expected.reshape(2, 384) + 1) / 2, atol=1e-6)
+    plain.close()
+    wrapped.close()
 
 
 # --- the table ----------------------------------------------------------------------

@@ -17,6 +17,7 @@ def filled(load: Load, present: np.ndarray) -> containers.Containers:
     """One container, whose other fields are empty, among two."""
     starts, links = load.contacts
     state = containers.allocate(2, len(load) + 3, len(links) + 1)
+    state.sizes[1] = load.container
     state.geometry[1, : len(load)] = np.hstack([load.positions, load.sizes])
     state.starts[1, :, : len(load) + 1] = starts
     state.links[1, : len(links)] = links
@@ -52,7 +53,8 @@ def test_digests_of_situations_at_walls_and_floor(boxes, share):
     step = share * CONTACT_TOLERANCE
     leaning = boxes((0.5, 0.2), (0.2 + step, 0.6), (2.0, 0.2), (2.3 - step, 0.6))
     lifted = boxes((0.2 + step, 0.2 + step), (2.3 - step, 0.2), (1.2, 0.2 + step))
-    for load in (leaning, lifted):
+    wider = Load(leaning.positions + (0, 0.3, 0), leaning.sizes, container=(7, 2.8, 2.5))
+    for load in (leaning, lifted, wider):
         assert assert_digests_agree(load, np.ones(len(load), bool)) == 0
 
 

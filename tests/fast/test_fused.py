@@ -18,10 +18,10 @@ BATCH, ITEMS = 300, 128
 FOR_TWO_THREADS = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
 
 
-def random_batch(rng, size):
+def random_batch(rng, size, items=ITEMS):
     return {
-        "observations": rng.uniform(-1, 1, (size, ITEMS, 3)).astype(np.float32),
-        "actions": rng.integers(ITEMS, size=size),
+        "observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=size),
         "rewards": rng.choice(np.array([-1, 1], np.float32), size),
     }
 
@@ -70,12 +70,7 @@ def test_gradients_are_those_of_pytorch(batch, n_features, beta):
 @pytest.mark.parametrize("bias", [3.0, -3.0])
 @pytest.mark.parametrize("items", [5, 200])
 def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
-    batch = {
-        "observations": rng.uniform(-1, 1, (BATCH, items, 3)).astype(np.float32),
-        "actions": rng.integers(items, size=BATCH),
-        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH),
-    }
-    net = network(70)
+    batch, net = random_batch(rng, BATCH, items), network(70)
     with torch.no_grad():
         net.extractor.bias[:] = bias
         net.scorer.weight /= 10  # so that tanh does not saturate
@@ -240,12 +235,6 @@ def test_rule_of_where_it_applies(other):
     assert not fused.applies(other)
     with pytest.raises(ValueError, match="fused_update is True"):
         DQN(other, fused_update=True)
-
-
-def test_only_some_rows_of_a_large_memory_are_used(batch, rng):
-    net, rows = network(16), rng.integers(BATCH, size=100)
-    expected = gradients(net, {name: array[rows] for name, array in batch.items()})
-    assert gradients(net, batch, 1.0, rows).tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 import pickle
 from dataclasses import FrozenInstanceError
+from decimal import Decimal
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -135,7 +137,7 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
         other_low[axis] = max(other_high[axis] - 0.3, 0)
     if other_high[axis] - other_low[axis] < SMALLEST_EDGE:
         other_low, other_high = low[first], high[first]  # no room beside it: the same place
-    with pytest.raises(ValueError, match=r"boxes .*: overlap by .* m; expected at most 1e-06"):
+    with pytest.raises(ValueError, match=r"boxes .*: overlap by .* m; expected none"):
         load_of(np.vstack([low, other_low]), np.vstack([high, other_high]))
 
 
@@ -176,3 +178,70 @@ def test_crossed_boxes_have_more_contacts_than_expected():
     for bar in range(count):
         assert sorted(found.of(ABOVE, bar)) == list(range(count, 2 * count))
         assert sorted(found.of(BELOW, count + bar)) == list(range(count))
+
+
+# --- loads from outside -------------------------------------------------------------
+
+
+def test_packages_and_walls_follow_from_the_boxes(full_load):
+    load = Load(full_load.positions, full_load.sizes)
+    assert (load.walls == full_load.walls).all()
+    pairs = {*zip(load.packages.tolist(), full_load.packages.tolist())}
+    assert len(pairs) == len({*load.packages.tolist()}) == len({*full_load.packages.tolist()})
+
+
+def test_the_container_is_the_papers_or_ones_own():
+    assert (one_box().container == task.CONTAINER).all()
+    deep = np.array([[11.5, 1.25, 0.5]])
+    load = one_box(positions=deep, container=[12.0, 2.5, 1.0])
+    assert load.container.tolist() == [12, 2.5, 1] and not load.container.flags.writeable
+    for container, message in (
+        ((7.0, 2.5, 2.5), "reaches from"),
+        ((12.0, 2.5, 0.9), "reaches from"),
+        ((12.0, 2.5), r"container has shape \(2,\)"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            one_box(positions=deep, container=container)
+
+
+def test_extras_belong_to_the_boxes():
+    load = one_box(extras={"stop": [3]})
+    assert load.extras["stop"].tolist() == [3] and one_box().extras == {}
+    with pytest.raises(ValueError, match=r"extras\['stop'\] has shape \(2,\); expected \(1,\)"):
+        one_box(extras={"stop": [3, 4]})
+
+
+def test_what_a_packer_returns_becomes_a_load_in_one_call():
+    """The attributes are those of ``py3dbp``, whose numbers are decimals."""
+
+    def item(name, position, size):
+        position, size = ([*map(Decimal, each)] for each in (position, size))
+        return SimpleNamespace(name=name, position=position, get_dimension=lambda: size)
+
+    packed = SimpleNamespace(
+        width=Decimal(6), height=Decimal(2), depth=Decimal("2.2"),
+        items=[item("a", "000", ("0.5", "0.4", "0.3")), item("b", ("0", "0", "0.3"), "111")],
+    )  # fmt: skip
+    load = Load.from_corners(
+        [item.position for item in packed.items],
+        [item.get_dimension() for item in packed.items],
+        ids=[item.name for item in packed.items],
+        container=[packed.width, packed.height, packed.depth],
+    )
+    assert load.positions.tolist() == [[0.25, 0.2, 0.15], [0.5, 0.5, 0.8]]
+    assert load.ids.tolist() == ["a", "b"] and load.container.tolist() == [6, 2, 2.2]
+    with pytest.raises(ValueError, match=r"sizes has shape \(1, 3\); expected \(2, 3\)"):
+        Load.from_corners(np.zeros((2, 3)), np.ones((1, 3)))
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(pair=corners(), data=st.data())
+def test_behind_and_covered_are_what_their_definitions_say(pair, data):
+    load, (low, high) = load_of(*pair), pair
+    present = np.array(data.draw(st.lists(st.booleans(), min_size=len(low), max_size=len(low))))
+    for box in range(len(low)):
+        shared = np.minimum(high[box], high) - np.maximum(low[box], low)
+        front = (shared[:, 1:] > 1e-6).all(axis=1) & (low[:, 0] >= high[box, 0] - 1e-6)
+        assert load.behind(present)[box] == front[present].any()
+        above = load.contacts.of(ABOVE, box)
+        assert load.covered(present)[box] == present[above].any()

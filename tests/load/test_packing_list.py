@@ -1,9 +1,12 @@
 """Packing lists: what they may hold, and what is refused by row and id."""
 
+import logging
+
 import numpy as np
+import pandas as pd
 import pytest
 
-from unload import read_load, stack_load
+from unload import Load, read_load, stack_load
 from unload.load.boxes import SMALLEST_EDGE
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
@@ -59,6 +62,156 @@ def test_a_load_that_is_written_is_read_again(written, rng):
     assert np.array_equal(read.walls, load.walls)
 
 
+STACK = "a,6,0.1,0,0.5,0.4,0.3", "b,6,0.1,0.3,0.5,0.4,0.2"
+LENGTHS = ",".join(f"{name}_cm" for name in ("length", "width", "height"))
+
+
+def assert_same(one: Load, other: Load) -> None:
+    for name in ("positions", "sizes", "packages", "walls", "container"):
+        assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-12)
+    assert one.ids.tolist() == other.ids.tolist()
+
+
+@pytest.mark.parametrize(
+    ("separator", "mark", "encoding"),
+    [(",", ".", "utf-8-sig"), (",", ".", "utf-16"), ("\t", ".", "utf-8"), ("\t", ",", "utf-8"),
+     (";", ",", "utf-8-sig"), (";", ".", "utf-8")],
+)  # fmt: skip
+def test_separators_decimals_and_encodings(written, tmp_path, separator, mark, encoding):
+    lines = [f"ID,{CORNERS.upper()},Ort", *(f"{line},Köln 1.2" for line in STACK)]
+    text = "\r\n".join(lines).replace(",", separator).replace(".", mark)
+    (tmp_path / "list.csv").write_bytes(text.encode(encoding))
+    read = read_load(tmp_path / "list.csv")
+    assert_same(read, read_load(written(*STACK)))
+    assert read.extras["Ort"].tolist() == [f"Köln 1{mark}2"] * 2
+
+
+@pytest.mark.parametrize(
+    ("columns", "factor", "arguments"),
+    [
+        (f"id,{CORNERS}", 1000, {"units": "mm"}),
+        (f"id,{CORNERS}", 1 / 0.0254, {"units": "in"}),
+        (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {}),
+        (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {"units": "cm"}),
+        ('Box ID,X Min (mm),Y min [mm],z-min in mm,"L (mm)",W mm,H_mm', 1000, {"units": "m"}),
+        ('id,x_min,y_min,z_min,"depth ("")",width inches,height in', 1 / 0.0254, {}),
+        ("nr,u,v,w,a,b,c", 1, {"columns": dict(zip("uvwabc", CORNERS.split(","))) | {"nr": "id"}}),
+    ],
+)  # fmt: skip
+def test_names_and_units(written, columns, factor, arguments):
+    expected = read_load(written(*STACK))
+    cells = pd.DataFrame([line.split(",") for line in STACK])
+    numbers = (cells.iloc[:, 1:].astype(float) * factor).map(repr)
+    lines = pd.concat([cells[0], numbers], axis=1).agg(",".join, axis=1)
+    assert_same(read_load(written(*lines, columns=columns), **arguments), expected)
+
+
+def test_a_table_is_a_list_too(written):
+    table = pd.read_csv(written(*STACK), index_col=None).set_index(pd.Index([5, 7]))
+    assert_same(read_load(table), read_load(written(*STACK)))
+    with pytest.raises(ValueError, match=r"the table: row 2 \(id 'b'\): a cell that is no number"):
+        read_load(table.assign(size_x=[0.5, None]))
+    with pytest.raises(TypeError, match="path is 3; expected a path"):
+        read_load(3)
+
+
+def test_x_may_count_from_the_entrance(written):
+    expected = read_load(written(*STACK))
+    corners = "a,0.5,0.1,0,0.5,0.4,0.3", "b,0.5,0.1,0.3,0.5,0.4,0.2"
+    centres = "a,0.75,0.3,0.15,0.5,0.4,0.3", "b,0.75,0.3,0.4,0.5,0.4,0.2"
+    assert_same(read_load(written(*corners), x_from="door"), expected)
+    columns = f"id,x,y,z{CORNERS[17:]}"
+    assert_same(read_load(written(*centres, columns=columns), x_from="door"), expected)
+
+
+def test_a_container_of_ones_own(written):
+    path = written("a,11,0.1,0,0.5,0.4,0.3")
+    load = read_load(path, container=(12.03, 2.35, 2.39))
+    assert load.container.tolist() == [12.03, 2.35, 2.39] and load.positions[0, 0] == 11.25
+    with pytest.raises(
+        ValueError, match=r"row 1 \(id 'a'\): reaches .*inside the container, \[0 0"
+    ):
+        read_load(path)
+    assert read_load(path, container=(12, 2, 2), x_from="door").positions[0, 0] == 0.75
+
+
+def test_small_faults_are_settled_and_logged(written, caplog):
+    lines = "a,-0.001,0,0,1,1,1", "b,1,0,0,1,1,1", "c,0.5,0,1.003,1,1,1", "d,2.004,0,0,1,1,1"
+    load = read_load(written(*lines))
+    assert (load.positions - load.sizes / 2).tolist() == [
+        [0, 0, 0], [1, 0, 0], [0.5, 0, 1], [2.004, 0, 0]
+    ]  # fmt: skip
+    assert "2 of 4 boxes moved by up to 3.0 mm" in caplog.text
+    with pytest.raises(ValueError, match=r"row 3 \(id 'c'\): floats.*, tolerance 0.002 m"):
+        read_load(written(*lines), tolerance=0.002)
+    caplog.clear()
+    read_load(written(*STACK))
+    assert not caplog.text
+
+
+def test_other_columns_are_kept_and_named(written, caplog):
+    columns = f"stop,code,note,name,{CORNERS},id,weight_kg,yaw,pitch"
+    lines = "2,07,,B,6,0.1,0,0.5,0.4,0.3,a,1,90,0", "1,11,top,C,6,0.1,0.3,0.5,0.4,0.2,b,1.0,-90,0"
+    load = read_load(written(*lines, columns=columns))
+    assert load.ids.tolist() == ["a", "b"]
+    kept = {name: values.tolist() for name, values in load.extras.items()}
+    assert kept == {
+        "stop": [2, 1], "code": ["07", "11"], "note": ["", "top"], "name": ["B", "C"],
+        "weight_kg": [1, 1], "yaw": [90, -90], "pitch": [0, 0],
+    }  # fmt: skip
+    assert "kept but not used: stop, code, note, name\n" in caplog.text
+    assert "sizes are taken for those after the turns" in caplog.text
+    assert {record.levelno for record in caplog.records} == {logging.WARNING}
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad", "message"),
+    [
+        ("weight", "1", "5.4", "a weight other than 1 kg; .* 'weight' in ignore .*weight '5.4'"),
+        ("Mass (g)", "1000", "1", r"a weight other than 1 kg; .* 'Mass \(g\)' in ignore"),
+        ("mass_kg", "1.0", "", "a cell that is no number; .*mass_kg ''"),
+        ("yaw", "-90", "15", "a rotation that is no quarter turn; .* 'yaw' in ignore"),
+        ("rotation (rad)", "3.1415926536", "1.5", "a rotation that is no quarter turn"),
+        ("tilt", "0", "up", "a cell that is no number; .*tilt 'up'"),
+    ],
+)
+def test_what_the_task_leaves_out_is_refused_unless_ignored(written, name, good, bad, message):
+    path = written(f"{STACK[0]},{good}", f"{STACK[1]},{bad}", columns=f"id,{CORNERS},{name}")
+    with pytest.raises(ValueError, match=rf": row 2 \(id 'b'\): {message}"):
+        read_load(path)
+    for ignored in (name, name.lower().split(" ")[0].removesuffix("_kg")):
+        assert str(read_load(path, ignore=[ignored]).extras[name][1]) == bad
+    path = written(f"{STACK[0]},{good}", f"{STACK[1]},{good}", columns=f"id,{CORNERS},{name}")
+    assert len(read_load(path)) == 2
+
+
+def test_two_units_leave_that_of_a_third_column_open(written, caplog):
+    columns = "id,x_min,y_min,z_min,length_mm,width_cm,height_mm"
+    path = written("a,6,0.1,0,500,40,300", columns=columns)
+    with pytest.raises(ValueError, match="says no unit of x_min, y_min, z_min; expected units"):
+        read_load(path)
+    assert read_load(path, units="m").sizes.tolist() == [[0.5, 0.4, 0.3]]
+    read_load(written("a,600,10,0,50,40,30", columns=columns.replace("mm", "cm")))
+    assert "in the unit of the other lengths: x_min, y_min, z_min\n" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"units": "yard"}, "units is 'yard'; expected one of None, 'm', 'cm', 'mm', 'in'"),
+        ({"tolerance": 1}, r"tolerance is 1; expected a number in \[0, 0.1\]"),
+        ({"x_from": "front"}, "x_from is 'front'; expected one of 'rear', 'door'"),
+        ({"container": (1, 2)}, "container has shape"),
+        ({"ignore": ["wight"]}, "has no column 'wight'; expected one of .*'x_min'"),
+        ({"columns": {"Tiefe": "size_x"}}, "has no column 'Tiefe'"),
+        ({"columns": {"size_x": "depth"}}, "columns is 'depth'; expected one of 'id', 'size_x'"),
+    ],
+)
+def test_wrong_arguments_are_refused(written, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        read_load(written(*STACK), **arguments)
+
+
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
@@ -67,9 +220,11 @@ def test_a_load_that_is_written_is_read_again(written, rng):
             r"row 1 \(id 'a'\), row 2 \(id 'b'\): overlap by",
         ),
         (
-            ["a,0,0,0,1,1,1", "b,0,0,1.001,1,1,1"],
-            r": row 2 \(id 'b'\): floats in load, its lower face at 1.001 m; .* z_min '1.001'",
+            ["a,0,0,0,1,1,1", "b,0,0,1.01,1,1,1"],
+            r": row 2 \(id 'b'\): floats in load, its lower face at 1.01 m; .* z_min '1.01'",
         ),
+        (["a,0,0,0,1,1,1", "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
+        (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
         (
             ["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"],
             r"'b'\): reaches from .* x_min '6.5'",
@@ -86,7 +241,7 @@ def test_a_load_that_is_written_is_read_again(written, rng):
         (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\): edges of"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: reaches from"),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with either"),
-        (["a,0,0,0,1,1,1,5,5"], "has more cells in a row than names"),
+        (["a,0,0,0,1,1,1,5,5"], "is not a readable CSV file: .*Expected 7 fields in line 2, saw 9"),
     ],
 )
 def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, message):
@@ -97,8 +252,10 @@ def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, messag
 def test_files_that_are_no_lists_are_refused(written, tmp_path):
     for columns, message in (
         ("id,x", "has 1 rows and the columns id, x; expected boxes"),
-        ("ID,x", "has the column 'ID'; expected 'id', and once"),
-        ("x,x", "has the column 'x.1'; expected 'x', and once"),
+        ("X,x (cm)", r"has \['X', 'x \(cm\)'\]; expected each column once"),
+        ("x,x", r"has \['x', 'x'\]; expected each column once"),
+        (f"x,y,z,{CORNERS},id", "expected boxes with either x, y, z or x_min, y_min, z_min"),
+        (f"{CORNERS},depth", "size_z, each once; columns={...} says"),
         ("x,y_min", "columns x, y_min; expected boxes with either x, y, z or x_min"),
     ):
         with pytest.raises(ValueError, match=message):

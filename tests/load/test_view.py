@@ -8,7 +8,7 @@ from IPython.core.formatters import DisplayFormatter
 from matplotlib.colors import to_hex
 from matplotlib.image import imread
 
-from unload import view
+from unload import Load, view
 from unload.load.picture import COLOURS, EYE
 from unload.load.view import PLOTLY_MIMETYPE
 
@@ -55,6 +55,16 @@ def test_the_container_has_its_true_proportions(small_load):
     assert ranges == pytest.approx(drawn * 2.5)
     eye = np.array([scene.camera.eye[axis] for axis in "xyz"])  # from the container's middle
     assert eye * 2.5 + (3.5, 1.25, 1.25) == pytest.approx(EYE)
+
+
+def test_another_container_is_drawn_in_its_own_proportions(boxes):
+    load = boxes((1.0, 0.2))
+    figure = view(Load(load.positions, load.sizes, container=(14.0, 2.5, 2.5)))
+    scene = figure.layout.scene
+    drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
+    assert drawn / drawn[1] == pytest.approx([5.6, 1, 1]) and scene.xaxis.range == (0, 14)
+    assert scene.camera.eye.x * drawn[0] / 2.8 > drawn[0] / 2, "from outside"
+    assert figure.picture() != view(load).picture()
 
 
 def test_present_chooses_what_is_drawn(small_load):

@@ -33,3 +33,22 @@ def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
     expected = [numpy_forward(peq, observation) for observation in batch]
     assert values.numpy() == pytest.approx(np.array(expected), abs=1e-6)
     assert values.abs().max() < 1
+
+
+@pytest.mark.filterwarnings("default::FutureWarning")  # PyTorch's own, of what it calls
+def test_a_network_can_be_exported(tmp_path):
+    """To ONNX, for any number of observations and items, as the reference says."""
+    pytest.importorskip("onnx")
+    pytest.importorskip("onnxscript")
+    runtime = pytest.importorskip("onnxruntime")
+    peq, path = network().eval(), tmp_path / "policy.onnx"
+    torch.onnx.export(
+        peq, (torch.zeros(2, 128, 3),), path,
+        input_names=["observations"], output_names=["values"],
+        dynamic_shapes=[{0: "batch", 1: "items"}],
+    )  # fmt: skip
+    session = runtime.InferenceSession(path)
+    for shape in ((1, 128, 3), (5, 60, 3)):
+        observations = torch.rand(shape)
+        (values,) = session.run(["values"], {"observations": observations.numpy()})
+        assert values == pytest.approx(peq(observations).detach().numpy(), abs=1e-6)

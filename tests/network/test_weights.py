@@ -32,10 +32,13 @@ def test_the_digest_stays_so_that_published_files_can_be_read(path):
 
 
 def test_every_flipped_bit_is_noticed(path, rng):
+    """So is a file that is empty, or cut short."""
     whole = path.read_bytes()
+    damages = [b"", whole[: len(whole) // 2]]
     for place in range(len(whole)):
-        damaged = bytearray(whole)
-        damaged[place] ^= 1 << int(rng.integers(8))
+        damages.append(bytearray(whole))
+        damages[-1][place] ^= 1 << int(rng.integers(8))
+    for damaged in damages:
         path.write_bytes(damaged)
         with pytest.raises(ValueError, match="w.safetensors (is not a safetensors file|holds no)"):
             read_weights(path, "pair", lambda *made: made)

@@ -90,9 +90,9 @@ def test_closing_a_client_leaves_the_others(make_world):
     assert second.pull(box) == pytest.approx(ONE_BOX, rel=0.02)
 
 
-def test_a_push_lasts_one_step(make_world):
+def test_a_force_lasts_as_long_as_the_call(make_world):
     world, (box,) = make_world()
-    world.push(box, (60.0, 0.0, 0.0))
+    world.step(TIME_STEP, box, (60.0, 0.0, 0.0))
     velocity = (60 - 0.25 * task.GRAVITY) * TIME_STEP
     assert world.client.getBaseVelocity(box)[0] == pytest.approx((velocity, 0, 0), abs=0.005)
     world.step(0.1)
@@ -105,7 +105,7 @@ def test_a_box_can_be_turned_and_have_its_own_friction(make_world):
     box = world.add_box((2, 0, 0.15), (0.3, 0.3, 0.3), 1.0, turn, friction=0.0)
     assert world.pose(box)[1] == pytest.approx(turn)
     for _ in range(120):
-        world.push(box, (0.05 * task.GRAVITY, 0.0, 0.0))
+        world.step(TIME_STEP, box, (0.05 * task.GRAVITY, 0.0, 0.0))
     assert world.pose(box)[0][0] > 2.03
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.physics.kinds import lifts
-from unload import task
+from unload import Load, task
 from unload.load.substacks import stack_load
 from unload.physics.bullet import World
 
@@ -65,12 +65,14 @@ def test_an_interrupted_lift_moves_no_box(make, boxes, after_pick, monkeypatch):
     assert physics.lift(0) == pytest.approx(make("full", load).lift(0), abs=0.002)
 
 
-def test_the_container_has_a_floor_and_three_walls(make, boxes):
+@pytest.mark.parametrize("container", [task.CONTAINER, (6.0, 2.2, 2.7)])
+def test_the_container_has_a_floor_and_three_walls(make, boxes, container):
     """Rays from its inside, also close to its corners, meet them where the container ends."""
-    client = make("full", boxes((0.4, 0.2)))._world.client
-    low, high = np.array([0.01, 0.01, 0.01]), task.CONTAINER - 0.01
+    load = boxes((0.4, 0.2))
+    client = make("full", Load(load.positions, load.sizes, container=container))._world.client
+    low, high = np.array([0.01, 0.01, 0.01]), np.array(container) - 0.01
     for start in (low, high, (low + high) / 2):
-        for axis, end in ((0, 0), (1, 0), (1, task.CONTAINER[1]), (2, 0)):
+        for axis, end in ((0, 0), (1, 0), (1, container[1]), (2, 0)):
             target = start.copy()
             target[axis] = 3 * (end or -1)
             hit = client.rayTest(start, target)[0][3]

@@ -66,6 +66,13 @@ def test_a_box_exactly_at_the_tolerance_touches_the_side_wall():
     assert around.situation(0).sides == (250_100,)
 
 
+def test_side_walls_are_those_of_the_container(boxes):
+    load = boxes((2.0, 0.2))
+    narrow = Load(load.positions, load.sizes, container=(7.0, 2.2, 2.5))
+    assert surroundings(narrow).situation(0).sides == (200_000,)
+    assert surroundings(load).situation(0).sides == ()
+
+
 def test_equal_situations_at_different_places_have_equal_keys(boxes):
     around = surroundings(boxes((0.8, 0.2), (1.0, 0.6), (1.6, 0.2), (1.8, 0.6)))
     first, second = around.situation(0), around.situation(2)

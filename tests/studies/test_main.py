@@ -1,4 +1,4 @@
-"""The command line, the files that it has made in ``data/``, and what the room refuses."""
+"""The command line, the files it has made in ``data/``, what the room refuses; and exercises."""
 
 import sys
 from functools import partial
@@ -8,12 +8,16 @@ import pytest
 
 from studies import __main__ as command
 from studies import paths
+from studies.exercise import check
 from studies.falls.laboratory import laboratory_data
 from studies.grid import train_grid
+from studies.paper import visible_items
 from studies.paper.training import PAPER
 from studies.paper.tuning import tuning_config
+from studies.paper.visible_items import read_points
 from studies.policies import comparison
 from studies.policies.variants import variants_data, variants_msr
+from studies.results import read_provenance
 from unload import stack_load
 
 
@@ -104,7 +108,7 @@ BAD_INPUT = {
     "cells is 'nonsense'": lambda folder: laboratory_data(["nonsense"], folder=folder),
     "cells is 'nothing'": lambda folder: train_grid(PAPER, ["nothing"], folder=folder),
     "steps is 0": lambda _: tuning_config(8, 1e-3, steps=0),
-    "n_jobs is 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
+    "n_jobs == 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
     "grids is 'nothing'": lambda folder: variants_data(["nothing"], folder=folder),
     "grid is 'nothing'": lambda folder: variants_msr("nothing", folder),
 }
@@ -114,3 +118,38 @@ BAD_INPUT = {
 def test_bad_input_is_refused_by_name(message, tmp_path):
     with pytest.raises(ValueError, match=message):
         BAD_INPUT[message](tmp_path)
+
+
+NAMES = ("all_items", "Observation", "Equalized_Observation")
+
+
+def test_committed_data_is_written_again_byte_for_byte(tmp_path):
+    visible_items.observation_data(tmp_path)
+    for name in NAMES:
+        again, committed = (
+            (folder / f"obs_hist_equal/{name}.csv").read_bytes()
+            for folder in (tmp_path, paths.DATA)
+        )
+        assert again == committed
+    assert read_provenance(tmp_path / "obs_hist_equal", "observation")["settings"] == {"seed": 0}
+
+
+def test_the_observed_items_are_equalized():
+    everything, observed, equalized = map(read_points, NAMES)
+    assert {tuple(point) for point in observed} <= {tuple(point) for point in everything}
+    ranks = np.linspace(-1, 1, 128)
+    assert np.allclose(np.sort(equalized, axis=0), ranks[:, None], atol=1e-6)
+
+
+def test_an_answer_is_awaited_right_or_wrong(capsys):
+    for answer in (None, 4, 5):
+        check("Exercise 1", answer, lambda value: value == 4, "count again")
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[:2] == ["Exercise 1: not yet", "Exercise 1: right"]
+    assert printed[2] == "Exercise 1: not yet: 5 is not right; count again"
+
+
+@pytest.mark.parametrize("answer", [None, 5])
+def test_a_wrong_answer_stops_a_solution(answer):
+    with pytest.raises(AssertionError, match="Exercise 1: not yet"):
+        check("Exercise 1", answer, lambda value: value == 4, "count again", strict=True)

@@ -17,7 +17,6 @@ from unload.support import checks
         *((checks.real, value, (0, 1)) for value in (0, 1, 0.25, np.float32(0.25), np.int8(1))),
         (checks.real, np.longdouble(0.25), (0, 1)),
         *((checks.boolean, value, ()) for value in (True, False, np.True_)),
-        *((checks.jobs, value, ()) for value in (-2, -1, 1, 8)),
     ],
 )
 def test_numbers_are_returned_as_pythons_own(check, value, arguments):
@@ -52,8 +51,6 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
             for value in (1, 0, 1.0, None, "yes", np.array([True]))
         ),
         *((checks.file, value, (), ValueError, "the name of a file") for value in ("", "/")),
-        (checks.jobs, 2.0, (), TypeError, "a number of processes, or -1 for one per core"),
-        (checks.jobs, 0, (), ValueError, "a number of processes, or -1 for one per core"),
         *(
             (checks.one_of, value, (("red", None, 1),), ValueError, "one of 'red', None, 1")
             for value in ("blue", np.array(["red"]), torch.ones(2), ["red"], float("nan"))

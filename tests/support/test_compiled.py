@@ -58,7 +58,7 @@ def edit(copy: Path, old: str, new: str) -> None:
 def test_code_is_compiled_once_until_a_constant_changes(copy):
     printed, said = run(copy, NUMBA_CACHE_DIR="")
     assert printed == "0.3 0 0.4"
-    assert said.count("compiling unload.load.made.least and others") == said.count("\n") == 1
+    assert said.count("compiling for this processor") == said.count("\n") == 1
     assert str(copy / "unload/__pycache__/compiled-") in said
     assert run(copy, NUMBA_CACHE_DIR="") == ("0.3 1 0.4", "")
     edit(copy, "LIFT_THRESHOLD = 0.2", "LIFT_THRESHOLD = 0.5")

@@ -14,7 +14,7 @@ from unload.support import checks
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
 OPTIONS = {"env": ENVS, "ties": TIES, "network": tuple(NETWORKS)}
-MAY_BE_ZERO = ("seed", "gradient_steps")  # of the whole numbers
+MAY_BE_ZERO = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
 # Of the real numbers, which are 0 or larger.
 HIGHEST = {"position_noise": MOST_NOISE} | dict.fromkeys(
     ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"), 1.0
@@ -51,7 +51,8 @@ class TrainConfig:
             Only with gamma = 0, because values of next observations rest on their places.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
-        log_interval: * steps of all environments per point of the curve.
+        log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
+            of the run, at most 500.
         checkpoint_interval: * seconds between two checkpoints.
 
     Raises:
@@ -80,7 +81,7 @@ class TrainConfig:
     shuffle_places: bool = False
     gradient_steps: int = 1
     target_update_interval: int = 10_000
-    log_interval: int = 500
+    log_interval: int = 0
     checkpoint_interval: float = 600.0
 
     def __post_init__(self) -> None:
@@ -96,6 +97,8 @@ class TrainConfig:
             elif not (name == "network" and callable(value)):
                 value = checks.one_of(name, value, OPTIONS[name])
             object.__setattr__(self, name, value)
+        hundredth = max(1, self.picks // self.num_envs // 100)
+        object.__setattr__(self, "log_interval", self.log_interval or min(500, hundredth))
 
         # What the fields must be of each other.
         fewest = self.num_envs + min(self.batch_size, self.replay_size)

@@ -86,6 +86,9 @@ def evaluate(
         checks.one_of("an argument of evaluate", name, ENV_KWARGS)
     if physics == "table":
         checks.one_of("after_pick", env_kwargs.pop("after_pick", "restore"), ("restore",))
+
+    # Each load has a seed of its own, so that it does not depend on how many are played at once;
+    # only the table answers many containers in arrays.
     at_once = task.NUM_ENVS if physics == "table" else 1
     load_seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     frames = []

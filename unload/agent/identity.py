@@ -41,6 +41,7 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         ``partial`` also its arguments, of arrays, dataclasses and other objects that can be called
         a digest of what they hold; of anything else its type.
     """
+    # What JSON can hold, perhaps after its elements.
     if isinstance(value, PLAIN):
         return value
     if isinstance(value, np.generic):
@@ -49,6 +50,8 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         return [identity(each, within) for each in value]
     if isinstance(value, dict):
         return {str(name): identity(each, within) for name, each in value.items()}
+
+    # What can be called: in its parts, so that whoever reads a card finds the arguments.
     if isinstance(value, partial):
         named = dict(sorted(value.keywords.items()))
         parts = {"function": value.func, "arguments": value.args, "keywords": named}
@@ -62,6 +65,8 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         digest = blake2b(digest_size=8)
         _absorb(value, _package(value), digest, set(within))
         return f"{name} {digest.hexdigest()}"
+
+    # Other objects, of which a digest tells one content from another.
     name = f"{type(value).__module__}.{type(value).__qualname__}"
     if isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()

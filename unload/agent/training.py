@@ -32,6 +32,7 @@ from unload.physics.table import shared_table
 from unload.support import checks
 
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
+SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 # PyTorch draws first weights otherwise without these instructions; with either, all bits agree.
 INSTRUCTIONS = ("AVX2", "AVX512")
 
@@ -53,16 +54,12 @@ class Curve:
 
     Attributes:
         points: so far.
-        sums: of ``picks``, ``rewards``, ``deadlocked``, ``updates`` and ``losses``.
+        sums: since the last point, by the names in ``SUMS``.
     """
 
     def __init__(self) -> None:
         self.points: list[Point] = []
-        self._start_point()
-
-    def _start_point(self) -> None:
-        names = ("picks", "rewards", "deadlocked", "updates", "losses")
-        self.sums = dict.fromkeys(names, 0.0)
+        self.sums = dict.fromkeys(SUMS, 0.0)
 
     def add(self, rewards: np.ndarray, deadlocked: np.ndarray, losses: Iterable[float]) -> None:
         """Count the picks of one step, (num_envs,) arrays, and the losses of its updates."""
@@ -82,7 +79,7 @@ class Curve:
         self.points.append(
             Point(picks, reward, (reward + 1) / 2, deadlocked, loss, epsilon, time.time())
         )
-        self._start_point()
+        self.sums = dict.fromkeys(SUMS, 0.0)
 
     def table(self) -> pd.DataFrame:
         """Return one row per point."""
@@ -222,7 +219,7 @@ def train(
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
-    callback: Callable[[dict[str, float]], None] | None = None,
+    callback: Callable[[dict[str, float]], bool | None] | None = None,
 ) -> TrainResult:
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
@@ -255,7 +252,8 @@ def train(
             else.
         callback: is called at each point of the curve with that point, a dict by the columns of
             ``TrainResult.curve``: ``picks``, ``success_rate``, ``loss`` and so on. A run that is
-            resumed calls it for new points only; an error in it ends the run.
+            resumed calls it for new points only; an error in it ends the run. So does False, with
+            a policy and a curve: what has been learned until then is the run's result.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
@@ -284,7 +282,7 @@ def train_changed(
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
-    callback: Callable[[dict[str, float]], None] | None = None,
+    callback: Callable[[dict[str, float]], bool | None] | None = None,
 ) -> TrainResult:
     """``train`` with something changed that no ``TrainConfig`` offers, such as the reward.
 
@@ -347,7 +345,7 @@ def _go(
     run: Training,
     folder: RunFolder,
     keep_lifts: Callable[[], None],
-    callback: Callable[[dict[str, float]], None] | None,
+    callback: Callable[[dict[str, float]], bool | None] | None,
     progress: bool | TextIO,
     interrupts: list[int],
 ) -> None:
@@ -386,8 +384,9 @@ def _go(
                     if time.monotonic() - shown > CURVE_INTERVAL:
                         folder.save_curve(run)
                         shown = time.monotonic()
-                    if callback is not None:
-                        callback(point._asdict())
+                    if callback is not None and callback(point._asdict()) is False:
+                        run.agent.check_finite()
+                        return
                 if interrupts:
                     raise KeyboardInterrupt(
                         f"stopped after {rollout.picks} picks; call train again with "

@@ -1,9 +1,8 @@
 """The bases of the environments, single ones and arrays of them: settings and order of calls.
 
 ``gymnasium.make_vec(id, num_envs)`` makes an array of environments. It behaves, bit for bit, as
-Gymnasium's ``SyncVectorEnv`` of the single environments with autoreset in the same step: same
-seeds, same actions, same observations, rewards, masks and infos. Each environment begins its next
-episode when its own has ended.
+Gymnasium's ``SyncVectorEnv`` of the single environments with the same ``autoreset_mode``: same
+seeds, same actions, same observations, rewards, masks and infos.
 
 They are registered without Gymnasium's ``max_episode_steps``, which would wrap them and cut every
 episode there, whatever their own ``max_picks`` is.
@@ -143,10 +142,12 @@ class PickingEnv(Picking, EpisodeEnv):
         """Free what the environment holds; may be called again."""
         self._state = "closed"
 
-    def _features(self, positions: np.ndarray) -> np.ndarray:
+    def _features(
+        self, positions: np.ndarray, container: np.ndarray = task.CONTAINER
+    ) -> np.ndarray:
         """The observation of up to 128 items at ``positions`` (n, 3) in m, nearest first."""
         seen = np.full((task.N_VISIBLE, 3), task.PADDING, np.float32)
-        seen[: len(positions)] = observation.scaled(positions)
+        seen[: len(positions)] = observation.scaled(positions, container)
         if not self.equalize:
             return seen
         present = np.arange(task.N_VISIBLE) < len(positions)
@@ -163,24 +164,33 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
 
     Args:
         num_envs: number of environments.
+        autoreset_mode: when the next episode begins in an environment whose own has ended:
+            ``SAME_STEP``, ``NEXT_STEP``, in which the action is not used and the reward is 0, as
+            most of Gymnasium's vector wrappers want it, or ``DISABLED``, by the caller's
+            ``reset(options={"reset_mask": mask})``. Gymnasium takes ``vector_kwargs`` only for its
+            own arrays: ``make_vec(id, num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)``.
         **settings: equalize, ties, max_picks and position_noise, as for the single environment.
 
     Attributes:
-        autoreset_mode: in the same step. TorchRL reads it here, Gymnasium in ``metadata``.
+        autoreset_mode: TorchRL reads it here, Gymnasium in ``metadata``.
 
     Raises:
         TypeError, ValueError: an argument, a seed or actions are not as described.
         gymnasium.error.ResetNeeded: ``step`` or ``state`` before ``reset``, or after a call
-            that raised an error half-way.
+            that raised an error half-way; ``step`` where an episode has ended, if ``DISABLED``.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
-    autoreset_mode = AutoresetMode.SAME_STEP
-    metadata = {"render_modes": [], "autoreset_mode": autoreset_mode}
-
-    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
+    def __init__(
+        self,
+        num_envs: int = task.NUM_ENVS,
+        autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
+        **settings,
+    ) -> None:
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         super().__init__(**settings)
+        self.autoreset_mode = checks.one_of("autoreset_mode", autoreset_mode, AutoresetMode)
+        self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self._rngs: list[np.random.Generator] = []
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
@@ -197,9 +207,16 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             seed: environment i gets ``seed + i``, or ``seed[i]`` of a sequence; None lets
                 the generators go on, or seeds them at random.
             options: as for the single environment, the same for all. They hold for these
-                episodes, not for the next ones.
+                episodes, not for the next ones. ``reset_mask``, (num_envs,) bool, says in
+                which environments; in the others their episodes go on.
         """
         self._check_open()
+        chosen = np.ones(self.num_envs, bool)
+        if isinstance(options, dict) and "reset_mask" in options:
+            self._check_started()
+            options = dict(options)
+            mask = options.pop("reset_mask")
+            chosen = checks.flag_array("options['reset_mask']", mask, chosen.shape)
         options = check_options(options, self.options)
 
         # One seed or None for each environment; None lets a generator go on that there is.
@@ -212,20 +229,23 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         else:
             seeds = [checks.integer("seed", seed, 0) + env for env in range(self.num_envs)]
         rngs = [
-            rng if one is None and rng is not None else seeding.np_random(one)[0]
-            for one, rng in zip(seeds, self._rngs or [None] * self.num_envs)
+            rng if rng is not None and (one is None or not new) else seeding.np_random(one)[0]
+            for one, new, rng in zip(seeds, chosen, self._rngs or [None] * self.num_envs)
         ]
-        self._begin(np.arange(self.num_envs), rngs, **options)
+        self._begin(chosen, rngs, **options)
         self._rngs, self._state = rngs, "running"
-        return self._shown()
+        return self._look(), _flagged(self._infos(), chosen)
 
     def step(self, actions: np.ndarray):
         """Pick row ``actions[i]``, (num_envs,) int, in environment i.
 
-        Where an episode ends, the next one begins: the observation and infos are the
-        reset's, and ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones.
+        Where the next episode begins in this step, the observation and infos are the reset's. With
+        ``SAME_STEP``, ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones then.
         """
         self._check_started()
+        began = self._over()  # in the mode NEXT_STEP; SAME_STEP leaves no episode that is over
+        if began.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
         actions = checks.integer_array("actions", actions, (self.num_envs,))
         if actions.min() < 0 or actions.max() >= task.N_VISIBLE:
             raise ValueError(
@@ -234,42 +254,35 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             )
 
         with AllOrReset(self):
-            rewards = self._pick(actions)
+            rewards, picked = self._pick(actions, ~began), self._pick_infos()
             self._picks += 1
-            terminations = self._emptied()
-            truncations = self._picks == self.max_picks
-            observations, infos = self._look(), self._infos() | self._pick_infos()
+            if began.any():
+                rewards[began] = 0
+                self._begin(began, self._rngs)
+            terminations, truncations = self._emptied(), self._picks == self.max_picks
 
-            # Autoreset in the same step: what is returned belongs to the next episode.
+            # What the last pick of an episode showed goes aside, as Gymnasium wants it.
+            final: dict[str, Any] = {}
             ended = terminations | truncations
-            if ended.any():
-                observations, infos = self._begin_next(ended, observations, infos)
-            else:
-                infos = _flagged(infos, ~ended)
-        return observations, rewards, terminations, truncations, infos
+            if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
+                last, began = self._look(), ended
+                observations = np.full(self.num_envs, None)
+                for env in np.flatnonzero(ended):
+                    observations[env] = last[env]
+                final_infos = _flagged(self._infos() | picked, ended)
+                final = {"final_obs": observations, "_final_obs": ended}
+                final |= {"final_info": final_infos, "_final_info": ended}
+                self._begin(ended, self._rngs)
 
-    def _begin_next(self, ended: np.ndarray, last: np.ndarray, last_infos: dict[str, np.ndarray]):
-        """Begin the next episode where one has ended; return ``step``'s observations and infos.
+            # The infos are the reset's where an episode has begun, and the pick's elsewhere.
+            infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
+            if not began.all():  # a reset has no infos about a pick
+                infos |= _flagged(picked, ~began)
+        return self._look(), rewards, terminations, truncations, infos | final
 
-        ``last`` and ``last_infos`` are those after the pick in every environment.
-        """
-        envs = np.flatnonzero(ended)
-        self._begin(envs, [self._rngs[env] for env in envs])
-
-        # The infos are the reset's where an episode has begun, and the pick's elsewhere.
-        observations, infos = self._shown()
-        if not ended.all():  # a reset has no infos about a pick
-            picks = {name: each for name, each in last_infos.items() if name not in infos}
-            infos |= _flagged(_masked(picks, ~ended), ~ended)
-
-        # What the last pick of an episode showed goes aside, as Gymnasium wants it.
-        final = np.full(self.num_envs, None)
-        for env in envs:
-            final[env] = last[env]
-        infos |= {"final_obs": final, "_final_obs": ended}
-        final_infos = _flagged(_masked(last_infos, ended), ended)
-        infos |= {"final_info": final_infos, "_final_info": ended}
-        return observations, infos
+    def _over(self) -> np.ndarray:
+        """(num_envs,) bool, True where an episode has ended and the next one has not begun."""
+        return self._emptied() | (self._picks == self.max_picks)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of the arrays that ``load_state`` needs to go on from here."""
@@ -296,17 +309,14 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             self._picks = rest.pop("picks")
             self._hold(rest)
         self._state = "running"
-        return self._shown()
-
-    def _shown(self) -> tuple[np.ndarray, dict[str, Any]]:
-        """The observations and infos of ``reset``."""
         return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
 
-    def _begin(self, envs: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
-        """Begin an episode in each of these environments."""
+    def _begin(self, where: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
+        """Begin an episode in some environments, (num_envs,) bool, by the generators of all."""
         with AllOrReset(self):
-            self._picks[envs] = 0
-            self._fill(envs, rngs, **options)
+            self._picks[where] = 0
+            envs = np.flatnonzero(where)
+            self._fill(envs, [rngs[env] for env in envs], **options)
 
     def close_extras(self, **kwargs) -> None:
         """Free what the environments hold."""
@@ -317,8 +327,11 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         """Put fresh items into some environments, (k,) int64, drawn from the generator of each."""
 
     @abstractmethod
-    def _pick(self, actions: np.ndarray) -> np.ndarray:
-        """Carry out checked actions; return the rewards, (num_envs,) float64."""
+    def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
+        """Carry out checked actions; return the rewards, (num_envs,) float64.
+
+        Where an environment is not ``playing``, (num_envs,) bool, it is filled next.
+        """
 
     @abstractmethod
     def _emptied(self) -> np.ndarray:
@@ -346,13 +359,9 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
 
 
 def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
-    """Add Gymnasium's flags that say in which environments there are such infos."""
+    """Infos of some environments, (num_envs,) bool, 0 elsewhere, with Gymnasium's flags."""
+    if not where.all():
+        infos = {name: values.copy() for name, values in infos.items()}
+        for values in infos.values():
+            values[~where] = 0
     return infos | {f"_{name}": where for name in infos}
-
-
-def _masked(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:
-    """The infos of some environments, and 0 elsewhere."""
-    infos = {name: values.copy() for name, values in infos.items()}
-    for values in infos.values():
-        values[~where] = 0
-    return infos

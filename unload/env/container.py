@@ -88,9 +88,9 @@ class ContainerEnv(PickingEnv):
             the 1 mm down. It applies where the boxes stay where they were put; ``"full"``
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
-        stack: makes a ``Load``, of any number of items, from a ``numpy.random.Generator``. Each
-            box stands on the floor or, within 0.1 mm, on another one: across a wider gap it would
-            not hold down what is below.
+        stack: makes a ``Load``, of any number of items and in a container of any size, from a
+            ``numpy.random.Generator``. Each box stands on the floor or, within 0.1 mm, on another
+            one: across a wider gap it would not hold down what is below.
         render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
@@ -204,10 +204,11 @@ class ContainerEnv(PickingEnv):
         """Update which items are visible, and the observation of them."""
         present = np.flatnonzero(self.physics.present)
         positions = self.observed_positions()[present]
-        rows = observation.nearest(positions)
+        container = self.physics.load.container
+        rows = observation.nearest(positions, container=container)
         self.visible = np.full(task.N_VISIBLE, -1)
         self.visible[: len(rows)] = present[rows]
-        self._observation = self._features(positions[rows])
+        self._observation = self._features(positions[rows], container)
 
     def _info(self) -> dict:
         return {

@@ -15,20 +15,26 @@ from unload.support import checks
 POSITION_NOISE = 0.0005
 SINK = 0.001
 MOST_NOISE = 10.0  # m, more than the container is long
+VIEWPOINT = task.VIEWPOINT / task.CONTAINER  # as a share of the container
 
 
-def distance(positions: np.ndarray) -> np.ndarray:
+def distance(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
     """Weighted distance d to the viewpoint of centres at ``positions``, (n, 3) float in m.
+
+    The viewpoint is the middle of the upper edge of the container's entrance. ``container``, here
+    and below, is a load's.
 
     Returns:
         (n,) float64: m, y not counting and z counting double.
     """
     positions = checks.finite_array("positions", positions, (None, 3))
-    offset = task.VIEWPOINT - positions
+    offset = container * VIEWPOINT - positions
     return np.sqrt(offset**2 @ task.DISTANCE_WEIGHTS)
 
 
-def nearest(positions: np.ndarray, count: int = task.N_VISIBLE) -> np.ndarray:
+def nearest(
+    positions: np.ndarray, count: int = task.N_VISIBLE, container: np.ndarray = task.CONTAINER
+) -> np.ndarray:
     """The items that are observed.
 
     Args:
@@ -40,7 +46,7 @@ def nearest(positions: np.ndarray, count: int = task.N_VISIBLE) -> np.ndarray:
         same distance the one with the smaller index comes first.
     """
     checks.integer("count", count, 1)
-    distances = distance(positions)
+    distances = distance(positions, container)
     order = np.argsort(distances)
     ranked = distances[order]
     if (ranked[1:] == ranked[:-1]).any():  # a stable order takes three times as long to find
@@ -48,7 +54,7 @@ def nearest(positions: np.ndarray, count: int = task.N_VISIBLE) -> np.ndarray:
     return order[:count]
 
 
-def scale(positions: np.ndarray) -> np.ndarray:
+def scale(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
     """Positions relative to the container.
 
     Args:
@@ -57,7 +63,7 @@ def scale(positions: np.ndarray) -> np.ndarray:
     Returns:
         (n, 3) float32, [-1, 1] from one side of the container to the other.
     """
-    return (2 / task.CONTAINER * positions - 1).astype(np.float32)
+    return (2 / container * positions - 1).astype(np.float32)
 
 
 def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
@@ -68,9 +74,9 @@ def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.nda
     return offsets
 
 
-def scaled(positions: np.ndarray) -> np.ndarray:
+def scaled(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
     """``scale`` within [-1, 1]: an item that is outside the container is seen at its edge."""
-    return np.clip(scale(positions), -1, 1)
+    return np.clip(scale(positions, container), -1, 1)
 
 
 def holds_item(observations: np.ndarray) -> np.ndarray:

@@ -49,6 +49,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.stack, self.table = stack, shared_table()
         self._physics = TablePhysics(self.table)
         self._containers = containers.allocate(self.num_envs, 0, 0)
+        self._around: dict[int, Surroundings] = {}
 
     def close_extras(self, **kwargs) -> None:
         self._physics.close()
@@ -80,6 +81,7 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
+        self._around.pop(env, None)
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)
@@ -93,8 +95,9 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env] = count
-        state.seen[env, :count] = scaled(positions)
-        state.by_distance[env, :count] = observation.nearest(positions, count)
+        state.sizes[env] = load.container
+        state.seen[env, :count] = scaled(positions, load.container)
+        state.by_distance[env, :count] = observation.nearest(positions, count, load.container)
         containers.start(state, env, *self._features)
 
     def _make_room(self, items: int, links: int) -> None:
@@ -106,30 +109,35 @@ class ContainerVectorEnv(PickingVectorEnv):
         # A tenth more than needed, so that not every larger load moves all again.
         wanted = [max(have, need + need // 10) for have, need in zip(room, (items, links))]
         self._containers = containers.allocate(self.num_envs, *wanted)
+        self._around.clear()  # which refer to the old arrays
         for before, after in zip(old, self._containers):
             after[tuple(slice(length) for length in before.shape)] = before
 
-    def _pick(self, actions: np.ndarray) -> np.ndarray:
+    def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
         self._items, self._distances = self._look_up(actions)
         return containers.pick(self._containers, actions, self._distances, *self._features)
 
     def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
         items, distances = containers.look_up(self._containers, actions, *self.table.slots)
-        if distances.min() == containers.UNKNOWN:
-            for env in np.flatnonzero(distances == containers.UNKNOWN):
-                distances[env] = self._lift(int(env), int(items[env]))
+        unknown = np.flatnonzero(distances == containers.UNKNOWN)
+        if unknown.size:
+            self._physics.table = self.table  # it may have been replaced
+            distances[unknown] = self._physics.simulate_all(
+                [self._surroundings(int(env)).situation(int(items[env])) for env in unknown]
+            )
         return items, distances
 
-    def _lift(self, env: int, item: int) -> float:
-        """Lift an item whose situation the table does not know; return the distance in m."""
-        self._physics.table = self.table  # it may have been replaced
-        # The load is built again, because to keep those of all containers makes resets slower.
-        count = np.flatnonzero(self._containers.present[env])[-1] + 1
-        boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-        load = Load(boxes[:, :3], boxes[:, 3:], labels, labels)
-        around = Surroundings(load, self._containers.present[env, :count])
-        return self._physics.simulate(around.situation(item))
+    def _surroundings(self, env: int) -> Surroundings:
+        """The situations in a container, made when one is first needed."""
+        if env not in self._around:
+            # The load is built again, because to keep those of all containers makes resets slower.
+            count = np.flatnonzero(self._containers.present[env])[-1] + 1
+            boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
+            container = self._containers.sizes[env]
+            load = Load(boxes[:, :3], boxes[:, 3:], labels, labels, container=container)
+            self._around[env] = Surroundings(load, self._containers.present[env, :count])
+        return self._around[env]
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0
@@ -148,7 +156,10 @@ class ContainerVectorEnv(PickingVectorEnv):
         return self._containers._asdict()
 
     def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        # Older checkpoints know only the paper's container.
+        arrays.setdefault("sizes", np.tile(task.CONTAINER, (self.num_envs, 1)))
         self._containers = containers.Containers(**arrays)
+        self._around.clear()
 
     def _pick_infos(self) -> dict[str, np.ndarray]:
         return {"item": self._items, "distance": self._distances}
@@ -183,10 +194,11 @@ class HighestItemVectorEnv(PickingVectorEnv):
         )
         self._observations[envs], self._highest[envs] = observations, highest
 
-    def _pick(self, actions: np.ndarray) -> np.ndarray:
+    def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
         envs = np.arange(self.num_envs)
         rewards = np.where(self._highest[envs, actions], 1.0, -1.0)
-        self._fill(envs, self._rngs)
+        envs = np.flatnonzero(playing)
+        self._fill(envs, [self._rngs[env] for env in envs])
         return rewards
 
     def _emptied(self) -> np.ndarray:

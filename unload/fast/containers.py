@@ -17,7 +17,6 @@ from unload.physics.situation import RESOLUTION
 from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, absorb, slot_of
 from unload.support.compiled import compiled
 
-CONTAINER_WIDTH = float(task.CONTAINER[1])
 N_VISIBLE = task.N_VISIBLE
 UNKNOWN = -1.0  # in place of a distance that is not in the table
 
@@ -26,6 +25,7 @@ class Containers(NamedTuple):
     """The state of E containers with room for ``capacity`` items and ``links`` contacts each.
 
     Attributes:
+        sizes: (E, 3) float64, inner edges of each container in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
@@ -41,6 +41,7 @@ class Containers(NamedTuple):
         failed: (E, 128) float64, how far such a row moved, in m.
     """
 
+    sizes: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -60,6 +61,7 @@ class Containers(NamedTuple):
 def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
+        sizes=np.zeros((num_envs, 3)),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
@@ -225,7 +227,8 @@ def situation_digest(containers, env, members, dynamic):
     for mover in range(dynamic):
         y, width = geometry[members[mover], 1], geometry[members[mover], 4]
         lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
-    at_left, at_right = lowest <= CONTACT_TOLERANCE, highest >= CONTAINER_WIDTH - CONTACT_TOLERANCE
+    right = containers.sizes[env, 1]
+    at_left, at_right = lowest <= CONTACT_TOLERANCE, highest >= right - CONTACT_TOLERANCE
 
     # Word for word as digest_of reads Situation.key, without writing the key down.
     digest = np.uint64(2 + on_floor + at_left + at_right + 6 * count)  # words of the key
@@ -236,7 +239,7 @@ def situation_digest(containers, env, members, dynamic):
     if at_left:
         digest = absorb(digest, _micrometres(-geometry[item, 1]))
     if at_right:
-        digest = absorb(digest, _micrometres(CONTAINER_WIDTH - geometry[item, 1]))
+        digest = absorb(digest, _micrometres(right - geometry[item, 1]))
     for number in range(count):
         for axis in range(3):
             offset = geometry[members[number], axis] - geometry[item, axis]

@@ -4,9 +4,10 @@ Overlaps and contacts are those of axis-aligned boxes, given by their lower and 
 ``low`` and ``high``, (n, 3) float64 in m.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,9 +59,13 @@ class Load:
     Attributes:
         positions: (n, 3) float64, centre of each box in m, inside the container.
         sizes: (n, 3) float64, edge lengths along x, y and z in m, at least 0.002.
-        packages: (n,) int64, package number (0–12 in the paper's loads), for the colours of views.
-        walls: (n,) int64, number of the item wall, 0 at the rear; a label, too.
+        packages: (n,) int64, package number (0–12 in the paper's loads), for the colours of views;
+            if not given, boxes of equal size are of one package.
+        walls: (n,) int64, number of the item wall, 0 at the rear; a label, too. If not given,
+            boxes that share a stretch of depth are of one wall.
         ids: (n,) str, what a packing list calls the boxes; None without a list.
+        container: (3,) float64, inner length, width and height in m; the paper's if not given.
+        extras: name → (n,) array, what a packing list says besides; empty if not given.
         contacts: which boxes touch, computed from positions and sizes.
 
     Raises:
@@ -72,9 +77,11 @@ class Load:
 
     positions: np.ndarray
     sizes: np.ndarray
-    packages: np.ndarray
-    walls: np.ndarray
+    packages: np.ndarray = None
+    walls: np.ndarray = None
     ids: np.ndarray | None = None
+    container: np.ndarray = None
+    extras: Mapping[str, np.ndarray] = None
     contacts: Contacts = field(init=False)
 
     def __post_init__(self) -> None:
@@ -83,11 +90,24 @@ class Load:
         if count == 0:
             raise ValueError("positions is empty; expected at least one box")
         sizes = checks.finite_array("sizes", self.sizes, (count, 3))
-        labels = {}
-        for name in ("packages", "walls"):
-            labels[name] = checks.integer_array(name, getattr(self, name), (count,))
+        container = task.CONTAINER if self.container is None else self.container
+        container = checks.finite_array("container", np.array(container, np.float64), (3,))
+        low, high = positions - sizes / 2, positions + sizes / 2
+
+        labels = {"packages": self.packages, "walls": self.walls}
+        if labels["packages"] is None:
+            edges = np.rint(sizes / OVERLAP)
+            labels["packages"] = np.unique(edges, axis=0, return_inverse=True)[1].reshape(-1)
+        if labels["walls"] is None:
+            labels["walls"] = slabs(low[:, 0] + OVERLAP, high[:, 0])
+        for name, label in labels.items():
+            labels[name] = checks.integer_array(name, label, (count,))
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
+        extras = {name: np.array(values) for name, values in dict(self.extras or {}).items()}
+        for name, values in extras.items():
+            if values.shape != (count,):
+                raise ValueError(f"extras[{name!r}] has shape {values.shape}; expected ({count},)")
         if self.ids is not None:
             labels["ids"] = np.array(self.ids, dtype=str)
             if labels["ids"].shape != (count,):
@@ -97,24 +117,62 @@ class Load:
                 raise BoxError(repeated, "the same id; expected one for each box")
 
         # Where there are no thin boxes and none outside, contacts finds those that overlap.
-        low, high = positions - sizes / 2, positions + sizes / 2
         thin = np.flatnonzero(sizes.min(axis=1) < SMALLEST_EDGE)
         if thin.size:
             raise BoxError(thin, f"edges of {sizes[thin[0]]} m; expected >= {SMALLEST_EDGE} m")
-        beyond = (low < -OVERLAP) | (high > task.CONTAINER + OVERLAP)
+        beyond = (low < -OVERLAP) | (high > container + OVERLAP)
         outside = np.flatnonzero(beyond.any(axis=1))
         if outside.size:
             place = f"from {low[outside[0]]} to {high[outside[0]]} m"
-            inside = f"inside the container, [0 0 0] to {task.CONTAINER} m"
+            inside = f"inside the container, [0 0 0] to {container} m"
             raise BoxError(outside, f"reaches {place}; expected it {inside}")
         touching = contacts(low, high)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
-        fields = {"positions": positions, "sizes": sizes, **labels}
-        for array in (*fields.values(), *touching):
+        fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
+        for array in (*fields.values(), *extras.values(), *touching):
             array.setflags(write=False)
-        for name, value in {**fields, "contacts": touching}.items():
+        for name, value in {**fields, "extras": extras, "contacts": touching}.items():
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_corners(cls, corners: Any, sizes: Any, **fields: Any) -> "Load":
+        """The load of boxes that are given by their corners nearest to the origin.
+
+        Args:
+            corners, sizes: (n, 3) in m; numbers of any kind that ``float`` takes, such as the
+                decimals of ``py3dbp``.
+            **fields: the other attributes.
+        """
+        corners = checks.finite_array("corners", np.array(corners, np.float64), (None, 3))
+        sizes = checks.finite_array("sizes", np.array(sizes, np.float64), corners.shape)
+        return cls(corners + sizes / 2, sizes, **fields)
+
+    def behind(self, present: np.ndarray) -> np.ndarray:
+        """Which boxes stand behind one of the present ones, (n,) bool each.
+
+        In front of a box is what stands nearer to the door and overlaps it in y and z.
+        """
+        box, front = self._fronts
+        return np.bincount(box[present[front]], minlength=len(self)) > 0
+
+    def covered(self, present: np.ndarray) -> np.ndarray:
+        """Which boxes lie under one of the present ones, (n,) bool each."""
+        starts, boxes = self.contacts
+        lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
+        above = boxes[starts[ABOVE, 0] : starts[ABOVE, -1]]
+        return np.bincount(lower[present[above]], minlength=len(self)) > 0
+
+    @cached_property
+    def _fronts(self) -> tuple[np.ndarray, np.ndarray]:
+        """All pairs of a box and one in front of it, as two arrays."""
+        low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
+        fronts = []
+        for box in range(len(self)):
+            shared = np.minimum(high[box], high) - np.maximum(low[box], low)
+            across = (shared[:, 1:] > OVERLAP).all(axis=1)
+            fronts.append(np.flatnonzero(across & (low[:, 0] > low[box, 0])))
+        return np.repeat(np.arange(len(self)), [*map(len, fronts)]), np.concatenate(fronts)
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -171,7 +229,7 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
     found, *pair = _find(*rows, left_to_right, np.cumsum(np.bincount(groups)))
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
-        raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected at most {OVERLAP}")
+        raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected none")
     return Contacts(*_lists(found, len(low)))
 
 

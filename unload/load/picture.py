@@ -37,7 +37,8 @@ PACKAGE_COLOURS = (
     "#e07a5f", "#b5838d", "#f2b880", "#8d6a9f", "#d4a373", "#f6e27f",
 )  # fmt: skip
 SEAM = 0.012  # m, boxes are drawn this much smaller so that one sees where they end
-# From outside, over the left edge of the entrance, which is the side of x = 7 m.
+# From outside, over the left edge of the entrance, which is the side of x = 7 m. Those of a
+# container of another size are scaled with it.
 EYE = np.array([11.6, -2.9, 4.4])  # m
 TARGET = np.array([4.4, 1.1, 0.9])  # m
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
@@ -68,7 +69,8 @@ def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarr
     moved = (positions - load.positions)[items]
     low, high = (corner + moved for corner in corners(load, items))
     colours = np.array([package_colour(package) for package in load.packages[items]])
-    return pixels(_drawn(low, high, colours.reshape(-1, 3), (6.4, 4.8), 0.0))
+    container = load.container
+    return pixels(_drawn(low, high, colours.reshape(-1, 3), (6.4, 4.8), 0.0, container))
 
 
 def still(
@@ -77,6 +79,7 @@ def still(
     colours: np.ndarray,
     legend: Mapping[str, tuple[float, float, float]],
     height: float,
+    container: np.ndarray = task.CONTAINER,
 ) -> bytes:
     """Return a PNG picture of boxes in the container with a legend.
 
@@ -84,8 +87,9 @@ def still(
         low, high, colours: see ``draw``; in any order.
         legend: name → colour.
         height: of the picture in inches.
+        container: of the load.
     """
-    figure = _drawn(low, high, colours, (WIDTH, height), LEGEND)
+    figure = _drawn(low, high, colours, (WIDTH, height), LEGEND, container)
     handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
     figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
     file = io.BytesIO()
@@ -94,29 +98,37 @@ def still(
     return file.getvalue()
 
 
-def _drawn(low, high, colours, size: tuple[float, float], left: float) -> Figure:
+def _drawn(low, high, colours, size: tuple[float, float], left: float, container) -> Figure:
     """A figure of boxes in the container, of this size in inches, free in a share at the left."""
     figure = Figure(size, dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
     order = back_to_front(low, high)
-    draw(figure.add_axes((left, 0, 1 - left, 1)), low[order], high[order], colours[order])
+    axes = figure.add_axes((left, 0, 1 - left, 1))
+    draw(axes, low[order], high[order], colours[order], container)
     return figure
 
 
-def draw(axes: Axes, low: np.ndarray, high: np.ndarray, colours: np.ndarray) -> None:
+def draw(
+    axes: Axes,
+    low: np.ndarray,
+    high: np.ndarray,
+    colours: np.ndarray,
+    container: np.ndarray = task.CONTAINER,
+) -> None:
     """Draw boxes in the container, seen from ``EYE``; the container fills the axes.
 
     Args:
         axes: Matplotlib's.
         low, high: (n, 3) float64, corners in m, in an order such as that of ``back_to_front``.
         colours: (n, 3) float64, RGB in [0, 1].
+        container: of the load.
     """
     # The container's insides lie behind all boxes.
-    frame = project(CORNERS * task.CONTAINER)
+    frame = project(CORNERS * container, container)
     for face, brightness in INSIDES:
         axes.fill(*frame[list(face)].T, color=str(brightness), zorder=0)
 
     # Of each box only three faces are seen, because of where the eye is.
-    seen = project(low[:, None] + CORNERS * (high - low)[:, None])
+    seen = project(low[:, None] + CORNERS * (high - low)[:, None], container)
     polygons = np.stack([seen[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
     shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
     axes.add_collection(
@@ -148,12 +160,13 @@ def corners(load: Load, items: np.ndarray, seam: float = SEAM) -> tuple[np.ndarr
     return centres - halves, centres + halves
 
 
-def project(points: np.ndarray) -> np.ndarray:
+def project(points: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
     """Where points (..., 3) in m are seen from ``EYE``, (..., 2), right and up."""
-    ahead = (TARGET - EYE) / np.linalg.norm(TARGET - EYE)
+    eye, target = (place * (container / task.CONTAINER) for place in (EYE, TARGET))
+    ahead = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(ahead, (0, 0, 1))
     right /= np.linalg.norm(right)
-    seen = (points - EYE) @ np.array([right, np.cross(right, ahead), ahead]).T
+    seen = (points - eye) @ np.array([right, np.cross(right, ahead), ahead]).T
     return seen[..., :2] / seen[..., 2:]  # what is farther away looks smaller
 
 

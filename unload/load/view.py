@@ -20,7 +20,7 @@ OTHER_COLOURS = ((0.58, 0.40, 0.74), (0.90, 0.62, 0.00), (0.55, 0.34, 0.16), (0.
 FIRST_PICKS = 10  # that a view of an order shows
 PICK_COLOURS = colormaps["viridis"](np.linspace(0, 1, FIRST_PICKS))[:, :3].tolist()
 PLOTLY_MIMETYPE = "application/vnd.plotly.v1+json"
-UNIT = task.CONTAINER[0] / 2.8  # m, plotly's unit of length in our views
+UNITS_LONG = 2.8  # how long a container is in plotly's unit of length in our views
 LABEL = (
     "item %{customdata[0]}, package %{customdata[1]}<br>"
     "%{customdata[2]} × %{customdata[3]} × %{customdata[4]} mm<extra>%{fullData.name}</extra>"
@@ -117,9 +117,9 @@ def view(
     ]
 
     # The still picture is drawn when the figure is displayed, if it is at all.
-    figure, drawn = View(traces, layout(height)), np.flatnonzero(present)
+    figure, drawn = View(traces, layout(height, load.container)), np.flatnonzero(present)
     boxes = *picture.corners(load, drawn), np.array([*legend.values()])[of_item[drawn]]
-    figure.picture = partial(picture.still, *boxes, legend, height / 100)
+    figure.picture = partial(picture.still, *boxes, legend, height / 100, load.container)
     return figure
 
 
@@ -168,17 +168,18 @@ def _short(numbers: np.ndarray) -> np.ndarray:
     return numbers.astype(np.int16 if numbers.max(initial=0) < 2**15 else np.int32)
 
 
-def layout(height: int) -> go.Layout:
+def layout(height: int, container: np.ndarray = task.CONTAINER) -> go.Layout:
     """The container's axes in true proportions, seen from outside the entrance.
 
     A white ground, because the axes' names are dark in JupyterLab's dark theme, too.
     """
     # plotly measures the camera from the middle of the scene.
-    middle = task.CONTAINER / 2
-    camera = {"eye": (picture.EYE - middle) / UNIT, "center": (picture.TARGET - middle) / UNIT}
+    places = {"eye": picture.EYE, "center": picture.TARGET}
+    unit, scale = container[0] / UNITS_LONG, container / task.CONTAINER
+    camera = {name: (place * scale - container / 2) / unit for name, place in places.items()}
     scene = {
         f"{axis}axis": {"title": {"text": f"{axis} (m)"}, "range": [0, length], "nticks": 8}
-        for axis, length in zip("xyz", task.CONTAINER)
+        for axis, length in zip("xyz", container)
     }
     return go.Layout(
         height=height,
@@ -187,7 +188,7 @@ def layout(height: int) -> go.Layout:
         legend={"x": 0, "y": 1, "itemsizing": "constant", "bgcolor": "rgba(255,255,255,0.8)"},
         showlegend=True,  # of a single group, too
         scene_aspectmode="manual",
-        scene_aspectratio=dict(zip("xyz", task.CONTAINER / UNIT)),
+        scene_aspectratio=dict(zip("xyz", container / unit)),
         scene_camera={name: dict(zip("xyz", place)) for name, place in camera.items()},
         scene=scene,
     )

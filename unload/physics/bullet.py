@@ -42,7 +42,7 @@ def _pybullet() -> Any:
         except ModuleNotFoundError as error:
             raise ModuleNotFoundError(
                 "a lift that no table knows, a whole container or a heap has to be simulated; "
-                "expected PyBullet: pip install 'unload[pybullet]'"
+                "expected PyBullet: pip install pybullet (ready-made for Python 3.11 and lower)"
             ) from error
     return pybullet
 
@@ -136,7 +136,6 @@ class World:
         self.client.resetSimulation()
         self.client.setGravity(0, 0, -task.GRAVITY)
         self.client.setPhysicsEngineParameter(
-            fixedTimeStep=self.time_step,
             numSolverIterations=self._iterations,
             deterministicOverlappingPairs=1,
         )
@@ -188,10 +187,29 @@ class World:
         """Position (m) and orientation (quaternion x, y, z, w) of a body."""
         return self.client.getBasePositionAndOrientation(body)
 
-    def step(self, seconds: float) -> None:
-        """Let time pass, rounded to whole time steps."""
-        for _ in range(round(seconds / self.time_step)):
+    def step(
+        self,
+        seconds: float,
+        body: int | None = None,
+        force: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        """Let time pass, rounded to whole time steps.
+
+        Meanwhile ``force``, in N, acts at the centre of mass of ``body``, if one is given.
+        """
+        steps = round(seconds / self.time_step)
+        while steps:
+            # PyBullet makes many steps in a call, and the force lasts as long as the call does. It
+            # divides the time by their number, which is exact for powers of two.
+            many = 1 << (steps.bit_length() - 1)
+            self.client.setPhysicsEngineParameter(
+                fixedTimeStep=many * self.time_step, numSubSteps=many
+            )
+            if body is not None:
+                place, frame = self.pose(body)[0], self.client.WORLD_FRAME
+                self.client.applyExternalForce(body, -1, force, place, frame)
             self.client.stepSimulation()
+            steps -= many
 
     def pull(
         self, body: int, force: float = task.PICK_FORCE, seconds: float = task.LIFT_TIME
@@ -204,16 +222,8 @@ class World:
             seconds: how long, rounded to whole time steps.
         """
         start = np.array(self.pose(body)[0])
-        for _ in range(round(seconds / self.time_step)):
-            self.push(body, (0, 0, force))
+        self.step(seconds, body, (0.0, 0.0, force))
         return float(np.linalg.norm(np.array(self.pose(body)[0]) - start))
-
-    def push(self, body: int, force: tuple[float, float, float]) -> None:
-        """Let one time step pass, in which ``force``, in N, acts at a body's centre of mass."""
-        # PyBullet forgets the force after a step, therefore it is applied anew before each.
-        place, frame = self.pose(body)[0], self.client.WORLD_FRAME
-        self.client.applyExternalForce(body, -1, force, place, frame)
-        self.client.stepSimulation()
 
     def close(self) -> None:
         """Disconnect the client; may be called again."""

@@ -32,7 +32,7 @@ class FullPhysics(Physics):
     def _reset(self, load: Load) -> None:
         self._stop()
         self._world = self._make_world()
-        length, width, height = task.CONTAINER
+        length, width, height = self._container = load.container
         for position, size in (
             ((length / 2, width / 2, -0.5), (length + 2, width + 2, 1)),  # floor
             ((length / 2, -0.5, height / 2), (length + 2, 1, height)),  # side walls
@@ -63,7 +63,9 @@ class FullPhysics(Physics):
     def _park(self, body: int) -> None:
         """Move a body to a place of its own in the depot."""
         row, column = divmod(body, 100)
-        self._world.place(body, (8.0 * row, 3.0 * column, DEPOT + task.CONTAINER[2] / 2))
+        length, width, height = self._container
+        place = ((length + 1) * row, (width + 0.5) * column, DEPOT + height / 2)
+        self._world.place(body, place)
 
     def settle(self, seconds: float) -> None:
         """Let time pass without a pick, and take the poses reached for the load's own."""

@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from unload import task
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load
 
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
@@ -91,8 +90,9 @@ class Surroundings:
         sides = []
         if self._low[dynamic, 1].min() <= CONTACT_TOLERANCE:
             sides.append(-centre[1])
-        if self._high[dynamic, 1].max() >= task.CONTAINER[1] - CONTACT_TOLERANCE:
-            sides.append(task.CONTAINER[1] - centre[1])
+        right = self.load.container[1]
+        if self._high[dynamic, 1].max() >= right - CONTACT_TOLERANCE:
+            sides.append(right - centre[1])
         return Situation(
             boxes=np.rint(boxes / RESOLUTION).astype(np.int32),
             dynamic=len(dynamic),

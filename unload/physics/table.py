@@ -21,6 +21,7 @@ import numpy as np
 from unload import task
 from unload.physics.bullet import DAMPING, SETTINGS, TIME_STEP
 from unload.physics.local import LocalPhysics
+from unload.physics.pool import Pool
 from unload.physics.situation import Situation
 from unload.support import files
 from unload.support.compiled import compiled
@@ -33,6 +34,9 @@ FEWEST_SLOTS = 1024
 ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
 SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
 CLOSE = 1e-5  # m, other processors may round otherwise
+FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
+FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
+PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
 
 
 def _free_lift() -> float:
@@ -190,7 +194,7 @@ class LiftTable:
                 if len(self) > len(stored):
                     self.save(path)
         except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            if error.errno not in FULL:
                 raise
             LOGGER.warning("lifts are kept in memory only: %s", error)
 
@@ -210,6 +214,7 @@ class TablePhysics(LocalPhysics):
     def __init__(self, table: LiftTable | None = None) -> None:
         super().__init__()
         self.table = LiftTable() if table is None else table
+        self._pool, self._waited = Pool(), 0  # and the lifts that might have been shared
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
@@ -223,6 +228,23 @@ class TablePhysics(LocalPhysics):
             distance = super().simulate(situation)
             self.table.add(situation, distance)
         return distance
+
+    def simulate_all(self, situations: list[Situation]) -> list[float]:
+        """``simulate`` each of several situations that the table does not know, in m.
+
+        Where such lists keep coming, other processes share the lifts.
+        """
+        if len(situations) >= FEWEST_SHARED:
+            self._waited += len(situations)
+            if self._waited > PATIENCE:
+                shared = self._pool.simulate(situations, super().simulate)
+                for situation, distance in zip(situations, shared):
+                    self.table.add(situation, distance)
+        return [self.simulate(situation) for situation in situations]
+
+    def _stop(self) -> None:
+        self._pool.close()
+        super()._stop()
 
 
 @cache

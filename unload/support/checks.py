@@ -46,16 +46,6 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
     return int(value)
 
 
-def jobs(name: str, value: object) -> int:
-    """Return a number of processes as int, as joblib counts them; -1 stands for one per core."""
-    wanted = "expected a number of processes, or -1 for one per core"
-    if isinstance(value, bool) or not isinstance(value, Integral):
-        raise TypeError(f"{name} is {value!r}; {wanted}")
-    if value == 0:
-        raise ValueError(f"{name} is {value!r}; {wanted}")
-    return int(value)
-
-
 def path(name: str, value: object) -> Path:
     """Return ``value`` as a Path; raise TypeError unless it is one, or a str."""
     if not isinstance(value, (str, Path)):

@@ -19,7 +19,6 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from numba.core import event
 
 CONFIG: Any = numba.config  # whose names type checkers do not see
 LOGGER = logging.getLogger(__name__)
@@ -33,8 +32,8 @@ def compiled(function: Callable | None = None, **options) -> Callable:
     """``numba.njit`` of a function in one of ``SOURCES``, with a cache that follows all of them.
 
     ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. A fresh installation
-    compiles for ten seconds, which the first function that has to be compiled logs. Where no
-    folder can be written, compiled code is kept in memory, with a warning.
+    compiles for ten seconds, each function at its first call, which is logged when the folder is
+    made. Where none can be written, compiled code is kept in memory, with a warning.
     """
     if function is None:
         return partial(compiled, **options)
@@ -61,11 +60,16 @@ def folder() -> Path | None:
             continue
         found = Path(place, f"compiled-{digest(PACKAGE)}")
         try:
+            fresh = not found.exists()
             found.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=found).close()
         except OSError:
             continue
-        event.register("numba:compile", _Announcement(found))
+        if fresh:  # else whoever waits for the compiler does not know why
+            LOGGER.warning(
+                "compiling for this processor, for about ten seconds in all; kept for later in %s",
+                found,
+            )
         return found
     warnings.warn(
         "compiled code cannot be kept, and every process compiles for ten seconds; set "
@@ -82,24 +86,3 @@ def digest(package: Path) -> str:
         for path in sorted(package.glob(pattern)):
             found.update(path.read_bytes())
     return found.hexdigest()
-
-
-class _Announcement(event.Listener):
-    """Says once that functions of this package are compiled, which their cache does not hold."""
-
-    def __init__(self, place: Path) -> None:
-        self.place, self.logged = place, False
-
-    def on_start(self, event: event.Event) -> None:
-        function = event.data["dispatcher"].py_func
-        if self.logged or not function.__module__.startswith("unload."):
-            return
-        self.logged = True
-        LOGGER.warning(
-            "compiling %s and others for this processor, for about ten seconds in all; "
-            "kept for later in %s",
-            f"{function.__module__}.{function.__name__}",
-            self.place,
-        )
-
-    def on_end(self, event: event.Event) -> None: ...

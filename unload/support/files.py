@@ -4,13 +4,10 @@ Errors name the file: a damaged or changed one is a ValueError whatever the deco
 missing one a FileNotFoundError, one that cannot be written an OSError.
 """
 
-import errno
-import fcntl
 import json
 import logging
 import os
 import socket
-import time
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -22,6 +19,7 @@ from typing import Any, BinaryIO
 from uuid import uuid4
 
 import numpy as np
+from filelock import FileLock, Timeout
 
 LOGGER = logging.getLogger(__name__)
 PATIENCE = 5.0  # s
@@ -141,8 +139,8 @@ def _check_equal(path: str | Path, wanted: object, found: str) -> None:
 def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     """Keep all other processes that ask for it out of ``folder``, which is made if missing.
 
-    ``folder/lock`` names its owner, or the last one. The operating system releases the lock of a
-    process that dies, so that a killed process stops nobody.
+    ``folder/owner`` names who holds ``folder/lock``, or the last one who did. The operating system
+    releases the lock of a process that dies, so that a killed process stops nobody.
 
     Args:
         folder: to be locked.
@@ -150,38 +148,25 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
 
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock; not if
-            ``wait``.
+            another process does and ``wait``.
         OSError: ``folder/lock`` is a link, or the file system has no locks, or no room.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    # Not buffered, because closing a buffered file tries again to write what failed.
-    with open(folder / "lock", "a+b", buffering=0, opener=_open_no_link) as file:
-        if os.fstat(file.fileno()).st_nlink > 1:
-            raise OSError(errno.EMLINK, "has several names; expected a file of its own", file.name)
-
+    lock, owner = FileLock(folder / "lock", fallback_to_soft=False), folder / "owner"
+    try:
         # Others hold such a lock for moments; who does so for longer may have been stopped.
-        patience = time.monotonic() + (PATIENCE if wait else 0)
-        while True:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() < patience:
-                    time.sleep(0.05)
-                    continue
-            file.seek(0)
-            owner = file.read().decode().strip() or "another process"
-            if not wait:
-                raise RuntimeError(f"{folder} is in use by {owner}; wait, or take another folder")
-            LOGGER.warning("waiting for %s, which uses %s", owner, folder)
-            fcntl.flock(file, fcntl.LOCK_EX)
-            break
+        lock.acquire(timeout=PATIENCE if wait else 0)
+    except Timeout:
+        holder = owner.read_text().strip() if owner.exists() else "another process"
+        if not wait:
+            reason = f"{folder} is in use by {holder}; wait, or take another folder"
+            raise RuntimeError(reason) from None
+        LOGGER.warning("waiting for %s, which uses %s", holder, folder)
+        lock.acquire()
+    try:
         started = datetime.now().astimezone().isoformat(timespec="seconds")
-        file.truncate(0)
-        file.write(f"process {os.getpid()} on {socket.gethostname()} since {started}\n".encode())
+        write_text(owner, f"process {os.getpid()} on {socket.gethostname()} since {started}\n")
         yield
-
-
-def _open_no_link(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NOFOLLOW, 0o666)
+    finally:
+        lock.release()

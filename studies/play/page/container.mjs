@@ -44,9 +44,9 @@ export function stackLoad(generator, task) {
 }
 
 export class Container {
-  /** A full one; `generator` blurs where its boxes are seen, by `task.position_noise`. */
+  /** A full one; `generator` blurs the places by `task.position_noise`, and jams boxes. */
   constructor(boxes, task, generator) {
-    Object.assign(this, { boxes, task, picks: 0 });
+    Object.assign(this, { boxes, task, generator, picks: 0 });
     this.present = new Uint8Array(boxes.length).fill(1);
     this.failed = new Set(); // items that failed since the last success
     const items = [...boxes.keys()];
@@ -71,9 +71,12 @@ export class Container {
     this.byAxis = [0, 1, 2].map(along);
   }
 
-  /** Choose what is observed: positions, or ranks (`equalize`) with `ties` of either kind. */
-  show({ equalize, ties }) {
-    Object.assign(this, { equalize, ties });
+  /**
+   * Choose what is observed: positions, or ranks (`equalize`) with `ties` of either kind; and
+   * whether walls are `seamless`, so that a free box jams with probability `jam`.
+   */
+  show({ equalize, ties, seamless, jam }) {
+    Object.assign(this, { equalize, ties, jam: seamless ? jam : 0 });
     this.look();
   }
 
@@ -107,9 +110,10 @@ export class Container {
     return levels;
   }
 
-  /** Lift a box; return whether that unloads it. */
+  /** Lift a box; return whether that unloads it. Whether it jams is drawn at each attempt. */
   pick(item) {
-    const success = this.liftable(item);
+    const jams = () => this.jam > 0 && this.generator.uniform() < this.jam;
+    const success = this.liftable(item) && !jams();
     this.picks++;
     this.failed.add(item);
     if (success) {

@@ -3,120 +3,227 @@
 const element = (id) => document.getElementById(id);
 const task = JSON.parse(element("task").textContent);
 const [canvas, form, presets] = ["canvas", "settings", "presets"].map(element);
+const [steps, plot] = ["steps", "plot"].map(element);
 const drawing = new Drawing(canvas, task);
 const network = new PEQNetwork(N_FEATURES, new Generator(0)); // its weights come from the worker
 const code = ["library", "worker"].map((id) => element(id).textContent);
 const worker = new Worker(URL.createObjectURL(new Blob(code)));
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const MAP_SIDE = 12; // pixels
+const done = new Set(); // steps
 let config, run, mine, chosen; // settings, the worker's last report, the reader's container, a box
+let number = 0; // of runs, because a report of an earlier one may come late
+let frame; // that will be drawn
+let [step, said] = ["unload", ""]; // the step or preset that is told of, what the last pick did
 
-for (const [name, [text, choices]] of Object.entries(SETTINGS)) {
-  const [label, select] = ["label", "select"].map((kind) => document.createElement(kind));
-  select.name = name;
-  select.append(...Object.entries(choices).map((choice) => new Option(...choice)));
-  label.append(text, select);
-  form.lastElementChild.before(label); // the seed stands last
+const make = (kind, fields, ...content) => {
+  const made = Object.assign(document.createElement(kind), fields);
+  made.append(...content);
+  return made;
+};
+for (const [name, [text, options, title]] of Object.entries(CHOICES)) {
+  if (name === "blank") continue; // stands beside its numbers
+  const choices = Object.entries(options).map((option) => new Option(...option));
+  const select = make("select", { name }, ...choices);
+  element("jams").before(make("label", { title }, text, select));
+}
+const tiles = Array.from({ length: N_FEATURES }, () => make("canvas", {}));
+element("features").append(...tiles);
+
+// Files beside the page: in the repository, or in its site. A copy that stands alone names them.
+for (const link of document.querySelectorAll("a[data-file]")) {
+  const { file } = link.dataset;
+  const inside = (folder) => location.pathname.includes(folder);
+  if (inside("/_downloads/")) link.href = `../../${file.replace(/\.\w+$/, ".html")}`;
+  else if (inside("/figures/")) link.href = `../${file}`;
+  else link.title = `In the repository: ${file}`;
 }
 
-const send = (command) => worker.postMessage({ command, config, task });
+const send = (command) => worker.postMessage({ command, config, task, number });
 
 /** Take over settings; begin from the first weights if the seed is another one, or if `anew`. */
 function set(text, anew) {
-  const seed = config?.seed;
-  config = fromText(text);
+  const before = config;
+  const read = fromText(text);
+  config = read.config;
+  element("problems").textContent = read.problems.join(" ");
+  element("problems").hidden = !read.problems.length;
   history.replaceState(null, "", `#${toText(config)}`);
   for (const [name, value] of Object.entries(config)) form.elements[name].value = value;
-  for (const button of presets.children) {
-    const preset = { ...PRESETS[button.value], seed: config.seed };
-    button.ariaPressed = toText(preset) === toText(config);
-  }
-  const begin = anew || config.seed !== seed;
+  for (const button of presets.children) button.ariaPressed = button.value === named();
+  const begin = anew || config.seed !== before?.seed;
   if (begin) {
     const generator = new Generator(config.seed);
     mine = new Container(stackLoad(generator, task), task, generator);
-    [chosen, element("status").textContent] = [-1, "\u00a0"]; // a line that is empty
+    [chosen, said, run] = [-1, "", undefined];
+    number++;
   }
   mine.show(config);
-  send(begin ? "reset" : "change");
+  send(begin ? "reset" : config.blank === before.blank ? "change" : "freeze");
+}
+
+/** Settings of a preset; the seed and the walls stay. */
+function preset(name) {
+  const { seed, seamless, jam } = config;
+  return { ...PRESETS[name], seed, seamless, jam };
+}
+
+/** The preset that the settings are, or "own". */
+function named() {
+  const names = Object.keys(PRESETS);
+  return names.find((name) => toText(preset(name)) === toText(config)) ?? "own";
+}
+
+/** Do what a step or preset says. */
+function begin(name) {
+  step = name;
+  if (name === "unload") element("mine").checked = true;
+  else if (name !== "blank") {
+    set(toText(preset(name)), true);
+    watch("train");
+  } else if (run?.picks) set(toText({ ...config, blank: true }), false);
+  render();
 }
 
 function pick(item) {
-  if (!element("mine").checked || !(item >= 0)) return; // no box is there
-  if (!mine.visible.includes(item)) {
-    element("status").textContent = "This box is not among the 128 nearest ones.";
-    return;
-  }
-  const how = mine.pick(item) ? "Unloaded." : "Failed: a box lies on it.";
-  const unloaded = mine.present.filter((here) => !here).length;
-  element("status").textContent = `${how} ${unloaded} of ${mine.picks} picks succeeded.`;
+  if (!element("mine").checked || !(item >= 0)) return false; // no box is there
+  step = "unload";
+  const seen = mine.visible.includes(item);
+  const success = seen && mine.pick(item);
+  said = seen ? pickVerdict(mine, item, success) : "This box is not among the 128 nearest ones.";
+  if (success) done.add("unload");
   render();
+  return success;
 }
 
-/** Choose, by an arrow key, the next box in its direction, across or upwards, rather in front. */
-function move([right, up]) {
-  const from = mine.seen[chosen] ?? mine.seen[mine.visible[0]];
-  const far = (item) => {
-    const [x, y, z] = mine.seen[item].map((value, axis) => value - from[axis]);
-    const ahead = y * right + z * up;
-    return ahead > 0.01 ? ahead + 3 * Math.abs(y * up - z * right) - x : Infinity;
-  };
-  const next = mine.visible.reduce((best, item) => (far(item) < far(best) ? item : best));
-  if (far(next) < Infinity) chosen = next;
-  render();
+function verdict() {
+  if (step === "unload") return said;
+  if (step !== "blank") return runVerdict(run, config, task);
+  return run.picks ? blankVerdict(run, config, task) : UNTRAINED;
 }
 
 function render() {
+  if (!run) return; // a report will come
+  const { parameters, picks, points, rates, running } = run;
+  network.parameters.set(parameters);
+  if (rates.true) done.add("blank");
+  showSteps();
+  showContainer();
+  element("train").textContent = running ? "Pause" : "Train";
+  element("picks").textContent = `${picks.toLocaleString("en")} picks`;
+  for (const blank of [false, true]) {
+    const rate = rates[blank];
+    element(`rate-${blank}`).textContent = rate ? percent(rate.success_rate) : "";
+  }
+  showCurve(points, Math.max(config.picks, picks));
+  showPreferences(points);
+  showMaps();
+  element("jams").hidden = !config.seamless;
+  element("share").textContent = config.jam;
+}
+
+function showSteps() {
+  const next = nextStep(done);
+  for (const { firstChild: button } of steps.children) {
+    button.ariaCurrent = button.value === step ? "step" : null;
+    button.className = done.has(button.value) ? "done" : button.value === next ? "next" : "";
+  }
+  element("sentence").textContent = SENTENCES[step];
+  element("verdict").ariaLive = run.running ? "off" : "polite"; // not at each of many changes
+  element("verdict").textContent = verdict() || "\u00a0"; // a line that is empty
+}
+
+function showContainer() {
   const own = element("mine").checked;
   const container = own ? mine : run.container;
-  network.parameters.set(run.parameters);
   const scores = compared(network, container.observation, config);
   const order = [...scores.keys()].sort((a, b) => scores[a] - scores[b]);
-  const places = order.map((row, i) => [container.visible[row], i / (order.length - 1)]);
+  const places = order.map((row, i) => [container.visible[row], i / (order.length - 1 || 1)]);
   drawing.draw(container, new Map(places), own ? chosen : -1);
-  element("train").textContent = run.running ? "Pause" : "Train";
-  element("picks").textContent = `${run.picks.toLocaleString("en")} picks`;
-  const end = Math.max(config.picks, run.picks);
+}
+
+function showCurve(points, end) {
   for (const name of ["success_rate", "epsilon"]) {
-    const corner = (point) => [(100 * point.picks) / end, 100 - 100 * point[name]];
-    element(name).setAttribute("points", run.points.map(corner).join(" "));
+    element(name).setAttribute("points", line(points, name, end));
   }
-  const last = run.points.at(-1);
-  element("rate").textContent = last ? `${Math.round(100 * last.success_rate)} %` : "";
-  ["x", "y"].forEach((name, axis) => {
-    const turn = (kind, radians) =>
-      Object.assign(element(`${kind}-${name}`).style, { rotate: `${radians}rad`, opacity: last ? 1 : 0 });
-    turn("needle", last ? Math.atan2(last.slopes[axis], last.slopes[2]) : 0);
-    turn("surface", last ? Math.atan(2 * last.tilts[axis]) : 0);
+  const last = points.at(-1);
+  element("rate").textContent = last ? percent(last.success_rate) : "";
+  element("end").textContent = end.toLocaleString("en");
+  element("ceiling").setAttribute("d", `M0 ${100 - 100 * ceiling(config)}H100`);
+}
+
+function showPreferences(points) {
+  const most = limits(config, task.thresholds);
+  const known = most.map((limit, axis) => `${limit} along ${"xy"[axis]}`);
+  const above = known.filter((_, axis) => most[axis] < Infinity).join(" or ");
+  element("region").setAttribute("d", region(most));
+  element("trail").setAttribute("points", points.map((point) => place(point.slopes)).join(" "));
+  const last = points.at(-1);
+  const [x, y] = last ? preferences(last.slopes) : [];
+  const [right, down] = last ? place(last.slopes) : [0, 0];
+  element("dot").setAttribute("transform", `translate(${right} ${down})`);
+  element("dot").style.opacity = last ? 1 : 0;
+  element("preferences").textContent = last ? `x ${signed(x)}, y ${signed(y)}` : "";
+  const none = "For positions no limit is known.";
+  element("limits").textContent = above ? `Shaded: nearly all runs err (above ${above}).` : none;
+}
+
+const signed = (value) => value.toFixed(2).replace("-", "\u2212");
+
+function showMaps() {
+  const maps = featureMaps(network, Number(element("axis").value), config.blank, MAP_SIDE);
+  const largest = Math.max(...maps.flatMap((map) => [...map].map(Math.abs)));
+  maps.forEach((map, f) => {
+    const [x, y, z] = [...network.extractor.subarray(4 * f, 4 * f + 3)].map(signed);
+    const score = signed(network.scorer[f]);
+    paint(tiles[f], map, largest);
+    tiles[f].title = `Feature ${f + 1}: x ${x}, y ${y}, z ${z}; its weight in the score: ${score}`;
   });
+  const sum = sumMap(maps);
+  paint(element("sum"), sum, Math.max(...sum.map(Math.abs)));
 }
 
 /** Give the worker a command, and show what it does to the agent's container. */
 function watch(command) {
   element("agents").checked = true;
+  if (step === "unload" || step === "blank") step = named();
   send(command);
 }
 
 worker.onmessage = ({ data }) => {
+  if (data.number !== number) return;
+  if (run?.running && !data.running && data.picks >= config.picks) done.add(named());
   run = data;
-  requestAnimationFrame(render);
+  cancelAnimationFrame(frame); // one picture is drawn of all that came since the last
+  frame = requestAnimationFrame(render);
 };
-onresize = element("mine").onchange = element("agents").onchange = () => run && render();
+onresize = element("axis").onchange = render;
+element("mine").onchange = element("agents").onchange = render;
 onhashchange = () => set(location.hash.slice(1), true);
-form.onchange = () => set(new URLSearchParams(new FormData(form)), false);
-form.onsubmit = (event) => event.preventDefault(); // Enter in a field applies it, no more
-presets.onclick = ({ target }) => {
-  if (!target.value) return;
-  set(toText({ ...PRESETS[target.value], seed: config.seed }), true);
-  watch("train");
+form.onchange = ({ target }) => {
+  set(new URLSearchParams(new FormData(form)), false);
+  step = target.name === "blank" ? "blank" : named();
 };
+form.oninput = () => (element("share").textContent = form.elements.jam.value);
+form.onsubmit = (event) => event.preventDefault(); // Enter in a field applies it, no more
+steps.onclick = presets.onclick = ({ target }) => target.value && begin(target.value);
 element("train").onclick = () => watch(run?.running ? "pause" : "train");
 element("step").onclick = () => watch("step");
 element("reset").onclick = () => set(toText(config), true);
+plot.onpointermove = ({ offsetX }) => {
+  if (!run) return;
+  const end = Math.max(config.picks, run.picks);
+  const at = pointAt(run.points, offsetX / plot.clientWidth, end);
+  const says = at && `${at.picks.toLocaleString("en")} picks: ${percent(at.success_rate)}`;
+  element("readout").textContent = says || "";
+};
+plot.onpointerleave = () => (element("readout").textContent = "");
 canvas.onclick = ({ offsetX, offsetY }) => pick(drawing.boxAt(offsetX, offsetY));
 canvas.onkeydown = (event) => {
-  if (event.key in ARROWS) move(ARROWS[event.key]);
-  else if (event.key === "Enter" || event.key === " ") pick(chosen);
-  else return;
+  if (!element("mine").checked) return;
+  if (event.key in ARROWS) chosen = towards(mine, chosen, ARROWS[event.key]);
+  else if (event.key !== "Enter" && event.key !== " ") return;
+  else if (pick(chosen)) chosen = nearest(mine, chosen);
   event.preventDefault(); // the page would scroll
+  render();
 };
 set(location.hash.slice(1), true);

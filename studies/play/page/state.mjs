@@ -1,37 +1,74 @@
 // The page's state: all settings in one object, by their names in `TrainConfig` where it has them,
 // and how they stand in the page's address, so that an experiment can be sent as a link.
 
-const SEED = 2; // its run leans to one side, so that one sees what is told
-/** Label of each setting, and the value of each choice; the first is the default. */
-export const SETTINGS = {
-  equalize: ["Agent sees", { ranks: true, positions: false }],
-  mask: ["Failed boxes", { masked: true, allowed: false }],
-  replay: ["Replay", { "as it is": "as_is", mirrored: "mirrored", "places dealt anew": "shuffled" }],
-  ties: ["Equal heights", { "noise decides": "noise", averaged: "average" }],
-  blank: ["Chooses by", { "x, y, z": false, "z alone": true }],
-  picks: ["Picks", { "96,000": 96_000, "32,000": 32_000, "64,000": 64_000, "384,000": 384_000 }],
-  learning_rate: ["Learning rate", { 0.003: 0.003, 0.001: 0.001, 0.01: 0.01 }],
-  batch_size: ["Batch", { "64 picks": 64, "16 picks": 16, "256 picks": 256 }],
+/** Label of each choice, what it is, and the value of each option; the first is the default. */
+export const CHOICES = {
+  equalize: ["Agent sees", { positions: false, ranks: true },
+    "Positions of the boxes, or, as in the paper, ranks: numbers in the order along each axis"],
+  mask: ["Failed boxes", { masked: true, allowed: false },
+    "Masked: a box that has failed is not chosen again before another one is unloaded"],
+  replay: ["Replay",
+    { "as it is": "as_is", mirrored: "mirrored", "shuffled places": "shuffled" },
+    "What is remembered of a pick. Mirrored: x and y get random signs. Shuffled places: the boxes " +
+    "exchange their places, left – right and rear – front, at random"],
+  ties: ["Equal coordinates", { "noise decides": "noise", averaged: "average" },
+    "Boxes of equal coordinates are ranked by noise of half a millimetre, or share a rank"],
+  blank: ["Chooses by", { "x, y, z": false, "z alone": true },
+    "With z alone, x and y count as 0 when the agent chooses; the weights stay as they are"],
+  picks: ["Picks",
+    { "32,000": 32_000, "64,000": 64_000, "96,000": 96_000, "384,000": 384_000 },
+    "Length of a run; random picks end after half of it"],
+  learning_rate: ["Learning rate", { 0.003: 0.003, 0.001: 0.001, 0.01: 0.01 }, "Of Adam"],
+  batch_size: ["Batch", { "64 picks": 64, "16 picks": 16, "256 picks": 256 },
+    "Remembered picks from which each update learns"],
+  seamless: ["Walls", { "with a gap": false, seamless: true },
+    "In seamless walls, a free box jams with a probability, drawn anew at each attempt"],
+};
+
+/** Numbers: default, highest, form, and what a valid one is called. */
+export const NUMBERS = {
+  jam: [0.4, 0.8, /^0$|^0?\.\d\d?$/, "a number from 0 to 0.8 with two decimals at most"],
+  // The run of seed 2 prefers one side, so that one sees what is told.
+  seed: [2, 2 ** 32 - 1, /^\d+$/, "a whole number from 0 to 4294967295"],
 };
 
 /** What experiments change in the defaults. */
 export const PRESETS = {
-  positions: { equalize: false, picks: 32_000 },
-  stuck: { mask: false, picks: 64_000 },
-  paper: {},
-  place: { replay: "shuffled" },
+  positions: {},
+  stuck: { equalize: true, mask: false, picks: 64_000 },
+  paper: { equalize: true, picks: 96_000 },
+  shuffled: { equalize: true, replay: "shuffled", picks: 96_000 },
 };
 
-/** Settings from a text such as an address holds; what it lacks or misnames has its default. */
+/**
+ * Settings from a text such as an address holds; what it lacks has its default.
+ *
+ * @returns {{config: object, problems: string[]}} the settings, and a sentence for each value that
+ *   is not valid, in whose place the default stands.
+ */
 export function fromText(text) {
   const given = new URLSearchParams(text);
-  const config = { seed: [Number.parseInt(given.get("seed")), SEED].find(Number.isInteger) };
-  for (const [name, [, choices]] of Object.entries(SETTINGS)) {
-    const values = Object.values(choices);
-    config[name] = values.find((value) => String(value) === given.get(name)) ?? values[0];
+  const [config, problems] = [{}, []];
+  const refuse = (name, what) =>
+    problems.push(`${name} is “${given.get(name)}”, which is not ${what}.`);
+  for (const [name, [, options]] of Object.entries(CHOICES)) {
+    const values = Object.values(options);
+    const value = values.find((each) => String(each) === given.get(name));
+    if (given.has(name) && value === undefined) refuse(name, `one of ${values.join(", ")}`);
+    config[name] = value ?? values[0];
   }
-  return config;
+  for (const [name, [standard, most, form, what]] of Object.entries(NUMBERS)) {
+    const value = given.has(name) ? Number(given.get(name)) : standard;
+    const valid = !given.has(name) || (form.test(given.get(name)) && value <= most);
+    if (!valid) refuse(name, what);
+    config[name] = valid ? value : standard;
+  }
+  for (const name of given.keys()) {
+    if (!Object.hasOwn(config, name)) problems.push(`No setting is named “${name}”.`);
+  }
+  return { config, problems };
 }
 
 /** Settings as a text, completed by the defaults. */
-export const toText = (config) => `${new URLSearchParams(fromText(new URLSearchParams(config)))}`;
+export const toText = (settings) =>
+  `${new URLSearchParams(fromText(new URLSearchParams(settings)).config)}`;

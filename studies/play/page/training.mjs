@@ -1,8 +1,9 @@
 // The training loop of unload/agent/training.py: ε-greedy picks, replay, updates, learning curve.
 
 import { Container, Generator, stackLoad } from "./container.mjs";
-import { slopes, tilts } from "./measures.mjs";
+import { slopes } from "./measures.mjs";
 import { Adam, PEQNetwork } from "./network.mjs";
+import { compared, highest } from "./policy.mjs";
 
 export const N_FEATURES = 16;
 const REPLAY_SIZE = 2 ** 15; // picks
@@ -33,11 +34,15 @@ export class Training {
     for (const container of this.containers) container.show(config);
   }
 
+  /** Share of random picks: from 1 to 0 over the first half of the picks. */
+  get epsilon() {
+    return Math.max(0, 1 - this.picks / (this.config.picks / 2));
+  }
+
   /** Pick once in every container, and learn from the picks before. */
   step() {
-    const { choices, config, memory, network } = this;
+    const { choices, config, epsilon, memory, network } = this;
     if (this.containers[0].picks === this.task.max_picks) this.fill();
-    const epsilon = Math.max(0, 1 - this.picks / (config.picks / 2));
     const picks = this.containers.map((container) => {
       const { observation, visible } = container;
       const explore = choices.uniform() < epsilon;
@@ -56,28 +61,17 @@ export class Training {
       memory[this.picks++ % REPLAY_SIZE] = { ...pick, observation };
       this.latest.push(pick.reward);
     }
-    if (this.latest.length >= config.picks / POINTS) this.addPoint(epsilon);
+    if (this.latest.length >= config.picks / POINTS) this.addPoint();
   }
 
-  addPoint(epsilon) {
-    const { network, containers, latest, picks } = this;
+  /** Add what was picked since the last point to the curve, if anything was. */
+  addPoint() {
+    const { network, containers, epsilon, latest, picks } = this;
+    if (!latest.length) return;
     const success_rate = latest.filter((reward) => reward > 0).length / latest.length;
-    const measured = { slopes: slopes(network, containers), tilts: tilts(containers) };
-    this.points.push({ picks, success_rate, epsilon, ...measured });
+    this.points.push({ picks, success_rate, epsilon, slopes: slopes(network, containers) });
     this.latest = [];
   }
-}
-
-/** The scores that a choice compares, (items); with `blank`, x and y count as 0. */
-export function compared(network, observation, { blank }) {
-  const seen = blank ? observation.map((value, i) => (i % 3 === 2 ? value : 0)) : observation;
-  return network.scores(seen);
-}
-
-/** The row of the highest score; with `mask`, of those that have not failed. */
-function highest(scores, { visible, failed }, { mask }) {
-  const allowed = scores.map((score, row) => (mask && failed.has(visible[row]) ? -Infinity : score));
-  return allowed.indexOf(Math.max(...allowed));
 }
 
 /** What is remembered of an observation, by the name of the setting. */

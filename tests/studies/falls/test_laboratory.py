@@ -1,3 +1,5 @@
+"""The laboratory, its measures, the fresh seeds and the long runs."""
+
 from dataclasses import replace
 from functools import partial
 
@@ -6,11 +8,17 @@ import pandas as pd
 import pytest
 import torch
 
-from studies import changes
-from studies.falls import fresh, laboratory
-from studies.provenance import read_provenance
+from studies import changes, paths
+from studies.falls import fresh, laboratory, long, measures
+from studies.falls.laboratory import CONFIG
+from studies.grid import read_policies
+from studies.paper.training import PAPER
+from studies.results import read_provenance
+from unload import evaluate, policies
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
+from unload.network.peq import PEQNetwork
+from unload.network.variants import NETWORKS
 
 
 @pytest.mark.slow
@@ -105,3 +113,135 @@ def test_a_slope_is_kept_from_sinking(axes, scaled):
     # What is learned in eleven steps in between differs a little, too.
     ratio = (weights["held"] / weights["plain"]).numpy()
     assert ratio == pytest.approx(1 + np.array(scaled) * (fresh.MOST_HELD - 1), abs=0.02)
+
+
+def test_runs_are_traced(tmp_path, monkeypatch):
+    monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
+    monkeypatch.setattr(long, "CONFIG", replace(long.CONFIG, picks=64_000))
+    long.trace_data(tmp_path, tmp_path / "runs", 1)
+    table = long.read_long_trace(tmp_path)
+    assert list(table["seed"]) == [20, 20, 21, 21]
+    assert list(table["picks"]) == [31_936, 63_936] * 2
+    assert read_provenance(tmp_path / "falls", "long_trace")["settings"]["picks"] == 64_000
+
+
+def test_the_published_trace_is_of_the_published_runs():
+    """A trace only looks: the success rates at its points are those of the same run."""
+    trace = long.read_long_trace()
+    for seed, points in trace.groupby("seed"):
+        assert points["picks"].is_monotonic_increasing and seed in long.TRACED_SEEDS
+        assert points["picks"].iloc[-1] > 0.99 * long.CONFIG.picks
+        assert (points["wrong_without_place"] == 0).mean() > 0.99
+
+
+def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
+    """One published policy and one network without training, in one container each."""
+    monkeypatch.setattr(long, "UNTRAINED", 1)
+    name = "paper_mask/seed_0"
+    policy = read_policies(paths.DATA / "falls/paper.safetensors")[name]
+    monkeypatch.setattr(
+        long, "read_policies", lambda path: {name: policy} if path.stem == "paper" else {}
+    )
+    monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
+    monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
+    long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
+    judged = long.read_published(tmp_path)
+    kept = set((tmp_path / "runs/published").iterdir())
+    policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
+    long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
+    again = set((tmp_path / "runs/published").iterdir())
+    assert kept < again and len(again) == len(kept) + 1
+    assert list(judged["cell"]) == ["paper_mask", "untrained"]
+    policy, network = judged.itertuples()
+    assert policy.judged_place == 1 > policy.judged_as_is
+    assert network.judged_as_is < 0.9
+
+
+def test_the_published_table_holds_every_policy():
+    table = long.read_published()
+    planned = {cell: len(each.seeds) for cell, each in PAPER.cells.items()}
+    counts = table.groupby("cell").size()
+    assert {cell: counts[cell] for cell in planned} == planned
+    assert counts["untrained"] == long.UNTRAINED
+
+
+@pytest.fixture
+def network():
+    """Its score is z + y / 2."""
+    network = PEQNetwork(2)
+    with torch.no_grad():
+        network.extractor.weight.copy_(torch.tensor([[0, 0.5, 1], [0, 0, 0]]))
+        network.extractor.bias.copy_(torch.tensor([2.0, 0.0]))  # so that ReLU is open
+        network.scorer.weight.zero_()
+        network.scorer.weight[0, 0] = 1
+    return network
+
+
+@pytest.fixture
+def observations():
+    return np.random.default_rng(0).uniform(-1, 1, (40, 128, 3)).astype(np.float32)
+
+
+def test_slopes_are_those_of_the_score(network, observations):
+    assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
+
+
+@pytest.mark.parametrize("name", ["two_layer", "stack", "attention"])
+def test_slopes_of_other_networks_are_those_of_their_values(name, observations):
+    """Their first weights are no slopes, and not all of them have an extractor."""
+    seen, step = observations[:2, :7].astype(float), 1e-5
+    network = NETWORKS[name](8, torch.Generator().manual_seed(0)).double()
+
+    def value(change, row, item):
+        with torch.no_grad():
+            return network(torch.from_numpy(seen + change))[row, item].item()
+
+    found = []
+    for row, item in np.argwhere(seen[..., 2] > np.median(seen[..., 2])):
+        moves = np.zeros((3, *seen.shape))
+        moves[range(3), row, item, range(3)] = step
+        ends = [[value(sign * move, row, item) for sign in (1, -1)] for move in moves]
+        found.append([(after - before) / (2 * step) for after, before in ends])
+    expected = np.mean(found, axis=0)
+    assert measures.slopes(network, seen) == pytest.approx(expected, abs=1e-7)
+    assert np.abs(expected).max() > 1e-3
+
+
+def test_tilt_is_the_effect_of_place_at_equal_height(observations):
+    x, y, z = np.moveaxis(observations, -1, 0)
+    level = z > 0.3
+    assert measures.tilt(observations, level) == pytest.approx([0, 0], abs=0.03)
+    dug = z + 0.5 * y > 0.3
+    along_x, along_y = measures.tilt(observations, dug)
+    assert abs(along_x) < 0.03 and along_y > 0.15
+
+
+def test_mistakes_with_and_without_place(network, observations):
+    highest = observations[..., 2] == observations[..., 2].max(axis=1, keepdims=True)
+    wrong, without_place, height = measures.mistakes(network, observations, highest)
+    assert wrong > 0.3 and without_place == 0
+    assert 0.5 < height < 1
+
+
+def test_judging_without_place_makes_height_decide(network):
+    loads = {"episodes": 2, "seed": 5}
+    config = replace(CONFIG, mask=True)
+    assert measures.judged(network, config, (0, 1), loads=loads) == 1
+    assert measures.judged(network, config, loads=loads) < 1
+    assert measures.judged(network, config, seen=lambda o: o * [1, 0, 1], loads=loads) == 1
+
+
+def test_the_surface_is_level_where_the_highest_is_taken():
+    places, level = measures.surface(policies.highest, picks=200, containers=2)
+    _, dug = measures.surface(measures.preferring(0, -1), picks=200, containers=2)
+    assert places[0] == pytest.approx(0.0125) and len(places) == 100
+    assert np.ptp(level) < 0.5 < dug[-1] - dug[0]
+
+
+def test_depth_misleads_only_where_ranks_are_random():
+    msr = {
+        (x, y, ties): evaluate(measures.preferring(x, y, ties), 2)["success_rate"].mean()
+        for x, y, ties in ((0, 0, "noise"), (1, 0, "noise"), (1, 0, "average"), (0, 1, "average"))
+    }
+    assert msr[0, 0, "noise"] == 1 == msr[1, 0, "average"]
+    assert msr[1, 0, "noise"] < 0.8 and msr[0, 1, "average"] < 0.8

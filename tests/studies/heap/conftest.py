@@ -1,4 +1,4 @@
-"""Small heaps that are made at once: towers of upright cubes, and a real one; and an outcome."""
+"""Small heaps that are made at once: towers of upright cubes, and a real one."""
 
 from collections.abc import Callable, Iterator
 
@@ -8,7 +8,7 @@ import pytest
 from studies.heap.boxes import Heap
 from studies.heap.env import HeapEnv
 from studies.heap.generate import settled_heap
-from studies.heap.rake import Outcome, Rake
+from studies.heap.rake import Rake
 from unload.physics.bullet import World
 
 EDGE = 0.4  # m
@@ -91,13 +91,3 @@ def heap(cubes) -> Heap:
     turns = upright.orientations.copy()
     turns[3] = (0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8))
     return Heap(upright.positions, turns, upright.sizes, upright.packages)
-
-
-@pytest.fixture
-def outcome(heap) -> Outcome:
-    """Box 0 was dragged and box 2 came with it; box 1 fell."""
-    after = heap.only(np.array([1, 3]))
-    places = after.positions - [[0, 0, 0.4], [0, 0, 0]]
-    after = Heap(places, after.orientations, after.sizes, after.packages)
-    unloaded, fallen = np.array([1, 0, 1, 0], bool), np.array([0, 1, 0, 0], bool)
-    return Outcome(after, unloaded, fallen, 0.7, True)

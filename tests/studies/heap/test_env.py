@@ -29,7 +29,29 @@ def trace(env: HeapEnv, seed: int, picks: int = 4) -> list:
 
 @pytest.mark.filterwarnings("ignore:.*render modes")
 def test_gymnasium_finds_nothing_wrong(make_heap_env):
-    check_env(make_heap_env(), skip_render_check=True)
+    check_env(make_heap_env(render_mode="rgb_array"))
+
+
+def test_a_picture_shows_what_a_pick_has_left(make_heap_env, cubes):
+    env, plain = make_heap_env(render_mode="rgb_array"), make_heap_env()
+    with pytest.raises(ResetNeeded):
+        env.render()
+    assert plain.metadata["render_modes"] == ["rgb_array"]
+    heap = cubes((5, 1, 0))
+    pictures = []
+    for each in (env, plain):
+        each.reset(options={"heap": heap})
+        pictures.append(each.render())
+    first, nothing = pictures
+    assert nothing is None and first.shape == (480, 640, 3) and first.dtype == np.uint8
+    for _ in range(15):
+        if env.step(0)[2]:
+            break
+    assert len(env.heap) == 0
+    empty = env.render()  # the conveyor's edge is at the rear wall then
+    assert (empty != first).any() and (empty < 255).any()
+    with pytest.raises(ValueError, match="render_mode is 'human'"):
+        make_heap_env(render_mode="human")
 
 
 def test_the_stored_heaps_can_be_played():

@@ -1,6 +1,15 @@
+"""Heaps, how they are made, and what a pick does to them."""
+
 import numpy as np
 import pytest
 
+from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_sizes
+from studies.heap.generate import (
+    FEWEST,
+    HIGHEST,
+    read_heaps,
+    write_heaps,
+)
 from studies.heap.rake import FALL, PHYSICS
 
 
@@ -55,3 +64,58 @@ def test_a_pick_depends_on_nothing_but_the_heap(pile, make_rake, physics):
         assert other.heap.positions.tobytes() == first.heap.positions.tobytes()
         assert other.heap.orientations.tobytes() == first.heap.orientations.tobytes()
         assert other.unloaded.tolist() == first.unloaded.tolist()
+
+
+def turned(angle: float, axis: int) -> Heap:
+    """One box of 0.6 × 0.4 × 0.2 m, turned about one of the container's axes."""
+    turn = np.zeros(4)
+    turn[axis], turn[3] = np.sin(angle / 2), np.cos(angle / 2)
+    return Heap(np.array([[5.0, 1, 1]]), turn[None], np.array([[0.6, 0.4, 0.2]]), np.array([0]))
+
+
+def test_extents_of_turned_boxes_are_those_of_their_corners():
+    corners = np.array([(x, y, z) for x in (-0.3, 0.3) for y in (-0.2, 0.2) for z in (-0.1, 0.1)])
+    for axis in range(3):
+        heap = turned(0.7, axis)
+        places = corners @ heap.axes()[0].T
+        assert heap.extents()[0] == pytest.approx(np.ptp(places, axis=0))
+
+
+@pytest.mark.parametrize(("angle", "tilt"), [(0.3, 0.3), (np.pi / 2, 0), (2.0, 2.0 - np.pi / 2)])
+def test_tilt_is_measured_from_the_nearest_axis(angle, tilt):
+    assert turned(angle, 0).tilts()[0] == pytest.approx(tilt, abs=1e-6)
+    assert turned(angle, 2).tilts()[0] == pytest.approx(0, abs=1e-6)
+
+
+def test_the_edge_is_at_the_front_but_does_not_give_way_beyond_the_door(cubes):
+    assert cubes((5, 1, 0), (6, 1, 0)).edge() == pytest.approx(6.2)
+    assert cubes((5, 1, 0), (7.1, 1, 0)).edge() == FARTHEST_EDGE
+    assert cubes((5, 1, 0)).only(np.array([], int)).edge() == REAR
+    assert DOOR < FARTHEST_EDGE < 7.3
+
+
+def test_packages_have_the_sizes_of_the_neat_loads():
+    assert package_sizes(np.array([0]))[0] == pytest.approx([7 / 12, 25 / 36, 15 / 36])
+
+
+def test_a_heap_is_disordered_and_fits_in(real_heap):
+    assert FEWEST <= len(real_heap) <= 130
+    low = real_heap.positions - real_heap.extents() / 2
+    high = real_heap.positions + real_heap.extents() / 2
+    assert low.min(axis=0) == pytest.approx([REAR, 0, 0], abs=0.02)
+    assert (real_heap.positions[:, 0] < DOOR).all()
+    assert high[:, 1].max() < WIDTH + 0.02 and high[:, 2].max() <= HIGHEST
+    assert (real_heap.tilts() > np.radians(10)).mean() > 0.3
+
+
+def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
+    path = tmp_path / "heaps.npz"
+    part = real_heap.only(np.arange(7))
+    write_heaps(path, {"train": [real_heap, part], "test": [part]})
+    first, second = read_heaps("train", path)
+    (third,) = read_heaps("test", path)
+    for read, heap in ((first, real_heap), (second, part), (third, part)):
+        assert read.positions.tobytes() == heap.positions.tobytes()
+        assert read.orientations.tobytes() == heap.orientations.tobytes()
+        assert read.sizes.tobytes() == heap.sizes.tobytes()
+        assert read.packages.tolist() == heap.packages.tolist()

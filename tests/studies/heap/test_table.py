@@ -1,17 +1,23 @@
-"""Policies compared on heaps, at reduced size."""
+"""The heaps, recorded picks, learning and comparison at reduced size; and the figures."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 
 from studies import paths
+from studies.heap import figures, picture, recording
 from studies.heap import table as study
-from studies.heap.learning import save_networks
+from studies.heap.boxes import Heap
+from studies.heap.env import stored_heaps
+from studies.heap.generate import read_heaps
+from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
-from studies.heap.recording import HEAPS, WEIGHTS
-from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan
-from studies.provenance import read_provenance
+from studies.heap.recording import HEAPS, WEIGHTS, make_heaps, make_networks
+from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan, read_heap_table
+from studies.results import read_provenance, unpacked
+from unload.load.picture import COLOURS
 
 
 @pytest.fixture
@@ -128,3 +134,111 @@ def test_data_of_heaps_are_those_that_are_read():
     assert names == {"heaps", "networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == HEAPS["test"]).all() and len(table) == 19
+
+
+def test_the_throughput_draws_its_data():
+    """From data/ where it is read: dots at the values of the table, and all their names."""
+    table = read_heap_table()
+    (curves,) = figures.throughput_falls().axes
+    named = {line.get_label(): line for line in curves.lines}
+    learned = table[table["policy"] == "learned"].sort_values("falls_weight")
+    assert named["learned"].get_xdata().tolist() == learned["falls"].tolist()
+    assert named["learned"].get_ydata().tolist() == learned["boxes"].tolist()
+    texts = {text.get_text() for text in curves.texts}
+    assert texts == {*figures.RULES, *(f"λ = {weight:g}" for weight in learned["falls_weight"])}
+    assert {text.get_text() for text in curves.get_legend().get_texts()} == set(figures.LINES)
+
+
+def test_corners_are_those_of_turned_boxes(heap):
+    corners = picture.corners(heap)
+    seam = picture.SEAM
+    assert np.ptp(corners[0], axis=0) == pytest.approx([0.4 - seam] * 3)
+    wide = (0.4 - seam) * 2**0.5
+    assert np.ptp(corners[3], axis=0) == pytest.approx([wide, wide, 0.4 - seam])
+    assert corners.mean(axis=1) == pytest.approx(heap.positions)
+
+
+def test_nearer_boxes_are_painted_later(heap):
+    """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
+    axes = plt.figure().add_subplot()
+    colours = np.array([picture.MEANINGS[name] for name in ("comes along", "is dragged")])
+    picture.draw_heap(axes, heap.only(np.array([2, 0])), colours)
+    painted = axes.collections[0].get_facecolors()[:, :3]
+    assert len(painted) == 6, "three faces of a box are turned to the eye"
+    dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))
+    own = [np.linalg.norm(face / face.max() - dragged / dragged.max()) < 0.02 for face in painted]
+    assert own == [True] * 3 + [False] * 3
+    assert painted[3:].max() <= along.max() + 1e-9
+
+
+@pytest.fixture
+def quick_heaps(monkeypatch):
+    """A generator of parts of a stored heap, which the seed chooses."""
+
+    def make(rng: np.random.Generator) -> Heap:
+        whole = stored_heaps("train")[0]
+        return whole.only(np.sort(rng.choice(len(whole), 5, replace=False)))
+
+    monkeypatch.setattr(recording, "settled_heap", make)
+
+
+def test_the_shipped_heaps_are_what_the_generator_makes():
+    """Of number 60, boxes were still leaving in the last round of settling."""
+    made = unpacked(recording._new_heap(recording.SEEDS["train"], 60))
+    assert stored_heaps("train")[60].positions.tolist() == made["positions"].tolist()
+
+
+def test_heaps_are_those_of_their_seeds(quick_heaps, tmp_path, monkeypatch):
+    few, more = tmp_path / "few", tmp_path / "more"
+    monkeypatch.setattr(recording, "HEAPS", {"train": 2, "test": 1})
+    make_heaps(few, tmp_path)
+    monkeypatch.setattr(recording, "HEAPS", {"train": 3, "test": 2})
+    make_heaps(more, tmp_path / "again")
+    for split, count in (("train", 2), ("test", 1)):
+        first = read_heaps(split, few / "heap/heaps.npz")
+        second = read_heaps(split, more / "heap/heaps.npz")
+        assert len(first) == count and len(second) == count + 1
+        for one, other in zip(first, second):
+            assert one.positions.tobytes() == other.positions.tobytes()
+    train, test = (read_heaps(split, more / "heap/heaps.npz")[0] for split in ("train", "test"))
+    assert not np.array_equal(train.positions, test.positions)
+    provenance = read_provenance(few / "heap", "heaps")
+    assert provenance["settings"]["heaps"] == {"train": 2, "test": 1}
+
+
+def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
+    small = {"MAX_PICKS": 3, "PICKS": 12, "NETWORKS": 2, "STEPS": 2}
+    for name, value in small.items():
+        monkeypatch.setattr(recording, name, value)
+    learned, explorers = [], []
+    fit, policy = recording.fit, recording.Learned
+
+    def noted_fit(picks, seed, steps):
+        learned.append(picks)
+        return fit(picks, seed, steps)
+
+    def noted_policy(networks, weight):
+        explorers.append(weight)
+        return policy(networks, weight)
+
+    monkeypatch.setattr(recording, "fit", noted_fit)
+    monkeypatch.setattr(recording, "Learned", noted_policy)
+    make_networks(tmp_path, tmp_path)
+    assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
+    assert len(explorers) == 2 and set(explorers) <= set(recording.WEIGHTS)
+    picks = learned[-1]
+    assert np.isfinite(picks.observations).all() and picks.unloaded.sum() > 0
+    came = picks.fates[np.arange(12), picks.actions] & 1
+    assert (came <= picks.unloaded).all(), "fates are those of the picks"
+    published = tmp_path / "heap" / "networks.safetensors"
+    assert len(load_networks(published)) == 2
+    assert read_provenance(tmp_path / "heap", "networks")["runs"] == 4 + 4
+    written = published.read_bytes()
+    make_networks(tmp_path, tmp_path)
+    assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
+    make_networks(tmp_path / "again", tmp_path / "again")
+    assert (tmp_path / "again" / "heap" / "networks.safetensors").read_bytes() == written
+    monkeypatch.setattr(recording, "STEPS", 3)
+    make_networks(tmp_path, tmp_path)
+    assert len(learned) == 12 and published.read_bytes() != written, "another question"
+    assert len(list((tmp_path / "heap" / "picks").glob("*.json"))) == 6, "other explorers, too"

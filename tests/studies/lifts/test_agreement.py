@@ -1,4 +1,4 @@
-"""The three physics decide alike."""
+"""The three physics decide alike; and the data of the lift table."""
 
 from functools import partial
 
@@ -8,11 +8,13 @@ import pandas as pd
 import pytest
 
 from studies.lifts import agreement
+from studies.lifts import lift_table as lifts
 from studies.policies.robustness import front_walls
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from studies.statistics import share_interval
-from unload import policies
+from unload import policies, task
 from unload.load.substacks import stack_load
+from unload.physics.table import LiftTable
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +111,20 @@ def test_committed_lifts_can_be_computed_again(committed):
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
     assert (frame[columns] == first[columns]).all(axis=None)
     assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
+
+
+def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(task, "NUM_ENVS", 1)
+    monkeypatch.setattr(lifts, "EPISODES", 1)
+    monkeypatch.setattr(lifts, "_filling_policies", lambda rng: [policies.random, policies.highest])
+    for name in "ab":
+        lifts.lift_data(tmp_path / name, tmp_path / name / "runs")
+    assert (tmp_path / "a/lifts.npz").read_bytes() == (tmp_path / "b/lifts.npz").read_bytes()
+    count = len(LiftTable.load(tmp_path / "a/lifts.npz"))
+    assert count > 50
+    provenance = read_provenance(tmp_path / "a", "lifts")
+    assert provenance["settings"]["lifts"] == count
+    # What is kept is not computed again.
+    lifts.lift_data(tmp_path / "c", tmp_path / "a/runs")
+    again = read_provenance(tmp_path / "c", "lifts")
+    assert again["wall_time_s"] == provenance["wall_time_s"]

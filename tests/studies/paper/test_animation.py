@@ -7,7 +7,7 @@ from PIL import Image
 from studies import paths
 from studies.paper import animation
 from studies.policies.robustness import front_walls
-from tests.agent.networks import lowest
+from tests.agent.runs import lowest
 from unload import policies
 from unload.load import picture
 from unload.load.substacks import stack_load
@@ -43,8 +43,13 @@ def test_frames_begin_slowly_and_show_the_end_twice():
 
 
 def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_path, monkeypatch):
-    texts, drawn = [], []
-    monkeypatch.setattr(animation, "_draw_half", _noting(animation._draw_half, texts))
+    texts, drawn, draw_half = [], [], animation._draw_half
+
+    def noting(half, *args):
+        draw_half(half, *args)
+        texts.extend(text.get_text() for text in half.texts)
+
+    monkeypatch.setattr(animation, "_draw_half", noting)
     monkeypatch.setattr(animation, "draw", lambda *all: drawn.append(all[1:]) or picture.draw(*all))
     first, second = tmp_path / "a.gif", tmp_path / "b.gif"
     frames = animation.save_unloading(episodes, first)
@@ -63,16 +68,6 @@ def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_pat
     assert first.read_bytes() == second.read_bytes()
     with Image.open(first) as image:
         assert image.n_frames == len(frames) == len(animation.picks_of_frames(picks))
-
-
-def _noting(draw_half, texts):
-    """``draw_half``, which also notes what it writes."""
-
-    def draw(half, *args):
-        draw_half(half, *args)
-        texts.extend(text.get_text() for text in half.texts)
-
-    return draw
 
 
 def test_committed_picture_is_small_enough_for_a_readme():

@@ -9,7 +9,7 @@ from studies.fingerprint import training_fingerprint
 from studies.grid import read_measures
 from studies.policies import variants
 from studies.policies.variants import GRIDS, judged, read_variants, variants_data
-from studies.provenance import read_provenance
+from studies.results import read_provenance
 from unload import TrainConfig, evaluate, load_policy
 
 FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable

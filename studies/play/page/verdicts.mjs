@@ -1,0 +1,87 @@
+// One line that says what the reader's picks or a run did, computed from what was measured.
+
+import { limits, preferences } from "./measures.mjs";
+
+const ROSE = 0.8; // rate of an agent that has learned, although it errs
+const FELL = 0.2; // by how much a rate has sunk
+const STUCK = 0.5; // share of picks that repeat one that has just failed
+const MISLED = 0.1; // by how much a rate rises if x and y are blank
+const SIDES = [["the rear", "the front"], ["the left side", "the right side"]];
+
+export const percent = (share) => `${Math.round(100 * share)} %`;
+const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
+
+/** What no policy can exceed, because free boxes jam. */
+export const ceiling = ({ seamless, jam }) => (seamless ? 1 - jam : 1);
+
+/** What became of a pick of an item in the reader's container. */
+export function pickVerdict(container, item, success) {
+  const unloaded = container.present.filter((here) => !here).length;
+  const blocked = !container.liftable(item);
+  const failed = `Failed: ${blocked ? "a box lies on it" : "it jams, although no box lies on it"}.`;
+  const how = success ? "Unloaded: no box lay on it." : failed;
+  return `${how} ${unloaded} of your ${container.picks} picks succeeded.`;
+}
+
+/**
+ * What a run did.
+ *
+ * @param {object} run its `points`, see training.mjs, `picks`, and `seconds` of training; whether
+ *   it is `running`; its `rates`, see policy.mjs, by whether x and y are blank.
+ * @param {object} config its settings.
+ * @param {object} task its numbers `thresholds` and `errs`.
+ */
+export function runVerdict({ points, picks, seconds, running, rates }, config, task) {
+  if (!points.length) return "";
+  const success = points.map((point) => point.success_rate);
+  const latest = percent(success.at(-1));
+  if (running || picks < config.picks) return `${latest} of its latest picks succeeded.`;
+  const last = success.slice(-Math.ceil(success.length / 10));
+  const [top, best, end] = [ceiling(config), Math.max(...success), mean(last)];
+  const judged = rates[config.blank];
+  const limit = top < 1 ? ` With these jams nothing ends above ${percent(top)}.` : "";
+
+  if (end >= task.errs * top) {
+    const time = `after ${seconds.toFixed(1)} s`;
+    return `It learned: ${percent(end)} of its last picks succeeded, ${time}.${limit}`;
+  }
+  if (judged?.repeated > STUCK) {
+    return `It is stuck: ${percent(judged.repeated)} of its picks repeat one that has just failed.`;
+  }
+  const why = misled(points.at(-1).slopes, config, task);
+  if (best - end < FELL * top) {
+    const what = end >= ROSE * top ? "It did not fall" : "It did not learn";
+    return `${what}: ${percent(end)} at the end, ${percent(best)} at best; it ${why}.${limit}`;
+  }
+  const fell = `It fell, from ${percent(best)} to ${percent(end)}`;
+  if (!judged) return `${fell}.`;
+  if (judged.success_rate < task.errs * top) return `${fell}: it ${why}.${limit}`;
+  const fresh = percent(judged.success_rate);
+  return `${fell}, and rose again: its last weights succeed in ${fresh} of fresh picks.`;
+}
+
+/** What a network prefers to height, by its slopes. */
+function misled(slopes, config, task) {
+  if (slopes[2] <= 0) return "prefers low boxes";
+  const along = preferences(slopes);
+  const known = limits(config, task.thresholds);
+  const beyond = known.map((limit, axis) => Math.abs(along[axis]) / limit);
+  const axis = beyond[1] > beyond[0] ? 1 : 0;
+  if (beyond[axis] <= 1) return "prefers no place to height";
+  return `prefers ${SIDES[axis][along[axis] > 0 ? 1 : 0]} to height`;
+}
+
+/** What frozen weights do in fresh containers, with x and y and without. */
+export function blankVerdict({ rates }, config, task) {
+  const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
+  if (blank === undefined) return "";
+  const without = `With z alone these weights succeed in ${percent(blank)} of fresh picks`;
+  if (seen === undefined) return `${without}.`;
+  const both = `${without}, with x and y in ${percent(seen)}`;
+  const good = blank >= task.errs * ceiling(config);
+  const [all, part] =
+    blank - seen < MISLED
+      ? ["no place misleads them", "their mistakes are not those of a place"]
+      : ["they know height, but a place outweighed it", "not only a place misled them"];
+  return `${both}: ${good ? all : part}.`;
+}

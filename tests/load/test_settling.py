@@ -1,0 +1,90 @@
+"""Measured places that are settled, and boxes that tip."""
+
+import numpy as np
+import pytest
+
+from tests.load.walls import own_load
+from unload import Load, stack_load, task
+from unload.load.boxes import BoxError, check_stacked
+from unload.load.settling import settle as moves
+from unload.load.settling import uncarried
+
+TOLERANCE = 0.005
+
+
+def settle(low, sizes, tolerance=TOLERANCE):
+    """The corners of boxes that have settled."""
+    low = np.array(low, float)
+    return low + moves(low, np.array(sizes, float), task.CONTAINER, tolerance)
+
+
+@pytest.mark.parametrize("kind", ["the paper's", "continuous sizes", "few sizes"])
+def test_boxes_that_fit_stay_where_they_are(rng, kind):
+    load = stack_load(rng, walls=6) if kind == "the paper's" else own_load(rng, kind)
+    low = load.positions - load.sizes / 2
+    assert (settle(low, load.sizes) == low).all()
+
+
+@pytest.mark.parametrize("kind", ["the paper's", "continuous sizes", "few sizes"])
+def test_measured_boxes_become_a_load(rng, kind):
+    """Rows from wall to wall, in which no box has room to spare."""
+    load = stack_load(rng, walls=6) if kind == "the paper's" else own_load(rng, kind)
+    low = load.positions - load.sizes / 2
+    measured = low + rng.uniform(-0.002, 0.002, low.shape)
+    found = settle(measured, load.sizes)
+    check_stacked(Load.from_corners(found, load.sizes))
+    assert abs(found - low)[:, 2].max() < 1e-6, "every box lies where it lay"
+    assert abs(found - low).max() < 0.02
+
+
+def test_a_stack_settles_by_more_than_the_tolerance():
+    low = [(0, 0, 0.304 * layer) for layer in range(6)]
+    for edge in (0.3, 0.308):  # with gaps of 4 mm, and with overlaps
+        found = settle(low, np.full((6, 3), edge))
+        assert found[:, 2] == pytest.approx(edge * np.arange(6))
+
+
+def test_boxes_are_pushed_apart_to_the_side_and_back_from_the_wall():
+    sizes = np.full((3, 3), 0.5)
+    low = np.array([(0, 0, 0), (0, 0.496, 0), (0, 2.003, 0)])
+    assert settle(low, sizes)[:, 1] == pytest.approx([0, 0.5, 2.0])
+    at_the_wall = np.array([(0, 1.0, 0), (0, 1.503, 0), (0, 2.0, 0)])
+    assert settle(at_the_wall, sizes)[:, 1] == pytest.approx([1.0, 1.5, 2.0])
+    along = np.array([(-0.004, 0, 0), (0.496, 0.2, 0), (0.5, 1.0, 0.003)])
+    assert settle(along, sizes) == pytest.approx(np.array([(0, 0, 0), (0.5, 0.2, 0), (0.5, 1, 0)]))
+
+
+@pytest.mark.parametrize(
+    "second",
+    [(0.494, 0, 0), (0, 0, 0.494), (0, 0, 0.506), (0, -0.006, 1), (0, 2.006, 0), (6.506, 0, 0)],
+)
+def test_larger_faults_are_left_for_a_load_to_refuse(second):
+    sizes, low = np.full((2, 3), 0.5), np.array([(0, 0, 0), second], float)
+    assert (settle(low, sizes) == low).all()
+    with pytest.raises(BoxError):
+        check_stacked(Load.from_corners(low, sizes))
+    if second != (0, -0.006, 1):
+        check_stacked(Load.from_corners(settle(low, sizes, 0.01), sizes))
+
+
+@pytest.mark.parametrize(
+    ("supports", "tips"),
+    [
+        ([(1.0, 1.0)], False),
+        ([(0.77, 1.0)], False),
+        ([(0.75, 1.0)], True),  # its edge is under the centre
+        ([(0.74, 1.0)], True),
+        ([(1.26, 1.2)], True),
+        ([(0.7, 1.0), (1.3, 1.0)], False),  # a bridge
+        ([(0.7, 0.7), (1.3, 1.3)], False),  # across, from corner to corner
+        ([(0.7, 0.7), (1.3, 0.7)], True),  # both at one side
+    ],
+)
+def test_a_box_tips_if_its_centre_lies_beside_what_it_stands_on(supports, tips):
+    low = np.array([(x, y, 0) for x, y in supports] + [(1.0, 1.0, 0.5)], float)
+    load = Load.from_corners(low, np.full((len(low), 3), 0.5))
+    assert uncarried(load).tolist() == ([len(supports)] if tips else [])
+
+
+def test_no_box_of_the_paper_tips(full_load):
+    assert uncarried(full_load).size == 0

@@ -1,0 +1,131 @@
+"""Lifts that several processes share."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from unload.physics import table
+from unload.physics.local import LocalPhysics
+from unload.physics.pool import Pool
+from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics
+from unload.support.compiled import CONFIG
+
+
+@pytest.fixture(autouse=True)
+def three_cores(monkeypatch):
+    monkeypatch.setattr(CONFIG, "NUMBA_NUM_THREADS", 3)
+
+
+@pytest.fixture
+def local():
+    physics = LocalPhysics()
+    yield physics
+    physics.close()
+
+
+@pytest.fixture
+def pool():
+    pool = Pool()
+    yield pool
+    pool.close()
+
+
+@pytest.fixture
+def hard(situations):
+    """Different situations that a table knows by no rule."""
+    different = {each.key: each for each in situations if 0 < each.on_top < HELD_DOWN}
+    return list(different.values())[:16]
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 16])
+def test_shared_lifts_are_those_of_one_process(pool, local, hard, count):
+    alone = [local.simulate(each) for each in hard[:count]]
+    assert len(set(alone)) > count / 2
+    for _ in range(2):  # the processes stay
+        assert pool.simulate(hard[:count], local.simulate) == alone
+    assert len(pool._workers) == 2
+    assert pool.simulate([], local.simulate) == []
+
+
+def test_each_process_has_its_share(pool, hard):
+    own = []
+    pool.simulate(hard, lambda situation: own.append(situation) or 0.0)
+    assert own == hard[::3]
+
+
+def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
+    def interrupt(situation):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pool.simulate(hard, interrupt)
+    assert pool.simulate(hard[5:], local.simulate) == [local.simulate(each) for each in hard[5:]]
+
+
+def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
+    alone = pool.simulate(hard, local.simulate)
+    pool._workers[1].kill()
+    pool._workers[1].wait()
+    with pytest.raises(RuntimeError, match="a process that simulates lifts has died"):
+        pool.simulate(hard, local.simulate)
+    assert pool.simulate(hard, local.simulate) == alone
+
+
+def test_ctrl_c_is_not_for_them(pool, local, hard):
+    alone = pool.simulate(hard, local.simulate)
+    for worker in pool._workers:
+        worker.send_signal(signal.SIGINT)
+    assert pool.simulate(hard, local.simulate) == alone
+
+
+def test_they_end_with_the_pool_or_its_physics(hard):
+    pool, physics = Pool(), TablePhysics(LiftTable())
+    for each in (pool, physics._pool):
+        each.simulate([], None)
+    workers = pool._workers + physics._pool._workers
+    assert [worker.poll() for worker in workers] == [None] * 4
+    del pool
+    physics.close()
+    assert [worker.returncode for worker in workers] == [-signal.SIGKILL] * 4
+
+
+def test_they_end_with_a_process_that_is_killed():
+    script = (
+        "import os; from unload.physics.pool import Pool; pool = Pool(); pool.simulate([], None); "
+        "print(*[worker.pid for worker in pool._workers], flush=True); os.kill(os.getpid(), 9)"
+    )
+    environment = os.environ | {"NUMBA_NUM_THREADS": "3"}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True)
+    left = [int(number) for number in done.stdout.split()]
+    assert len(left) == 2
+    until = time.monotonic() + 20
+    while left and time.monotonic() < until:
+        left = [number for number in left if os.path.exists(f"/proc/{number}/cmdline")]
+        time.sleep(0.05)
+    assert not left
+
+
+def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
+    shared = []
+
+    def simulate(pool, situations, own):
+        shared.append(len(situations))
+        return [own(each) for each in situations]
+
+    monkeypatch.setattr(Pool, "simulate", simulate)
+    monkeypatch.setattr(table, "PATIENCE", 15)
+    alone = [local.simulate(each) for each in hard]
+    physics = TablePhysics(LiftTable())
+    for first, last in ((0, 6), (6, 12), (12, 15)):  # three are too few to count
+        assert physics.simulate_all(hard[first:last]) == alone[first:last]
+    assert shared == [] and len(physics.table) == 15
+    physics.table = LiftTable()
+    assert physics.simulate_all(hard) == alone
+    assert shared == [16] and len(physics.table) == 16
+    assert np.allclose([physics.table.find(each) for each in hard], alone)
+    physics.close()
