@@ -69,4 +69,4 @@ def test_the_runs_with_jams_are_those_of_the_data():
     runs = verdicts.by_run(read_grid(SEAMLESS, cells=["mask_order", "no_mask_order"]))
     text = " ".join(README.split())
     assert f"{len(runs)} runs | on average {100 * runs['end'].mean():.0f} %" in text
-    assert f"only {runs['fig12'].sum()} of {len(runs)} runs rise as steadily" in text
+    assert f"only {runs['fig12'].sum()} of {len(runs)} rise as steadily" in text

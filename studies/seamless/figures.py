@@ -16,12 +16,14 @@ from studies.style import styled
 PAPER_START = 0.15  # MSR at the start of its Fig. 12
 CHANCE = 0.26  # MSR of random picks with a gap of 1 mm
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
-ANEW_CELLS = ("mask", "no_mask", "b2048", "shuffled", "positions")  # drawn anew, with j = 0.4
+ANEW = ("mask", "no_mask", "b2048", "shuffled", "positions")  # drawn anew, with j = 0.4
+ANEW_CELLS = [name for name in CELLS if name.startswith(ANEW)]
 SMOOTH = 16  # episodes of all containers, about half a million picks
 
 # Cells of the grid whose runs have one look in ``draw_start_and_end``: name, cells, marker, colour.
 GROUPS = (
-    ("j = 0.4", [name for name in CELLS if name.startswith(ANEW_CELLS)], "s", "C0"),
+    ("j = 0.4, ties by order", [name for name in ANEW_CELLS if "order" in name], "s", "C0"),
+    ("j = 0.4, ties otherwise", [name for name in ANEW_CELLS if "order" not in name], "s", "C5"),
     ("j = 0.2", ["share_0.2_mask_order"], "^", "C2"),
     ("j = 0.3", ["share_0.3_mask_order"], "v", "C2"),
     ("jams as measured", [name for name in CELLS if name.startswith("measured")], "D", "C4"),
@@ -146,9 +148,7 @@ def draw_jams(table: pd.DataFrame, wanted: tuple[float, float]) -> Figure:
         wanted: the shares between which the paper's start and end lie; shaded.
     """
     figure, axes = plt.subplots(figsize=(5.2, 3.4))
-    axes.axhspan(
-        100 * wanted[0], 100 * wanted[1], color="0.9", label="would give the paper's curve"
-    )
+    axes.axhspan(100 * wanted[0], 100 * wanted[1], color="0.9", label="j of the model")
     colours = plt.get_cmap("viridis")(np.linspace(0, 0.85, table["gap"].nunique()))
     for (gap, rows), colour in zip(table.groupby("gap"), colours):
         groups = rows.groupby("friction")[["free", "jammed"]].sum()
