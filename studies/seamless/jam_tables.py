@@ -118,7 +118,7 @@ def episodes_data(
         if case.walls == 3 and case.gap == 0 and after_pick == "restore":
             about = {"load": case.load, "friction": case.friction, "policy": policy}
             attempts.append(pd.DataFrame(result.value).assign(**about))
-    attempts = prepared(pd.concat(attempts, ignore_index=True))
+    attempts = in_classes(pd.concat(attempts, ignore_index=True))
     first = first_attempts(attempts)
     tables = {
         "jam_episodes": pd.DataFrame(rows), "jam_first": first,
@@ -142,7 +142,7 @@ def episode_rows(case: Case, policy: str, after_pick: str, attempts: list[dict])
     ]
 
 
-def prepared(attempts: pd.DataFrame) -> pd.DataFrame:
+def in_classes(attempts: pd.DataFrame) -> pd.DataFrame:
     """Attempts in the order of their episodes, with ``jammed`` and ``beside`` in few classes."""
     return attempts.assign(
         jammed=attempts["distance"] < task.LIFT_THRESHOLD,
@@ -161,7 +161,7 @@ def again(attempts: pd.DataFrame, first: pd.DataFrame) -> pd.DataFrame:
     """``jam_again.csv``, see ``episodes_data``.
 
     Args:
-        attempts: of one policy, see ``prepared``.
+        attempts: of one policy, see ``in_classes``.
         first: of ``first_attempts``.
     """
     share = (first["jammed"] / first["free"]).rename("neighbours")

@@ -138,7 +138,7 @@ def test_first_attempts_are_counted_by_place():
         attempt(0, 7, 0, True), attempt(0, 7, 3, False),  # the second one is no first one
         attempt(1, 7, 0, False), attempt(0, 8, 0, True, True, 5), attempt(0, 9, 0, True, True, 3),
     ]  # fmt: skip
-    first = jam_tables.first_attempts(jam_tables.prepared(pd.DataFrame(rows)))
+    first = jam_tables.first_attempts(jam_tables.in_classes(pd.DataFrame(rows)))
     assert first.to_dict("records") == [
         {"friction": 1.0, "covered": False, "beside": 1, "free": 2, "jammed": 1},
         {"friction": 1.0, "covered": True, "beside": 3, "free": 2, "jammed": 2},
@@ -151,7 +151,7 @@ def test_attempts_at_boxes_that_jammed_are_counted_by_the_successes_between():
         attempt(0, 9, 1, False), attempt(0, 7, 30, False), attempt(0, 6, 31, True, True, 2),
         attempt(1, 7, 31, True),
     ]  # fmt: skip
-    attempts = jam_tables.prepared(pd.DataFrame(rows))
+    attempts = jam_tables.in_classes(pd.DataFrame(rows))
     found = jam_tables.again(attempts, jam_tables.first_attempts(attempts))
     assert found["between"].tolist() == [1, 26]
     assert found["attempts"].tolist() == [1, 1] and found["jammed"].tolist() == [1, 0]
