@@ -98,8 +98,7 @@ def test_what_is_installed_is_what_is_pinned():
 
 def test_what_is_imported_is_named():
     extras = PROJECT["optional-dependencies"]
-    optional = {*extras["pybullet"], *extras["sb3"]} - {"sb3-contrib"}
-    assert distributions("unload") == set(LOWEST) | optional
+    assert distributions("unload") == set(LOWEST) | {*extras["pybullet"]}
     others = distributions("studies") - on_demand()
     assert set(extras["studies"]) <= others
     others |= (distributions("tests") | distributions("notebooks")) - on_demand()

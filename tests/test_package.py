@@ -39,7 +39,6 @@ LIBRARIES = {
     "pybullet": ("unload/physics/bullet.py",),
     "safetensors": ("unload/network/weights.py",),
     "scipy": ("studies/heap/", "studies/statistics.py"),
-    "stable_baselines3": ("unload/env/sb3.py",),
     "torch": (
         "unload/network/", "unload/fast/", "unload/agent/", "studies/grid.py", "studies/sweep.py",
         "studies/falls/", "studies/heap/",

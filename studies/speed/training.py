@@ -7,10 +7,10 @@ from unittest import mock
 import numpy as np
 import stable_baselines3
 import torch
+from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 
 import unload
-from unload.env.sb3 import ContainerVecEnv
 from unload.fast import fused
 
 # Picks that count, of ours with the fused update, of ours with plain PyTorch's, and of theirs.
@@ -74,7 +74,8 @@ def _our_rate(picks: int, threads: int, before: int) -> float:
 def _their_rate(picks: int, threads: int) -> float:
     torch.set_num_threads(threads)
     config = unload.TrainConfig()
-    envs = ContainerVecEnv(config.num_envs, equalize=config.equalize)
+    settings = {"physics": "table", "equalize": config.equalize}
+    envs = make_vec_env("unload/Container-v0", config.num_envs, env_kwargs=settings)
     model = stable_baselines3.DQN(
         PEQPolicy,
         envs,

@@ -4,13 +4,14 @@ import numpy as np
 import pandas as pd
 import stable_baselines3
 import torch
+from sb3_contrib import MaskablePPO
+from stable_baselines3.common.env_util import make_vec_env
 
 import unload
 from studies.speed import mutants, parts
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
 from studies.speed.run import show
 from studies.speed.training import PEQPolicy
-from unload.env.sb3 import ContainerVecEnv
 
 
 def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
@@ -23,8 +24,10 @@ def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
 
 
 def test_stable_baselines_trains_the_papers_network():
+    settings = {"physics": "table", "max_picks": 3}
+    envs = make_vec_env("unload/Container-v0", 4, env_kwargs=settings)
     model = stable_baselines3.DQN(
-        PEQPolicy, ContainerVecEnv(4, max_picks=3), buffer_size=64, learning_starts=8,
+        PEQPolicy, envs, buffer_size=64, learning_starts=8,
         batch_size=8, train_freq=1, policy_kwargs={"net_arch": [6]}, seed=0, device="cpu",
     )  # fmt: skip
     network = model.q_net.q_net
@@ -39,6 +42,22 @@ def test_stable_baselines_trains_the_papers_network():
     chosen, _ = model.predict(observations, deterministic=True)
     assert np.array_equal(chosen, values.argmax(dim=1))
     model.env.close()
+
+
+def test_maskable_ppo_learns_on_64_containers():
+    envs = make_vec_env("unload/Container-v0", 64, env_kwargs={"physics": "table", "max_picks": 50})
+    model = MaskablePPO(
+        "MlpPolicy", envs, n_steps=16, batch_size=256, gamma=0, learning_rate=1e-3, seed=0,
+        device="cpu",
+    )  # fmt: skip
+    model.learn(16_000)
+    assert model.ep_info_buffer[0]["l"] == 50
+
+    def policy(observations, masks, rng):
+        return model.predict(observations, action_masks=masks, deterministic=True)[0]
+
+    assert unload.evaluate(policy, 20, max_picks=50)["success_rate"].mean() > 0.98
+    envs.close()
 
 
 def test_rates_are_positive(small_load, monkeypatch):

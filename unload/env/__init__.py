@@ -1,5 +1,5 @@
 """The environments: a container, and the choice of the highest item.
 
 Read ``observation``, ``equalization``, ``base``, ``container``, ``highest_item`` and ``vector``,
-in this order; ``sb3`` is for Stable-Baselines3.
+in this order.
 """
