@@ -5,7 +5,7 @@
 First its cells, as ``data/falls/PLAN.md`` names them; then how a run is trained and measured.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from studies import changes, paths
 from studies.falls import measures
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, keep_all, publish, read_table
+from studies.results import COMMAND, JOBS, Result, keep_all, publish, read_table
 from studies.statistics import end_msr
 from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
@@ -195,20 +195,29 @@ def point(run: Training, seen: measures.Seen | None = None) -> dict[str, float]:
     return dict(zip(POINT, map(float, values), strict=True))
 
 
-def run_cell(cell: str, seed: int) -> dict:
+def run_cell(name: str, cell: Cell, seed: int) -> dict:
     """Train and measure a run: a row of ``COLUMNS``, and the points of its trace."""
-    config, trace = replace(CELLS[cell].config, seed=seed), []
-    seen = SEEN.get(cell)
-    run = train_in_laboratory(
-        config, CELLS[cell].change, lambda run: trace.append(point(run, seen))
-    )
+    config, trace, seen = replace(cell.config, seed=seed), [], SEEN.get(name)
+    run = train_in_laboratory(config, cell.change, lambda run: trace.append(point(run, seen)))
     network, curve = run.agent.network, run.curve.table()
-    row = {"cell": cell, "seed": seed, "mean": curve["success_rate"].mean(), "end": end_msr(curve)}
-    for name, blank in zip(JUDGED, measures.BLANKED.values()):
-        row[name] = measures.judged(network, config, blank, seen)
+    row = {"cell": name, "seed": seed, "mean": curve["success_rate"].mean(), "end": end_msr(curve)}
+    row |= measures.judged_blanked(network, config, seen)
     points = pd.DataFrame(trace)
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
-    return {"row": row, "trace": trace if cell in TRACED else []}
+    return {"row": row, "trace": trace if name in TRACED else []}
+
+
+def keep_cells(
+    folder: Path, cells: Mapping[str, Cell], run: Callable[[str, Cell, int], dict], n_jobs: int
+) -> list[Result]:
+    """What ``run`` returns of each seed of some cells, see ``results.kept``."""
+    jobs, same = [], {"measured": identity(run), "fingerprint": training_fingerprint()}
+    for name, cell in cells.items():
+        question = {"cell": name, "change": identity(cell.change), **same}
+        for seed in cell.seeds:
+            config = replace(cell.config, seed=seed).plain()
+            jobs.append((question | config, partial(run, name, cell, seed)))
+    return keep_all(folder, jobs, n_jobs)
 
 
 def laboratory_data(
@@ -234,15 +243,8 @@ def laboratory_data(
     """
     for cell in cells:
         checks.one_of("cells", cell, CELLS)
-    fingerprint, jobs = training_fingerprint(), []
-    measured = identity([point, measures.judged])  # what is measured, whatever is trained
-    for cell in cells:
-        changed = identity([CELLS[cell].change, SEEN.get(cell)])
-        for seed in CELLS[cell].seeds[:seeds]:
-            config = replace(CELLS[cell].config, seed=seed).plain()
-            question = {"cell": cell, "changed": changed, "measured": measured, **config}
-            jobs.append((question | {"fingerprint": fingerprint}, partial(run_cell, cell, seed)))
-    results = keep_all(Path(runs_dir) / "laboratory", jobs, n_jobs)
+    chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
+    results = keep_cells(Path(runs_dir) / "laboratory", chosen, run_cell, n_jobs)
     rows = [result.value["row"] for result in results]
     traces = [
         pd.DataFrame(result.value["trace"]).assign(cell=row["cell"], seed=row["seed"])
@@ -255,7 +257,7 @@ def laboratory_data(
     reduced = seeds is not None or set(cells) < set(CELLS)
     place = Path(folder) / ("reduced/falls" if reduced else "falls")
     command = f"{COMMAND} laboratory"
-    settings = {"config": CONFIG.plain(), "runs": len(rows)}
+    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(rows)}, training_fingerprint()
     publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 

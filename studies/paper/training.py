@@ -83,20 +83,8 @@ def paper_runs(folder: str | Path = paths.DATA) -> list[tuple[str, int, pd.DataF
     return [(cell, seed, curve) for (cell, seed), curve in groups]
 
 
-def default_curves(folder: str | Path = paths.DATA) -> dict[int, pd.DataFrame]:
-    """The published curves of the paper's configuration that the figures show, by their seeds.
-
-    Each point is a mean over an episode of all environments; they are indexed by ``picks``.
-    """
-    curves = read_grid(PAPER, folder, [DEFAULTS])
-    return {
-        seed: curves[curves["seed"] == seed].set_index("picks", drop=False)
-        for seed in DEFAULT_SEEDS
-    }
-
-
 def default_policies(folder: str | Path = paths.DATA) -> dict[int, Greedy]:
-    """The policies that these runs have learned, by their seeds."""
+    """The policies that ``DEFAULT_SEEDS`` of the paper's configuration have learned."""
     policies = read_policies(Path(folder) / f"{PAPER.name}.safetensors")
     return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
 

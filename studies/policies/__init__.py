@@ -2,6 +2,6 @@
 
 Read ``margin`` first (why many rules never fail in a neat load), then ``comparison`` (where the
 lift table reaches, and what a policy's file says of it), ``robustness`` (every box simulated),
-``variants`` (other networks, rewards and settings), ``figures`` (the policies beside each other)
-and ``orders`` (which of them a robot can carry out).
+``variants`` (other networks, rewards and settings) and ``figures`` (the policies beside each
+other).
 """
