@@ -23,7 +23,6 @@ from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
 from unload.agent.identity import identity, unchanged
 from unload.agent.training import Training
-from unload.support import checks
 
 # The mask is on by default.
 CONFIG = TrainConfig(
@@ -236,13 +235,8 @@ def laboratory_data(
     over the training (see ``measures``). The second has the points of the runs in ``TRACED``, see
     ``point``.
 
-    Args:
-        cells: names in ``CELLS``.
-        seeds: of each cell at most, those of the plan if None.
-        folder: of the data; a part of the cells or seeds goes to its folder ``reduced``.
+    A part of the ``cells``, or fewer ``seeds`` of each, goes to the folder ``reduced``.
     """
-    for cell in cells:
-        checks.one_of("cells", cell, CELLS)
     chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
     results = keep_cells(Path(runs_dir) / "laboratory", chosen, run_cell, n_jobs)
     rows = [result.value["row"] for result in results]

@@ -101,9 +101,6 @@ def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
     Returns:
         One row per episode with the columns of ``curve``; ``picks``, ``wall_time`` and
         ``epsilon`` are those at its end.
-
-    Raises:
-        ValueError: a point of the curve lies in two episodes.
     """
     length = task.NUM_ENVS * task.MAX_PICKS
     episode = ((curve["picks"] - 1) // length).rename("episode")

@@ -99,10 +99,7 @@ def variants_data(
     """Train some grids, see ``train_grid``.
 
     The recommended agent's first run also leaves ``policies/recommended.safetensors``.
-
     """
-    for name in grids:
-        checks.one_of("grids", name, GRIDS)
     for name in grids:
         kept = train_grid(GRIDS[name], folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
         if name == "recommended":
@@ -111,11 +108,7 @@ def variants_data(
 
 
 def read_variants(grid: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """What the policies of a grid reach, see ``read_measures``; before rewards their control.
-
-    Args:
-        grid: a name in ``GRIDS``.
-    """
+    """What the policies of a grid reach, see ``read_measures``; before rewards their control."""
     checks.one_of("grid", grid, GRIDS)
     rows = read_measures(GRIDS[grid], folder)
     if grid != "rewards":
@@ -126,10 +119,7 @@ def read_variants(grid: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
 
 @styled
 def variants_msr(grid: str, folder: str | Path = paths.DATA) -> Figure:
-    """MSR of the policies of a grid: each seed pale, their mean strong, with its 95 % interval.
-
-    Arguments and errors as for ``read_variants``.
-    """
+    """MSR of the policies of a grid: each seed pale, their mean strong, with its 95 % interval."""
     cells = dict(list(read_variants(grid, folder).groupby("cell", sort=False)))
     figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
     for row, cell in enumerate(cells.values()):
