@@ -102,7 +102,7 @@ def test_no_committed_file_is_too_large():
 BAD_INPUT = {
     "cells is 'nothing'": lambda folder: train_grid(PAPER, ["nothing"], folder=folder),
     "n_jobs == 0": lambda folder: comparison.comparison_data(folder, n_jobs=0),
-    "grid is 'nothing'": lambda folder: variants_msr("nothing", folder),
+    "part is 'nothing'": lambda folder: variants_msr("nothing", folder),
 }
 
 

@@ -2,9 +2,7 @@
 
 import os
 import resource
-import shutil
 import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 
@@ -106,40 +104,32 @@ def test_records_are_joined():
     assert together["machine"] == first["machine"]
 
 
-# Git sets variables for its hooks, which would lead the tests' git to another repository.
-OUTSIDE = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
+    for name in [name for name in os.environ if name.startswith("GIT_")]:
+        monkeypatch.delenv(name)  # git sets them for its hooks; they lead to another repository
+    found = revision.__wrapped__  # what it says is kept for a process
+    monkeypatch.setattr(paths, "ROOT", tmp_path)
 
+    def git(*command: str) -> str:
+        who = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+        return subprocess.check_output(["git", *who, *command], cwd=tmp_path, text=True).strip()
 
-def test_the_projects_own_commit_is_its_revision(tmp_path):
-    """Of a copy of the parts that find it."""
-    folder = tmp_path / "copy"
-    for part in ("unload/support", "studies"):
-        shutil.copytree(
-            paths.ROOT / part, folder / part,
-            ignore=lambda place, names: [name for name in names if not name.endswith(".py")],
-        )  # fmt: skip
-    (folder / "unload" / "__init__.py").touch()
-    shutil.copy(paths.ROOT / "pyproject.toml", folder)
-
-    def output(*command: str) -> str:
-        return subprocess.check_output(command, cwd=folder, text=True, env=OUTSIDE).strip()
-
-    def found() -> str:
-        return output(
-            sys.executable, "-c", "from studies import results; print(results.revision())"
-        )
-
-    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"]
+    assert found() == "unknown"
+    for name in ("unload/task.py", "studies/grid.py"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "theirs"]):
-        output(*git, *command)
-    own = output(*git, "rev-parse", "--short=12", "HEAD")
-    (folder / "README.md").write_text("not part of the package")
-    (folder / ".gitignore").write_text("__pycache__\n")
+        git(*command)
+    own = git("rev-parse", "--short=12", "HEAD")
+    (tmp_path / "README.md").write_text("not part of the code")
     assert found() == own
-    for changed in ("unload/task.py", "studies/more.py"):
-        (folder / changed).touch()
+    for name in ("unload/task.py", "studies/more.py"):
+        (tmp_path / name).write_text("changed")
         assert found() == f"{own}+"
-        (folder / changed).unlink()
+        (tmp_path / name).unlink()
+        git("checkout", "-q", ".")
+    monkeypatch.setattr(paths, "ROOT", tmp_path / "studies")
+    assert found() == "unknown", "the enclosing repository is another one"
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

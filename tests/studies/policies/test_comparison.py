@@ -11,7 +11,7 @@ import torch
 from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.policies import comparison, figures, robustness
-from studies.policies.comparison import PLAYERS, compare, comparison_data, digests
+from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
 from studies.results import read_provenance
@@ -25,24 +25,18 @@ from unload.physics.situation import Surroundings
 from unload.support import files
 
 
-def test_a_comparison_holds_the_rows_of_evaluate(monkeypatch):
-    monkeypatch.setattr(comparison, "LOADS", 2)
-    rows = compare("highest", policies.highest, True, "σ 5 cm")
-    expected = evaluate(policies.highest, 2, comparison.SEED, position_noise=0.05)
-    pd.testing.assert_frame_equal(rows[expected.columns], expected)
-    assert rows["load"].tolist() == [0, 1]
-    assert set(rows["condition"]) == {"σ 5 cm"}
-
-
-def test_data_and_its_provenance(tmp_path, monkeypatch):
+def test_a_comparison_holds_the_rows_of_evaluate(tmp_path, monkeypatch):
     monkeypatch.setattr(comparison, "LOADS", 1)
-    monkeypatch.setattr(
-        comparison, "CONDITIONS", {"500 picks": {}, "σ 2 cm": {"position_noise": 0.02}}
-    )
+    conditions = {"500 picks": {}, "σ 5 cm": {"position_noise": 0.05}}
+    monkeypatch.setattr(comparison, "CONDITIONS", conditions)
     comparison_data(tmp_path, n_jobs=1)
     table = pd.read_csv(tmp_path / "policies/comparison.csv")
     played = table[["condition", "policy", "mask"]].itertuples(index=False, name=None)
-    assert list(played) == [(c, *player) for c in ("500 picks", "σ 2 cm") for player in PLAYERS]
+    assert list(played) == [(name, *player) for name in conditions for player in PLAYERS]
+    rows = table.query("policy == 'highest' and condition == 'σ 5 cm'").reset_index()
+    expected = evaluate(policies.highest, 1, comparison.SEED, position_noise=0.05)
+    pd.testing.assert_frame_equal(rows[expected.columns], expected, rtol=1e-5)
+    assert table["load"].unique().tolist() == [0]
     assert read_provenance(tmp_path / "policies", "comparison")["settings"]["loads"] == 1
 
 
@@ -148,15 +142,11 @@ def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
         assert load.walls[seen].min() > 12 - FRONT_WALLS
 
 
-def test_every_condition_has_its_panel():
+def test_every_condition_has_its_panel_whose_dots_are_means_over_the_containers():
     assert set(figures.CONDITIONS) == {*comparison.CONDITIONS, *figures.FULL.values()}
     assert set(figures.FULL) == {after_pick for _, after_pick in robustness.PLAYED}
-    shown = [axes.get_title("left") for axes in figures.comparison_msr().axes]
-    assert shown == list(figures.CONDITIONS)
-
-
-def test_dots_are_the_means_over_the_containers():
     panels = {axes.get_title("left"): axes for axes in figures.comparison_msr().axes}
+    assert list(panels) == list(figures.CONDITIONS)
     table = figures.read_comparison()
     for condition, axes in panels.items():
         rows = table[table["condition"] == condition]

@@ -41,13 +41,6 @@ def all_attempts(run) -> np.ndarray:
     return np.stack([attempts(run, row) for row in range(128)])
 
 
-def msr_of_an_episode(run) -> float:
-    """Of the random picks of a whole episode of 64 containers."""
-    while not run.rollout.finished:
-        run.step()
-    return run.curve.table()["success_rate"].iloc[0]
-
-
 def test_uniform_numbers_are_uniform_and_independent():
     drawn = uniform(7, np.arange(400)[:, None], np.arange(500))
     assert 0 <= drawn.min() and drawn.max() < 1
@@ -72,9 +65,11 @@ def test_the_share_of_free_boxes_jams_and_no_other_lift_changes(random_run):
 
 @pytest.mark.parametrize(("share", "start"), [(0.0, 0.264), (0.4, 0.158), (1.0, 0.0)])
 def test_random_picks_succeed_the_less_the_more_boxes_jam(random_run, share, start):
-    """Without jams the rate falls faster along the episode, because more is dug."""
     run = random_run(partial(jam, share=share))
-    assert msr_of_an_episode(run) == pytest.approx(start, abs=0.012)
+    while not run.rollout.finished:
+        run.step()
+    # A whole episode of 64 containers; without jams the rate falls faster, because more is dug.
+    assert run.curve.table()["success_rate"].iloc[0] == pytest.approx(start, abs=0.012)
 
 
 @pytest.mark.parametrize("lasts", [0, 1])
@@ -135,11 +130,6 @@ def test_the_papers_weight_changes_nothing(random_run):
         for _ in range(50):
             run.step()
     assert plain.curve.sums == weighed.curve.sums
-
-
-def test_random_picks_succeed_less_often_with_weight_one(random_run):
-    run = random_run(partial(weigh, z=1.0))
-    assert msr_of_an_episode(run) == pytest.approx(0.18, abs=0.01)  # 0.264 with the paper's 4
 
 
 def test_neighbours_are_those_of_the_measured_places(random_run):
