@@ -18,7 +18,7 @@ from studies.paper import diagrams, learning_curves, loads
 from studies.paper.training import PAPER
 from studies.paper.tuning import running_mean
 from studies.paper.visible_items import scaled_side_view
-from studies.policies import figures as policies
+from studies.policies.comparison import comparison_msr
 from studies.policies.variants import PARTS, variants_msr
 
 LINE = np.arange(3.0)
@@ -27,7 +27,7 @@ RUNS = {"a": ({0: LINE, 3: 2 * LINE}, 3), "with FE": ({1: LINE}, 1)}
 # Figures that are drawn from data/, and take its folder.
 FROM_DATA = {
     **{f"variants_{part}": partial(variants_msr, part) for part in PARTS},
-    "comparison": policies.comparison_msr,
+    "comparison": comparison_msr,
     "why_60": lambda folder=paths.DATA: falls.four_cells(read_grid(PAPER, folder)),
     "why_runs_fall": lambda folder=paths.DATA: falls.loop(
         read_trace(folder), read_laboratory(folder)

@@ -71,6 +71,7 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
     variants_data(n_jobs=1, **folders)
     rows = read_measures(GRIDS["variants"], tmp_path)
+    assert rows["seed"].tolist() == 3 * [0, 1, 2]
     assert rows["cell"].nunique() == 3 and rows["msr_mask"].between(0, 1).all()
     provenance = read_provenance(tmp_path, "variants/recommended")
     assert provenance["fingerprint"] == training_fingerprint()

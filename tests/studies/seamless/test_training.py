@@ -138,7 +138,8 @@ def test_dashed_lines_are_without_the_mask(curves, draw):
     assert [each.get_title() for each in axes] == ["a gap of 1 mm", "seamless walls"]
     strong = [line for line in axes[0].lines if line.get_linewidth() > 1.5]
     assert {line.get_label(): line.get_linestyle() for line in strong} == figures.MASK_LINES
-    assert len([line for line in axes[0].lines if line.get_linewidth() < 0.5]) == 16
+    thin = [line for line in axes[0].lines if line.get_linewidth() < 0.5]
+    assert len(thin) == 16 and strong[0].get_ydata()[0] == thin[0].get_ydata()[0]  # the first run
     stars = [line.get_xydata()[0] for line in axes[0].lines if line.get_marker() == "*"]
     if draw == figures.fig12_reward:  # the paper's start and end
         assert np.array(stars) == pytest.approx(np.array([(0, -0.7), (2e7, 0.2)]))
