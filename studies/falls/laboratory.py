@@ -73,10 +73,6 @@ def _both(name: str, change: Change = unchanged, seeds: int = SEEDS, **fields) -
     }
 
 
-def _seen(name: str) -> Cell:
-    return _cell(partial(changes.see, change=SEEN[name]), FEW_SEEDS, equalize=False)
-
-
 def _watching(change: Change) -> Change:
     """Only watch a network that chooses, and that learns with a change of its own."""
     return partial(changes.tandem, change=change, seed=50)
@@ -102,7 +98,10 @@ CELLS: dict[str, Cell] = {
     **_both("averaged", seeds=REMEDY_SEEDS, **AVERAGED),
     **_both("averaged_mirrored", changes.mirrored, **AVERAGED),
     **_both("positions", equalize=False),
-    **{f"averaged_{axis}": _seen(f"averaged_{axis}") for axis in "xyz"},
+    **{
+        name: _cell(partial(changes.see, change=SEEN[name]), FEW_SEEDS, equalize=False)
+        for name in ("averaged_x", "averaged_y", "averaged_z")
+    },
     **{f"ranks_{name}": _cell(**fields) for name, fields in TAKEN_BACK.items()},
     **{
         f"shuffled_{name}": _cell(changes.shuffled, **fields) for name, fields in TAKEN_BACK.items()

@@ -12,7 +12,7 @@ from studies import grid, sweep
 from studies.changes import shuffled
 from studies.paper.tuning import tuning_config
 from studies.results import read_provenance
-from tests.agent.runs import CONTAINER, assert_same
+from tests.agent.runs import assert_same
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import train
@@ -111,22 +111,17 @@ def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path,
     assert (tmp_path / "run" / "policy.safetensors").exists()
 
 
-def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
-    (tmp_path / "set").mkdir()
-    (tmp_path / "set" / "run_0").write_text("a file where the run's folder should be")
-    report = sweep.run_sweep(configs, tmp_path, n_jobs=1)
-    assert "run_0" in report["error"].iloc[0]
-    assert report["error"].iloc[1] == ""
-
-
-def test_an_error_in_own_code_is_traced_in_the_runs_log(tmp_path):
+def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp_path):
     def leaning(run):
         raise RuntimeError("it fell over")
 
-    config = {"run": TrainConfig(**CONTAINER)}
-    report = sweep.run_sweep(config, tmp_path, 1, changes={"run": leaning})
-    assert report["error"].item() == "RuntimeError: it fell over"
-    assert "in leaning" in (tmp_path / "run" / "log.txt").read_text()
+    configs["set/leaning"] = configs["set/run_0"]
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set/run_0").write_text("a file where the run's folder should be")
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, changes={"set/leaning": leaning})
+    blocked, fine, fallen = report["error"]
+    assert "run_0" in blocked and fine == "" and fallen == "RuntimeError: it fell over"
+    assert "in leaning" in (tmp_path / "set/leaning/log.txt").read_text()
 
 
 @pytest.mark.slow
