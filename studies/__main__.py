@@ -61,12 +61,8 @@ def paper(n_jobs: int) -> None:
 
 
 ALL = {"paper": ("all of them", paper, JOBS)}
-LISTED = "\n".join(f"    {COMMAND} {name:<15} {text}" for name, (text, *_) in (PARTS | ALL).items())
-DESCRIPTION = f"""\
+DESCRIPTION = """
 The data behind the paper's figures, computed and kept in ``data/`` with its provenance.
-
-{LISTED}
-
 File names and columns are those that the paper's own plots read. What has been computed is
 kept in ``runs/``: a command that was stopped goes on where it was, and what is finished is
 not repeated. Each training run writes its progress to ``log.txt`` in its folder there.
@@ -74,12 +70,11 @@ not repeated. Each training run writes its progress to ``log.txt`` in its folder
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        COMMAND, description=DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(COMMAND, description=DESCRIPTION)
     parts = parser.add_subparsers(dest="part", required=True, metavar="part")
-    for name, (_, make, options) in (PARTS | ALL).items():
-        part = parts.add_parser(name, formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    for name, (text, make, options) in (PARTS | ALL).items():
+        defaults = argparse.ArgumentDefaultsHelpFormatter
+        part = parts.add_parser(name, help=text, description=text, formatter_class=defaults)
         part.set_defaults(make=make)
         for option, details in options.items():
             part.add_argument(option, **details)

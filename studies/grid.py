@@ -5,8 +5,7 @@ and perhaps something changed in its runs that no configuration offers. All runs
 published together: a table of each measure, in which a run is a column; one file of policies;
 one record of where they come from.
 
-A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<table>/<name>``, its
-curves are published in a table of that name, so that no file of a large grid becomes large.
+A run is called ``<cell>/seed_<seed>``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,13 +18,7 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.results import (
-    joined,
-    read_provenance,
-    read_table,
-    write_provenance,
-    write_table,
-)
+from studies.results import joined, read_provenance, read_table, write_provenance, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
@@ -142,12 +135,19 @@ def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint
             config, change=grid.cells[cell_of(name)].change
         )
     if grid.measure is None:
-        write_curves(place, curves)
+        picks = next(iter(curves.values()))["picks"]  # the same for all
+        for column, digits in COLUMNS.items():
+            table = {"picks": picks} | {name: curve[column] for name, curve in curves.items()}
+            write_table(_table_path(place, column), pd.DataFrame(table), digits)
         if grid.policies:
             write_policies(place.with_name(f"{place.name}.safetensors"), policies)
     else:
-        rows = {name: grid.measure(policies[name], config) for name, config in done.items()}
-        write_measures(place, rows)
+        names = [name.rpartition("/seed_") for name in done]
+        rows = [
+            {"cell": cell, "seed": int(seed), **grid.measure(policies[name], config)}
+            for (cell, _, seed), (name, config) in zip(names, done.items())
+        ]
+        write_table(place.with_name(f"{place.name}.csv"), pd.DataFrame(rows))
 
     # The first seed stands for the others of its cell: it rebuilds their configurations, too.
     first = {
@@ -163,33 +163,9 @@ def cell_of(run: str) -> str:
     return run.rpartition("/seed_")[0]
 
 
-def _table_path(place: Path, cell: str, column: str) -> Path:
-    """Of the table that holds a column of a cell's curves."""
-    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}.csv")
-
-
-def write_curves(place: Path, curves: Mapping[str, pd.DataFrame]) -> None:
-    """Write curves by the names of their runs; all have the same picks.
-
-    ``<place>_success_rate.csv`` and ``<place>_loss.csv`` have a row per point of the curves, its
-    ``picks``, and a column per run.
-    """
-    picks = next(iter(curves.values()))["picks"]
-    for column, digits in COLUMNS.items():
-        tables: dict[Path, dict[str, pd.Series]] = {}
-        for name, curve in curves.items():
-            path = _table_path(place, cell_of(name), column)
-            tables.setdefault(path, {"picks": picks})[name] = curve[column]
-        for path, table in tables.items():
-            write_table(path, pd.DataFrame(table), digits)
-
-
-def write_measures(place: Path, rows: Mapping[str, dict[str, float]]) -> None:
-    """Write ``<place>.csv``: what is measured, by the names of the runs."""
-    table = pd.DataFrame(list(rows.values()))
-    table.insert(0, "cell", [cell_of(name) for name in rows])
-    table.insert(1, "seed", [int(name.rpartition("/seed_")[2]) for name in rows])
-    write_table(place.with_name(f"{place.name}.csv"), table)
+def _table_path(place: Path, column: str) -> Path:
+    """Of the table of a column of the curves: a row per point, its ``picks``; a column per run."""
+    return place.with_name(f"{place.name}_{column}.csv")
 
 
 def read_grid(
@@ -208,22 +184,17 @@ def read_grid(
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
-    columns = [_read_column(grid, Path(folder) / grid.name, wanted, column) for column in COLUMNS]
+    columns = []
+    for column in COLUMNS:
+        path = _table_path(Path(folder) / grid.name, column)
+        table = read_table(path, grid.command, ["picks"])
+        table = table[[name for name in table if name == "picks" or cell_of(name) in wanted]]
+        columns.append(table.melt("picks", var_name="run", value_name=column))
     curves = columns[0].assign(loss=columns[1]["loss"])
     names = curves.pop("run").str.rpartition("/seed_")
     curves.insert(0, "cell", names[0])
     curves.insert(1, "seed", names[2].astype(int))
     return curves
-
-
-def _read_column(grid: Grid, place: Path, cells: list[str], column: str) -> pd.DataFrame:
-    """A column of the curves of some cells: ``picks``, ``run`` and the column."""
-    parts = []
-    for path in dict.fromkeys(_table_path(place, cell, column) for cell in cells):
-        table = read_table(path, grid.command, ["picks"])
-        table = table[[name for name in table if name == "picks" or cell_of(name) in cells]]
-        parts.append(table.melt("picks", var_name="run", value_name=column))
-    return pd.concat(parts, ignore_index=True)
 
 
 def read_measures(grid: Grid, folder: str | Path = paths.DATA) -> pd.DataFrame:

@@ -100,15 +100,9 @@ def unpacked(text: str) -> dict[str, np.ndarray]:
 
 
 def keep_all(
-    folder: str | Path,
-    jobs: Sequence[tuple[dict, Callable[[], Any]]],
-    n_jobs: int,
+    folder: str | Path, jobs: Sequence[tuple[dict, Callable[[], Any]]], n_jobs: int
 ) -> list[Result]:
-    """``kept`` for several questions, each with what computes its answer, side by side.
-
-    Args:
-        jobs: pairs of ``question`` and ``compute``.
-    """
+    """``kept`` for several pairs of ``question`` and ``compute``, side by side."""
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question, compute) for question, compute in jobs
     )
@@ -156,13 +150,7 @@ def write_table(path: str | Path, table: pd.DataFrame, float_format: str = "%.6g
 
 
 def read_table(path: str | Path, command: str, columns: Sequence[str]) -> pd.DataFrame:
-    """A table that a command of this repository has made.
-
-    Args:
-        path: of the ``.csv`` file.
-        command: what makes it.
-        columns: that it must have.
-    """
+    """A table, a CSV file, that a ``command`` has made; it must have the ``columns``."""
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"{path} is missing; {command} makes it")
@@ -172,12 +160,7 @@ def read_table(path: str | Path, command: str, columns: Sequence[str]) -> pd.Dat
 
 
 def write_provenance(
-    folder: str | Path,
-    name: str,
-    command: str,
-    settings: dict,
-    reduced: bool,
-    record: dict,
+    folder: str | Path, name: str, command: str, settings: dict, reduced: bool, record: dict
 ) -> None:
     """Write ``folder/name.provenance.json``, see ``results.publish``; the record is ``joined``."""
     content = {"command": command, "reduced": reduced, "settings": settings, **record}
@@ -190,10 +173,7 @@ def read_provenance(folder: str | Path, name: str) -> dict:
 
 
 def run_record(seconds: float) -> dict:
-    """Record of the process that has computed a result.
-
-    Args:
-        seconds: wall time.
+    """Record of the process that has computed a result, in so many seconds of wall time.
 
     Returns:
         ``wall_time_s``, ``peak_memory_mib`` of the process so far, ``revision`` of the code,
@@ -220,13 +200,9 @@ def joined(records: Iterable[dict]) -> dict:
     Their number, the sum of their wall times, the highest peak of memory; and of the rest the
     one value that all share, or the list of those that occur.
     """
-    records = list(records)
-    rest = {}
+    records, rest = list(records), {}
     for name in ("revision", "versions", "python", "machine"):
-        values = []
-        for record in records:
-            if record[name] not in values:
-                values.append(record[name])
+        values = list({str(record[name]): record[name] for record in records}.values())
         rest[name] = values[0] if len(values) == 1 else values
     return {
         "runs": len(records),
@@ -259,7 +235,6 @@ def revision() -> str:
 
 
 def _cpu() -> str:
-    """Name of the processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
         return next(line.split(": ", 1)[1] for line in lines if line.startswith("model name"))

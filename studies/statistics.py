@@ -16,7 +16,6 @@ PAPER_MSR = 0.6  # at the end of its Fig. 12
 LIKE_THE_PAPER = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
 LEVEL = 0.95  # of the intervals
 RESAMPLES = 10_000
-COUNTED = ("fell", "steady", "slower", "noisier", "fig11", "fig12", "both")  # runs of a cell
 
 
 def windows(curve: pd.DataFrame) -> pd.DataFrame:
@@ -62,11 +61,7 @@ def resembles_fig11(curve: pd.DataFrame) -> bool:
 
 
 def loss_peak(loss: pd.Series) -> int | None:
-    """Return the window of the highest loss after a rise by a tenth; None without such a rise.
-
-    Args:
-        loss: of the windows, without NaN.
-    """
+    """Return the window of the highest loss after a rise by a tenth; None without such a rise."""
     risen = loss[loss >= 1.1 * loss.cummin()]
     return None if risen.empty else int(risen.idxmax())
 
@@ -89,7 +84,7 @@ def after_loss_peak(curve: pd.DataFrame) -> tuple[bool, bool]:
 
 
 def run_measures(curve: pd.DataFrame) -> dict:
-    """Return the measures of one run: end, falls, and likeness to the paper's."""
+    """Return the measures of one run that ``cell_table`` joins."""
     fig11, fig12 = resembles_fig11(curve), resembles_fig12(curve)
     slower, noisier = after_loss_peak(curve)
     return {
@@ -126,7 +121,7 @@ def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
         lowest="min",
         highest="max",
     )
-    return ends.join(groups[list(COUNTED)].sum()).reset_index()
+    return ends.join(groups.sum().drop(columns="end")).reset_index()
 
 
 def t_interval(values: Sequence[float]) -> tuple[float, float]:
@@ -145,13 +140,13 @@ def welch_interval(first: Sequence[float], second: Sequence[float]) -> tuple[flo
 
     NaN if there are fewer than two values of either.
     """
-    samples = [
+    first, second = (
         checks.finite_array(name, values, (None,))
         for name, values in (("first", first), ("second", second))
-    ]
-    if min(map(len, samples)) < 2:
+    )
+    if min(len(first), len(second)) < 2:
         return np.nan, np.nan
-    test = stats.ttest_ind(*samples, equal_var=False)
+    test = stats.ttest_ind(first, second, equal_var=False)
     return tuple(map(float, test.confidence_interval(LEVEL)))
 
 

@@ -10,7 +10,6 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from studies import paths
-from studies.results import read_provenance
 
 # It warns of the date in the fonts that come with Matplotlib, at each PDF.
 logging.getLogger("fontTools").setLevel(logging.ERROR)
@@ -51,9 +50,3 @@ def as_png(figure: Figure) -> bytes:
         figure.savefig(content, dpi="figure", format="png", metadata={"Software": None})
     plt.close(figure)
     return content.getvalue()
-
-
-def mark_reduced(figure: Figure, folder: str | Path, data: str) -> None:
-    """Say so in the figure if its data is of a smaller run than the paper's."""
-    if read_provenance(folder, data)["reduced"]:
-        figure.supxlabel("reduced run", fontsize=8, color="0.45")

@@ -31,7 +31,6 @@ def run_sweep(
     configs: Mapping[str, TrainConfig],
     folder: str | Path,
     n_jobs: int = -1,
-    progress: bool = True,
     changes: Mapping[str, Callable[[Training], None]] | None = None,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
@@ -53,7 +52,6 @@ def run_sweep(
         folder: the run ``name`` is kept in ``folder/name``. Machines of a cluster must share it.
         n_jobs: processes, -1 for one per core; 1 runs all in this process. Dask uses its whole
             cluster.
-        progress: show a progress bar over the runs.
         changes: what is changed in some of the runs, by name, see ``training.train_changed``;
             functions that can be pickled.
 
@@ -79,8 +77,7 @@ def run_sweep(
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     jobs = ((name, configs[name], folder / name, changes[name]) for name in configs)
     errors = {}
-    bar = tqdm(total=len(configs), unit="run", disable=not progress, ncols=100, file=sys.stdout)
-    with bar:
+    with tqdm(total=len(configs), unit="run", ncols=100, file=sys.stdout) as bar:
         for name, error in runs(delayed(_run)(*job, os.getpid()) for job in jobs):
             errors[name] = error
             bar.set_postfix(failed=sum(map(bool, errors.values())), refresh=False)

@@ -16,14 +16,12 @@ from studies.style import COLOURS, styled
 from unload import task
 
 MOST_PREFERENCE = 1.5  # larger ones are drawn at the edge
-NAMES = {
+NAMES = {  # of what ``PUPILS`` see and store, in their order
     "ranks": "ranks",
     "shuffled": "shuffled places",
     "averaged": "ties averaged",
     "level": "level loads",
 }
-# Name and colour of each of ``PUPILS``.
-PUPIL_LOOKS = [(name, COLOURS[kind]) for kind, name in NAMES.items()]
 TITLES = {
     "paper_no_mask": "mask off, b = 256",
     "paper_mask": "mask on, b = 256",
@@ -104,14 +102,14 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
         left.plot(preference, points["tilt_y"], ".", color=COLOURS[cell], ms=3, label=NAMES[cell])
     left.set(xlabel="preference: slope across / upward", ylabel="tilt of the load", xlim=(-2, 2))
     middle.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
-    for pupil, (name, colour) in zip(PUPILS, PUPIL_LOOKS):
+    for pupil, (kind, name) in zip(PUPILS, NAMES.items()):
         cells = [f"{pupil}_{preference}" for preference in PREFERENCES]
         groups = [runs[runs["cell"] == cell] for cell in cells]
         learned = [(group["slope_y"] / group["slope_z"].abs()).mean() for group in groups]
-        middle.plot(PREFERENCES, learned, "o-", ms=3, color=colour, label=name)
+        middle.plot(PREFERENCES, learned, "o-", ms=3, color=COLOURS[kind], label=name)
         if pupil == "taught":
             success = [100 * group["mean"].mean() for group in groups]
-            right.plot(PREFERENCES, success, "o-", ms=3, color=colour)
+            right.plot(PREFERENCES, success, "o-", ms=3, color=COLOURS[kind])
     middle.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
     # Its colours are those of the other panels, whose data leave no room for a legend.
     figure.legend(*middle.get_legend_handles_labels(), loc="outside upper center", ncols=4)

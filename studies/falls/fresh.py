@@ -22,15 +22,16 @@ from studies.falls.laboratory import (
     SEEN,
     SLOPES,
     TAKEN_BACK,
+    keep_cells,
     point,
     train_in_laboratory,
 )
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, keep_all, publish, read_table
+from studies.results import COMMAND, publish, read_table
 from studies.statistics import end_msr
 from unload.agent.config import TrainConfig
-from unload.agent.identity import identity, unchanged
+from unload.agent.identity import unchanged
 from unload.agent.training import Training
 
 FIRST_SEED, SEEDS, FEW_SEEDS = 3000, 20, 10
@@ -97,14 +98,13 @@ CELLS: dict[str, Cell] = {
 COLUMNS = ["cell", "seed", "end", *JUDGED, "judged_averaged_x", *SLOPES]
 
 
-def run_cell(cell: str, seed: int) -> dict:
+def run_cell(name: str, cell: Cell, seed: int) -> dict:
     """Train and measure a run: a row of ``COLUMNS``."""
-    config, points = replace(CELLS[cell].config, seed=seed), []
-    run = train_in_laboratory(config, CELLS[cell].change, lambda run: points.append(point(run)))
+    config, points = replace(cell.config, seed=seed), []
+    run = train_in_laboratory(config, cell.change, lambda run: points.append(point(run)))
     network = run.agent.network
-    row = {"cell": cell, "seed": seed, "end": end_msr(run.curve.table())}
-    for name, blank in zip(JUDGED, measures.BLANKED.values()):
-        row[name] = measures.judged(network, config, blank)
+    row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
+    row |= measures.judged_blanked(network, config)
     positions = replace(config, equalize=False)  # they are ranked after the environment
     row["judged_averaged_x"] = measures.judged(network, positions, seen=SEEN["averaged_x"])
     return row | {name: points[-1][name] for name in SLOPES}
@@ -117,26 +117,10 @@ def fresh_data(
 
     Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
     containers if equal x share one rank when the trained network chooses.
-
-    Args:
-        folder: of the data.
-        runs_dir: where finished runs are kept.
-        n_jobs: processes, as in joblib.
     """
-    fingerprint, measured, jobs = training_fingerprint(), identity(run_cell), []
-    for name, cell in CELLS.items():
-        for seed in cell.seeds:
-            question = {
-                "cell": name,
-                "change": identity(cell.change),
-                "measured": measured,
-                "fingerprint": fingerprint,
-                **replace(cell.config, seed=seed).plain(),
-            }
-            jobs.append((question, partial(run_cell, name, seed)))
-    results = keep_all(Path(runs_dir) / "fresh", jobs, n_jobs)
+    results = keep_cells(Path(runs_dir) / "fresh", CELLS, run_cell, n_jobs)
     table = pd.DataFrame([result.value for result in results])[COLUMNS]
-    settings = {"config": CONFIG.plain(), "runs": len(table)}
+    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
     place, command = Path(folder) / "falls", f"{COMMAND} fresh"
     publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")
 

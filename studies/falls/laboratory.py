@@ -5,7 +5,7 @@
 First its cells, as ``data/falls/PLAN.md`` names them; then how a run is trained and measured.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -17,13 +17,12 @@ from studies import changes, paths
 from studies.falls import measures
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, keep_all, publish, read_table
+from studies.results import COMMAND, JOBS, Result, keep_all, publish, read_table
 from studies.statistics import end_msr
 from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
 from unload.agent.identity import identity, unchanged
 from unload.agent.training import Training
-from unload.support import checks
 
 # The mask is on by default.
 CONFIG = TrainConfig(
@@ -74,10 +73,6 @@ def _both(name: str, change: Change = unchanged, seeds: int = SEEDS, **fields) -
     }
 
 
-def _seen(name: str) -> Cell:
-    return _cell(partial(changes.see, change=SEEN[name]), FEW_SEEDS, equalize=False)
-
-
 def _watching(change: Change) -> Change:
     """Only watch a network that chooses, and that learns with a change of its own."""
     return partial(changes.tandem, change=change, seed=50)
@@ -103,7 +98,10 @@ CELLS: dict[str, Cell] = {
     **_both("averaged", seeds=REMEDY_SEEDS, **AVERAGED),
     **_both("averaged_mirrored", changes.mirrored, **AVERAGED),
     **_both("positions", equalize=False),
-    **{f"averaged_{axis}": _seen(f"averaged_{axis}") for axis in "xyz"},
+    **{
+        name: _cell(partial(changes.see, change=SEEN[name]), FEW_SEEDS, equalize=False)
+        for name in ("averaged_x", "averaged_y", "averaged_z")
+    },
     **{f"ranks_{name}": _cell(**fields) for name, fields in TAKEN_BACK.items()},
     **{
         f"shuffled_{name}": _cell(changes.shuffled, **fields) for name, fields in TAKEN_BACK.items()
@@ -195,20 +193,29 @@ def point(run: Training, seen: measures.Seen | None = None) -> dict[str, float]:
     return dict(zip(POINT, map(float, values), strict=True))
 
 
-def run_cell(cell: str, seed: int) -> dict:
+def run_cell(name: str, cell: Cell, seed: int) -> dict:
     """Train and measure a run: a row of ``COLUMNS``, and the points of its trace."""
-    config, trace = replace(CELLS[cell].config, seed=seed), []
-    seen = SEEN.get(cell)
-    run = train_in_laboratory(
-        config, CELLS[cell].change, lambda run: trace.append(point(run, seen))
-    )
+    config, trace, seen = replace(cell.config, seed=seed), [], SEEN.get(name)
+    run = train_in_laboratory(config, cell.change, lambda run: trace.append(point(run, seen)))
     network, curve = run.agent.network, run.curve.table()
-    row = {"cell": cell, "seed": seed, "mean": curve["success_rate"].mean(), "end": end_msr(curve)}
-    for name, blank in zip(JUDGED, measures.BLANKED.values()):
-        row[name] = measures.judged(network, config, blank, seen)
+    row = {"cell": name, "seed": seed, "mean": curve["success_rate"].mean(), "end": end_msr(curve)}
+    row |= measures.judged_blanked(network, config, seen)
     points = pd.DataFrame(trace)
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
-    return {"row": row, "trace": trace if cell in TRACED else []}
+    return {"row": row, "trace": trace if name in TRACED else []}
+
+
+def keep_cells(
+    folder: Path, cells: Mapping[str, Cell], run: Callable[[str, Cell, int], dict], n_jobs: int
+) -> list[Result]:
+    """What ``run`` returns of each seed of some cells, see ``results.kept``."""
+    jobs, same = [], {"measured": identity(run), "fingerprint": training_fingerprint()}
+    for name, cell in cells.items():
+        question = {"cell": name, "change": identity(cell.change), **same}
+        for seed in cell.seeds:
+            config = replace(cell.config, seed=seed).plain()
+            jobs.append((question | config, partial(run, name, cell, seed)))
+    return keep_all(folder, jobs, n_jobs)
 
 
 def laboratory_data(
@@ -227,22 +234,10 @@ def laboratory_data(
     over the training (see ``measures``). The second has the points of the runs in ``TRACED``, see
     ``point``.
 
-    Args:
-        cells: names in ``CELLS``.
-        seeds: of each cell at most, those of the plan if None.
-        folder: of the data; a part of the cells or seeds goes to its folder ``reduced``.
+    A part of the ``cells``, or fewer ``seeds`` of each, goes to the folder ``reduced``.
     """
-    for cell in cells:
-        checks.one_of("cells", cell, CELLS)
-    fingerprint, jobs = training_fingerprint(), []
-    measured = identity([point, measures.judged])  # what is measured, whatever is trained
-    for cell in cells:
-        changed = identity([CELLS[cell].change, SEEN.get(cell)])
-        for seed in CELLS[cell].seeds[:seeds]:
-            config = replace(CELLS[cell].config, seed=seed).plain()
-            question = {"cell": cell, "changed": changed, "measured": measured, **config}
-            jobs.append((question | {"fingerprint": fingerprint}, partial(run_cell, cell, seed)))
-    results = keep_all(Path(runs_dir) / "laboratory", jobs, n_jobs)
+    chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
+    results = keep_cells(Path(runs_dir) / "laboratory", chosen, run_cell, n_jobs)
     rows = [result.value["row"] for result in results]
     traces = [
         pd.DataFrame(result.value["trace"]).assign(cell=row["cell"], seed=row["seed"])
@@ -255,7 +250,7 @@ def laboratory_data(
     reduced = seeds is not None or set(cells) < set(CELLS)
     place = Path(folder) / ("reduced/falls" if reduced else "falls")
     command = f"{COMMAND} laboratory"
-    settings = {"config": CONFIG.plain(), "runs": len(rows)}
+    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(rows)}, training_fingerprint()
     publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 

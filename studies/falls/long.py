@@ -66,10 +66,7 @@ def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
 def trace_data(
     folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
-    """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``.
-
-    Arguments as of ``published_data``.
-    """
+    """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``."""
     fingerprint = training_fingerprint()
     question = {"every": TRACE_EVERY, "fingerprint": fingerprint, "measured": identity(_trace)}
     configs = [replace(CONFIG, seed=seed) for seed in TRACED_SEEDS]
@@ -131,10 +128,8 @@ def published_data(
 
 def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     cell, _, seed = name.partition("/seed_")
-    row: dict[str, object] = {"cell": cell, "seed": int(seed)}
-    for column, blank in zip(JUDGED, measures.BLANKED.values()):
-        row[column] = measures.judged(network, config, blank, loads=LOADS)
-    return row
+    row = {"cell": cell, "seed": int(seed)}
+    return row | measures.judged_blanked(network, config, loads=LOADS)
 
 
 def read_published(folder: str | Path = paths.DATA) -> pd.DataFrame:

@@ -16,7 +16,7 @@ from unload.env import observation
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.picture import COLOURS, back_to_front, corners, draw, pixels
-from unload.support import checks, files
+from unload.support import files
 
 WIDTH, HEIGHT = 4.4, 4.4  # of one agent's half, in inches at 100 pixels each
 RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
@@ -48,7 +48,7 @@ def record_episode(policy: Policy, seed: int, **env_kwargs) -> Episode:
         **env_kwargs: arguments of ``ContainerEnv``, such as ``stack``.
     """
     env = ContainerEnv(physics="table", max_picks=10**6, **env_kwargs)
-    rng = np.random.default_rng(checks.integer("seed", seed, 0))
+    rng = np.random.default_rng(seed)
     seen, info = env.reset(seed=seed)
     positions = env.observed_positions()
     items, unloaded, emptied = [], [], False
@@ -96,7 +96,7 @@ def picks_of_frames(picks: int) -> list[int]:
 
 
 def _palette(frames: list[Image.Image]) -> Image.Image:
-    """An image with one palette for all frames, taken from the first, a middle and the last."""
+    """One palette for all frames, taken from the first, a middle and the last."""
     chosen = [frames[0], frames[len(frames) // 2], frames[-1]]
     sample = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in chosen])
     sample = sample[sample.min(axis=1) < 246]  # white is added, or it would become a light grey

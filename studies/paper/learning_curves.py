@@ -15,7 +15,6 @@ from studies.style import COLOURS, styled
 from unload import task
 
 Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
-SEED_COLOURS = ("black", "#e69f00", "#56b4e9", "#cc79a7")  # distinct for the colour-blind, too
 FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
 
 

@@ -1,17 +1,13 @@
-"""Loads: their substacks (Fig. 3), and a wall seen from the entrance."""
-
-from collections.abc import Mapping
+"""The substacks of which loads are made (Fig. 3)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Rectangle
 
 from studies.style import styled
-from unload import task
-from unload.load.boxes import Load
-from unload.load.picture import COLOURS, package_colour
+from unload.load.picture import package_colour
 from unload.load.substacks import CELL, CELLS_WIDE, COLUMNS, LEFT, MID, PACKAGES, RIGHT, ROWS_HIGH
 
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
@@ -77,36 +73,3 @@ def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
     for column, row in np.argwhere(inside[:, 1:] != inside[:, :-1]):
         across, up = x + column * CELL, z + row * CELL
         axes.plot([across - CELL, across], [up, up], **style)
-
-
-@styled
-def wall_view(
-    load: Load,
-    wall: int,
-    groups: Mapping[str, np.ndarray],
-    present: np.ndarray | None = None,
-) -> Figure:
-    """A wall of a load as it is seen from the entrance, to scale.
-
-    Args:
-        load: the boxes.
-        wall: its number.
-        groups: meaning, a name in ``unload.load.picture.COLOURS`` → item numbers; items in no
-            group are "unseen".
-        present: (n,) bool, which boxes to draw; all if None.
-    """
-    groups = {"unseen": np.arange(len(load)), **groups}
-    meaning_of = {item: meaning for meaning, items in groups.items() for item in items}
-    in_wall = load.walls == wall if present is None else (load.walls == wall) & present
-    figure, axes = plt.subplots(figsize=(4.68, 3.6))
-    for item in np.flatnonzero(in_wall):
-        _, width, height = load.sizes[item]
-        corner, colour = load.positions[item] - load.sizes[item] / 2, COLOURS[meaning_of[item]]
-        axes.add_patch(Rectangle(corner[1:], width, height, fc=colour, ec="white", lw=0.8))
-    _, width, height = task.CONTAINER
-    axes.set(xlim=(0, width), ylim=(0, height), xlabel="y (m)", ylabel="z (m)", aspect="equal")
-    axes.set(title=f"wall {wall}", xticks=[0, 1, 2], yticks=[0, 1, 2])
-    axes.grid(False)
-    handles = [Patch(fc=COLOURS[meaning], label=meaning) for meaning in groups]
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(groups))
-    return figure

@@ -25,12 +25,10 @@ from unload.env.equalization import equalize
 from unload.load import substacks
 from unload.network.peq import PEQNetwork
 from unload.physics import bullet
-from unload.support import checks
 
 CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper gives in 5 % steps
 CONTAINERS = 40  # full ones, whose free items and whose bars of Fig. 5 are counted
 FIG5_AXIS = 70  # where the paper's axis ends, in steps of 10
-MEASURES = ("success_rate", "loss")
 SETTLED = 200  # tuning steps after which the noise of the loss is measured
 READINGS = {  # of the paper's training: cell → column
     "paper_no_mask": "without the mask, b = 256",
@@ -41,7 +39,7 @@ READINGS = {  # of the paper's training: cell → column
 
 
 def table(rows: list[tuple]) -> pd.DataFrame:
-    """Rows as text: ``number``, ``where``, ``paper``, ``here``, ``agrees``."""
+    """Rows as text, see above."""
     columns = ["number", "where", "paper", "here", "agrees"]
     frame = pd.DataFrame(rows, columns=columns, dtype=object).set_index("number")
     return frame.assign(agrees=frame["agrees"].map(word), here=frame["here"].astype(str))
@@ -57,8 +55,8 @@ def constants() -> pd.DataFrame:
     config = TrainConfig()
     network = PEQNetwork(n := config.n_features)
     inputs = network.extractor.in_features, network.scorer.in_features
-    kinds = [[len(boxes) for boxes in kind] for kind in (substacks.LEFT, substacks.MID,
-                                                        substacks.RIGHT)]  # fmt: skip
+    substack_kinds = (substacks.LEFT, substacks.MID, substacks.RIGHT)
+    kinds = [[len(boxes) for boxes in kind] for kind in substack_kinds]
     rows = [
         ("container", "III-B", [7.0, 2.5, 2.5], task.CONTAINER.tolist()),
         ("items in a container", "III-A", [800, 1000], [task.MIN_ITEMS, task.MAX_ITEMS]),
@@ -97,9 +95,8 @@ def measured(loads: int, episodes: int, seed: int) -> pd.DataFrame:
         episodes: containers that each policy unloads.
         seed: of the loads and of these containers.
     """
-    rng = np.random.default_rng(checks.integer("seed", seed, 0))
-    drawn = range(checks.integer("loads", loads, 1))
-    counts = np.array([len(substacks.stack_load(rng)) for _ in drawn])
+    rng = np.random.default_rng(seed)
+    counts = np.array([len(substacks.stack_load(rng)) for _ in range(loads)])
     low, high = task.MIN_ITEMS, task.MAX_ITEMS
     items = f"{counts.mean():.0f} ± {counts.std():.0f} ({counts.min()}–{counts.max()})"
     fits = low <= counts.min() and counts.max() <= high
@@ -187,11 +184,17 @@ def tuning() -> pd.DataFrame:
         agrees = (runs.solved > runs.runs / 2) == (claim == "successful")
         rows.append((f"tuning, b = 1024, μ = {rate:g}", "IV-A, Fig. 8", claim, here, agrees))
 
-    steps, noise = {}, {}  # by batch size and feature engineering
-    for key in [(size, True) for size in search.BATCH_SIZES] + [(2048, False)]:
-        msr, loss = (search.read_curves(name, key[0], 1e-3, key[1]) for name in MEASURES)
-        steps[key], noise[key] = search.greedy_reached(msr.values()), loss_noise(loss)
     sizes = [(size, True) for size in search.BATCH_SIZES]
+    steps, noise = {}, {}  # by batch size and feature engineering
+    for size, equalized in [*sizes, (2048, False)]:
+        msr, losses = (
+            search.read_curves(name, size, 1e-3, equalized).values()
+            for name in ("success_rate", "loss")
+        )
+        steps[size, equalized] = search.greedy_reached(msr)
+        # Of each run, the standard deviation of the loss around its running mean.
+        rough = [(loss - search.running_mean(loss))[SETTLED:] for loss in losses]
+        noise[size, equalized] = np.nanstd(rough, axis=1)
     spreads = [statistics.t_interval(noise[size]) for size in sizes]
     calmer = all(larger[1] < smaller[0] for smaller, larger in pairwise(spreads))
     faster = steps[2048, True]["high"] < steps[64, True]["low"]
@@ -225,13 +228,6 @@ def tuning() -> pd.DataFrame:
 
 def _steps(reached: dict[str, float]) -> str:
     return f"{reached['step']:.0f} ({reached['low']:.0f}–{reached['high']:.0f})"
-
-
-def loss_noise(losses: dict[int, np.ndarray]) -> np.ndarray:
-    """Return the standard deviation of the loss around its running mean, of each tuning run."""
-    return np.array(
-        [np.nanstd((loss - search.running_mean(loss))[SETTLED:]) for loss in losses.values()]
-    )
 
 
 def training() -> pd.DataFrame:

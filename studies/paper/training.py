@@ -83,20 +83,8 @@ def paper_runs(folder: str | Path = paths.DATA) -> list[tuple[str, int, pd.DataF
     return [(cell, seed, curve) for (cell, seed), curve in groups]
 
 
-def default_curves(folder: str | Path = paths.DATA) -> dict[int, pd.DataFrame]:
-    """The published curves of the paper's configuration that the figures show, by their seeds.
-
-    Each point is a mean over an episode of all environments; they are indexed by ``picks``.
-    """
-    curves = read_grid(PAPER, folder, [DEFAULTS])
-    return {
-        seed: curves[curves["seed"] == seed].set_index("picks", drop=False)
-        for seed in DEFAULT_SEEDS
-    }
-
-
 def default_policies(folder: str | Path = paths.DATA) -> dict[int, Greedy]:
-    """The policies that these runs have learned, by their seeds."""
+    """The policies that ``DEFAULT_SEEDS`` of the paper's configuration have learned."""
     policies = read_policies(Path(folder) / f"{PAPER.name}.safetensors")
     return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
 
@@ -113,9 +101,6 @@ def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
     Returns:
         One row per episode with the columns of ``curve``; ``picks``, ``wall_time`` and
         ``epsilon`` are those at its end.
-
-    Raises:
-        ValueError: a point of the curve lies in two episodes.
     """
     length = task.NUM_ENVS * task.MAX_PICKS
     episode = ((curve["picks"] - 1) // length).rename("episode")

@@ -15,7 +15,7 @@ from studies.results import COMMAND
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.env.highest_item import GRID
-from unload.support import checks, files
+from unload.support import files
 
 LEARNING_RATES = (1e-1, 1e-2, 1e-3)
 BATCH_SIZES = (64, 256, 1024, 2048)
@@ -39,24 +39,22 @@ SOLVED = 0.99  # MSR
 REACHED = 0.9  # greedy MSR
 LEAST_GREEDY = 0.05  # share of the picks from which the greedy MSR can be told
 RESAMPLES = 500  # of the runs, for intervals
-SEARCHED = ("equalize", "batch_size", "learning_rate")
 
 
 def tuning_config(
     batch_size: int, learning_rate: float, run: int = 0, equalize: bool = True, steps: int = STEPS,
     **changes,
 ) -> TrainConfig:  # fmt: skip
-    """One run in the hyperparameter-tuning environment (Sec. IV-A).
+    """Run number ``run`` in the hyperparameter-tuning environment (Sec. IV-A).
 
     Args:
         batch_size: b.
         learning_rate: μ.
-        run: number of the run, its seed.
+        run: its seed.
         equalize: with the paper's feature engineering (FE) or without.
         steps: K.
         **changes: further fields of ``TrainConfig``.
     """
-    checks.integer("steps", steps, 1)
     return TrainConfig(
         env="unload/HighestItem-v0",
         picks=steps * task.NUM_ENVS,
@@ -89,7 +87,7 @@ def tuning_grid(
     cells = {
         tuning_cell(batch_size, learning_rate, equalized): Cell(
             tuning_config(batch_size, learning_rate, equalize=equalized, steps=steps),
-            range(checks.integer("runs", runs, 1)),
+            range(runs),
         )
         for batch_size in sorted(batch_sizes, reverse=True)
         for equalized in equalize
@@ -200,12 +198,9 @@ def reached_at(msr: np.ndarray) -> np.ndarray:
 
 
 def greedy_reached(curves: Iterable[np.ndarray]) -> dict[str, float]:
-    """When the mean greedy MSR of a configuration's runs reaches 90 %.
+    """When the mean greedy MSR of runs reaches 90 %, of their (steps,) MSR while training.
 
     The mean, because at that time one run alone has too few greedy picks.
-
-    Args:
-        curves: (steps,) MSR while training of each run.
 
     Returns:
         ``step``, see ``reached_at``, and ``low`` and ``high``, its 95 % bootstrap interval over
@@ -252,12 +247,11 @@ def tuning_summary(folder: str | Path = paths.DATA) -> pd.DataFrame:
     Columns: ``equalize``, ``batch_size``, ``learning_rate``; the means, but of ``solved`` the
     number of runs; ``final_msr_std``, a standard deviation; and ``runs``.
     """
-    rows = []
+    searched, rows = ["equalize", "batch_size", "learning_rate"], []
     for (cell, _), curve in read_grid(TUNING, folder).groupby(["cell", "seed"]):
-        config = TUNING.cells[cell].config
-        settings = {name: getattr(config, name) for name in SEARCHED}
+        settings = {name: getattr(TUNING.cells[cell].config, name) for name in searched}
         rows.append(settings | run_summary(*curve[["success_rate", "loss"]].to_numpy().T))
-    groups = pd.DataFrame(rows).groupby(list(SEARCHED))
+    groups = pd.DataFrame(rows).groupby(searched)
     summary = groups.mean().assign(
         solved=groups["solved"].sum(), final_msr_std=groups["final_msr"].std(), runs=groups.size()
     )

@@ -1,7 +1,6 @@
 """Policies compared: rules, the paper's agent, and the recommended one.
 
 Read ``margin`` first (why many rules never fail in a neat load), then ``comparison`` (where the
-lift table reaches, and what a policy's file says of it), ``robustness`` (every box simulated),
-``variants`` (other networks, rewards and settings), ``figures`` (the policies beside each other)
-and ``orders`` (which of them a robot can carry out).
+lift table reaches, what a policy's file says of it, and the figure), ``robustness`` (every box
+simulated) and ``variants`` (other networks, rewards and settings).
 """

@@ -5,7 +5,7 @@
 The file of a policy that comes with the package holds a card: how it was trained, and how it does;
 ``print(unload.load_policy("recommended"))`` shows it. In the comparison, rules and learned policies
 unload the same containers: in the conditions of the training, with blurred positions, and with
-boxes of other sizes.
+boxes of other sizes. The figure shows those with every box simulated beside them (``robustness``).
 """
 
 from dataclasses import replace
@@ -13,13 +13,19 @@ from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pandas as pd
 from joblib import Parallel, delayed
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
 from studies import paths
 from studies.paper import training
 from studies.policies.variants import GRIDS, RECOMMENDED
-from studies.results import COMMAND, measured, publish, read_provenance
+from studies.results import COMMAND, measured, publish, read_provenance, read_table
+from studies.statistics import bootstrap_interval
+from studies.style import COLOURS, styled
 from unload import task
 from unload.agent import policies
 from unload.agent.config import TrainConfig
@@ -59,6 +65,15 @@ CONDITIONS = {
     "boxes × 0.8": {"stack": partial(stack_load, scale=0.8)},
     "boxes × 1.2": {"stack": partial(stack_load, scale=1.2)},
 }
+# The conditions of ``robustness``, and the panels of all from left to right and top to bottom.
+FULL = {"restore": "full, restored", "keep": "full, kept"}
+PANELS = (
+    "500 picks", *FULL.values(),
+    "σ 0.5 cm", "σ 2 cm", "σ 5 cm",
+    "complete", "boxes × 0.8", "boxes × 1.2",
+)  # fmt: skip
+LINES = {(policy, mask): policy if mask else f"{policy}, no mask" for policy, mask in PLAYERS}
+SEEN = {"paper": "ranks", "paper_seed_2": "ranks", "recommended": "positions"}
 
 
 def write_cards(folder: str | Path = files.SHIPPED) -> None:
@@ -146,3 +161,54 @@ def digests() -> dict[str, str]:
         content = weights_file("policy", settings_of(policy), policy.network.state_dict())
         found[name] = blake2b(content, digest_size=16).hexdigest()
     return found
+
+
+def read_comparison(folder: str | Path = paths.DATA) -> pd.DataFrame:
+    """Every container that a policy has unloaded.
+
+    Returns:
+        One row per container: ``policy``, ``mask``, ``condition`` (one of ``PANELS``) and
+        ``success_rate``.
+    """
+    place, command = Path(folder) / "policies", f"{COMMAND} policies"
+    columns = ["policy", "mask", "condition", "success_rate"]
+    table = read_table(place / "comparison.csv", command, columns)
+    full = read_table(place / "robustness.csv", command, ["policy", "after_pick", "success_rate"])
+    full = full.assign(mask=True, condition=full["after_pick"].map(FULL))
+    return pd.concat([table, full], ignore_index=True)[columns]
+
+
+@styled
+def comparison_msr(folder: str | Path = paths.DATA) -> Figure:
+    """MSR of every policy: a panel for each condition, dots with 95 % intervals.
+
+    Hollow dots are played without the mask.
+    """
+    table = read_comparison(folder)
+    figure, panels = plt.subplots(3, 3, figsize=(8.4, 6.2), sharex=True, sharey=True)
+    for axes, condition in zip(panels.flat, PANELS):
+        _panel(axes, table[table["condition"] == condition])
+        axes.set_title(condition, loc="left")
+    panels[0, 0].set(xlim=(0, 1.04), ylim=(len(LINES) - 0.5, -0.5))
+    panels[0, 0].set_yticks(range(len(LINES)), LINES.values())
+    panels[0, 0].xaxis.set_major_formatter(PercentFormatter(1, symbol=""))
+    for axes in panels[-1]:
+        axes.set_xlabel("MSR (%)")
+    return figure
+
+
+def _panel(axes: Axes, table: pd.DataFrame) -> None:
+    """All policies under one condition."""
+    rates = dict(list(table.groupby(["policy", "mask"])["success_rate"]))
+    count = max(map(len, rates.values()))
+    axes.set_title(f"{count} containers", loc="right", fontsize=7, color="0.45")
+    for row, (policy, mask) in enumerate(LINES):
+        if (policy, mask) not in rates:
+            # With every box simulated: without the mask, and restored by most policies.
+            axes.text(0.03, row, "–", va="center", fontsize=7, color="0.45")
+            continue
+        rate = rates[policy, mask]
+        colour = COLOURS[SEEN.get(policy, policy)]
+        axes.plot(bootstrap_interval(rate), [row, row], color=colour)
+        axes.plot(rate.mean(), row, "o", color=colour, markerfacecolor=colour if mask else "white",
+                  markersize=5, clip_on=False, zorder=3)  # fmt: skip

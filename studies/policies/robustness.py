@@ -50,9 +50,8 @@ def robustness_data(
     containers, jobs = [], []
     for (name, after_pick), (episode, seed) in product(PLAYED, enumerate(seeds)):
         containers.append({"policy": name, "after_pick": after_pick, "episode": episode})
-        size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS}
-        question = containers[-1] | size | {"weights": weights.get(name), "settings": SETTINGS}
-        question |= {"code": code}
+        size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS, "settings": SETTINGS}
+        question = containers[-1] | size | {"weights": weights.get(name), "code": code}
         jobs.append((question, partial(play, find_policy(name), after_pick, seed, PICKS)))
     answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
     rows = [one | answer.value for one, answer in zip(containers, answers)]

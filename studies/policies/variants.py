@@ -2,7 +2,7 @@
 
     python -m studies variants
 
-Each is a grid. The first three differ from the paper's configuration in one thing, and in what
+Two grids. The runs of the first differ from the paper's configuration in one thing, and in what
 makes them affordable: fewer picks and a smaller batch. Networks without a fused update are small,
 too, and so is the paper's beside them.
 """
@@ -53,36 +53,30 @@ def _setting(field: str, value: float) -> dict[str, Cell]:
     return {f"{field}_{value}": Cell(replace(CONFIG, **{field: value}), SEEDS)}
 
 
+# Attention has fewer seeds, because to train and to judge it takes five times as long.
+NETWORKS = {
+    name: Cell(replace(SMALL, network=name), range(2) if name == "attention" else SEEDS)
+    for name in ("peq", "two_layer", "stack", "attention")
+}
+CONTROL = {"unchanged": Cell(CONFIG, SEEDS)}
+# The paper's outlook: failing at a higher item is less bad.
+REWARDS = {
+    f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share)) for share in SHARES
+}
+SETTINGS = (
+    _setting("n_features", 16)
+    | _setting("n_features", 256)
+    | _setting("learning_rate", 1e-4)
+    | _setting("learning_rate", 1e-2)
+    | _setting("batch_size", 64)
+    | _setting("batch_size", 2048)
+    | _setting("gradient_steps", 4)
+)
+# What is shown together.
+PARTS = {"networks": NETWORKS, "rewards": CONTROL | REWARDS, "settings": CONTROL | SETTINGS}
 _grid = partial(Grid, command=f"{COMMAND} variants", measure=judged)
 GRIDS = {
-    # Attention has fewer seeds, because to train and to judge it takes five times as long.
-    "networks": _grid(
-        "variants/networks",
-        cells={
-            name: Cell(replace(SMALL, network=name), range(2) if name == "attention" else SEEDS)
-            for name in ("peq", "two_layer", "stack", "attention")
-        },
-    ),
-    # The paper's outlook: failing at a higher item is less bad. What stays as it is, its control,
-    # is a cell of the settings.
-    "rewards": _grid(
-        "variants/rewards",
-        cells={
-            f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share))
-            for share in SHARES
-        },
-    ),
-    "settings": _grid(
-        "variants/settings",
-        cells={"unchanged": Cell(CONFIG, SEEDS)}
-        | _setting("n_features", 16)
-        | _setting("n_features", 256)
-        | _setting("learning_rate", 1e-4)
-        | _setting("learning_rate", 1e-2)
-        | _setting("batch_size", 64)
-        | _setting("batch_size", 2048)
-        | _setting("gradient_steps", 4),
-    ),
+    "variants": _grid("variants/variants", cells=NETWORKS | CONTROL | REWARDS | SETTINGS),
     # The paper's configuration but for one thing, and shorter: positions, not ranks.
     "recommended": _grid("variants/recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
 }
@@ -99,10 +93,7 @@ def variants_data(
     """Train some grids, see ``train_grid``.
 
     The recommended agent's first run also leaves ``policies/recommended.safetensors``.
-
     """
-    for name in grids:
-        checks.one_of("grids", name, GRIDS)
     for name in grids:
         kept = train_grid(GRIDS[name], folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
         if name == "recommended":
@@ -110,27 +101,17 @@ def variants_data(
             save_policy(best, Path(shipped) / "policies/recommended.safetensors")
 
 
-def read_variants(grid: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """What the policies of a grid reach, see ``read_measures``; before rewards their control.
-
-    Args:
-        grid: a name in ``GRIDS``.
-    """
-    checks.one_of("grid", grid, GRIDS)
-    rows = read_measures(GRIDS[grid], folder)
-    if grid != "rewards":
-        return rows
-    settings = read_measures(GRIDS["settings"], folder)
-    return pd.concat([settings[settings["cell"] == "unchanged"], rows], ignore_index=True)
+def read_variants(part: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
+    """What the policies of one of ``PARTS`` reach, see ``read_measures``."""
+    checks.one_of("part", part, PARTS)
+    rows = read_measures(GRIDS["variants"], folder)
+    return rows[rows["cell"].isin(PARTS[part])]
 
 
 @styled
-def variants_msr(grid: str, folder: str | Path = paths.DATA) -> Figure:
-    """MSR of the policies of a grid: each seed pale, their mean strong, with its 95 % interval.
-
-    Arguments and errors as for ``read_variants``.
-    """
-    cells = dict(list(read_variants(grid, folder).groupby("cell", sort=False)))
+def variants_msr(part: str, folder: str | Path = paths.DATA) -> Figure:
+    """MSR of the policies of a part: each seed pale, their mean strong, with its 95 % interval."""
+    cells = dict(list(read_variants(part, folder).groupby("cell", sort=False)))
     figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
     for row, cell in enumerate(cells.values()):
         for place, (name, (colour, marker, label)) in enumerate(APPLIED.items()):

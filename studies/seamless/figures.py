@@ -5,30 +5,16 @@ from collections.abc import Mapping
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
-from studies.seamless.training import CELLS
 from studies.statistics import PAPER_MSR
 from studies.style import styled
 
 PAPER_START = 0.15  # MSR at the start of its Fig. 12
 CHANCE = 0.26  # MSR of random picks with a gap of 1 mm
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
-ANEW = ("mask", "no_mask", "b2048", "shuffled", "positions")  # drawn anew, with j = 0.4
-ANEW_CELLS = [name for name in CELLS if name.startswith(ANEW)]
 SMOOTH = 16  # episodes of all containers, about half a million picks
-
-# Cells of the grid whose runs have one look in ``draw_start_and_end``: name, cells, marker, colour.
-GROUPS = (
-    ("j = 0.4, ties by order", [name for name in ANEW_CELLS if "order" in name], "s", "C0"),
-    ("j = 0.4, ties otherwise", [name for name in ANEW_CELLS if "order" not in name], "s", "C5"),
-    ("j = 0.2", ["share_0.2_mask_order"], "^", "C2"),
-    ("j = 0.3", ["share_0.3_mask_order"], "v", "C2"),
-    ("jams as measured", [name for name in CELLS if name.startswith("measured")], "D", "C4"),
-    ("weight 1 for z", [name for name in CELLS if name.startswith("weight_1")], "P", "C3"),
-)
 
 # Curves of the runs of a panel, by whether the mask is on.
 Panel = Mapping[str, list[pd.DataFrame]]
@@ -87,23 +73,18 @@ def _panels(panels: Mapping[str, Panel], value) -> tuple[Figure, np.ndarray]:
     for axes, (title, panel) in zip(all_axes, panels.items()):
         for name, colour in zip(panel, ("C1", "C0")):
             for number, run in enumerate(panel[name]):
-                draw_run(axes, run["picks"], value(run), colour, MASK_LINES[name], not number, name)
+                values = value(run)
+                axes.plot(run["picks"], values, colour, linewidth=0.4, alpha=0.35)
+                if number == 0:
+                    smooth = values.rolling(SMOOTH, min_periods=1).mean()
+                    look = {"linestyle": MASK_LINES[name], "linewidth": 1.8, "zorder": 3}
+                    axes.plot(run["picks"], smooth, colour, label=name, **look)
         axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7), xticks=np.arange(5) * 5e6)
         axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
     figure.get_layout_engine().set(wspace=0.06)  # the last tick of a panel, the first of the next
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2)
     return figure, all_axes
-
-
-def draw_run(
-    axes: Axes, picks: pd.Series, values: pd.Series, colour: str, line: str, strong: bool, name: str
-) -> None:
-    """Draw a run: thin, and if it is the first of its kind a strong running mean, too."""
-    axes.plot(picks, values, colour, linewidth=0.4, alpha=0.35)
-    if strong:
-        smooth = values.rolling(SMOOTH, min_periods=1).mean()
-        axes.plot(picks, smooth, colour, linestyle=line, linewidth=1.8, label=name, zorder=3)
 
 
 @styled

@@ -14,15 +14,8 @@ from studies.seamless.jams import Case
 from unload import task
 from unload.agent.identity import identity
 
-PART = "jams"
+MADE_BY = f"{COMMAND} jams"
 OUT_STEP = 25  # boxes taken out, between two rows of an episode
-# Of a case, by its column; ``moment`` counts the boxes that were taken out before the lifts.
-COLUMNS = {
-    "walls": "walls", "load": "load", "friction": "friction", "gap": "gap", "spread": "spread",
-    "picks": "moment", "again": "again", "settle": "settle", "time_step": "time_step",
-    "iterations": "iterations", "maximal": "maximal",
-}  # fmt: skip
-PLACE = ["friction", "wall", "edge", "covered", "beside"]
 FEW_BESIDE = 3  # so many neighbours or more are one class along episodes
 BETWEEN = (0, 1, 2, 4, 7, 13, 26)  # successes between two attempts at a jammed box, from
 
@@ -30,47 +23,33 @@ BETWEEN = (0, 1, 2, 4, 7, 13, 26)  # successes between two attempts at a jammed 
 def jams_data(
     folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
-    """Lift the boxes of all cases; write three tables in ``seamless/``.
+    """Lift the boxes of all cases; write two tables in ``seamless/``.
 
-    ``jams.csv`` has a row per case: its ``question``, the fields of ``jams.Case`` by ``COLUMNS``;
-    ``free``, the boxes lifted; ``jammed``, those that moved less than 0.2 m; ``median``, how far
-    they moved, in m. ``jam_places.csv`` counts the boxes of fresh seamless walls by place, see
-    ``jams.place``. ``jam_lasting.csv`` has a row per case and number of boxes ``out``: of the
-    ``boxes`` ``jammed_before`` how many jammed ``again_jammed``, and how many of the others
-    ``newly_jammed``.
-
-    Args:
-        folder: of the data.
-        runs_dir: where the lifts of each case are kept.
-        n_jobs: processes, as in joblib.
+    ``jams.csv`` has a row per case: its ``question``, the fields of ``jams.Case``, where ``moment``
+    is its ``picks``; ``free``, the boxes lifted; ``jammed``, those that moved less than 0.2 m;
+    ``median``, how far they moved, in m. ``jam_lasting.csv`` has a row per case and number of boxes
+    ``out``: of the ``boxes`` ``jammed_before`` how many jammed ``again_jammed``, and how many of
+    the others ``newly_jammed``.
     """
     cases = list(jams.cases())
     jobs = [(jams.question(kind, case), partial(jams.asker(kind), case)) for kind, case in cases]
     results = keep_all(Path(runs_dir) / "seamless/jams", jobs, n_jobs)
-    counts, places, lasting = [], [], []
+    counts, lasting = [], []
     for (kind, case), result in zip(cases, results):
         if kind == "lasting":
             lasting += lasting_rows(case, result.value)
-            continue
-        counts.append(count_row(kind, case, result.value))
-        if kind == "fresh" and case.gap == 0:
-            places.append(pd.DataFrame(result.value).assign(friction=case.friction))
-    every = pd.concat(places)
-    groups = every.assign(jammed=every["distance"] < task.LIFT_THRESHOLD).groupby(PLACE)["jammed"]
-    tables = {
-        "jams": pd.DataFrame(counts),
-        "jam_places": groups.agg(free="size", jammed="sum").reset_index(),
-        "jam_lasting": pd.DataFrame(lasting),
-    }
+        else:
+            counts.append(count_row(kind, case, result.value))
+    counts = pd.DataFrame(counts).rename(columns={"picks": "moment"})
+    tables = {"jams": counts, "jam_lasting": pd.DataFrame(lasting)}
     settings = {"loads": len(jams.LOADS), "cases": len(cases)}
-    publish(Path(folder) / "seamless", "jams", tables, f"{COMMAND} {PART}", settings, results)
+    publish(Path(folder) / "seamless", "jams", tables, MADE_BY, settings, results)
 
 
 def count_row(kind: str, case: Case, lifts: list[dict]) -> dict:
-    """The row of a case in ``jams.csv``."""
+    """The row of a case in ``jams.csv``, see ``jams_data``."""
     distances = np.array([each["distance"] for each in lifts])
-    fields = {column: asdict(case)[name] for name, column in COLUMNS.items()}
-    return {"question": kind, **fields} | {
+    return {"question": kind, "walls": case.walls, **asdict(case)} | {
         "free": len(distances),
         "jammed": int((distances < task.LIFT_THRESHOLD).sum()),
         "median": np.median(distances),
@@ -78,7 +57,7 @@ def count_row(kind: str, case: Case, lifts: list[dict]) -> dict:
 
 
 def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
-    """The rows of a case in ``jam_lasting.csv``."""
+    """The rows of a case in ``jam_lasting.csv``, see ``jams_data``."""
     table = pd.DataFrame(lifts)
     table["was"] = table["before"] < task.LIFT_THRESHOLD
     table["is"] = table["distance"] < task.LIFT_THRESHOLD
@@ -124,9 +103,8 @@ def episodes_data(
         "jam_episodes": pd.DataFrame(rows), "jam_first": first,
         "jam_again": again(attempts[attempts["policy"] == "random"], first),
     }  # fmt: skip
-    command = f"{COMMAND} {PART}"
     settings = {"episodes": len(cases)}
-    publish(Path(folder) / "seamless", "jam_episodes", tables, command, settings, results)
+    publish(Path(folder) / "seamless", "jam_episodes", tables, MADE_BY, settings, results)
 
 
 def episode_rows(case: Case, policy: str, after_pick: str, attempts: list[dict]) -> list[dict]:
@@ -178,45 +156,12 @@ def again(attempts: pd.DataFrame, first: pd.DataFrame) -> pd.DataFrame:
     return counts.reset_index()
 
 
-def read_episodes(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """Jams along episodes, see ``episodes_data``."""
-    columns = ["load", "walls", "friction", "gap", "policy", "after_pick"]
-    columns += ["out", "attempts", "jammed"]
-    return read_table(Path(folder) / "seamless/jam_episodes.csv", f"{COMMAND} {PART}", columns)
-
-
-def read_first(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """First attempts at each box along episodes by place, see ``episodes_data``."""
-    columns = ["friction", "covered", "beside", "free", "jammed"]
-    return read_table(Path(folder) / "seamless/jam_first.csv", f"{COMMAND} {PART}", columns)
-
-
-def read_again(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """Attempts at boxes that had jammed, see ``episodes_data``."""
-    columns = ["friction", "between", "attempts", "jammed", "neighbours"]
-    return read_table(Path(folder) / "seamless/jam_again.csv", f"{COMMAND} {PART}", columns)
-
-
 def both_data(n_jobs: int = -1) -> None:
     """Make the data of single lifts and of episodes."""
     jams_data(n_jobs=n_jobs)
     episodes_data(n_jobs=n_jobs)
 
 
-def read_jams(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """A row per case, see ``jams_data``."""
-    columns = ["question", *COLUMNS.values(), "free", "jammed", "median"]
-    return read_table(Path(folder) / "seamless/jams.csv", f"{COMMAND} {PART}", columns)
-
-
-def read_places(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """Free and jammed boxes by where they stand, see ``jams_data``."""
-    columns = [*PLACE, "free", "jammed"]
-    return read_table(Path(folder) / "seamless/jam_places.csv", f"{COMMAND} {PART}", columns)
-
-
-def read_lasting(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """How long jams last, see ``jams_data``."""
-    columns = ["load", "friction", "again", "out", "boxes"]
-    columns += ["jammed_before", "again_jammed", "newly_jammed"]
-    return read_table(Path(folder) / "seamless/jam_lasting.csv", f"{COMMAND} {PART}", columns)
+def read_jams(name: str = "jams", folder: str | Path = paths.DATA) -> pd.DataFrame:
+    """A table of ``jams_data`` or ``episodes_data``, by its name."""
+    return read_table(Path(folder) / "seamless" / f"{name}.csv", MADE_BY, ["friction"])

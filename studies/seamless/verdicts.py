@@ -5,7 +5,6 @@ import pandas as pd
 from studies.statistics import LIKE_THE_PAPER, STEADY, end_msr, t_interval, windows
 
 LIKE_THE_START = (0.13, 0.17)  # MSR over the first episode that counts as the paper's 15 %
-COUNTS = ("runs", "steady", "fig12", "fig11")
 
 
 def measures(run: pd.DataFrame) -> dict:
@@ -59,14 +58,10 @@ def by_cell(runs: pd.DataFrame) -> pd.DataFrame:
         ``high``, the 95 % t interval of the end; ``lowest`` and ``highest`` end; the mean ``best``;
         how many runs lose at most 5 points (``steady``), and are like ``fig12`` and ``fig11``.
     """
-    rows = {}
-    for cell, group in runs.groupby("cell", sort=False):
-        low, high = t_interval(group["end"])
-        rows[cell] = {
-            "runs": len(group), "start": group["start"].mean(),
-            "end": group["end"].mean(), "low": low, "high": high,
-            "lowest": group["end"].min(), "highest": group["end"].max(),
-            "best": group["best"].mean(), "steady": (group["drop"] <= STEADY).sum(),
-            "fig12": group["fig12"].sum(), "fig11": group["fig11"].sum(),
-        }  # fmt: skip
-    return pd.DataFrame(rows).T.astype({name: int for name in COUNTS})
+    cells = runs.assign(steady=runs["drop"] <= STEADY).groupby("cell", sort=False)
+    return cells.agg(
+        runs=("end", "size"), start=("start", "mean"), end=("end", "mean"),
+        low=("end", lambda end: t_interval(end)[0]), high=("end", lambda end: t_interval(end)[1]),
+        lowest=("end", "min"), highest=("end", "max"), best=("best", "mean"),
+        steady=("steady", "sum"), fig12=("fig12", "sum"), fig11=("fig11", "sum"),
+    ).rename_axis(None)  # fmt: skip

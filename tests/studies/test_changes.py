@@ -44,13 +44,15 @@ def run_of(change, steps=3, config=SMALL):
     return run, np.concatenate(seen)
 
 
-def note_what_is_asked(run):
-    """The observations of greedy choices, which all become that of the first item."""
-    asked = []
+@pytest.fixture
+def asking():
+    """A run, and the observations of its greedy choices, which all become that of item 0."""
+    run, asked = Training(SMALL), []
     run.agent.learner.best_actions = lambda observations, allowed: (
         asked.append(observations) or np.zeros(len(allowed), np.int64)
     )
-    return asked
+    yield run, asked
+    run.rollout.close()
 
 
 def remembered(run):
@@ -68,13 +70,11 @@ def test_only_what_is_stored_is_changed():
     assert (remembered(plain) == seen).all()
 
 
-def test_what_is_seen_is_changed_in_choosing_and_learning():
-    run = Training(SMALL)
-    asked = note_what_is_asked(run)
+def test_what_is_seen_is_changed_in_choosing_and_learning(asking):
+    run, asked = asking
     changes.see(run, changes.without)
     run.step()
     run.agent.choose(run.rollout.observations, run.rollout.allowed, 0.0, run.rng)
-    run.rollout.close()
     assert (asked[-1][..., :2] == 0).all()
     assert (asked[-1][..., 2] == run.rollout.observations[..., 2]).all()
     assert (remembered(run)[..., :2] == 0).all()
@@ -88,24 +88,21 @@ def test_failures_are_replaced_by_successes_of_the_same_step():
     assert run.replay.total == 256
 
 
-def test_a_teacher_chooses_by_height_and_its_preference():
-    run = Training(SMALL)
+def test_a_teacher_chooses_by_height_and_its_preference(asking):
+    run, _ = asking
     changes.taught(run, preference=0.5)
     seen = np.array([[[0, 0, 0.5], [0, 1, 0.1], [1, 1, 0.2]]], np.float32)
     best = run.agent.learner.best_actions
-    run.rollout.close()
     assert best(seen, np.array([[True, True, True]])) == 2
     assert best(seen, np.array([[True, True, False]])) == 1
 
 
-def test_choices_see_other_signs_than_the_memory_holds():
-    run = Training(SMALL)
-    asked = note_what_is_asked(run)
+def test_choices_see_other_signs_than_the_memory_holds(asking):
+    run, asked = asking
     changes.untilted(run, axes=(1,))
     seen = run.rollout.observations.copy()
     run.agent.choose(seen, run.rollout.allowed, 0.0, run.rng)
     run.step()
-    run.rollout.close()
     signs = asked[0][..., 1] / seen[..., 1]
     assert set(np.unique(signs)) == {-1, 1} and (signs == signs[:, :1]).all()
     assert (asked[0][..., [0, 2]] == seen[..., [0, 2]]).all()

@@ -15,26 +15,19 @@ from studies.falls.laboratory import read_laboratory, read_trace
 from studies.falls.long import read_long_trace
 from studies.grid import read_grid
 from studies.paper import diagrams, learning_curves, loads
-from studies.paper.loads import wall_view
 from studies.paper.training import PAPER
 from studies.paper.tuning import running_mean
 from studies.paper.visible_items import scaled_side_view
-from studies.policies import figures as policies
-from studies.policies.robustness import front_walls
-from studies.policies.variants import GRIDS, variants_msr
-from unload import stack_load
-from unload.env.observation import nearest
-from unload.load.picture import COLOURS
+from studies.policies.comparison import comparison_msr
+from studies.policies.variants import PARTS, variants_msr
 
-LOAD = stack_load(np.random.default_rng(0))
-VISIBLE = nearest(LOAD.positions)
 LINE = np.arange(3.0)
 RUNS = {"a": ({0: LINE, 3: 2 * LINE}, 3), "with FE": ({1: LINE}, 1)}
 
 # Figures that are drawn from data/, and take its folder.
 FROM_DATA = {
-    **{f"variants_{grid}": partial(variants_msr, grid) for grid in GRIDS},
-    "comparison": policies.comparison_msr,
+    **{f"variants_{part}": partial(variants_msr, part) for part in PARTS},
+    "comparison": comparison_msr,
     "why_60": lambda folder=paths.DATA: falls.four_cells(read_grid(PAPER, folder)),
     "why_runs_fall": lambda folder=paths.DATA: falls.loop(
         read_trace(folder), read_laboratory(folder)
@@ -49,7 +42,6 @@ FIGURES = FROM_DATA | {
     "fig01_mdp": diagrams.fig01_mdp,
     "fig03_substacks": loads.fig03_substacks,
     "fig07_network": diagrams.fig07_network,
-    "wall_view": lambda: loads.wall_view(LOAD, 11, {"visible": VISIBLE}),
     "scaled_side_view": lambda: scaled_side_view({"items": (np.eye(2), "C0")}, "p"),
     "over_steps": lambda: learning_curves.over_steps(RUNS, "MSR"),
     "in_panels": lambda: learning_curves.in_panels(RUNS, "MSR"),
@@ -105,23 +97,3 @@ def test_the_published_figures_are_those_that_notebooks_save():
                 saved |= set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", "".join(cell["source"])))
     assert {path.stem for path in paths.FIGURES.glob("*.png")} == saved
     assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in saved}
-
-
-@pytest.fixture
-def load():
-    return front_walls(stack_load(np.random.default_rng(0)), 2)
-
-
-def test_a_wall_view_shows_the_boxes_of_the_wall_to_scale(load):
-    wall = load.walls.max()
-    visible, present = np.flatnonzero(load.walls == wall)[:4], np.ones(len(load), dtype=bool)
-    present[visible[0]] = False
-    figure = wall_view(load, wall, {"visible": visible}, present)
-    (axes,) = figure.axes
-    assert axes.get_aspect() == 1
-    for item, box in zip(np.flatnonzero(present & (load.walls == wall)), axes.patches, strict=True):
-        meaning = "visible" if item in visible else "unseen"
-        assert box.get_facecolor()[:3] == pytest.approx(COLOURS[meaning])
-        assert (box.get_width(), box.get_height()) == pytest.approx(load.sizes[item, 1:])
-        assert box.get_center() == pytest.approx(load.positions[item, 1:])
-    assert [text.get_text() for text in figure.legends[0].texts] == ["unseen", "visible"]

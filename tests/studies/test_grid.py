@@ -12,7 +12,7 @@ from studies import grid, sweep
 from studies.changes import shuffled
 from studies.paper.tuning import tuning_config
 from studies.results import read_provenance
-from tests.agent.runs import CONTAINER, assert_same
+from tests.agent.runs import assert_same
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import train
@@ -52,7 +52,7 @@ def test_a_grid_is_read_as_it_was_trained(small, trained):
     assert not np.array_equal(plain["loss"], changed["loss"])
 
 
-def test_policies_of_a_grid_are_told_by_their_runs(small, trained):
+def test_policies_of_a_grid_have_the_names_of_their_runs(small, trained):
     policies = grid.read_policies(trained / "some/small.safetensors")
     assert list(policies) == list(small.configs())
     assert policies["averaged_mask/seed_3"].ties == "average"
@@ -60,25 +60,16 @@ def test_policies_of_a_grid_are_told_by_their_runs(small, trained):
     assert all(not np.array_equal(first[name], second[name]) for name in first)
 
 
-def test_its_provenance_says_what_is_planned_and_done(small, trained):
+def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(small, trained):
+    before = (trained / "some/small_loss.csv").read_bytes()
+    message = "holds 2 finished runs; expected at least as many as the 4"
+    with pytest.raises(ValueError, match=message):
+        grid.train_grid(small, ["plain"], None, trained, trained / "other", 1)
+    grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1)
+    assert (trained / "some/small_loss.csv").read_bytes() == before
     provenance = read_provenance(trained / "some", "small")
     assert (provenance["runs"], provenance["planned"], provenance["reduced"]) == (4, 4, False)
     assert provenance["settings"]["averaged_mask"]["mask"] is True
-
-
-def test_published_runs_are_not_replaced_by_fewer(small, trained):
-    before = (trained / "some/small_loss.csv").read_bytes()
-    with pytest.raises(
-        ValueError, match="holds 2 finished runs; expected at least as many as the 4"
-    ):
-        grid.train_grid(small, ["plain"], None, trained, trained / "other", 1)
-    assert (trained / "some/small_loss.csv").read_bytes() == before
-
-
-def test_a_shorter_grid_is_published_elsewhere(small, trained):
-    before = (trained / "some/small_loss.csv").read_bytes()
-    grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1)
-    assert (trained / "some/small_loss.csv").read_bytes() == before
     assert read_provenance(trained / "reduced/some", "small")["reduced"]
 
 
@@ -89,11 +80,11 @@ def configs():
 
 
 def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
-    report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    report = sweep.run_sweep(configs, tmp_path / "many", n_jobs=1)
     assert list(report.index) == list(configs)
     assert (report["error"] == "").all()
     assert report["seed"].tolist() == [0, 1]
-    assert capfd.readouterr() == ("", "")
+    assert capfd.readouterr().err == ""
     for name, config in configs.items():
         folder = tmp_path / "many" / name
         assert report.loc[name, "folder"] == str(folder)
@@ -105,7 +96,7 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
         assert "256/256" in (folder / "log.txt").read_text()
     written = sorted(tmp_path.glob("many/set/*/*"))
     before = [path.stat().st_mtime_ns for path in written]
-    sweep.run_sweep(configs, tmp_path / "many", n_jobs=1, progress=False)
+    sweep.run_sweep(configs, tmp_path / "many", n_jobs=1)
     assert [path.stat().st_mtime_ns for path in written] == before
 
 
@@ -116,26 +107,21 @@ def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path,
         patch.setattr(os, "getppid", lambda: next(parents))
         sweep._run("run", config, tmp_path / "run", unchanged, sweep=1)
     assert (tmp_path / "run" / "checkpoint.npz").exists()
-    sweep.run_sweep({"run": config}, tmp_path, n_jobs=1, progress=False)
+    sweep.run_sweep({"run": config}, tmp_path, n_jobs=1)
     assert (tmp_path / "run" / "policy.safetensors").exists()
 
 
-def test_a_run_that_fails_is_reported_and_stops_no_other(configs, tmp_path):
-    (tmp_path / "set").mkdir()
-    (tmp_path / "set" / "run_0").write_text("a file where the run's folder should be")
-    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, progress=False)
-    assert "run_0" in report["error"].iloc[0]
-    assert report["error"].iloc[1] == ""
-
-
-def test_an_error_in_own_code_is_traced_in_the_runs_log(tmp_path):
+def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp_path):
     def leaning(run):
         raise RuntimeError("it fell over")
 
-    config = {"run": TrainConfig(**CONTAINER)}
-    report = sweep.run_sweep(config, tmp_path, 1, progress=False, changes={"run": leaning})
-    assert report["error"].item() == "RuntimeError: it fell over"
-    assert "in leaning" in (tmp_path / "run" / "log.txt").read_text()
+    configs["set/leaning"] = configs["set/run_0"]
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set/run_0").write_text("a file where the run's folder should be")
+    report = sweep.run_sweep(configs, tmp_path, n_jobs=1, changes={"set/leaning": leaning})
+    blocked, fine, fallen = report["error"]
+    assert "run_0" in blocked and fine == "" and fallen == "RuntimeError: it fell over"
+    assert "in leaning" in (tmp_path / "set/leaning/log.txt").read_text()
 
 
 @pytest.mark.slow
@@ -150,10 +136,10 @@ def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
     with cluster, distributed.Client(cluster) as client:
         workers = set(client.run(os.getpid).values())
         with parallel_config("dask"):
-            report = sweep.run_sweep(configs, tmp_path / "dask", progress=False)
+            report = sweep.run_sweep(configs, tmp_path / "dask")
     assert capfd.readouterr().err == ""
     assert (report["error"] == "").all()
-    sweep.run_sweep(configs, tmp_path / "loky", n_jobs=2, progress=False)
+    sweep.run_sweep(configs, tmp_path / "loky", n_jobs=2)
     for name in configs:
         assert_same(tmp_path / "dask" / name, tmp_path / "loky" / name)
     used = {
@@ -183,7 +169,7 @@ def test_runs_that_do_not_fit_the_memory_are_warned_of(configs, tmp_path, monkey
     ],
 )
 def test_bad_arguments_are_refused_before_anything_runs(configs, tmp_path, arguments, message):
-    usual = {"configs": configs, "folder": tmp_path, "progress": False}
+    usual = {"configs": configs, "folder": tmp_path}
     with pytest.raises((TypeError, ValueError), match=message):
         sweep.run_sweep(**usual | arguments)
     assert not list(tmp_path.iterdir())

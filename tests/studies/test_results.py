@@ -2,9 +2,7 @@
 
 import os
 import resource
-import shutil
 import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 
@@ -12,15 +10,18 @@ import pandas as pd
 import pytest
 
 from studies import paths, results
-from studies.falls.laboratory import CONFIG
+from studies.falls import laboratory
 from studies.falls.long import LONG
+from studies.grid import Cell
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
 from studies.results import kept, measured, publish, read_provenance, read_table, revision
 from unload import TrainConfig
 
-PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
+# The cells of what is published, by its name.
+PUBLISHED = {grid.name: grid.cells for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
+PUBLISHED["falls/laboratory"] = {"config": Cell(laboratory.CONFIG, [0])}
 
 
 @pytest.fixture
@@ -87,23 +88,13 @@ def test_a_table_is_read_and_another_one_refused(tmp_path):
         read_table(path, "make tea", ["a", "d"])
 
 
-def test_a_record_is_written_and_read(tmp_path):
-    record = results.run_record(1.25)
-    results.write_provenance(tmp_path, "x", "make x", {"seed": 3}, True, record)
-    stored = read_provenance(tmp_path, "x")
-    assert stored["command"] == "make x"
-    assert stored["reduced"]
-    assert stored["settings"] == {"seed": 3}
-    assert stored["wall_time_s"] in (1.2, 1.3)
-    assert {"numba", "joblib", "torch", "pybullet", "numpy"} <= set(stored["versions"])
-    assert str(os.cpu_count()) in stored["machine"]
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
-    assert stored["peak_memory_mib"] == pytest.approx(peak, rel=0.1)
-    assert len(stored["revision"].rstrip("+")) == 12 or stored["revision"] == "unknown"
-
-
 def test_records_are_joined():
-    first = results.run_record(10)
+    first = results.run_record(9.96)
+    assert {"numba", "joblib", "torch", "pybullet", "numpy"} <= set(first["versions"])
+    assert str(os.cpu_count()) in first["machine"]
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
+    assert first["peak_memory_mib"] == pytest.approx(peak, rel=0.1)
+    assert len(first["revision"].rstrip("+")) == 12 or first["revision"] == "unknown"
     second = first | {"wall_time_s": 20.54, "peak_memory_mib": 10**6, "revision": "another"}
     together = results.joined([first, second, first])
     assert together["runs"] == 3
@@ -113,53 +104,38 @@ def test_records_are_joined():
     assert together["machine"] == first["machine"]
 
 
-# Git sets variables for its hooks, which would lead the tests' git to another repository.
-OUTSIDE = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
+    for name in [name for name in os.environ if name.startswith("GIT_")]:
+        monkeypatch.delenv(name)  # git sets them for its hooks; they lead to another repository
+    found = revision.__wrapped__  # what it says is kept for a process
+    monkeypatch.setattr(paths, "ROOT", tmp_path)
 
+    def git(*command: str) -> str:
+        who = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+        return subprocess.check_output(["git", *who, *command], cwd=tmp_path, text=True).strip()
 
-def test_the_projects_own_commit_is_its_revision(tmp_path):
-    """Of a copy of the parts that find it."""
-    folder = tmp_path / "copy"
-    for part in ("unload/support", "studies"):
-        shutil.copytree(
-            paths.ROOT / part, folder / part,
-            ignore=lambda place, names: [name for name in names if not name.endswith(".py")],
-        )  # fmt: skip
-    (folder / "unload" / "__init__.py").touch()
-    shutil.copy(paths.ROOT / "pyproject.toml", folder)
-
-    def output(*command: str) -> str:
-        return subprocess.check_output(command, cwd=folder, text=True, env=OUTSIDE).strip()
-
-    def found() -> str:
-        return output(
-            sys.executable, "-c", "from studies import results; print(results.revision())"
-        )
-
-    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"]
+    assert found() == "unknown"
+    for name in ("unload/task.py", "studies/grid.py"):
+        (tmp_path / name).parent.mkdir()
+        (tmp_path / name).touch()
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "theirs"]):
-        output(*git, *command)
-    own = output(*git, "rev-parse", "--short=12", "HEAD")
-    (folder / "README.md").write_text("not part of the package")
-    (folder / ".gitignore").write_text("__pycache__\n")
+        git(*command)
+    own = git("rev-parse", "--short=12", "HEAD")
+    (tmp_path / "README.md").write_text("not part of the code")
     assert found() == own
-    for changed in ("unload/task.py", "studies/more.py"):
-        (folder / changed).touch()
+    for name in ("unload/task.py", "studies/more.py"):
+        (tmp_path / name).write_text("changed")
         assert found() == f"{own}+"
-        (folder / changed).unlink()
+        (tmp_path / name).unlink()
+        git("checkout", "-q", ".")
+    monkeypatch.setattr(paths, "ROOT", tmp_path / "studies")
+    assert found() == "unknown", "the enclosing repository is another one"
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_the_settings_of_a_published_grid_are_its_configurations(name):
-    """Those that stand beside it train its runs again."""
+def test_the_settings_of_published_runs_are_their_configurations(name):
+    """Those that stand beside them train the runs again."""
     settings = read_provenance(paths.DATA, name)["settings"]
-    planned = {
-        cell: replace(plan.config, seed=plan.seeds[0])
-        for cell, plan in PUBLISHED[name].cells.items()
-    }
-    assert {cell: TrainConfig(**fields) for cell, fields in settings.items()} == planned
-
-
-def test_the_settings_of_the_laboratory_are_its_configuration():
-    settings = read_provenance(paths.DATA, "falls/laboratory")["settings"]
-    assert TrainConfig(**settings["config"]) == CONFIG
+    for cell, plan in PUBLISHED[name].items():
+        assert TrainConfig(**settings.pop(cell)) == replace(plan.config, seed=plan.seeds[0])
+    assert set(settings) <= {"runs"}

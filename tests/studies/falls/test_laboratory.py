@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -40,15 +41,14 @@ def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
 
 
 def test_cells_differ_from_the_first_in_what_they_are_named_for():
-    plain = laboratory.CELLS["ranks"].config
-    assert laboratory.CELLS["ranks_no_mask"].config.mask is False and plain.mask
-    assert laboratory.CELLS["averaged"].config.ties == "average"
-    assert not laboratory.CELLS["positions"].config.equalize
+    configs = {name: cell.config for name, cell in laboratory.CELLS.items()}
+    plain = configs["ranks"]
+    assert configs["ranks_no_mask"] == replace(plain, mask=False) and plain.mask
+    assert configs["averaged"] == replace(plain, ties="average")
+    assert configs["positions"] == replace(plain, equalize=False)
     assert {*laboratory.SEEN, *laboratory.TRACED} < set(laboratory.CELLS)
     for name, fields in laboratory.TAKEN_BACK.items():
-        ((field, value),) = fields.items()
-        changed = laboratory.CELLS[f"ranks_{name}"].config
-        assert getattr(changed, field) == value != getattr(plain, field)
+        assert configs[f"ranks_{name}"] == replace(plain, **fields) != plain
 
 
 @pytest.mark.parametrize(("cell", "label"), laboratory.WATCHING.items())
@@ -123,15 +123,10 @@ def test_runs_are_traced(tmp_path, monkeypatch):
     assert list(table["seed"]) == [20, 20, 21, 21]
     assert list(table["picks"]) == [31_936, 63_936] * 2
     assert read_provenance(tmp_path / "falls", "long_trace")["settings"]["picks"] == 64_000
-
-
-def test_the_published_trace_is_of_the_published_runs():
-    """A trace only looks: the success rates at its points are those of the same run."""
-    trace = long.read_long_trace()
-    for seed, points in trace.groupby("seed"):
-        assert points["picks"].is_monotonic_increasing and seed in long.TRACED_SEEDS
-        assert points["picks"].iloc[-1] > 0.99 * long.CONFIG.picks
-        assert (points["wrong_without_place"] == 0).mean() > 0.99
+    published = long.read_long_trace()
+    assert list(published["seed"].unique()) == [*long.TRACED_SEEDS]
+    assert (published["wrong_without_place"] == 0).mean() > 0.99
+    assert set(published["picks"]) == set(range(31_936, 20_000_000, 32_000))
 
 
 def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
@@ -139,30 +134,25 @@ def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
     monkeypatch.setattr(long, "UNTRAINED", 1)
     name = "paper_mask/seed_0"
     policy = read_policies(paths.DATA / "falls/paper.safetensors")[name]
-    monkeypatch.setattr(
-        long, "read_policies", lambda path: {name: policy} if path.stem == "paper" else {}
-    )
+    published = {"paper": {name: policy}, "long": {}}
+    monkeypatch.setattr(long, "read_policies", lambda path: published[path.stem])
     monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
     monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
     long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
-    judged = long.read_published(tmp_path)
-    kept = set((tmp_path / "runs/published").iterdir())
+    trained, drawn = long.read_published(tmp_path).itertuples()
+    assert (trained.cell, drawn.cell) == ("paper_mask", "untrained")
+    assert trained.judged_place == 1 > trained.judged_as_is and drawn.judged_as_is < 0.9
+    assert len(list((tmp_path / "runs/published").iterdir())) == 2
     policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
     long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
-    again = set((tmp_path / "runs/published").iterdir())
-    assert kept < again and len(again) == len(kept) + 1
-    assert list(judged["cell"]) == ["paper_mask", "untrained"]
-    policy, network = judged.itertuples()
-    assert policy.judged_place == 1 > policy.judged_as_is
-    assert network.judged_as_is < 0.9
+    assert len(list((tmp_path / "runs/published").iterdir())) == 3
 
 
 def test_the_published_table_holds_every_policy():
-    table = long.read_published()
+    counts = long.read_published().groupby("cell").size()
     planned = {cell: len(each.seeds) for cell, each in PAPER.cells.items()}
-    counts = table.groupby("cell").size()
-    assert {cell: counts[cell] for cell in planned} == planned
-    assert counts["untrained"] == long.UNTRAINED
+    assert (counts[[*planned]] == [*planned.values()]).all()
+    assert counts["untrained"] == 36
 
 
 @pytest.fixture
@@ -191,18 +181,14 @@ def test_slopes_of_other_networks_are_those_of_their_values(name, observations):
     """Their first weights are no slopes, and not all of them have an extractor."""
     seen, step = observations[:2, :7].astype(float), 1e-5
     network = NETWORKS[name](8, torch.Generator().manual_seed(0)).double()
-
-    def value(change, row, item):
+    upper = np.argwhere(seen[..., 2] > np.median(seen[..., 2]))
+    expected = np.zeros(3)
+    for (row, item), axis, sign in product(upper, range(3), (1, -1)):
+        moved = seen.copy()
+        moved[row, item, axis] += sign * step
         with torch.no_grad():
-            return network(torch.from_numpy(seen + change))[row, item].item()
-
-    found = []
-    for row, item in np.argwhere(seen[..., 2] > np.median(seen[..., 2])):
-        moves = np.zeros((3, *seen.shape))
-        moves[range(3), row, item, range(3)] = step
-        ends = [[value(sign * move, row, item) for sign in (1, -1)] for move in moves]
-        found.append([(after - before) / (2 * step) for after, before in ends])
-    expected = np.mean(found, axis=0)
+            value = network(torch.from_numpy(moved))[row, item].item()
+        expected[axis] += sign * value / (2 * step) / len(upper)
     assert measures.slopes(network, seen) == pytest.approx(expected, abs=1e-7)
     assert np.abs(expected).max() > 1e-3
 

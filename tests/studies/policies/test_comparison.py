@@ -1,49 +1,42 @@
-"""Policies compared by the lift table and with every box simulated, and the cards of some."""
+"""Policies compared by the lift table and with every box simulated; cards; and the margin."""
 
 from functools import partial
+from itertools import islice
 
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.policies import comparison, figures, robustness
-from studies.policies.comparison import (
-    PLAYERS,
-    compare,
-    comparison_data,
-    digests,
-)
+from studies.policies import comparison, robustness
+from studies.policies.comparison import PLAYERS, comparison_data, digests
+from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
 from studies.results import read_provenance
 from tests.agent.runs import lowest
-from unload import evaluate, load_policy, policies, task
+from unload import PEQNetwork, evaluate, load_policy, policies, task
 from unload.env.observation import nearest
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.bullet import World
+from unload.physics.situation import Surroundings
 from unload.support import files
 
 
-def test_a_comparison_holds_the_rows_of_evaluate(monkeypatch):
-    monkeypatch.setattr(comparison, "LOADS", 2)
-    rows = compare("highest", policies.highest, True, "σ 5 cm")
-    expected = evaluate(policies.highest, 2, comparison.SEED, position_noise=0.05)
-    pd.testing.assert_frame_equal(rows[expected.columns], expected)
-    assert rows["load"].tolist() == [0, 1]
-    assert set(rows["condition"]) == {"σ 5 cm"}
-
-
-def test_data_and_its_provenance(tmp_path, monkeypatch):
+def test_a_comparison_holds_the_rows_of_evaluate(tmp_path, monkeypatch):
     monkeypatch.setattr(comparison, "LOADS", 1)
-    monkeypatch.setattr(
-        comparison, "CONDITIONS", {"500 picks": {}, "σ 2 cm": {"position_noise": 0.02}}
-    )
+    conditions = {"500 picks": {}, "σ 5 cm": {"position_noise": 0.05}}
+    monkeypatch.setattr(comparison, "CONDITIONS", conditions)
     comparison_data(tmp_path, n_jobs=1)
     table = pd.read_csv(tmp_path / "policies/comparison.csv")
     played = table[["condition", "policy", "mask"]].itertuples(index=False, name=None)
-    assert list(played) == [(c, *player) for c in ("500 picks", "σ 2 cm") for player in PLAYERS]
+    assert list(played) == [(name, *player) for name in conditions for player in PLAYERS]
+    rows = table.query("policy == 'highest' and condition == 'σ 5 cm'").reset_index()
+    expected = evaluate(policies.highest, 1, comparison.SEED, position_noise=0.05)
+    pd.testing.assert_frame_equal(rows[expected.columns], expected, rtol=1e-5)
+    assert table["load"].unique().tolist() == [0]
     assert read_provenance(tmp_path / "policies", "comparison")["settings"]["loads"] == 1
 
 
@@ -117,11 +110,11 @@ def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, fre
 
 
 def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(robustness, "PLAYED", (("highest", "keep"), ("highest", "restore")))
-    monkeypatch.setattr(robustness, "EPISODES", 2)
-    monkeypatch.setattr(robustness, "PICKS", 2)
-    small = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 1))
-    monkeypatch.setattr(robustness, "play", small)
+    play = robustness.play
+    small = {"PLAYED": (("highest", "keep"), ("highest", "restore")), "EPISODES": 2, "PICKS": 2}
+    small["play"] = partial(play, stack=lambda rng: front_walls(stack_load(rng), 1))
+    for name, value in small.items():
+        monkeypatch.setattr(robustness, name, value)
     robustness.robustness_data(tmp_path, tmp_path / "runs")
     written = (tmp_path / "policies/robustness.csv").read_text()
     table = pd.read_csv(tmp_path / "policies/robustness.csv")
@@ -130,8 +123,7 @@ def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
     monkeypatch.setattr(robustness, "ContainerEnv", lambda *_, **__: pytest.fail("played again"))
     robustness.robustness_data(tmp_path, tmp_path / "runs")
     assert (tmp_path / "policies/robustness.csv").read_text() == written
-    other = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 2))
-    monkeypatch.setattr(robustness, "play", other)
+    monkeypatch.setattr(robustness, "play", partial(play, stack=two_walls))
     with pytest.raises(pytest.fail.Exception, match="played again"):
         robustness.robustness_data(tmp_path, tmp_path / "runs")
 
@@ -150,22 +142,46 @@ def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
         assert load.walls[seen].min() > 12 - FRONT_WALLS
 
 
-def test_every_condition_has_its_panel():
-    assert set(figures.CONDITIONS) == {*comparison.CONDITIONS, *figures.FULL.values()}
-    assert set(figures.FULL) == {after_pick for _, after_pick in robustness.PLAYED}
-    shown = [axes.get_title("left") for axes in figures.comparison_msr().axes]
-    assert shown == list(figures.CONDITIONS)
-
-
-def test_dots_are_the_means_over_the_containers():
-    panels = {axes.get_title("left"): axes for axes in figures.comparison_msr().axes}
-    table = figures.read_comparison()
+def test_every_condition_has_its_panel_whose_dots_are_means_over_the_containers():
+    assert set(comparison.PANELS) == {*comparison.CONDITIONS, *comparison.FULL.values()}
+    assert set(comparison.FULL) == {after_pick for _, after_pick in robustness.PLAYED}
+    panels = {axes.get_title("left"): axes for axes in comparison.comparison_msr().axes}
+    assert list(panels) == list(comparison.PANELS)
+    table = comparison.read_comparison()
     for condition, axes in panels.items():
         rows = table[table["condition"] == condition]
         means = [
             group["success_rate"].mean()
-            for player in figures.ROWS
+            for player in comparison.LINES
             if len(group := rows[(rows["policy"] == player[0]) & (rows["mask"] == player[1])])
         ]
         assert [line.get_xdata()[0] for line in axes.lines[1::2]] == pytest.approx(means)
-        assert len(axes.texts) == len(figures.ROWS) - len(means)
+        assert len(axes.texts) == len(comparison.LINES) - len(means)
+
+
+def test_a_step_leads_to_the_side_and_up():
+    sizes, labels = np.array([(0.5, 1.0, 0.4), (0.5, 0.6, 0.2)]), np.zeros(2, int)
+    load = Load(np.array([(6.7, 1.0, 0.2), (6.7, 1.3, 0.5)]), sizes, labels, labels)
+    assert steps_of(load) == pytest.approx(np.array([(0.3, 0.3)]))
+
+
+def test_own_scores_rank_as_the_network_does():
+    network = PEQNetwork(16, torch.Generator().manual_seed(0))
+    rows = np.random.default_rng(0).uniform(-1, 1, (128, 3))
+    with torch.no_grad():
+        values = network(torch.from_numpy(rows[None].astype(np.float32)))[0].numpy()
+    assert np.array_equal(own_scores(network, rows).argsort(), values.argsort())
+
+
+def test_pairs_are_of_boxes_that_are_visible_and_lie_on_one_another():
+    env, observation, action = next(islice(containers(policies.random, seed=0), 40, None))
+    below, above = pairs_in_sight(env)
+    assert len(below) > 20 and 0 <= action < 128
+    surroundings = Surroundings(env.physics.load, env.physics.present)
+    for low, high in zip(below, above):
+        assert env.visible[high] in surroundings.on_top(int(env.visible[low]))
+        assert observation[high, 2] > observation[low, 2]
+
+
+def test_a_container_ends_after_its_picks():
+    assert len(list(containers(policies.highest, seed=0, max_picks=7))) == 7

@@ -8,7 +8,7 @@ from studies import paths
 from studies.fingerprint import training_fingerprint
 from studies.grid import read_measures
 from studies.policies import variants
-from studies.policies.variants import GRIDS, judged, read_variants, variants_data
+from studies.policies.variants import GRIDS, PARTS, REWARDS, judged, read_variants, variants_data
 from studies.results import read_provenance
 from unload import TrainConfig, evaluate, load_policy
 
@@ -25,29 +25,23 @@ def test_data_hold_the_runs_of_the_plan(name):
     assert not provenance["reduced"]
 
 
-@pytest.mark.parametrize(
-    ("name", "varied"),
-    [
-        ("networks", {"network"}),
-        ("rewards", set()),
-        ("settings", {"learning_rate", "gradient_steps"}),
-        ("recommended", {"equalize"}),
-    ],
-)
-def test_each_cell_differs_from_the_paper_in_little(name, varied):
-    paper, changes = asdict(TrainConfig()), set()
-    for cell in GRIDS[name].cells.values():
-        config = asdict(cell.config)
-        assert {field for field in paper if paper[field] != config[field]} <= varied | FREE
-        changes.add((repr(cell.config), repr(cell.change)))
-    assert len(changes) == len(GRIDS[name].cells)
+def test_each_cell_differs_from_the_paper_in_little():
+    varied = {"networks": {"network"}, "rewards": set()}
+    varied |= {"settings": {"learning_rate", "gradient_steps"}, "recommended": {"equalize"}}
+    paper = asdict(TrainConfig())
+    for name, cells in {**PARTS, "recommended": GRIDS["recommended"].cells}.items():
+        for cell in cells.values():
+            config = asdict(cell.config)
+            differing = {field for field in paper if paper[field] != config[field]}
+            assert differing <= varied[name] | FREE
+        assert len(set(map(repr, cells.values()))) == len(cells)
 
 
-def test_rewards_stand_beside_the_setting_that_changes_nothing():
-    rows = read_variants("rewards")
-    control = read_measures(GRIDS["settings"]).query("cell == 'unchanged'")
-    assert rows.head(3).to_dict("list") == control.to_dict("list")
-    assert rows["cell"].unique().tolist() == ["unchanged", *GRIDS["rewards"].cells]
+@pytest.mark.parametrize("part", PARTS)
+def test_what_is_shown_together_stands_beside_its_control(part):
+    rows = read_variants(part)
+    assert rows["cell"].unique().tolist() == [*PARTS[part]]
+    assert part == "networks" or rows["cell"].iloc[0] == "unchanged"
 
 
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
@@ -66,17 +60,18 @@ def test_the_recommended_policy_is_judged_as_the_data_say():
 
 
 def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
-    small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5)
-    for name in ("rewards", "recommended"):
+    small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5, picks=200)
+    for name, cells in (("variants", REWARDS), ("recommended", GRIDS["recommended"].cells)):
         cells = {
-            cell: one._replace(config=replace(small, equalize=one.config.equalize, picks=200))
-            for cell, one in GRIDS[name].cells.items()
+            cell: one._replace(config=replace(small, equalize=one.config.equalize))
+            for cell, one in cells.items()
         }
         monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
     monkeypatch.setattr(variants, "LOADS", {"episodes": 1, "seed": 1000})
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
-    variants_data(["rewards", "recommended"], n_jobs=1, **folders)
-    rows = read_measures(GRIDS["rewards"], tmp_path)
+    variants_data(n_jobs=1, **folders)
+    rows = read_measures(GRIDS["variants"], tmp_path)
+    assert rows["seed"].tolist() == 3 * [0, 1, 2]
     assert rows["cell"].nunique() == 3 and rows["msr_mask"].between(0, 1).all()
     provenance = read_provenance(tmp_path, "variants/recommended")
     assert provenance["fingerprint"] == training_fingerprint()

@@ -1,12 +1,13 @@
-"""Jams in seamless walls: what is lifted, and what is counted."""
+"""Jams in seamless walls: what is lifted, and what is counted; and a second engine."""
 
+import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from studies.seamless import episodes, jam_tables, jams
+from studies.seamless import episodes, jam_tables, jams, mujoco_jams
 from studies.seamless.jams import Case
 from unload import task
 from unload.load.boxes import ABOVE
@@ -88,7 +89,7 @@ def test_what_lasts_is_counted():
 def test_a_count_is_of_lifts_below_the_threshold():
     lifts = [{"distance": each} for each in (0.0, 0.199, task.LIFT_THRESHOLD, 0.46)]
     row = jam_tables.count_row("fresh", Case(0, gap=0.0005, picks=25), lifts)
-    assert (row["free"], row["jammed"], row["gap"], row["moment"]) == (4, 2, 0.0005, 25)
+    assert (row["free"], row["jammed"], row["gap"], row["picks"]) == (4, 2, 0.0005, 25)
 
 
 def test_each_question_has_its_cases():
@@ -100,6 +101,8 @@ def test_each_question_has_its_cases():
     assert len(found) == len(fresh) == wanted
     questions = [str(jams.question(*case)) for case in cases]
     assert len(set(questions)) == len(cases)
+    other = [(case.load, case.gap, case.friction) for case in mujoco_jams.cases()]
+    assert len(set(other)) == len(other) == 21
 
 
 @pytest.mark.slow
@@ -157,3 +160,20 @@ def test_attempts_at_boxes_that_jammed_are_counted_by_the_successes_between():
     assert found["attempts"].tolist() == [1, 1] and found["jammed"].tolist() == [1, 0]
     # Of the four first attempts with one neighbour two jammed.
     assert found["neighbours"].tolist() == [0.5, 0.5]
+
+
+def test_the_model_of_the_second_engine_holds_the_boxes_of_the_case():
+    case = Case(0, walls=1, friction=0.49, gap=0.001)
+    world = ElementTree.fromstring(mujoco_jams.model_of(case)).find("worldbody")
+    load, bodies = jams.load_of(case), world.findall("body")
+    assert len(bodies) == len(load) and len(world.findall("geom")) == 4  # floor and walls
+    for body, position, size in zip(bodies, load.positions, load.sizes):
+        assert np.fromstring(body.get("pos"), sep=" ") == pytest.approx(position)
+        halves = np.fromstring(body.find("geom").get("size"), sep=" ")
+        assert 2 * halves == pytest.approx(size - [0.001, 0.001, 0])
+
+
+def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too():
+    pytest.importorskip("mujoco")
+    lifted = mujoco_jams.distances(Case(0, walls=1, friction=0.25, gap=0.001))
+    assert np.median(lifted) == pytest.approx(0.46, abs=0.02)

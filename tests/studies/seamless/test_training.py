@@ -1,15 +1,23 @@
+"""The runs in seamless walls: their plan, what is published of them, their measures and figures."""
+
 import re
 from fnmatch import fnmatch
 from shutil import copy
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from studies import grid, paths
-from studies.grid import Cell, Grid
-from studies.seamless import jam_tables, training, verdicts
-from studies.seamless.training import CELLS, FIRST_SEED
+from studies.grid import Cell, Grid, read_grid
+from studies.paper.training import PAPER
+from studies.seamless import figures, jam_tables, training, verdicts
+from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from unload import TrainConfig
+
+NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
+BY_MASK = {"with the mask": "paper_b2048_mask", "without the mask": "paper_b2048_no_mask"}
+PICKS = np.arange(1, 626) * 32_000
 
 
 def test_the_cells_are_those_of_the_plan():
@@ -19,18 +27,15 @@ def test_the_cells_are_those_of_the_plan():
     assert min(seed for cell in CELLS.values() for seed in cell.seeds) == FIRST_SEED == 40
 
 
-NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
-
-
 def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
     config = TrainConfig(picks=64 * 500, batch_size=64, n_features=4, log_interval=500)
-    cells = {training.EXPORTED[0]: Cell(config, [training.EXPORTED[1]], training.ANEW)}
+    cells = {EXPORTED[0]: Cell(config, [EXPORTED[1]], training.ANEW)}
     small = Grid("seamless/runs", "make it", cells)
     for name, value in (("SEAMLESS", small), ("CELLS", cells)):
         monkeypatch.setattr(training, name, value)
     training.seamless_data(None, None, tmp_path, tmp_path / "runs", n_jobs=1)
-    curve = grid.read_grid(small, tmp_path)
+    curve = read_grid(small, tmp_path)
     for name in NAMES:
         table = pd.read_csv(tmp_path / name)
         assert list(table.columns) == ["Wall time", "Step", "Value"]
@@ -40,24 +45,119 @@ def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
 
 
 def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path):
-    wall_time = pd.read_csv(paths.DATA / NAMES[1])["Wall time"]
-    curves = grid.read_grid(training.SEAMLESS, cells=[training.EXPORTED[0]])
-    run = curves[curves["seed"] == training.EXPORTED[1]]
-    found = verdicts.measures(run)
+    curves = read_grid(training.SEAMLESS, cells=[EXPORTED[0]])
+    found = verdicts.measures(curves[curves["seed"] == EXPORTED[1]])
     assert found["fig11"] and found["fig12"]
-    for curve_name in ("runs_success_rate.csv", "runs_loss.csv"):
-        (tmp_path / "seamless").mkdir(exist_ok=True)
-        copy(paths.DATA / "seamless" / curve_name, tmp_path / "seamless" / curve_name)
-    training.export(wall_time, tmp_path)
+    (tmp_path / "seamless").mkdir()
+    for name in ("seamless/runs_success_rate.csv", "seamless/runs_loss.csv"):
+        copy(paths.DATA / name, tmp_path / name)
+    training.export(pd.read_csv(paths.DATA / NAMES[1])["Wall time"], tmp_path)
     for name in NAMES:
         assert (tmp_path / name).read_bytes() == (paths.DATA / name).read_bytes()
 
 
 def test_measured_jams_are_those_of_the_published_table():
-    first = jam_tables.read_first()
+    first = jam_tables.read_jams("jam_first")
     first = first.assign(share=first["jammed"] / first["free"])
     for friction, shares in training.BY_PLACE.items():
         table = first[first["friction"] == friction]
         found = table.pivot(index="covered", columns="beside", values="share")
         # Three of the twenty episodes had not been played when the plan was written.
         assert found.to_numpy() == pytest.approx(shares, abs=0.1)
+
+
+def run(msr, loss=0.3) -> pd.DataFrame:
+    """A curve of 20 million picks, of numbers at equal distances."""
+    place = np.linspace(0, 1, len(PICKS))
+    values = {
+        name: np.interp(place, np.linspace(0, 1, np.size(each)), np.atleast_1d(each))
+        for name, each in (("success_rate", msr), ("loss", loss))
+    }
+    return pd.DataFrame({"picks": PICKS, **values})
+
+
+def test_a_run_starts_in_its_first_episode_and_ends_in_its_last_tenth():
+    found = verdicts.measures(run([0.2, *[0.5] * 8, 0.8, 0.8]))
+    assert found["start"] == pytest.approx(0.2)
+    assert found["end"] == pytest.approx(0.8, abs=1e-3)
+    assert found["best"] == pytest.approx(0.8) and found["drop"] == 0
+
+
+@pytest.mark.parametrize(
+    ("msr", "like"),
+    [
+        ([0.15, 0.6, 0.6], True),
+        ([0.26, 0.6, 0.6], False),  # the start
+        ([0.15, 0.6, 0.75], False),  # the end
+        ([0.15, 0.6, 0.45], False),
+        ([0.15, 0.6, 0.56, 0.6], True),  # four points down
+        ([0.15, 0.6, 0.53, 0.6], False),
+    ],
+)
+def test_a_run_is_like_fig_12_by_start_end_and_rise(msr, like):
+    assert verdicts.measures(run(msr))["fig12"] is like
+
+
+@pytest.mark.parametrize(
+    ("loss", "like"),
+    [
+        ([0.3, 0.2, *np.linspace(0.2, 0.5, 20), 0.45], True),
+        ([0.2, *np.linspace(0.2, 0.5, 20), 0.45], False),  # does not fall first
+        ([0.3, 0.2, *np.linspace(0.2, 0.5, 20), *[0.3] * 8], False),  # sinks by more than half
+        ([0.3, 0.2, *np.linspace(0.2, 0.5, 20)], True),
+        ([0.5, 0.4, 0.3, 0.2], False),  # does not rise
+    ],
+)
+def test_a_run_is_like_fig_11_by_its_loss(loss, like):
+    assert verdicts.measures(run(0.5, loss))["fig11"] is like
+
+
+def test_runs_are_counted_by_cell():
+    curves = pd.concat(
+        run([0.15, end, end]).assign(cell="mask_order", seed=seed)
+        for seed, end in ((40, 0.5), (41, 0.6), (42, 0.9))
+    )
+    row = verdicts.by_cell(verdicts.by_run(curves)).loc["mask_order"]
+    assert (row["runs"], row["fig12"], row["steady"]) == (3, 2, 3)
+    assert row["lowest"] == pytest.approx(0.5) and row["highest"] == pytest.approx(0.9)
+    assert row["end"] == pytest.approx(2 / 3, abs=1e-3)
+    assert row["low"] < row["end"] < row["high"]
+
+
+@pytest.fixture(scope="module")
+def curves() -> pd.DataFrame:
+    return read_grid(PAPER, cells=BY_MASK.values())
+
+
+@pytest.mark.parametrize("draw", [figures.fig11_loss, figures.fig12_reward])
+def test_dashed_lines_are_without_the_mask(curves, draw):
+    panel = figures.runs_of(curves, BY_MASK)
+    assert {name: len(runs) for name, runs in panel.items()} == dict.fromkeys(BY_MASK, 8)
+    assert {run["cell"].iloc[0] for run in panel["with the mask"]} == {"paper_b2048_mask"}
+    axes = draw({"a gap of 1 mm": panel, "seamless walls": panel}).axes
+    assert [each.get_title() for each in axes] == ["a gap of 1 mm", "seamless walls"]
+    strong = [line for line in axes[0].lines if line.get_linewidth() > 1.5]
+    assert {line.get_label(): line.get_linestyle() for line in strong} == figures.MASK_LINES
+    thin = [line for line in axes[0].lines if line.get_linewidth() < 0.5]
+    assert len(thin) == 16 and strong[0].get_ydata()[0] == thin[0].get_ydata()[0]  # the first run
+    stars = [line.get_xydata()[0] for line in axes[0].lines if line.get_marker() == "*"]
+    if draw == figures.fig12_reward:  # the paper's start and end
+        assert np.array(stars) == pytest.approx(np.array([(0, -0.7), (2e7, 0.2)]))
+
+
+def test_the_line_of_jams_passes_the_papers_point(curves):
+    runs, look = verdicts.by_run(curves), {"marker": "o"}
+    groups = {"ours": (runs, look), "none": (runs.head(0), look)}
+    bound, ours, paper = figures.draw_start_and_end(groups).axes[0].lines
+    at_start = np.interp(15, bound.get_xdata()[::-1], bound.get_ydata()[::-1])
+    assert at_start == pytest.approx(57.7, abs=0.1) and paper.get_xydata().tolist() == [[15, 60]]
+    assert len(ours.get_xdata()) == 16
+
+
+def test_a_share_of_jams_is_of_all_loads():
+    rows = [(0.25, 0.0, 0, 30, 0), (0.25, 0.0, 1, 10, 4), (1.0, 0.0, 0, 20, 20)]
+    rows.append((1.0, 0.001, 0, 20, 0))
+    table = pd.DataFrame(rows, columns=["friction", "gap", "load", "free", "jammed"])
+    axes = figures.draw_jams(table, (0.35, 0.45)).axes[0]
+    lines = {line.get_label(): line.get_ydata().tolist() for line in axes.lines}
+    assert lines["seamless"] == [10, 100] and lines["gap 1 mm"] == [0]
