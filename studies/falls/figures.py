@@ -58,32 +58,30 @@ def four_cells(curves: pd.DataFrame) -> Figure:
 
 @styled
 def dug(
-    profile: tuple[np.ndarray, np.ndarray],
-    preferences: tuple[float, float],
-    averaged: bool,
-    msr: float,
+    surface: np.ndarray, preferences: tuple[float, float], averaged: bool, msr: float
 ) -> Figure:
-    """What a rule leaves of the loads, seen from the entrance, and its place among ``phase``.
+    """What a rule leaves of the loads, seen from above, and its place among ``phase``.
 
     Args:
-        profile: what ``measures.surface`` returns.
+        surface: what ``measures.surface`` returns.
         preferences: of the rule, along x and y.
         averaged: whether equal coordinates share one rank.
         msr: of the rule, in [0, 1].
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6))
-    width, _, height = task.CONTAINER[[1, 0, 2]]
-    places, heights = profile
-    left.plot(places, heights, color=COLOURS["ranks"])
-    left.fill_between(places, heights, color=COLOURS["ranks"], alpha=0.1, lw=0)
-    left.set(xlim=(0, width), ylim=(0, height), xlabel="y, across the container (m)")
-    left.set(ylabel="mean height of the load (m)", title="what 300 picks leave")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.6), width_ratios=(1.4, 1))
+    length, width, height = task.CONTAINER
+    place = {"origin": "lower", "extent": (0, length, 0, width)}
+    image = left.imshow(surface.T, "viridis", vmin=0, vmax=height, **place)
+    figure.colorbar(image, ax=left, location="bottom", label="mean height of the load (m)")
+    left.set(xlabel="x, depth (m); the entrance is at the right", ylabel="y, across (m)")
+    left.set_title("what 300 picks leave, from above")
+    left.grid(False)
     point = dict(zip(("slope_x", "slope_y", "slope_z", "judged_as_is"), (*preferences, 1, msr)))
     draw_phase(right, pd.DataFrame([point]), averaged)
     (dot,) = (line for line in right.lines if line.get_xdata().size)
     dot.set(markersize=12, alpha=1, clip_on=False)
     errs = "errs" if msr < ERRS else "does not err"
-    right.set(ylabel="preference along y (across)", title=f"MSR {msr:.1%}: it {errs}")
+    right.set(ylabel="|preference| along y (across)", title=f"MSR {msr:.1%}: it {errs}")
     return figure
 
 
@@ -181,7 +179,7 @@ def phase(panels: Mapping[str, tuple[pd.DataFrame, bool]]) -> Figure:
     for axes, (title, (rows, averaged)) in zip(all_axes[0], panels.items()):
         draw_phase(axes, rows, averaged)
         axes.set_title(title)
-    all_axes[0, 0].set_ylabel("preference along y (across)")
+    all_axes[0, 0].set_ylabel("|preference| along y (across)")
     all_axes[0, 0].legend(loc="upper right", fontsize=8)
     return figure
 
@@ -203,5 +201,5 @@ def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
             places["slope_x"], places["slope_y"], marker, color=colour, markersize=4, alpha=0.7,
             markeredgewidth=0, label=f"{name}: {len(places)}",
         )  # fmt: skip
-    axes.set(xlabel="preference along x (depth)", xlim=(0, MOST_PREFERENCE))
+    axes.set(xlabel="|preference| along x (depth)", xlim=(0, MOST_PREFERENCE))
     axes.set(ylim=(0, MOST_PREFERENCE))

@@ -7,7 +7,6 @@ import torch
 from torch import nn
 
 from studies.changes import left, without
-from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
@@ -16,7 +15,6 @@ from unload.network.peq import PEQNetwork
 
 Seen = Callable[[np.ndarray], np.ndarray]
 HEIGHT_BINS = 12
-NEAR = 2.4  # m from the entrance, what the surface is of
 BLANKED = {"as_is": (), "x": (0,), "y": (1,), "place": (0, 1)}  # coordinates set to 0 in choosing
 LOADS = {"episodes": 16, "seed": 1000}  # of fresh containers, 500 picks each
 
@@ -132,8 +130,8 @@ def preferring(along_x: float, along_y: float, ties: str = "noise") -> Policy:
     return policy
 
 
-def surface(policy: Policy, picks: int = 300, containers: int = 8) -> tuple[np.ndarray, np.ndarray]:
-    """What a policy leaves of the loads, within 2.4 m of the entrance and seen from there.
+def surface(policy: Policy, picks: int = 300, containers: int = 8) -> np.ndarray:
+    """How high a policy leaves the loads, seen from above.
 
     Args:
         policy: see ``unload.policies``; it plays with the mask on.
@@ -141,16 +139,16 @@ def surface(policy: Policy, picks: int = 300, containers: int = 8) -> tuple[np.n
         containers: how many.
 
     Returns:
-        Places across the containers, (100,) in m, and the mean height of the highest box there,
-        (100,) in m.
+        (70, 25) float64 in m, the mean height of the highest box at each place. Places are 0.1 m
+        long and wide; the first ones lie at the rear and at the left wall.
     """
-    places = (np.arange(100) + 0.5) / 100 * task.CONTAINER[1]
-    heights = np.zeros((containers, len(places)))
+    along, across = ((np.arange(count) + 0.5) / 10 for count in (70, 25))
+    heights = np.zeros((containers, len(along), len(across)))
     for container in range(containers):
         load = left(policy, picks, seed=container)
-        near = load.positions[:, 0] > task.CONTAINER[0] - NEAR
-        for centre, size in zip(load.positions[near], load.sizes[near]):
-            above = np.abs(places - centre[1]) < size[1] / 2
+        for centre, size in zip(load.positions, load.sizes):
+            deep, wide = np.abs(along - centre[0]), np.abs(across - centre[1])
+            covered = np.outer(deep < size[0] / 2, wide < size[1] / 2)
             top = np.maximum(heights[container], centre[2] + size[2] / 2)
-            heights[container] = np.where(above, top, heights[container])
-    return places, heights.mean(axis=0)
+            heights[container] = np.where(covered, top, heights[container])
+    return heights.mean(axis=0)

@@ -45,7 +45,7 @@ FIGURES = FROM_DATA | {
     "scaled_side_view": lambda: scaled_side_view({"items": (np.eye(2), "C0")}, "p"),
     "over_steps": lambda: learning_curves.over_steps(RUNS, "MSR"),
     "in_panels": lambda: learning_curves.in_panels(RUNS, "MSR"),
-    "dug": lambda: falls.dug((LINE, LINE), (0.5, -0.2), False, 0.6),
+    "dug": lambda: falls.dug(np.eye(3), (0.5, -0.2), False, 0.6),
 }
 
 
