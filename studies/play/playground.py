@@ -1,5 +1,6 @@
 """A container to unload by hand, and to watch rules and agents unload, as a Jupyter widget."""
 
+import base64
 import html
 import logging
 
@@ -13,6 +14,7 @@ from unload import task
 from unload.agent.evaluation import Policy
 from unload.load.picture import COLOURS
 from unload.load.substacks import stack_load
+from unload.load.view import view
 from unload.support import checks
 
 YOU, TRAINED = "you", "your agent"
@@ -24,7 +26,8 @@ class Playground(widgets.VBox):
     """A load that you unload by clicking on boxes, and that others unload for you to watch.
 
     All players have the same load and the same number of picks on the score board. Where no
-    kernel runs, a replay stands in its place: of the chosen player, or of the recommended agent.
+    kernel runs, a replay of the player who is watched stands in its place, or a picture if you
+    pick.
 
     Args:
         seed: of the load, of the noise of its observed positions, and of random picks.
@@ -216,9 +219,14 @@ class Playground(widgets.VBox):
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
         """The widget, and what is shown of it where no kernel runs."""
-        run = self._run or self.runs["the recommended agent"]
-        run.play_to(self.slider.max)
-        return replay(run)._repr_mimebundle_() | super()._repr_mimebundle_(**kwargs)
+        if self._run is None:
+            now = self.you.moment()
+            picture = view(self.you.load, now.present, now.groups()).picture()
+            still = {"image/png": base64.b64encode(picture).decode()}
+        else:
+            self._run.play_to(self.slider.max)
+            still = replay(self._run)._repr_mimebundle_()
+        return still | super()._repr_mimebundle_(**kwargs)
 
 
 class _Said(logging.Handler):
