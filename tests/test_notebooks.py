@@ -89,7 +89,7 @@ def test_committed_outputs_are_clean(path):
     assert not [output for output in outputs if output.get("name") == "stderr"]
     assert not [output for output in outputs if run.WIDGET_MIMETYPE in output.get("data", {})]
     assert "widgets" not in json.loads(path.read_text())["metadata"]
-    assert path.stat().st_size < 2_000_000  # 00 holds three replays
+    assert path.stat().st_size < 1_500_000
 
 
 def test_a_wrong_answer_stops_every_solution():
