@@ -62,7 +62,7 @@ export function sumMap(maps) {
 
 /** Pixels of a map, RGBA: blue for a box and orange against it, the fainter the nearer to 0. */
 export function pixels(map, largest) {
-  const strength = (value) => (255 * Math.abs(value)) / (largest || 1);
+  const strength = (value) => (255 * Math.abs(value)) / largest;
   const pixel = (value) => [...COLOURS[value < 0 ? 1 : 0], strength(value)];
   return Uint8ClampedArray.from([...map].flatMap(pixel));
 }

@@ -49,8 +49,8 @@ def real_heap() -> Heap:
 def make_rake() -> Iterator[Callable[..., Rake]]:
     made = []
 
-    def make(physics: str = "coarse", **kwargs) -> Rake:
-        made.append(Rake(physics, **kwargs))
+    def make(physics: str = "coarse") -> Rake:
+        made.append(Rake(physics))
         return made[-1]
 
     yield make

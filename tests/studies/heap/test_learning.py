@@ -1,5 +1,7 @@
 """The networks that guess fates, and what they learn from recorded picks."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
@@ -13,7 +15,7 @@ from studies.heap.learning import (
     load_networks,
     save_networks,
 )
-from studies.heap.network import FateNetwork, fate_loss
+from studies.heap.network import FateNetwork
 from studies.heap.observation import COLUMN, COLUMNS, ROWS
 
 BOXES = 6
@@ -156,20 +158,26 @@ def test_one_row_another_order_and_empty_rows_change_no_fate(network, observatio
 
 def test_the_loss_is_least_for_what_has_happened(network, observations):
     """One visible box is unloaded and one falls; of the two falls the other one is hidden."""
-    present, rows = holds_box(observations), torch.tensor([0, 0])
-    found = torch.tensor([[1, 2, 0, 0, 0], [1, 2, 0, 0, 0]], dtype=torch.int8)
-    fates = network.fates(observations, present, rows)
+    present = holds_box(observations)
+    batch = {
+        "observations": observations,
+        "actions": torch.tensor([0, 0]),
+        "unloaded": torch.ones(2),
+        "falls": torch.full((2,), 2.0),
+        "fates": torch.tensor([[1, 2, 0, 0, 0]] * 2, dtype=torch.int8),
+    }
+    fates = network.fates(observations, present, batch["actions"])
     sure = torch.full_like(fates.logits, -9.0)
     sure[:, 0, 0, 0] = sure[:, 0, 1, 1] = 9.0
-    hidden = torch.tensor([[[1e-6, 1.0]]]).expand(2, 1, 2)
-    right = fates._replace(logits=sure, hidden=hidden)
-    boxes, falls = torch.ones(2), torch.full((2,), 2.0)
-    losses = [fate_loss(each, present, found, boxes, falls) for each in (right, fates)]
-    assert losses[0] < losses[1]
-    counts = right.sums(present)
-    assert counts[0].numpy() == pytest.approx(1, abs=0.01)
-    assert counts[1].numpy() == pytest.approx(2, abs=0.01)
+    right = fates._replace(logits=sure, hidden=torch.tensor([[[1e-6, 1.0]]]).expand(2, 1, 2))
+    boxes, falls = right.sums(present)
+    assert boxes.numpy() == pytest.approx(1, abs=0.01)
+    assert falls.numpy() == pytest.approx(2, abs=0.01)
+
+    def loss(fates):
+        return batch_loss(SimpleNamespace(fates=lambda *_: fates), batch)
+
+    assert loss(right) < loss(fates)
     empty = fates.logits.clone()
     empty[1, :, 3:] += 5
-    same = fate_loss(fates._replace(logits=empty), present, found, boxes, falls)
-    assert same == losses[1], "rows without a box do not count"
+    assert loss(fates._replace(logits=empty)) == loss(fates), "rows without a box do not count"

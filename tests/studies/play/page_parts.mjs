@@ -351,9 +351,9 @@ test("what became of the reader's pick", () => {
     [true, true, "Unloaded: no box lay on it."], [false, false, "Failed: a box lies on it."],
     [true, false, "Failed: it jams, although no box lies on it."],
   ]) {
-    const container = { present: Uint8Array.from([1, 0, 0, 1]), picks: 5, liftable: () => free };
+    const container = { present: Uint8Array.from([1, 0, 0, 0]), picks: 5, liftable: () => free };
     const said = words.pickVerdict(container, 0, success);
-    assert.equal(said, `${line} 2 of your 5 picks succeeded.`);
+    assert.equal(said, `${line} 3 of your 5 picks succeeded.`);
   }
 });
 
@@ -602,12 +602,13 @@ test("frozen weights are judged both ways", () => {
   assert.deepEqual([both.weights, tell("freeze").rates], [kept.weights, both.rates]);
   assert.notDeepEqual(both.rates.true, both.rates.false);
   assert.deepEqual(tell("change", { seamless: true }).judged, []);
-  // In the midst of a run it stops; what was judged before is forgotten.
+  // In the midst of a run it stops.
   tell("train");
   some(1);
   const stopped = tell("freeze", { blank: true });
   assert.deepEqual([stopped.running, stopped.judged], [false, []]);
   const then = rest();
   assert.deepEqual([then[0].judged, then.at(-1).judged], [["true"], ["false", "true"]]);
+  assert.notDeepEqual(then.at(-1).rates.true, then.at(-1).rates.false);
   assert.equal(then.at(-1).picks, stopped.picks);
 });
