@@ -3,6 +3,7 @@
 import base64
 import html
 import logging
+from logging.handlers import BufferingHandler
 
 import ipywidgets as widgets
 import numpy as np
@@ -59,7 +60,7 @@ class Playground(widgets.VBox):
         self.runs = {name: Run(each, load, seed, mask) for name, each in players.items()}
         # Do once what a click does, because compiled code is loaded the first time. What that
         # says stands in the widget's own line, because a notebook shows it as an error above.
-        said = _Said()
+        said = BufferingHandler(100)
         logging.getLogger("unload").addHandler(said)
         self.you.pick(int(self.you.visible[0]))
         self.you.back_to(0)
@@ -69,8 +70,8 @@ class Playground(widgets.VBox):
         self._make_controls(player, mask, picks)
         super().__init__([self._bar, widgets.HBox([self._left, self._right])])
         self._choose_player()
-        if said.messages:
-            self._tell(f"Done for the first time: {said.messages[0]}")
+        if said.buffer:
+            self._tell(f"Done for the first time: {said.buffer[0].getMessage()}")
 
     def _make_controls(self, player: str, mask: bool, picks: int) -> None:
         self.player = widgets.Dropdown(
@@ -168,10 +169,9 @@ class Playground(widgets.VBox):
         self.undo.disabled = not self.you.picks
         liftable = episode.liftable(count) if self.hints.value else None
         self._draw(moment, liftable, lifted)
-        self._say(episode, count, moment)
         self._score()
 
-    def _say(self, episode: Episode, count: int, moment: Moment) -> None:
+        # The score of what is shown, and what the last pick has done.
         unloaded = episode.unloaded(count)
         share = f" ({unloaded / count:.0%})" if count else ""
         self.score.value = (
@@ -227,14 +227,3 @@ class Playground(widgets.VBox):
             self._run.play_to(self.slider.max)
             still = replay(self._run)._repr_mimebundle_()
         return still | super()._repr_mimebundle_(**kwargs)
-
-
-class _Said(logging.Handler):
-    """What the package logs."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.messages: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.messages.append(record.getMessage())

@@ -8,8 +8,7 @@ import torch
 import unload
 from studies.speed import mutants, parts
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
-from studies.speed.run import show
-from studies.speed.training import PEQPolicy
+from studies.speed.run import PEQPolicy, show
 from unload.env.sb3 import ContainerVecEnv
 
 
