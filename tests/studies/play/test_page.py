@@ -304,8 +304,7 @@ def test_presets_end_where_they_say():
 def test_a_browser_shows_it(tmp_path):
     """The five steps do what they say for three seeds at three sizes, and the controls answer."""
     pytest.importorskip("playwright", reason="make browser installs it")
-    from tests.browser.start import BROWSERS, browser
-    from tests.browser.train_page import look_at_page
+    from tests.browser.train_page import BROWSERS, browser, look_at_page
 
     if not any(map(shutil.which, BROWSERS)):
         pytest.skip("Chromium is not installed")
