@@ -40,7 +40,7 @@ def test_stable_baselines_trains_the_papers_network():
     model.env.close()
 
 
-def test_rates_are_positive(small_load, monkeypatch):
+def test_rates_are_positive_and_printed_with_their_units(small_load, monkeypatch, capsys):
     monkeypatch.setattr(parts, "ROUNDS", 1)
     rates = lift_rates(small_load, full=1, others=2)
     assert list(rates) == ["full", "local", "table"]
@@ -48,6 +48,9 @@ def test_rates_are_positive(small_load, monkeypatch):
     rates |= update_times(batch_size=8, n_features=4)
     assert len(rates) == 12
     assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
+    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
+    show(pd.DataFrame([row]))
+    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
 
 
 def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
@@ -76,9 +79,3 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
         ("print(f'{a + 1}') -> pass", "pass"),
     ]
-
-
-def test_speeds_are_printed_with_their_units(capsys):
-    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
-    show(pd.DataFrame([row]))
-    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
