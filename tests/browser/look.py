@@ -289,20 +289,16 @@ def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
         home: folder for its settings and messages; made.
         theme: ``"Light"`` or ``"Dark"``.
     """
-    for name, values in {
-        **LAB,
-        "apputils-extension/themes": {"theme": f"JupyterLab {theme}"},
-    }.items():
+    themes = {"apputils-extension/themes": {"theme": f"JupyterLab {theme}"}}
+    for name, values in (LAB | themes).items():
         file = home / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(values))
     folders = {
-        "JUPYTERLAB_SETTINGS_DIR": home / "settings",
-        "JUPYTERLAB_WORKSPACES_DIR": home / "workspaces",
-        "JUPYTER_CONFIG_DIR": home / "config",
-        "JUPYTER_RUNTIME_DIR": home / "runtime",
-        "IPYTHONDIR": home / "ipython",
-    }
+        "JUPYTERLAB_SETTINGS_DIR": "settings", "JUPYTERLAB_WORKSPACES_DIR": "workspaces",
+        "JUPYTER_CONFIG_DIR": "config", "JUPYTER_RUNTIME_DIR": "runtime", "IPYTHONDIR": "ipython",
+    }  # fmt: skip
+    env = os.environ | {name: str(home / folder) for name, folder in folders.items()}
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -313,12 +309,7 @@ def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
         *(f"--ServerApp.root_dir={notebooks}", "--LabApp.expose_app_in_browser=True"),
     ]
     with open(home / "jupyterlab.log", "w") as log:
-        server = subprocess.Popen(
-            command,
-            stdout=log,
-            stderr=log,
-            env=os.environ | {k: str(v) for k, v in folders.items()},
-        )
+        server = subprocess.Popen(command, stdout=log, stderr=log, env=env)
         try:
             _wait_for(f"http://127.0.0.1:{port}/api/status?token={token}", server, log.name)
             yield f"http://127.0.0.1:{port}/lab/tree/{{}}?token={token}&reset"
