@@ -28,13 +28,10 @@ def name(path):
     return str(path.relative_to(run.HERE))
 
 
-def test_every_chapter_has_solutions():
+def test_every_chapter_has_solutions_and_a_number_that_tells_its_track():
+    """Core from 00, reproduction from 10, beyond from 20, each without a gap."""
     solutions = {path.stem for path in NOTEBOOKS if path.parent.name == "solutions"}
     assert {path.stem for path in CHAPTERS} == solutions
-
-
-def test_a_number_tells_the_track():
-    """Core from 00, reproduction from 10, beyond from 20, each without a gap."""
     numbers = [int(path.stem[:2]) for path in CHAPTERS]
     for track in range(3):
         own = [number for number in numbers if number // 10 == track]
@@ -55,41 +52,33 @@ def test_has_one_parameters_cell_of_upper_case_names_with_the_reduced_ones(path)
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=name)
-def test_chapter_tells_what_one_learns_and_closes_with_exercises(path):
+def test_chapter_tells_what_one_learns_in_how_long_and_closes_with_checked_exercises(path):
     prose = [text(cell) for cell in cells(path, "markdown")]
     assert prose[0].startswith(f"# {path.stem[:2]} · ")
     assert "**What you will learn**" in prose[0]
-    assert "**Time**" in prose[0]
     ending = "\n".join(prose[-3:])
-    assert "## Summary" in ending
-    assert "## Exercises" in ending
-    assert f"solutions/{path.name}" in ending
+    for part in ("## Summary", "## Exercises", f"solutions/{path.name}"):
+        assert part in ending
+    assert any("\ncheck(" in "\n" + text(cell) for cell in cells(path, "code"))
 
-
-@pytest.mark.parametrize("path", CHAPTERS, ids=name)
-def test_stated_minutes_are_those_of_its_words_figures_and_exercises(path):
-    prose = text(cells(path, "markdown")[0])
-    stated = int(re.search(r"\*\*Time\*\*: (\d+) minutes to read", prose)[1])
+    # The minutes are those of its words, figures and exercises.
+    stated = int(re.search(r"\*\*Time\*\*: (\d+) minutes to read", prose[0])[1])
     assert abs(stated - run.measured(path)["minutes"]) <= 1
     readme = (run.HERE.parent / "README.md").read_text()
     assert re.search(rf"notebooks/{path.name}\) \((\d+)", readme)[1] == str(stated)
 
 
-@pytest.mark.parametrize("path", CHAPTERS, ids=name)
-def test_every_chapter_has_an_exercise_that_is_checked(path):
-    assert any("\ncheck(" in "\n" + text(cell) for cell in cells(path, "code"))
-
-
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
 def test_committed_outputs_are_clean(path):
     code = [cell for cell in cells(path, "code") if text(cell).strip()]
+    assert not any("sys.path" in text(cell) for cell in code), "the environment finds the studies"
     assert all(cell["execution_count"] for cell in code), "committed without outputs"
     outputs = [output for cell in code for output in cell["outputs"]]
     assert not [output for output in outputs if output["output_type"] == "error"]
     assert not [output for output in outputs if output.get("name") == "stderr"]
     assert not [output for output in outputs if run.WIDGET_MIMETYPE in output.get("data", {})]
     assert "widgets" not in json.loads(path.read_text())["metadata"]
-    assert path.stat().st_size < 2_000_000  # 00 holds three replays
+    assert path.stat().st_size < 1_500_000
 
 
 def test_a_wrong_answer_stops_every_solution():
@@ -103,19 +92,11 @@ def test_reduced_parameters_belong_to_notebooks():
     assert set(tables) <= {run.key(path) for path in NOTEBOOKS}
 
 
-def test_the_environment_finds_the_studies_and_no_cell_helps_it():
-    for path in NOTEBOOKS:
-        assert not any("sys.path" in text(cell) for cell in cells(path, "code")), path
-
-
-def test_a_name_that_no_notebook_has_is_refused(monkeypatch, capsys):
+def test_unknown_names_are_refused(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["run.py", "nope", "00"])
     with pytest.raises(SystemExit, match="2"):
         run.main()
     assert "no notebook starts with 'nope'" in capsys.readouterr().err
-
-
-def test_unknown_parameter_is_refused(tmp_path):
     with pytest.raises(ValueError, match="has no parameter NONSENSE"):
         run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
 

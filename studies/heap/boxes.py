@@ -73,15 +73,14 @@ class Heap:
         """(n,) float64, rad: angle between the vertical and the box's axis nearest to it."""
         return np.arccos(np.clip(np.abs(self.axes()[:, 2]).max(axis=1), 0, 1))
 
-    def front(self) -> float:
-        """x of the foremost face, m; the rear wall's if there is no box."""
-        if not len(self):
-            return REAR
-        return float((self.positions[:, 0] + self.extents()[:, 0] / 2).max())
-
     def edge(self) -> float:
-        """x of the conveyor's edge, m: at the foremost face, but at most at ``FARTHEST_EDGE``."""
-        return min(self.front(), FARTHEST_EDGE)
+        """x of the conveyor's edge, m.
+
+        It is at the foremost face, at the rear wall if there is no box, but at most at
+        ``FARTHEST_EDGE``.
+        """
+        front = (self.positions[:, 0] + self.extents()[:, 0] / 2).max(initial=REAR)
+        return min(float(front), FARTHEST_EDGE)
 
 
 def package_sizes(packages: np.ndarray) -> np.ndarray:

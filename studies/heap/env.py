@@ -10,7 +10,6 @@ from studies.heap import generate
 from studies.heap.boxes import Heap
 from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
 from studies.heap.rake import Rake
-from unload import task
 from unload.env.base import AllOrReset, EpisodeEnv
 from unload.support import checks
 
@@ -93,7 +92,6 @@ class HeapEnv(EpisodeEnv):
         split: ``"train"`` or ``"test"``, which of the stored heaps are played.
         physics: ``"whole"`` or ``"coarse"``, see ``Rake``.
         max_picks: greatest length of an episode.
-        mass: kg, of each box.
         render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
@@ -117,7 +115,6 @@ class HeapEnv(EpisodeEnv):
         split: str = "train",
         physics: str = "whole",
         max_picks: int = MAX_PICKS,
-        mass: float = task.MASS,
         render_mode: str | None = None,
     ) -> None:
         checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
@@ -129,7 +126,7 @@ class HeapEnv(EpisodeEnv):
             -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
         )
         self.action_space = gymnasium.spaces.Discrete(ROWS)
-        self._rake, self._camera = Rake(physics, mass), Camera()
+        self._rake, self._camera = Rake(physics), Camera()
         self._state = "not started"
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):

@@ -26,6 +26,7 @@ ROUNDS = 8  # of settling and clearing at most, after the barrier is gone
 TRIES = 20  # heaps made at most until one is accepted
 FEWEST, HIGHEST, FASTEST = 80, float(task.CONTAINER[2]), 0.1  # boxes, m, m/s: see ``settled_heap``
 SPLITS = "train", "test"
+STORED = {"positions": np.float32, "orientations": np.float32, "packages": np.int8}
 
 
 def settled_heap(rng: np.random.Generator) -> Heap:
@@ -116,7 +117,6 @@ def _settled(heap: Heap) -> tuple[Heap, float]:
 
 
 def _accepted(heap: Heap, fastest: float) -> bool:
-    """Whether a heap is worth keeping."""
     top = (heap.positions[:, 2] + heap.extents()[:, 2] / 2).max()
     inside = ((heap.positions > (REAR, 0, 0)) & (heap.positions < (DOOR, WIDTH, HIGHEST))).all()
     return bool(len(heap) >= FEWEST and top <= HIGHEST and inside and fastest <= FASTEST)
@@ -127,7 +127,7 @@ def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:
     arrays = {}
     for split, of in heaps.items():
         arrays[f"{split}_counts"] = np.array([len(heap) for heap in of])
-        for name, dtype in _STORED.items():
+        for name, dtype in STORED.items():
             joined = np.concatenate([getattr(heap, name) for heap in of])
             arrays[f"{split}_{name}"] = joined.astype(dtype)
     files.write_arrays(path, arrays)
@@ -137,16 +137,13 @@ def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz")
     """The stored heaps of a split, ``"train"`` or ``"test"``."""
     checks.one_of("split", split, SPLITS)
     arrays = files.read_arrays(path)
-    wanted = [f"{split}_{name}" for name in ("counts", *_STORED)]
+    wanted = [f"{split}_{name}" for name in ("counts", *STORED)]
     checks.entries(str(path), arrays, wanted)
     ends = np.cumsum(arrays[f"{split}_counts"])[:-1]
     positions, orientations, packages = (
-        np.split(arrays[f"{split}_{name}"], ends) for name in _STORED
+        np.split(arrays[f"{split}_{name}"], ends) for name in STORED
     )
     return [
         Heap(place.astype(float), turn.astype(float), package_sizes(kind), kind.astype(int))
         for place, turn, kind in zip(positions, orientations, packages)
     ]
-
-
-_STORED = {"positions": np.float32, "orientations": np.float32, "packages": np.int8}

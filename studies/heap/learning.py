@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch import nn
+from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
+from torch.nn.functional import poisson_nll_loss
 
-from studies.heap.network import FEATURES, FateNetwork, fate_loss
-from studies.heap.observation import COLUMN
+from studies.heap.network import FATES, FEATURES, FateNetwork
+from studies.heap.observation import COLUMN, FELL, UNLOADED
 from studies.heap.policies import Picks
 from unload.agent.learner import flat, grouped
 from unload.network.weights import read_weights, write_weights
@@ -18,7 +19,6 @@ BATCH = 128
 LEARNING_RATE = 5e-3  # with 0.001, STEPS are far too few; with 0.01 it learns less again
 STEPS = 4000  # 10 times through 50,000 picks
 WEIGHT_DECAY = 1e-4
-AT_ONCE = 32  # observations of which all rows are asked for: pairs take 25 MB a layer
 
 
 def joined(parts: Sequence[Picks]) -> Picks:
@@ -76,14 +76,21 @@ def batch_loss(network: FateNetwork, batch: Mapping[str, torch.Tensor]) -> torch
     """Negative log-likelihood per pick of a batch, which has the fields of ``Picks``."""
     observations = without_empty_rows(batch["observations"])
     present = holds_box(observations)
-    unloaded, falls = batch["unloaded"].float(), batch["falls"].float()
-    fates = batch["fates"][:, : observations.shape[1]]
-    answers = network.fates(observations, present, batch["actions"])
-    loss = fate_loss(answers, present, fates, unloaded, falls)
-    fell = (falls > 0).float()
-    loss = loss + nn.functional.binary_cross_entropy_with_logits(answers.fall_logits[:, 0], fell)
-    for mean, count in zip(answers.sums(present), (unloaded, falls)):
-        loss = loss + nn.functional.poisson_nll_loss(mean[:, 0], count, log_input=False)
+    counts = torch.stack([batch["unloaded"], batch["falls"]], dim=1).float()
+    fates = network.fates(observations, present, batch["actions"])
+
+    # What has happened to each visible box, and how many of the hidden ones were unloaded or fell.
+    found = batch["fates"][:, : observations.shape[1]]
+    bits = torch.stack([(found & UNLOADED) > 0, (found & FELL) > 0], dim=2).float()
+    each = cross_entropy(fates.logits[:, 0], bits, reduction="none")
+    loss = (each * present[..., None]).sum(dim=(1, 2)).mean()
+    hidden = counts - bits.sum(dim=1)
+    loss = loss + FATES * poisson_nll_loss(fates.hidden[:, 0], hidden, log_input=False)
+
+    # Whether anything fell, and how many boxes in all were unloaded or fell.
+    loss = loss + cross_entropy(fates.fall_logits[:, 0], (counts[:, 1] > 0).float())
+    for mean, count in zip(fates.sums(present), counts.unbind(1)):
+        loss = loss + poisson_nll_loss(mean[:, 0], count, log_input=False)
     return loss
 
 
@@ -125,13 +132,10 @@ class Learned:
     @torch.no_grad()
     def expected(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Expected boxes and falls, (batch, 96) float32 each; rows without a box mean nothing."""
-        whole = np.zeros((2, *np.shape(observations)[:2]), np.float32)
-        for start in range(0, len(observations), AT_ONCE):
-            chunk = np.asarray(observations[start : start + AT_ONCE], np.float32)
-            rows = without_empty_rows(torch.from_numpy(chunk))
-            answers = [torch.stack(network(rows, holds_box(rows))) for network in self.networks]
-            mean = torch.stack(answers).mean(dim=0).numpy()
-            whole[:, start : start + AT_ONCE, : rows.shape[1]] = mean
+        rows = without_empty_rows(torch.from_numpy(np.asarray(observations, np.float32)))
+        answers = [torch.stack(network(rows, holds_box(rows))) for network in self.networks]
+        whole = np.zeros((2, *observations.shape[:2]), np.float32)
+        whole[:, :, : rows.shape[1]] = torch.stack(answers).mean(dim=0)
         return tuple(whole)
 
     @torch.no_grad()

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import torch
 from torch import nn
 
-from studies.heap.observation import COLUMN, COLUMNS, FELL, UNLOADED
+from studies.heap.observation import COLUMN, COLUMNS
 from unload.support import checks
 
 FEATURES = 64
@@ -89,7 +89,11 @@ class FateNetwork(nn.Module):
         asked = observations
         if rows is not None:
             asked = observations.gather(1, rows[:, None, None].expand(-1, 1, observations.shape[2]))
-        messages = self._messages(asked, observations, present)
+        # What each other box means to each one asked for: (batch, asked, items, n) >= 0, so that 0
+        # of rows without a box adds nothing to the sum and leaves the maximum.
+        pairs = self.chosen(asked)[:, :, None] + self.other(observations)[:, None]
+        pairs = torch.relu(pairs + self.pair(pair_columns(asked, observations)))
+        messages = torch.relu(self.message(pairs)) * present[:, None, :, None]
         pooled = [messages.sum(dim=2) / 16, messages.amax(dim=2)]
         around = torch.relu(self.hidden(torch.cat([torch.relu(self.own(asked)), *pooled], dim=2)))
         pair = torch.relu(self.heard(messages) + self.context(around)[:, :, None])
@@ -101,16 +105,6 @@ class FateNetwork(nn.Module):
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Expected boxes and falls of dragging each row; arguments as in ``fates``."""
         return self.fates(observations, present).sums(present)
-
-    def _messages(
-        self, asked: torch.Tensor, others: torch.Tensor, present: torch.Tensor
-    ) -> torch.Tensor:
-        """What each other box means to each one asked for, (batch, asked, others, n) ≥ 0."""
-        relation = pair_columns(asked, others)
-        message = self.chosen(asked)[:, :, None] + self.other(others)[:, None]
-        message = torch.relu(self.message(torch.relu(message + self.pair(relation))))
-        # Messages are >= 0, so that 0 adds nothing to the sum and leaves the maximum.
-        return message * present[:, None, :, None]
 
 
 def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
@@ -124,27 +118,3 @@ def pair_columns(asked: torch.Tensor, others: torch.Tensor) -> torch.Tensor:
     apart = others[:, None, :, place] - asked[:, :, None, place]
     reach = (others[:, None, :, block] + asked[:, :, None, block]) / 2
     return torch.cat([apart, apart.abs() - reach], dim=3)
-
-
-def fate_loss(
-    fates: Fates,
-    present: torch.Tensor,
-    found: torch.Tensor,
-    boxes: torch.Tensor,
-    falls: torch.Tensor,
-) -> torch.Tensor:
-    """Negative log-likelihood of what one pick of each observation has done, per pick.
-
-    Args:
-        fates: of the box that was dragged in each observation.
-        present: (batch, items) bool.
-        found: (batch, items) int, the bits ``UNLOADED`` and ``FELL`` of each visible box.
-        boxes, falls: (batch,) float32, of the pick, hidden boxes included.
-    """
-    bits = torch.stack([(found & UNLOADED) > 0, (found & FELL) > 0], dim=2).float()
-    each = nn.functional.binary_cross_entropy_with_logits(
-        fates.logits[:, 0], bits, reduction="none"
-    )
-    hidden = torch.stack([boxes, falls], dim=1) - bits.sum(dim=1)
-    counts = nn.functional.poisson_nll_loss(fates.hidden[:, 0], hidden, log_input=False)
-    return (each * present[..., None]).sum(dim=(1, 2)).mean() + FATES * counts

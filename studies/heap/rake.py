@@ -57,10 +57,7 @@ def add_walls(world: World) -> None:
 def fill(world: World, heap: Heap, mass: float) -> dict[int, int]:
     """Let a world hold the walls and the boxes of a heap alone; return their bodies by number.
 
-    Args:
-        world: whatever was in it is removed.
-        heap: of the boxes.
-        mass: of each box, kg; 0 makes them immovable.
+    The mass is that of each box in kg; 0 makes them immovable.
     """
     world.clear()
     add_walls(world)
@@ -71,26 +68,18 @@ def fill(world: World, heap: Heap, mass: float) -> dict[int, int]:
     }
 
 
-def drag(world: World, body: int, mass: float) -> float:
+def drag(world: World, body: int) -> float:
     """Drag a body towards the door by its centre of mass, and stop it in that direction.
 
     A controller holds ``SPEED``, as far as ``FORCE`` allows, until the body has moved by
-    ``REACH`` or ``TIME`` is over.
-
-    Args:
-        world: which holds it.
-        body: its number there.
-        mass: of it, kg.
-
-    Returns:
-        How far it came along x, in m.
+    ``REACH`` or ``TIME`` is over. Return how far it came along x, in m.
     """
     start = world.pose(body)[0][0]
     for _ in range(round(TIME / world.time_step)):
         if world.pose(body)[0][0] - start >= REACH:
             break
         # What would bring the body to its speed within this step, if nothing resisted.
-        wanted = mass * (SPEED - world.client.getBaseVelocity(body)[0][0]) / world.time_step
+        wanted = task.MASS * (SPEED - world.client.getBaseVelocity(body)[0][0]) / world.time_step
         force = (min(max(wanted, -FORCE), FORCE), 0.0, 0.0)
         world.step(world.time_step, body, force)
     moved = world.pose(body)[0][0] - start
@@ -111,12 +100,10 @@ class Rake:
     Args:
         physics: ``"whole"``, PyBullet's default of 240 Hz and 50 iterations of the solver, or
             ``"coarse"``, 120 Hz and 20 iterations.
-        mass: kg, of each box.
     """
 
-    def __init__(self, physics: str = "whole", mass: float = task.MASS) -> None:
+    def __init__(self, physics: str = "whole") -> None:
         checks.one_of("physics", physics, PHYSICS)
-        self.mass = checks.real("mass", mass, 0.01, 1000)
         time_step, iterations = PHYSICS[physics]
         self._world = World(time_step, iterations=iterations)
 
@@ -124,8 +111,8 @@ class Rake:
         """Drag one box and see what comes."""
         box = checks.integer("box", box, 0, len(heap) - 1)
         world, edge = self._world, heap.edge()
-        bodies = fill(world, heap, self.mass)
-        moved = drag(world, bodies[box], self.mass)
+        bodies = fill(world, heap, task.MASS)
+        moved = drag(world, bodies[box])
         came = moved >= CAME
         unloaded = np.zeros(len(heap), bool)
         positions, orientations = heap.positions.copy(), heap.orientations.copy()

@@ -4,7 +4,7 @@ Picks are recorded in two rounds: the first explores around random linear rules,
 around the networks that were learned from the first.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -97,37 +97,29 @@ def make_networks(
 
 
 def _record(round_number: int, number: int, explorer: str | None) -> str:
-    """The picks of one exploring episode, see ``packed``; its number chooses the training heap."""
+    """The picks of one exploring episode, see ``packed``; its number chooses the training heap.
+
+    Half of the picks are random, because every box must be tried. The others are those of a
+    network, or of a rule with normally distributed weights of ``EXPLORED``.
+    """
     torch.set_num_threads(1)
     rng = np.random.default_rng([SEEDS["train"], round_number, number])
-    favourite = None
-    if explorer is not None:
-        favourite = Learned([_network(explorer)], float(rng.choice(WEIGHTS)))
-    env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
-    try:
-        policy, heap = exploring(rng, favourite), env.heaps[number % len(env.heaps)]
-        episode = play(env, policy, heap, int(rng.integers(2**32)))
-    finally:
-        env.close()
-    return packed(vars(joined([episode])))
-
-
-def exploring(rng: np.random.Generator, favourite: Callable | None = None) -> Callable:
-    """A policy to record: half of its picks are random, because every box must be tried.
-
-    Args:
-        rng: draws its favourite.
-        favourite: policy of the other half; a linear rule with normally distributed weights
-            of ``EXPLORED`` if None, a new one for each call of this function.
-    """
-    if favourite is None:
+    if explorer is None:
         favourite = best(linear({name: rng.normal() for name in EXPLORED}))
+    else:
+        favourite = Learned([_network(explorer)], float(rng.choice(WEIGHTS)))
 
     def policy(observations, masks, rng):
         chosen = random if rng.random() < 0.5 else favourite
         return chosen(observations, masks, rng)
 
-    return policy
+    env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
+    try:
+        heap = env.heaps[number % len(env.heaps)]
+        episode = play(env, policy, heap, int(rng.integers(2**32)))
+    finally:
+        env.close()
+    return packed(vars(joined([episode])))
 
 
 def _learn(recorded: Sequence[str], seed: int) -> str:

@@ -43,6 +43,7 @@ RULE_PHYSICS = "coarse"  # the rules are many
 PHYSICS = "whole"  # that judges
 SHOWN_WEIGHT = 1.0  # λ at which all policies play; at the others, only those that depend on it
 REFERENCE, LEARNED, ORACLE = "best rule", "learned", "oracle"
+RULE_COLUMNS = ["rule", "heaps", "boxes", "falls"]
 MEASURES = "boxes", "falls", "net"
 ENDS = "", "_low", "_high"  # of a mean and its interval
 
@@ -107,9 +108,9 @@ def _played(
     """
     code, jobs = identity(_play), []
     for player, heaps in players.values():
-        known = player | {
-            name: files.digest(path) for name, path in player.items() if name == "networks"
-        }
+        known = dict(player)
+        if "networks" in player:
+            known["networks"] = files.digest(player["networks"])
         for number, heap in enumerate(stored_heaps(split)[:heaps]):
             question = {"player": known, "heap": heap.digest(), "number": number, "code": code}
             question |= {"physics": physics, "picks": MAX_PICKS}
@@ -119,13 +120,11 @@ def _played(
 
 
 def _means(answers: dict[str, list[Result]]) -> pd.DataFrame:
-    return pd.DataFrame(
-        [
-            {"rule": name, "heaps": len(of)}
-            | {part: np.mean([each.value[part] for each in of]) for part in ("boxes", "falls")}
-            for name, of in answers.items()
-        ]
+    episodes = pd.DataFrame(
+        {"rule": rule} | answer.value for rule, of in answers.items() for answer in of
     )
+    rules = episodes.groupby("rule", sort=False)
+    return rules.mean().assign(heaps=rules.size()).reset_index()[RULE_COLUMNS]
 
 
 def _ranked(rules: pd.DataFrame, falls_weight: float) -> list[str]:
@@ -191,7 +190,7 @@ def compare(
         ``table.csv``, see ``compared``.
     """
     place, command = Path(folder) / NAME, f"{COMMAND} {NAME}"
-    rules = read_table(place / "rules.csv", command, ["rule", "heaps", "boxes", "falls"])
+    rules = read_table(place / "rules.csv", command, RULE_COLUMNS)
     planned = plan(rules, place / "networks.safetensors")
     players = {cell: (player, TEST_HEAPS) for cell, player in planned.items()}
     played = _played(players, "test", PHYSICS, runs_dir, n_jobs)
@@ -267,17 +266,17 @@ def ratio_interval(
     ratio = float(values.mean() / reference.mean())
     if np.abs(values - ratio * reference).max() < 1e-12:
         return ratio, ratio, ratio
+
+    def ratios(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
+        return values.mean(axis=axis) / reference.mean(axis=axis)
+
     with warnings.catch_warnings():  # samples of few different values: the interval is NaN
         warnings.simplefilter("ignore")
         low, high = stats.bootstrap(
-            (values, reference), _ratio, n_resamples=RESAMPLES, paired=True, method="BCa",
+            (values, reference), ratios, n_resamples=RESAMPLES, paired=True, method="BCa",
             confidence_level=LEVEL, vectorized=True, axis=-1, rng=np.random.default_rng(0),
         ).confidence_interval  # fmt: skip
     return ratio, float(low), float(high)
-
-
-def _ratio(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
-    return values.mean(axis=axis) / reference.mean(axis=axis)
 
 
 def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:

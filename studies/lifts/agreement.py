@@ -232,23 +232,17 @@ def choose_for_full(
     return why, walls
 
 
-def boxes_left(state: State, wall: int, walls: int) -> tuple[Load, np.ndarray]:
-    """The boxes that are left in so many walls around one, and their numbers in the load."""
-    load = state.load
-    near = (abs(load.walls - wall) <= NEAR_WALLS // 2) | (walls == WALLS)
-    items = np.flatnonzero(state.present & near)
-    fields = load.positions, load.sizes, load.packages, load.walls
-    return Load(*(field[items] for field in fields)), items
-
-
 def fresh_job(state: State, item: int, walls: int) -> tuple[dict, Callable[[], float]]:
     """Question and computation of one lift in a fresh world of some walls, for ``keep_all``.
 
     In a world that has seen other lifts, the answer depends on them (by a millimetre or so),
     and so on the order in which the items are lifted.
     """
-    left, items = boxes_left(state, state.load.walls[item], walls)
-    box = int(np.searchsorted(items, item))
+    load = state.load
+    near = (abs(load.walls - load.walls[item]) <= NEAR_WALLS // 2) | (walls == WALLS)
+    items = np.flatnonzero(state.present & near)
+    fields = load.positions, load.sizes, load.packages, load.walls
+    left, box = Load(*(field[items] for field in fields)), int(np.searchsorted(items, item))
     boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
     question = {"settings": SETTINGS, "boxes": boxes, "item": box}
     return question, partial(fresh_distance, left, box)

@@ -17,6 +17,8 @@ HEIGHT = 2  # column of the ranks along z
 LEVELS = 8  # colours of ranks
 # Of the lowest, the middle and the highest rank; none is grey, as the unseen boxes are.
 RANK_COLOURS = np.array([(0.99, 0.91, 0.40), (0.20, 0.65, 0.52), (0.25, 0.05, 0.33)])
+PLACES = np.linspace(0, 1, LEVELS)  # of the levels, between the lowest and the highest rank
+LEVEL_COLOURS = np.array([np.interp(PLACES, (0, 0.5, 1), part) for part in RANK_COLOURS.T]).T
 DRAWS = 50  # of the noise, for the share of greedy picks that succeed
 
 
@@ -116,8 +118,8 @@ class AgentView(widgets.VBox):
         numbers[visible] = levels
         edges = [round(level * len(ranks) / LEVELS) for level in range(LEVELS + 1)]
         palette = {
-            f"rank {low} to {high - 1} in height": _colour(level / (LEVELS - 1))
-            for level, (low, high) in enumerate(zip(edges, edges[1:]))
+            f"rank {low} to {high - 1} in height": colour
+            for low, high, colour in zip(edges, edges[1:], LEVEL_COLOURS.tolist())
         } | {"unseen": COLOURS["unseen"]}
         item = visible[greedy]
         self.canvas.show(numbers, palette, {"picked if greedy": [item]})
@@ -143,8 +145,3 @@ class AgentView(widgets.VBox):
         }
         still = view(self._load, self._moment.present, groups, height=420)
         return still._repr_mimebundle_() | super()._repr_mimebundle_(**kwargs)
-
-
-def _colour(share: float) -> tuple[float, float, float]:
-    """The colour of a rank; share 0 is the lowest, 1 the highest."""
-    return tuple(float(np.interp(share, (0, 0.5, 1), part)) for part in RANK_COLOURS.T)

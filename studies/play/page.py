@@ -3,8 +3,8 @@
     python -m studies.play.page
 
 It is one file, which loads nothing, made of those in ``page/``. ``page.html`` names them in the
-order in which they are read best: the network, the container, what is measured, how boxes are
-chosen and the training, which know nothing of the page and are the ones of this package in plain
+order in which they are read best: the network, the container, how boxes are chosen and what is
+measured, and the training, which know nothing of the page and are the ones of this package in plain
 JavaScript; then the worker, in which the training runs; the page's settings, its words, keys and
 pictures, of which none knows the page either; and the page. The numbers of the task are taken
 from the package. Comments stay in the sources.

@@ -1,7 +1,9 @@
 """A container to unload by hand, and to watch rules and agents unload, as a Jupyter widget."""
 
+import base64
 import html
 import logging
+from logging.handlers import BufferingHandler
 
 import ipywidgets as widgets
 import numpy as np
@@ -13,6 +15,7 @@ from unload import task
 from unload.agent.evaluation import Policy
 from unload.load.picture import COLOURS
 from unload.load.substacks import stack_load
+from unload.load.view import view
 from unload.support import checks
 
 YOU, TRAINED = "you", "your agent"
@@ -24,7 +27,8 @@ class Playground(widgets.VBox):
     """A load that you unload by clicking on boxes, and that others unload for you to watch.
 
     All players have the same load and the same number of picks on the score board. Where no
-    kernel runs, a replay stands in its place: of the chosen player, or of the recommended agent.
+    kernel runs, a replay of the player who is watched stands in its place, or a picture if you
+    pick.
 
     Args:
         seed: of the load, of the noise of its observed positions, and of random picks.
@@ -56,7 +60,7 @@ class Playground(widgets.VBox):
         self.runs = {name: Run(each, load, seed, mask) for name, each in players.items()}
         # Do once what a click does, because compiled code is loaded the first time. What that
         # says stands in the widget's own line, because a notebook shows it as an error above.
-        said = _Said()
+        said = BufferingHandler(100)
         logging.getLogger("unload").addHandler(said)
         self.you.pick(int(self.you.visible[0]))
         self.you.back_to(0)
@@ -66,8 +70,8 @@ class Playground(widgets.VBox):
         self._make_controls(player, mask, picks)
         super().__init__([self._bar, widgets.HBox([self._left, self._right])])
         self._choose_player()
-        if said.messages:
-            self._tell(f"Done for the first time: {said.messages[0]}")
+        if said.buffer:
+            self._tell(f"Done for the first time: {said.buffer[0].getMessage()}")
 
     def _make_controls(self, player: str, mask: bool, picks: int) -> None:
         self.player = widgets.Dropdown(
@@ -165,10 +169,9 @@ class Playground(widgets.VBox):
         self.undo.disabled = not self.you.picks
         liftable = episode.liftable(count) if self.hints.value else None
         self._draw(moment, liftable, lifted)
-        self._say(episode, count, moment)
         self._score()
 
-    def _say(self, episode: Episode, count: int, moment: Moment) -> None:
+        # The score of what is shown, and what the last pick has done.
         unloaded = episode.unloaded(count)
         share = f" ({unloaded / count:.0%})" if count else ""
         self.score.value = (
@@ -216,17 +219,11 @@ class Playground(widgets.VBox):
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
         """The widget, and what is shown of it where no kernel runs."""
-        run = self._run or self.runs["the recommended agent"]
-        run.play_to(self.slider.max)
-        return replay(run)._repr_mimebundle_() | super()._repr_mimebundle_(**kwargs)
-
-
-class _Said(logging.Handler):
-    """What the package logs."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.messages: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.messages.append(record.getMessage())
+        if self._run is None:
+            now = self.you.moment()
+            picture = view(self.you.load, now.present, now.groups()).picture()
+            still = {"image/png": base64.b64encode(picture).decode()}
+        else:
+            self._run.play_to(self.slider.max)
+            still = replay(self._run)._repr_mimebundle_()
+        return still | super()._repr_mimebundle_(**kwargs)

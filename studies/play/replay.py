@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 import plotly.graph_objects as go
 
-from studies.play.episode import Episode
+from studies.play.episode import Episode, Pick
+from unload.load.boxes import Load
 from unload.load.picture import COLOURS
 from unload.load.view import View, layout, mesh, view
 
@@ -41,15 +42,16 @@ def replay(episode: Episode) -> View:
         colour = EARLY + number / max(1, len(parts) - 1) * (LATE - EARLY)
         name = names.get(number, "unloaded")
         traces.append(mesh(load, part, name, tuple(colour), legend=number in names))
-    traces.append(_last_failure(episode, stops[0]))
+    traces.append(_failed(load, 0).update(visible="legendonly"))
 
-    # At a stop, what is unloaded later is still there, and the last pick's item is marked.
+    # At a stop, what is unloaded later is still there, and the last pick's item is marked. A frame
+    # holds only what changes, because notebooks keep them all.
     frames = [
         go.Frame(
             name=str(stop),
             data=[
                 *({"type": "mesh3d", "visible": later >= now} for later in range(len(parts))),
-                _last_failure(episode, stop),
+                _mark(load, picks[stop - 1] if stop else None),
             ],
             traces=list(range(1, len(traces))),
         )
@@ -59,7 +61,7 @@ def replay(episode: Episode) -> View:
     # Where plotly is not drawn, a picture stands for all frames.
     middle = episode.moment(stops[len(stops) // 2])
     still = view(load, middle.present, middle.groups(), HEIGHT)
-    figure = View(traces, layout(HEIGHT), frames)
+    figure = View(traces, layout(HEIGHT, load.container), frames)
     figure.picture = still.picture
     labels = {str(stop): f"{stop} picks, {episode.unloaded(stop)} unloaded" for stop in stops}
     figure.update_layout(_controls(labels))
@@ -100,12 +102,14 @@ def _controls(labels: Mapping[str, str]) -> dict:
     return {"sliders": [slider], "updatemenus": [buttons]}
 
 
-def _last_failure(episode: Episode, count: int) -> go.Mesh3d:
-    """The item of the last of ``count`` picks if it failed; hidden if not."""
-    pick = episode.picks[count - 1] if count else None
-    failed = pick is not None and not pick.success
-    items = np.array([pick.item if failed else 0])
-    # Without a seam it covers the same item of another colour.
-    trace = mesh(episode.load, items, "failed", COLOURS["failed"], legend=True, seam=0)
-    trace.visible = True if failed else "legendonly"
-    return trace
+def _mark(load: Load, pick: Pick | None) -> dict:
+    """What a frame changes in the mesh of the failed item: it shows a pick's, if that failed."""
+    if pick is None or pick.success:
+        return {"type": "mesh3d", "visible": "legendonly"}
+    item = _failed(load, pick.item)
+    return {name: item[name] for name in ("type", *"xyz", "customdata")} | {"visible": True}
+
+
+def _failed(load: Load, item: int) -> go.Mesh3d:
+    """A failed item; without a seam it covers the same item of another colour."""
+    return mesh(load, np.array([item]), "failed", COLOURS["failed"], legend=True, seam=0)

@@ -12,11 +12,18 @@ without. Pictures of all are kept in build/browser/.
 
 import argparse
 import io
+import json
+import os
 import re
+import secrets
 import shutil
+import socket
+import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import nbformat
@@ -28,8 +35,7 @@ from playwright.sync_api import Locator, Page
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
-from start import browser, jupyterlab  # noqa: E402
-from train_page import look_at_page  # noqa: E402
+from train_page import browser, look_at_page  # noqa: E402
 
 from notebooks import run  # noqa: E402
 
@@ -43,6 +49,12 @@ DRAW_LIMIT = 60  # s, for a picture, without a graphics card
 CLICKS = 4
 PLOTLY = ".jp-RenderedPlotly"
 SIZE = {"width": 1500, "height": 1000}
+LAB = {
+    "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
+    "docmanager-extension/plugin": {"autosave": False},
+    "notebook-extension/tracker": {"windowingMode": "none"},  # all cells are in the page
+}
+START_LIMIT = 120  # s
 
 OUTPUTS = """() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells
     .flatMap((cell, number) => (cell.outputs ?? []).map((output) => ({number, ...output})))"""
@@ -264,6 +276,58 @@ def play_moves(page: Page, pictures: Path) -> Iterator[str]:
     if not wait_until(lambda: int(score.locator("b").first.text_content()) > int(unloaded) + 5):
         yield f"00: the mask does not end the deadlock; the score is {score.text_content()!r}"
     shot(output, pictures / "deadlock-ended.png")
+
+
+@contextmanager
+def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
+    """A running JupyterLab; its address, in which ``format`` puts a notebook's name.
+
+    The address resets the workspace, which would open earlier notebooks again, too.
+
+    Args:
+        notebooks: folder that it shows.
+        home: folder for its settings and messages; made.
+        theme: ``"Light"`` or ``"Dark"``.
+    """
+    themes = {"apputils-extension/themes": {"theme": f"JupyterLab {theme}"}}
+    for name, values in (LAB | themes).items():
+        file = home / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(values))
+    folders = {
+        "JUPYTERLAB_SETTINGS_DIR": "settings", "JUPYTERLAB_WORKSPACES_DIR": "workspaces",
+        "JUPYTER_CONFIG_DIR": "config", "JUPYTER_RUNTIME_DIR": "runtime", "IPYTHONDIR": "ipython",
+    }  # fmt: skip
+    env = os.environ | {name: str(home / folder) for name, folder in folders.items()}
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    token = secrets.token_hex(16)
+    command = [
+        *(sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root"),
+        *(f"--port={port}", "--ServerApp.port_retries=0", f"--IdentityProvider.token={token}"),
+        *(f"--ServerApp.root_dir={notebooks}", "--LabApp.expose_app_in_browser=True"),
+    ]
+    with open(home / "jupyterlab.log", "w") as log:
+        server = subprocess.Popen(command, stdout=log, stderr=log, env=env)
+        try:
+            _wait_for(f"http://127.0.0.1:{port}/api/status?token={token}", server, log.name)
+            yield f"http://127.0.0.1:{port}/lab/tree/{{}}?token={token}&reset"
+        finally:
+            server.terminate()
+            server.wait(30)
+
+
+def _wait_for(address: str, server: subprocess.Popen, log: str) -> None:
+    for _ in range(2 * START_LIMIT):
+        if server.poll() is not None:
+            break
+        try:
+            urllib.request.urlopen(address, timeout=5).close()
+            return
+        except OSError:
+            time.sleep(0.5)
+    sys.exit(f"JupyterLab does not start; see {log}")
 
 
 if __name__ == "__main__":

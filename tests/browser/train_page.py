@@ -1,14 +1,21 @@
 """The page that trains in a browser: what a reader does with it, and what is wrong then."""
 
+import os
 import re
+import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Error, Page, sync_playwright
 
 from studies.play.page import PAGE
 
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Graphics without a graphics card, and nothing that the browser asks the network for by itself.
+OPTIONS = ("--use-gl=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
 SIZES = {"desktop": (1400, 900), "tablet": (820, 1180), "phone": (390, 844)}
 SCHEMES = ("light", "dark")
 SEEDS = (0, 1, 2)
@@ -16,6 +23,29 @@ TRAIN_LIMIT = 240  # s, for a run of 96,000 picks on a busy machine
 AT_ONCE = 10  # s, for fresh picks of frozen weights (0.3 s) on a busy machine
 FINGER = 44  # pixels, the height of what is touched
 STARTED = "#picks:has-text('0 picks')"
+
+
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Chromium, or what its own name on this system is.
+
+    Raises:
+        SystemExit: none is installed; the message says how to get one.
+    """
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    # A container's root may not use Chromium's sandbox.
+    options = [*OPTIONS, *(["--no-sandbox"] if hasattr(os, "getuid") and not os.getuid() else [])]
+    with sync_playwright() as playwright:
+        try:
+            chromium = playwright.chromium.launch(executable_path=found, args=options)
+        except Error as error:
+            sys.exit(
+                f"No browser can be started: {error.message.splitlines()[0]}\n"
+                "Install Chromium with your system's packages, or Playwright's own by\n"
+                "    .venv/bin/python -m playwright install chromium"
+            )
+        yield chromium
+        chromium.close()
 
 
 def look_at_page(chromium: Browser, pictures: Path) -> Iterator[str]:
@@ -32,17 +62,12 @@ def look_at_page(chromium: Browser, pictures: Path) -> Iterator[str]:
             for seed in SEEDS if scheme == SCHEMES[0] else SEEDS[:1]:
                 name = f"{scheme}, {size}, seed {seed}"
                 stem = pictures / f"train-{scheme}-{size}-{seed}"
-                page.goto("about:blank")
-                page.goto(f"{PAGE.as_uri()}#seed={seed}")
-                page.wait_for_selector(STARTED)
-                yield from (f"{name}: {each}" for each in fits(page, size))
-                yield from (f"{name}: {each}" for each in five_steps(page, stem))
-                yield from (f"{name}: {each}" for each in fits(page, size))
+                start(page, f"seed={seed}")
+                for problems in (fits(page, size), five_steps(page, stem), fits(page, size)):
+                    yield from (f"{name}: {each}" for each in problems)
             if (scheme, size) == (SCHEMES[0], "desktop"):
                 for look in (keys, settings, bad_address, controls, jams):
-                    page.goto("about:blank")
-                    page.goto(PAGE.as_uri())
-                    page.wait_for_selector(STARTED)
+                    start(page)
                     yield from look(page)
             yield from (f"the page says {error!r}" for error in errors)
             known = (PAGE.as_uri(), "blob:", "about:")
@@ -71,12 +96,12 @@ def five_steps(page: Page, stem: Path) -> Iterator[str]:
     yield from ends("positions", train, r"It learned: 100 % of its last picks succeeded, after \d")
     ranks = lambda: page.click(button("paper"))  # noqa: E731
     yield from ends("paper", ranks, "It (fell, from|did not|learned)")
-    frozen, start = weights(page), time.monotonic()
+    frozen, began = weights(page), time.monotonic()
     page.click(button("blank"))
     if not until(page, lambda: page.text_content("#rate-true")):
         yield "z alone shows no number"
-    if time.monotonic() - start > AT_ONCE:
-        yield f"z alone shows its number after {time.monotonic() - start:.1f} s"
+    if time.monotonic() - began > AT_ONCE:
+        yield f"z alone shows its number after {time.monotonic() - began:.1f} s"
     yield from ends("blank", lambda: None, r"With z alone .* in \d+ % .* with x and y in \d+ %: ")
     if weights(page) != frozen:
         yield "blank coordinates change the weights"
@@ -169,9 +194,7 @@ def settings(page: Page) -> Iterator[str]:
 
 def bad_address(page: Page) -> Iterator[str]:
     """Yield whether a value that is not valid is not named, or stays."""
-    page.goto("about:blank")
-    page.goto(f"{PAGE.as_uri()}#seed=1e21&replay=gone")
-    page.wait_for_selector(STARTED)
+    start(page, "seed=1e21&replay=gone")
     said = page.text_content("#problems")
     if not page.is_visible("#problems") or "1e21" not in said or "gone" not in said:
         yield f"of a bad address the page says {said!r}"
@@ -247,6 +270,13 @@ def without_scripts(chromium: Browser) -> Iterator[str]:
     if "JavaScript is switched off" not in page.locator("noscript").inner_text():
         yield "without scripts the page does not say so"
     context.close()
+
+
+def start(page: Page, settings: str = "") -> None:
+    """Open the page anew with settings in its address."""
+    page.goto("about:blank")
+    page.goto(f"{PAGE.as_uri()}#{settings}")
+    page.wait_for_selector(STARTED)
 
 
 def button(step: str) -> str:

@@ -10,8 +10,7 @@ from stable_baselines3.common.env_util import make_vec_env
 import unload
 from studies.speed import mutants, parts
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
-from studies.speed.run import show
-from studies.speed.training import PEQPolicy
+from studies.speed.run import PEQPolicy, show
 
 
 def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
@@ -60,7 +59,7 @@ def test_maskable_ppo_learns_on_64_containers():
     envs.close()
 
 
-def test_rates_are_positive(small_load, monkeypatch):
+def test_rates_are_positive_and_printed_with_their_units(small_load, monkeypatch, capsys):
     monkeypatch.setattr(parts, "ROUNDS", 1)
     rates = lift_rates(small_load, full=1, others=2)
     assert list(rates) == ["full", "local", "table"]
@@ -68,6 +67,9 @@ def test_rates_are_positive(small_load, monkeypatch):
     rates |= update_times(batch_size=8, n_features=4)
     assert len(rates) == 12
     assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
+    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
+    show(pd.DataFrame([row]))
+    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
 
 
 def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
@@ -96,9 +98,3 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
         ("print(f'{a + 1}') -> pass", "pass"),
     ]
-
-
-def test_speeds_are_printed_with_their_units(capsys):
-    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
-    show(pd.DataFrame([row]))
-    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out

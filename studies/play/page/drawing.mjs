@@ -1,10 +1,12 @@
-// A container seen from its entrance, in perspective, drawn from the rear to the front.
+// A container seen from its entrance, in perspective, drawn from the rear to the front; and how
+// clicks and keys choose its boxes. Places are those of `container.seen`, -1 to 1 along each axis.
 
 const EYE = [11.4, 1.25, 5.2]; // m
 const [WIDE, TOP] = [2.7, 3.02]; // m of the entrance that the picture shows: its width, its height
 const UNSEEN = [186, 186, 182];
 const SHADES = { top: 1, side: 0.66, front: 0.84 };
 const MARK = "#e8500c"; // seen on all other colours
+const AHEAD = 0.01; // a box that is nearer in an arrow's direction lies at the same place
 
 /** RGB of a box by its place in the agent's order, 0 to 1: dark blue to yellow, as in viridis. */
 const colourOf = (p) => [68 - 200 * p + 385 * p ** 2, 5 + 225 * p, 84 + 250 * p - 300 * p ** 2];
@@ -81,3 +83,32 @@ export class Drawing {
 }
 
 const polygon = (corners) => new Path2D(`M${corners.join("L")}Z`);
+
+/** Directions of keys, across and upwards. */
+export const ARROWS = {
+  ArrowLeft: [-1, 0],
+  ArrowRight: [1, 0],
+  ArrowUp: [0, 1],
+  ArrowDown: [0, -1],
+};
+
+/** The visible box with the least `far` of its way from a place; -1 if none is finite. */
+function least({ seen, visible }, from, far) {
+  const distance = (item) => far(seen[item].map((value, axis) => value - from[axis]));
+  const order = visible.toSorted((a, b) => distance(a) - distance(b));
+  return order.length && distance(order[0]) < Infinity ? order[0] : -1;
+}
+
+/** The next visible box in a direction, across or upwards, rather in front; else `chosen`. */
+export function towards(container, chosen, [right, up]) {
+  const from = container.seen[chosen] ?? container.seen[container.visible[0]];
+  const next = least(container, from, ([x, y, z]) => {
+    const ahead = y * right + z * up;
+    return ahead > AHEAD ? ahead + 3 * Math.abs(y * up - z * right) - x : Infinity;
+  });
+  return next < 0 ? chosen : next;
+}
+
+/** The visible box nearest to where one is or was; -1 in an empty container. */
+export const nearest = (container, item) =>
+  least(container, container.seen[item], (way) => Math.hypot(...way));

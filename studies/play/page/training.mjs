@@ -1,9 +1,8 @@
 // The training loop of unload/agent/training.py: ε-greedy picks, replay, updates, learning curve.
 
 import { Container, Generator, stackLoad } from "./container.mjs";
-import { slopes } from "./measures.mjs";
 import { Adam, PEQNetwork } from "./network.mjs";
-import { compared, highest } from "./policy.mjs";
+import { compared, highest, slopes } from "./policy.mjs";
 
 export const N_FEATURES = 16;
 const REPLAY_SIZE = 2 ** 15; // picks

@@ -12,8 +12,7 @@ onmessage = ({ data: { command, config, task, ...run } }) => {
   if (command === "reset") [training, seconds] = [new Training(config, task), 0];
   else training.change(config);
   const frozen = command === "freeze";
-  // Only a freeze after the end leaves the weights, and all but what is blank, as they were judged.
-  if (!frozen || training.picks < goal) rates = {};
+  if (!frozen) rates = {}; // only a freeze leaves the weights, and all but what is blank
   if (command === "train") goal = (Math.floor(training.picks / config.picks) + 1) * config.picks;
   else if (command !== "change") goal = 0;
   if (command === "step") training.step(), training.addPoint();

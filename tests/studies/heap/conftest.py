@@ -49,8 +49,8 @@ def real_heap() -> Heap:
 def make_rake() -> Iterator[Callable[..., Rake]]:
     made = []
 
-    def make(physics: str = "coarse", **kwargs) -> Rake:
-        made.append(Rake(physics, **kwargs))
+    def make(physics: str = "coarse") -> Rake:
+        made.append(Rake(physics))
         return made[-1]
 
     yield make
@@ -82,12 +82,3 @@ def make_heap_env(pile, monkeypatch) -> Iterator[Callable[..., HeapEnv]]:
     yield make
     for env in made:
         env.close()
-
-
-@pytest.fixture
-def heap(cubes) -> Heap:
-    """Three upright cubes of 0.4 m, and one that is turned by 45° about the vertical."""
-    upright = cubes((5, 1, 0), (5, 1, 1), (6, 2, 0), (6, 1, 0))
-    turns = upright.orientations.copy()
-    turns[3] = (0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8))
-    return Heap(upright.positions, turns, upright.sizes, upright.packages)

@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 
 from studies.heap.boxes import Heap
-from studies.heap.observation import (
-    COLUMN,
-    COLUMNS,
-    ROWS,
-    SEEN,
-    Camera,
-    features,
-    visible_boxes,
-)
+from studies.heap.observation import COLUMN, COLUMNS, ROWS, SEEN, Camera, features, visible_boxes
 from studies.heap.policies import RULES, Oracle, best, linear, play
 
 
@@ -32,26 +24,17 @@ def three_boxes() -> tuple[np.ndarray, np.ndarray]:
     return observations, masks
 
 
-@pytest.mark.parametrize(
-    ("name", "row"),
-    [("highest", 1), ("lowest", 2), ("foremost", 0), ("clear above", 1), ("nearest", 1)],
-)
-def test_rules_pick_what_their_names_say(three_boxes, rng, name, row):
-    assert RULES[name](*three_boxes, rng).tolist() == [row]
-
-
-@pytest.mark.parametrize("name", RULES)
-def test_no_rule_picks_what_is_masked(three_boxes, rng, name):
+def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(three_boxes, rng):
     observations, masks = three_boxes
+    expected = {"highest": 1, "lowest": 2, "foremost": 0, "clear above": 1, "nearest": 1}
+    assert set(expected) == set(RULES) - {"random"}
+    for name, row in expected.items():
+        assert RULES[name](observations, masks, rng).tolist() == [row]
+    score = linear({"z": -1, "behind": -1})
+    assert score(observations)[0, :3] == pytest.approx([-1.0, -2.5, -2.1])
+    assert best(score)(observations, masks, rng).tolist() == [0]
     masks[0, [0, 1]] = 0
-    assert RULES[name](observations, masks, rng).tolist() == [2]
-
-
-def test_linear_weighs_columns(three_boxes, rng):
-    observations, masks = three_boxes
-    score = linear({"z": -1, "behind": -1})(observations)[0, :3]
-    assert score == pytest.approx([-1.0, -2.5, -2.1])
-    assert best(linear({"z": -1, "behind": -1}))(observations, masks, rng).tolist() == [0]
+    assert [rule(observations, masks, rng).item() for rule in RULES.values()] == [2] * len(RULES)
 
 
 def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):
@@ -88,49 +71,36 @@ def camera():
     made.close()
 
 
-@pytest.fixture
-def observed(camera):
-    """``observed(heap)``: numbers of the visible boxes, and the rows that hold one."""
-
-    def observe(heap: Heap) -> tuple[np.ndarray, np.ndarray]:
-        pixels = camera.pixels(heap)
-        visible = visible_boxes(heap, pixels)
-        rows = features(heap.only(visible), pixels[visible])
-        assert rows.shape == (ROWS, len(COLUMNS)) and rows.dtype == np.float32
-        assert not rows[len(visible) :].any()
-        return visible, rows[: len(visible)]
-
-    return observe
-
-
-def column(rows: np.ndarray, name: str) -> np.ndarray:
-    return rows[:, COLUMN[name]]
-
-
 def test_a_box_behind_another_is_not_visible(camera, cubes):
     heap = cubes((6.5, 1.25, 0), (6.5, 1.25, 1), (6.5, 1.25, 2), (6.5, 1.25, 3), (4.5, 1.25, 0))
     assert visible_boxes(heap, camera.pixels(heap)).tolist() == [0, 1, 2, 3]
     assert camera.pixels(heap.only(np.array([4])))[0] > 50
 
 
-def test_boxes_with_few_pixels_are_not_visible_unless_there_are_no_others(cubes):
+def test_few_pixels_show_no_box_unless_there_are_no_others_and_the_foremost_get_rows(cubes):
     heap = cubes((5, 1, 0), (6, 1, 0), (4.5, 1, 0))
     assert visible_boxes(heap, np.array([SEEN, SEEN - 1, 0])).tolist() == [0]
     assert visible_boxes(heap, np.array([SEEN - 1, 0, 0])).tolist() == [1, 0, 2]
+    count = ROWS + 10
+    heap = cubes(*((x, 1, 0) for x in np.linspace(4, 7, count)))
+    assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))
 
 
-def test_features_of_upright_cubes(observed, cubes):
-    numbers, rows = observed(cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (6.0, 2.0, 0)))
-    assert numbers.tolist() == [2, 0, 1]
-    assert column(rows, "behind") == pytest.approx([0.2, 1.2, 1.2])
-    assert column(rows, "y") == pytest.approx([0.75, -0.25, -0.25])
-    assert column(rows, "z") == pytest.approx([0.2, 0.2, 0.6])
-    for name in ("extent_x", "extent_y", "extent_z", "longest", "middle", "shortest"):
-        assert column(rows, name) == pytest.approx([0.4, 0.4, 0.4])
-    assert column(rows, "tilt") == pytest.approx([0, 0, 0], abs=1e-6)
-    assert column(rows, "clear_above") == pytest.approx([1, 0, 1], abs=1e-6)
-    assert column(rows, "clear_in_front") == pytest.approx([1, 1, 1], abs=1e-6)
-    assert (column(rows, "pixels") * 1000 >= 4).all()
+def test_features_of_upright_cubes(camera, cubes):
+    """The last stands half before the one beside it."""
+    heap = cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (5.5, 1.2, 0))
+    pixels = camera.pixels(heap)
+    visible = visible_boxes(heap, pixels)
+    rows = features(heap.only(visible), pixels[visible])
+    assert visible.tolist() == [2, 0, 1]
+    assert rows.shape == (ROWS, len(COLUMNS)) and rows.dtype == np.float32 and not rows[3:].any()
+    edges = ("extent_x", "extent_y", "extent_z", "longest", "middle", "shortest")
+    for name, values in {
+        "behind": [0.2, 0.7, 0.7], "y": [-0.05, -0.25, -0.25], "z": [0.2, 0.2, 0.6],
+        "tilt": [0, 0, 0], "clear_above": [1, 0, 1], "clear_in_front": [1, 0.5, 1],
+        "pixels": pixels[visible] / 1000, **dict.fromkeys(edges, [0.4] * 3),
+    }.items():  # fmt: skip
+        assert rows[:3, COLUMN[name]] == pytest.approx(values, abs=1e-6)
 
 
 def test_edges_are_sorted_whichever_way_a_box_lies():
@@ -140,15 +110,3 @@ def test_edges_are_sorted_whichever_way_a_box_lies():
     assert row[0, COLUMN["extent_x"] : COLUMN["tilt"]].tolist() == pytest.approx(
         [0.6, 0.2, 0.4, 0.6, 0.4, 0.2]
     )
-
-
-def test_a_box_half_in_front_covers_half(observed, cubes):
-    numbers, rows = observed(cubes((5.0, 1.0, 0), (5.5, 1.2, 0)))
-    assert numbers.tolist() == [1, 0]
-    assert column(rows, "clear_in_front") == pytest.approx([1, 0.5])
-
-
-def test_only_the_foremost_boxes_get_a_row(cubes):
-    count = ROWS + 10
-    heap = cubes(*((x, 1, 0) for x in np.linspace(4, 7, count)))
-    assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))

@@ -104,18 +104,16 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
     networks = [FateNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 1)]
     save_networks(networks, tmp_path / "heap" / "networks.safetensors")
     table = study.compare(**where)
-    curve = [("best rule", 0.0), ("learned", 0.0), ("best rule", 1.0), ("learned", 1.0)]
-    played = [(row["policy"], row["falls_weight"]) for _, row in table.iterrows()]
-    others = [(name, 1.0) for name in ("random", "lowest", "highest", "oracle")]
-    assert sorted(played) == sorted(curve + others) and (table["heaps"] == 2).all()
     by = table.set_index(["policy", "falls_weight"])
+    curve = [(name, weight) for name in ("best rule", "learned") for weight in (0.0, 1.0)]
+    others = [(name, 1.0) for name in ("random", "lowest", "highest", "oracle")]
+    assert sorted(by.index) == sorted(curve + others) and (table["heaps"] == 2).all()
     assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
     assert read_provenance(tmp_path / "heap", "table")["settings"]["heaps"] == 2
-    stored = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
-    pd.testing.assert_frame_equal(study.compare(**where), table)
     pd.testing.assert_frame_equal(study.read_heap_table(tmp_path), table, check_dtype=False)
-    again = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
-    assert again == stored
+    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
+    pd.testing.assert_frame_equal(study.compare(**where), table)
+    assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
     players = []
 
     def made_up(player, split, number, physics):
@@ -149,17 +147,18 @@ def test_the_throughput_draws_its_data():
     assert {text.get_text() for text in curves.get_legend().get_texts()} == set(figures.LINES)
 
 
-def test_corners_are_those_of_turned_boxes(heap):
+def test_a_heap_is_drawn_from_the_rear_to_the_front(cubes):
+    """Of upright cubes, the third is nearer to the eye; one is turned by 45° about the vertical."""
+    upright = cubes((5, 1, 0), (5, 1, 1), (6, 2, 0), (6, 1, 0))
+    turns = upright.orientations.copy()
+    turns[3] = (0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8))
+    heap = Heap(upright.positions, turns, upright.sizes, upright.packages)
     corners = picture.corners(heap)
     seam = picture.SEAM
     assert np.ptp(corners[0], axis=0) == pytest.approx([0.4 - seam] * 3)
     wide = (0.4 - seam) * 2**0.5
     assert np.ptp(corners[3], axis=0) == pytest.approx([wide, wide, 0.4 - seam])
     assert corners.mean(axis=1) == pytest.approx(heap.positions)
-
-
-def test_nearer_boxes_are_painted_later(heap):
-    """Box 2 is nearer to the eye than box 0, and its top is brighter than its sides."""
     axes = plt.figure().add_subplot()
     colours = np.array([picture.MEANINGS[name] for name in ("comes along", "is dragged")])
     picture.draw_heap(axes, heap.only(np.array([2, 0])), colours)
@@ -171,39 +170,30 @@ def test_nearer_boxes_are_painted_later(heap):
     assert painted[3:].max() <= along.max() + 1e-9
 
 
-@pytest.fixture
-def quick_heaps(monkeypatch):
-    """A generator of parts of a stored heap, which the seed chooses."""
-
-    def make(rng: np.random.Generator) -> Heap:
-        whole = stored_heaps("train")[0]
-        return whole.only(np.sort(rng.choice(len(whole), 5, replace=False)))
-
-    monkeypatch.setattr(recording, "settled_heap", make)
-
-
 def test_the_shipped_heaps_are_what_the_generator_makes():
     """Of number 60, boxes were still leaving in the last round of settling."""
     made = unpacked(recording._new_heap(recording.SEEDS["train"], 60))
     assert stored_heaps("train")[60].positions.tolist() == made["positions"].tolist()
 
 
-def test_heaps_are_those_of_their_seeds(quick_heaps, tmp_path, monkeypatch):
-    few, more = tmp_path / "few", tmp_path / "more"
-    monkeypatch.setattr(recording, "HEAPS", {"train": 2, "test": 1})
-    make_heaps(few, tmp_path)
-    monkeypatch.setattr(recording, "HEAPS", {"train": 3, "test": 2})
-    make_heaps(more, tmp_path / "again")
+def test_heaps_are_those_of_their_seeds(tmp_path, monkeypatch):
+    """The generator is replaced by parts of a stored heap, which the seed chooses."""
+    whole = stored_heaps("train")[0]
+    monkeypatch.setattr(
+        recording, "settled_heap", lambda rng: whole.only(np.sort(rng.permutation(len(whole))[:5]))
+    )
+    made = {}
+    for name, counts in {"few": {"train": 2, "test": 1}, "more": {"train": 3, "test": 2}}.items():
+        monkeypatch.setattr(recording, "HEAPS", counts)
+        make_heaps(tmp_path / name, tmp_path / name / "runs")
+        path = tmp_path / name / "heap"
+        assert read_provenance(path, "heaps")["settings"]["heaps"] == counts
+        for split, count in counts.items():
+            made[name, split] = [heap.digest() for heap in read_heaps(split, path / "heaps.npz")]
+            assert len(set(made[name, split])) == count
     for split, count in (("train", 2), ("test", 1)):
-        first = read_heaps(split, few / "heap/heaps.npz")
-        second = read_heaps(split, more / "heap/heaps.npz")
-        assert len(first) == count and len(second) == count + 1
-        for one, other in zip(first, second):
-            assert one.positions.tobytes() == other.positions.tobytes()
-    train, test = (read_heaps(split, more / "heap/heaps.npz")[0] for split in ("train", "test"))
-    assert not np.array_equal(train.positions, test.positions)
-    provenance = read_provenance(few / "heap", "heaps")
-    assert provenance["settings"]["heaps"] == {"train": 2, "test": 1}
+        assert made["few", split] == made["more", split][:count]
+    assert made["more", "train"][0] != made["more", "test"][0]
 
 
 def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):

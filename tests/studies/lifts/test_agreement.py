@@ -17,11 +17,6 @@ from unload.load.substacks import stack_load
 from unload.physics.table import LiftTable
 
 
-@pytest.fixture(scope="module")
-def committed():
-    return agreement.read_agreement()
-
-
 def test_choice_for_full():
     """A few lifts of each state drawn, others of three and more on top, and all close ones."""
     rng = np.random.default_rng(0)
@@ -44,12 +39,10 @@ def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
     """Three lifts in a container of two walls, after 30 picks."""
     stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
     monkeypatch.setattr(agreement.gymnasium, "make", partial(gymnasium.make, **stack))
-    monkeypatch.setattr(agreement, "UNLOADED_BY", {"highest": policies.highest})
-    monkeypatch.setattr(agreement, "STAGES", (30,))
-    monkeypatch.setattr(agreement, "WANTED", (1, 1, 1, 0))
-    monkeypatch.setattr(agreement, "LIFT_COUNT", 3)
-    monkeypatch.setattr(agreement, "FULL_COUNT", 3)
-    monkeypatch.setattr(agreement, "FIRST_SEED", 5)
+    small = {"STAGES": (30,), "WANTED": (1, 1, 1, 0), "LIFT_COUNT": 3, "FULL_COUNT": 3}
+    small |= {"UNLOADED_BY": {"highest": policies.highest}, "FIRST_SEED": 5}
+    for name, value in small.items():
+        monkeypatch.setattr(agreement, name, value)
     folders = tmp_path / "data", tmp_path / "runs"
     agreement.agreement_data(*folders)
     frame = agreement.read_agreement(folders[0])
@@ -92,7 +85,8 @@ def test_bounds_count_each_kind_of_lift():
         assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))
 
 
-def test_committed_lifts(committed):
+def test_committed_lifts_can_be_computed_again():
+    committed = agreement.read_agreement()
     assert list(committed) == agreement.COLUMNS
     assert len(agreement.disagreements(committed, "table", "local")) == 0
     of = {why: committed[committed["asked_full"] == why] for why in agreement.ASKED_FULL}
@@ -103,9 +97,6 @@ def test_committed_lifts(committed):
     assert settings["lifts"] == len(committed)
     assert all(settings[f"in full, {why}"] == len(rows) for why, rows in of.items())
     assert settings["lift table"] == agreement.table_digest(), "another table ships: compare again"
-
-
-def test_committed_lifts_can_be_computed_again(committed):
     _, frame = agreement.collect_lifts(100, agreement.FIRST_SEED)
     first = committed[: len(frame)]
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]

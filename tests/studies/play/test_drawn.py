@@ -1,6 +1,7 @@
 """How a load is drawn: in the widget, by what an agent sees, and in the replay beside it."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,35 +13,27 @@ from studies.play.episode import Episode, Run, policy_of
 from studies.play.replay import PAUSE, STOPS, replay
 
 
-def test_boxes_and_labels_are_those_of_the_load(full_load):
+def test_the_canvas_holds_the_load_and_a_pick_is_one_small_message(full_load, monkeypatch):
     canvas = Canvas(full_load)
     corners = np.frombuffer(canvas.boxes, np.float32).reshape(-1, 2, 3)
     assert np.allclose(corners.mean(axis=1), full_load.positions, atol=1e-5)
     assert np.allclose(np.ptp(corners, axis=1), full_load.sizes, atol=1e-5)
     x, y, z = np.rint(full_load.sizes[7] * 1000).astype(int)
     assert canvas.labels[7] == f"item 7, package {full_load.packages[7]}: {x} × {y} × {z} mm"
-
-
-def test_a_pick_is_one_small_message(full_load, monkeypatch):
-    canvas = Canvas(full_load)
     sent = []
     monkeypatch.setattr(canvas, "send_state", lambda key=None: sent.append(key))
     numbers = np.zeros(len(full_load), int)
     numbers[3] = ABSENT
-    canvas.show(numbers, {"visible": (0, 0.5, 1)}, {"on it": np.array([5])}, (3, 0.46, (0, 1, 0)))
-    assert len(sent) == 1 and "boxes" not in sent[0] and "labels" not in sent[0]
+    lifts = []
+    for _ in range(2):
+        on_it = {"on it": np.array([5])}
+        canvas.show(numbers, {"visible": (0, 0.5, 1)}, on_it, (3, 0.46, (0, 1, 0)))
+        lifts.append(canvas.lift["number"])
+    assert len(sent) == 2 and not {"boxes", "labels"} & set().union(*sent)
     assert canvas.colours[3] == ABSENT and len(canvas.colours) == len(full_load)
     assert canvas.outlined == [5]
     assert [line[0] for line in canvas.legend] == ["visible", "on it"]
-
-
-def test_the_same_lift_twice_is_seen_twice(small_load):
-    canvas = Canvas(small_load)
-    seen = []
-    canvas.observe(lambda change: seen.append(change["new"]["number"]), "lift")
-    for _ in range(2):
-        canvas.show(np.zeros(len(small_load)), {}, {}, (3, 0.46, (0, 1, 0)))
-    assert seen == [1, 2]
+    assert lifts == [1, 2], "the same lift twice is seen twice"
 
 
 def hidden(frame) -> list[int]:
@@ -48,11 +41,10 @@ def hidden(frame) -> list[int]:
     return [n for n, trace in zip(frame.traces, frame.data[:-1]) if trace.visible is False]
 
 
-def test_items_vanish_in_the_order_of_the_picks(full_load):
+def test_items_vanish_in_the_order_of_the_picks_at_the_stops_of_the_slider(full_load):
     run = Run("highest", full_load)
     run.play_to(100)
     figure = replay(run)
-    assert len(figure.frames) == STOPS + 1
     for stop, frame in enumerate(figure.frames):
         gone = [figure.data[n].customdata[::8, 0] for n in hidden(frame)]
         gone = np.concatenate([[], *gone]).astype(int).tolist()
@@ -60,27 +52,24 @@ def test_items_vanish_in_the_order_of_the_picks(full_load):
         assert len(hidden(frame)) == stop
     drawn = np.concatenate([trace.customdata[::8, 0] for trace in figure.data[:-1]])
     assert sorted(drawn) == list(range(len(full_load)))
-
-
-def test_a_failed_pick_is_marked(boxes):
-    episode = Episode(boxes((1.0, 0.2), (1.0, 0.6)))
-    for item in (0, 1, 0):
-        episode.pick(item)
-    marks = [frame.data[-1] for frame in replay(episode).frames]
-    assert [mark.visible for mark in marks] == ["legendonly", True, "legendonly", "legendonly"]
-    assert marks[1].customdata[0, 0] == 0
-
-
-def test_slider_and_frames_have_the_same_stops(full_load):
-    run = Run("random", full_load, mask=False)
-    run.play_to(50)
-    figure = replay(run)
     steps = figure.layout.sliders[0].steps
     assert [step.args[0][0] for step in steps] == [frame.name for frame in figure.frames]
-    assert steps[-1].label == f"50 picks, {run.unloaded()} unloaded"
+    assert len(steps) == STOPS + 1 and steps[-1].label == "100 picks, 100 unloaded"
     play, pause = figure.layout.updatemenus[0].buttons
     assert play.args[0] is None and list(pause.args[0]) == [None]
     assert play.args[1]["frame"]["duration"] == PAUSE and play.args[1]["fromcurrent"]
+
+
+def test_a_failed_pick_is_marked_in_the_container_of_the_load(boxes):
+    small = replace(boxes((1.0, 0.2), (1.0, 0.6)), container=np.array([6.0, 2.0, 2.0]))
+    episode = Episode(small)
+    for item in (0, 1, 0):
+        episode.pick(item)
+    figure = replay(episode)
+    marks = [frame.data[-1] for frame in figure.frames]
+    assert [mark.visible for mark in marks] == ["legendonly", True, "legendonly", "legendonly"]
+    assert marks[1].customdata[0, 0] == 0 and figure.data[-1].visible == "legendonly"
+    assert figure.layout.scene.xaxis.range == (0, 6)
 
 
 @pytest.fixture
@@ -95,22 +84,16 @@ def ranks_and_item(view) -> tuple[int, int]:
     return int(ranks), int(item)
 
 
-def test_draw_0_is_the_noise_that_the_agent_is_stuck_with(stuck):
+def test_the_controls_show_why_the_agent_is_stuck(stuck):
+    """Draw 0 is the noise that it is stuck with; without noise or ties it is not."""
     assert ranks_and_item(stuck) == (128, 637)
-    assert "<b>cannot</b> be lifted" in stuck.message.value
-    stuck.draw.value = 3
-    assert "<b>can</b> be lifted" in stuck.message.value
-    stuck.draw.value, stuck.agent.value = 0, "the recommended agent"
-    assert "<b>can</b> be lifted" in stuck.message.value
-
-
-def test_without_noise_or_ties_it_is_not_stuck(stuck):
-    stuck.noise.value = 0
-    assert "<b>can</b> be lifted" in stuck.message.value
-    stuck.noise.value = 0.5
-    assert "<b>cannot</b> be lifted" in stuck.message.value
-    stuck.ties.value = "average"
-    assert "<b>can</b> be lifted" in stuck.message.value
+    for control, value, can in (
+        (stuck.noise, 0.5, False), (stuck.draw, 3, True), (stuck.draw, 0, False),
+        (stuck.agent, "the recommended agent", True), (stuck.agent, "the paper's agent", False),
+        (stuck.noise, 0, True), (stuck.noise, 0.5, False), (stuck.ties, "average", True),
+    ):  # fmt: skip
+        control.value = value
+        assert f"<b>{'can' if can else 'cannot'}</b> be lifted" in stuck.message.value
     assert ranks_and_item(stuck)[0] < 30
 
 
@@ -122,19 +105,12 @@ def test_colours_are_ranks_and_the_choice_is_outlined(stuck):
     assert stuck.canvas.outlined == [ranks_and_item(stuck)[1]]
 
 
-@pytest.fixture
-def seen(full_load):
-    """Positions of visible items, and which can be lifted, in the order of height."""
+def test_chance_mixes_the_greedy_and_a_random_pick(full_load):
     env = unload.ContainerEnv(physics="table", position_noise=0)
     env.reset(seed=0, options={"load": full_load})
-    yield full_load.positions[env.visible], env.liftable()
+    seen = full_load.positions[env.visible], env.liftable()
     env.close()
-
-
-def test_chance_mixes_the_greedy_and_a_random_pick(seen):
-    agent = policy_of("the recommended agent")
-    best = look(*seen, agent, 0, "noise")[2]
-    assert best == 1
     share = seen[1].mean()
-    assert look(*seen, agent, 1, "noise")[2] == pytest.approx(share)
-    assert look(*seen, agent, 0.5, "noise")[2] == pytest.approx((1 + share) / 2)
+    for epsilon, expected in ((0, 1), (1, share), (0.5, (1 + share) / 2)):
+        chance = look(*seen, policy_of("the recommended agent"), epsilon, "noise")[2]
+        assert chance == pytest.approx(expected)

@@ -10,8 +10,7 @@ def episode(full_load):
     return Episode(full_load, seed=3)
 
 
-def test_picks_are_those_of_the_environment(full_load, make_env):
-    episode = Episode(full_load, seed=3)
+def test_picks_are_those_of_the_environment(full_load, episode, make_env):
     env = make_env().unwrapped
     observation, info = env.reset(seed=3, options={"load": full_load})
     for row in (0, 20, 20, 40, 60, 5):
@@ -26,55 +25,40 @@ def test_picks_are_those_of_the_environment(full_load, make_env):
     assert episode.unloaded() == info["unloaded"] == episode.unloaded(6)
 
 
-def test_a_pick_names_what_rests_on_it(boxes):
+def test_a_pick_names_what_rests_on_it_and_fails_until_the_next_success(boxes):
     tower = Episode(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0), (2.0, 0.2)))
-    assert [tower.pick(item).on_top for item in (3, 0, 2)] == [(), (1, 2), ()]
-    assert tower.pick(0).on_top == (1,)
-    assert tower.unloaded() == 2
+    assert [tower.pick(item).on_top for item in (1, 0)] == [(2,), (1, 2)]
+    assert tower.moment().failed.tolist() == [0, 1]
+    groups = tower.moment().groups()
+    assert groups["failed"].tolist() == [0] and groups["tried"].tolist() == [0, 1]
+    assert tower.pick(0).deadlocked and tower.moment().failed.tolist() == [0, 1]
+    assert [tower.pick(item).on_top for item in (3, 2)] == [(), ()]
+    assert tower.moment().failed.tolist() == [] and "failed" not in tower.moment().groups()
+    again = tower.pick(0)
+    assert not again.deadlocked and again.on_top == (1,) and tower.unloaded() == 2
 
 
-def test_a_moment_is_the_container_after_some_picks(episode):
-    moments = [episode.moment()]
+def test_moments_are_remembered_and_picks_can_be_taken_back(episode):
+    def now() -> tuple:
+        return episode.observation.copy(), episode.allowed().copy(), episode.visible
+
+    seen, moments = [now()], [episode.moment()]
     for row in (3, 77, 50, 10, 100):
         episode.pick(int(episode.visible[row]))
+        seen.append(now())
         moments.append(episode.moment())
     for count, then in enumerate(moments):
-        now = episode.moment(count)
-        assert np.array_equal(now.present, then.present)
-        assert np.array_equal(now.visible, then.visible)
-        assert np.array_equal(now.failed, then.failed)
-        assert now.pick == then.pick
+        moment = episode.moment(count)
+        for name in ("present", "visible", "failed"):
+            assert np.array_equal(getattr(moment, name), getattr(then, name))
+        assert moment.pick == then.pick
     assert np.array_equal(episode.visible, moments[-1].visible)
     assert (~moments[-1].present).sum() == episode.unloaded()
-
-
-def test_failed_items_are_kept_until_the_next_success(boxes):
-    episode = Episode(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0), (2.0, 0.2)))
-    for item in (1, 0):
-        episode.pick(item)
-    assert episode.moment().failed.tolist() == [0, 1]
-    assert episode.moment().groups()["failed"].tolist() == [0]
-    assert episode.moment().groups()["tried"].tolist() == [0, 1]
-    assert episode.pick(0).deadlocked and episode.moment().failed.tolist() == [0, 1]
-    episode.pick(3)
-    assert episode.moment().failed.tolist() == []
-    assert "failed" not in episode.moment().groups()
-    assert not episode.pick(0).deadlocked
-
-
-def test_picks_can_be_taken_back(episode):
-    states = []
-    for row in (3, 60, 40, 0):
-        states.append((episode.observation.copy(), episode.allowed().copy(), episode.visible))
-        episode.pick(int(episode.visible[row]))
     picks = episode.picks.copy()
-    episode.back_to(4)
-    assert episode.picks == picks
-    for count in (2, 0):
+    for count in (5, 2, 0):
         episode.back_to(count)
         assert episode.picks == picks[:count]
-        now = episode.observation, episode.allowed(), episode.visible
-        assert all(np.array_equal(a, b) for a, b in zip(now, states[count]))
+        assert all(map(np.array_equal, now(), seen[count]))
     assert [episode.pick(pick.item) for pick in picks] == picks
 
 
@@ -82,8 +66,7 @@ def test_what_can_be_lifted_is_lifted(episode):
     liftable = episode.liftable()
     assert 0 < len(liftable) < len(episode.visible)
     for item in episode.visible:
-        success = episode.pick(int(item)).success
-        assert success == (item in liftable)
+        assert episode.pick(int(item)).success == (item in liftable)
         episode.back_to(0)
     episode.pick(int(liftable[0]))
     assert np.array_equal(episode.liftable(0), liftable)

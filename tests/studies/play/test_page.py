@@ -1,8 +1,11 @@
 """The page that trains in a browser: its modules against the package, and what its presets do."""
 
+import json
 import re
 import shutil
+import subprocess
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +13,6 @@ import torch
 
 from studies import paths
 from studies.play import page
-from tests.studies.play.javascript import needs_node, run_js
 from unload import load_policy, task
 from unload.agent.learner import PlainLearner
 from unload.env.container import ContainerEnv
@@ -22,6 +24,32 @@ from unload.physics.table import TablePhysics, shared_table
 
 MOST_BYTES = 60_000
 SETTINGS = {"seed": 0, "learning_rate": 3e-3, "batch_size": 64}
+NODE = shutil.which("node")
+needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed")
+# All that the modules of the page export, ``given`` and ``result``.
+MODULES = ("container", "network", "policy", "state", "training")
+IMPORTS = [
+    f"import * as {name}Module from {json.dumps((page.FOLDER / f'{name}.mjs').as_uri())};"
+    f"Object.assign(globalThis, {name}Module);"
+    for name in MODULES
+]
+START = """
+    import { readFileSync } from "node:fs";
+    const given = JSON.parse(readFileSync(0)), result = {};
+"""
+END = "console.log(JSON.stringify(result));"
+
+
+def run_js(script: str, **given) -> dict:
+    """What a script leaves in ``result``; it sees the page's modules and what is given."""
+    done = subprocess.run(
+        [NODE, "--input-type=module", "-e", "\n".join([*IMPORTS, START, script, END])],
+        input=json.dumps({"task": page.task_numbers(), **given}),
+        capture_output=True,
+        text=True,
+    )
+    assert not done.returncode, done.stderr
+    return json.loads(done.stdout)
 
 
 def parameters(network: PEQNetwork) -> list[float]:
@@ -47,6 +75,13 @@ def test_the_file_is_that_of_its_parts():
     assert len(links) == 3 and all((paths.ROOT / link).is_file() for link in links)
     # Nothing is loaded: an address of the web is where a link leads, and no more.
     assert not re.search(r"https?:", re.sub(r'<a href="https:[^"]+"', "", text))
+
+
+@needs_node
+def test_its_parts_do_what_they_are_for():
+    command = [NODE, Path(__file__).with_name("page_parts.mjs")]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert not done.returncode, done.stdout[-5000:]
 
 
 @needs_node
@@ -269,8 +304,7 @@ def test_presets_end_where_they_say():
 def test_a_browser_shows_it(tmp_path):
     """The five steps do what they say for three seeds at three sizes, and the controls answer."""
     pytest.importorskip("playwright", reason="make browser installs it")
-    from tests.browser.start import BROWSERS, browser
-    from tests.browser.train_page import look_at_page
+    from tests.browser.train_page import BROWSERS, browser, look_at_page
 
     if not any(map(shutil.which, BROWSERS)):
         pytest.skip("Chromium is not installed")

@@ -1,13 +1,19 @@
+"""The widgets: the playground, and a figure under sliders."""
+
+import base64
 import html
 import logging
 import re
 
+import ipywidgets as widgets
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 from studies.play.agent_view import AgentView
 from studies.play.canvas import ABSENT
 from studies.play.episode import Episode, Run
+from studies.play.explore import Explore
 from studies.play.playground import SHOWN, Playground
 from unload import policies, stack_load
 from unload.load.view import PLOTLY_MIMETYPE
@@ -41,12 +47,12 @@ def colour(playground, item) -> str | None:
     return None if number == ABSENT else SHOWN[number]
 
 
-def test_a_click_lifts_a_box_and_changes_the_score(game):
-    liftable = game.you.liftable()
+def test_a_click_lifts_a_box_and_undo_takes_it_back(game):
+    start, liftable = bytes(game.canvas.colours), game.you.liftable()
     blocked = np.setdiff1d(game.you.visible, liftable)
-    assert score(game) == [0, 0]
+    assert score(game) == [0, 0] and game.undo.disabled
     click(game, liftable[0])
-    assert score(game) == [1, 1]
+    assert score(game) == [1, 1] and not game.undo.disabled
     assert colour(game, liftable[0]) is None
     assert game.canvas.lift["item"] == liftable[0] and game.canvas.lift["distance"] > 0.2
     click(game, blocked[0])
@@ -54,6 +60,13 @@ def test_a_click_lifts_a_box_and_changes_the_score(game):
     assert colour(game, blocked[0]) == "failed"
     assert game.canvas.outlined == list(game.you.picks[-1].on_top) != []
     assert "therefore the pick failed" in game.message.value
+    hidden = np.setdiff1d(np.arange(len(game.you.load)), game.you.visible)
+    click(game, hidden[-1])
+    assert score(game) == [1, 2] and "not among the 128 nearest" in game.message.value
+    for left in (1, 0, 0):
+        game.undo.click()
+        assert len(game.you.picks) == left
+    assert score(game) == [0, 0] and bytes(game.canvas.colours) == start
 
 
 def test_a_playground_opens_no_simulator(monkeypatch):
@@ -62,25 +75,6 @@ def test_a_playground_opens_no_simulator(monkeypatch):
     game = Playground(seed=4)
     click(game, game.you.visible[0])
     assert score(game)[1] == 1
-
-
-def test_undo_takes_picks_back_one_by_one(game):
-    before = bytes(game.canvas.colours)
-    assert game.undo.disabled
-    for item in game.you.visible[:2]:
-        click(game, item)
-    assert not game.undo.disabled
-    game.undo.click()
-    assert len(game.you.picks) == 1
-    game.undo.click()
-    game.undo.click()
-    assert score(game) == [0, 0] and bytes(game.canvas.colours) == before
-
-
-def test_what_is_not_visible_may_not_be_picked(game):
-    hidden = next(i for i in range(len(game.you.load)) if i not in game.you.visible)
-    click(game, hidden)
-    assert score(game) == [0, 0] and "not among the 128 nearest" in game.message.value
 
 
 def test_the_seed_is_that_of_the_load_the_noise_and_random_picks(game):
@@ -98,12 +92,12 @@ def test_the_seed_is_that_of_the_load_the_noise_and_random_picks(game):
 
 
 def test_all_players_have_as_many_picks_as_you(game):
-    liftable = game.you.liftable()
-    for item in (*liftable[:2], np.setdiff1d(game.you.visible, liftable)[0]):
+    for item in game.you.visible[:3]:
         click(game, item)
-    alone = {name: Run(name, game.you.load, 4) for name in game.runs}
     expected = [("you", 3, game.you.unloaded())]
-    expected += [(name, run.play_to(3), run.unloaded(3)) for name, run in alone.items()]
+    for name in game.runs:
+        alone = Run(name, game.you.load, 4)
+        expected.append((name, alone.play_to(3), alone.unloaded(3)))
     assert game.standings() == expected
     for name, picks, unloaded in expected:
         row = f"<td align=right>{unloaded}</td><td align=right>{picks}</td>"
@@ -143,9 +137,12 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
     assert "this is a deadlock" in stuck.message.value
 
 
-def test_a_replay_stands_beside_the_widget(game):
+def test_where_no_kernel_runs_a_picture_or_a_replay_stands(game):
+    still = game._repr_mimebundle_()
+    assert set(still) == {WIDGET, "image/png", "text/plain"}
+    game.player.value = "highest"
     bundle = game._repr_mimebundle_()
-    assert {WIDGET, PLOTLY_MIMETYPE, "image/png", "text/plain"} == set(bundle)
+    assert set(bundle) == {*still, PLOTLY_MIMETYPE} and bundle["image/png"] != still["image/png"]
     labels = [step["label"] for step in bundle[PLOTLY_MIMETYPE]["layout"]["sliders"][0]["steps"]]
     assert labels[-1] == "20 picks, 20 unloaded"
 
@@ -187,3 +184,27 @@ def test_what_a_first_compilation_says_stands_in_the_widget(monkeypatch, capsys)
     playground = Playground(seed=4, picks=5)
     assert "compiling it for ten seconds" in playground.message.value
     assert capsys.readouterr().err == ""
+
+
+def test_a_figure_under_sliders_is_drawn_at_each_change():
+    seen = []
+
+    def draw(end, name):
+        seen.append((end, name))
+        figure, axes = plt.subplots(figsize=(1, 1))
+        axes.plot([0, 1], [0, end])
+        axes.set(title=name, ylim=(0, 10))
+        return figure
+
+    end, name = widgets.IntSlider(3, max=9), widgets.ToggleButtons(options="ab")
+    view = Explore(draw, end=end, name=name)
+    before = bytes(view.picture.value)
+    end.value = 7
+    name.value = "b"
+    assert seen == [(3, "a"), (7, "a"), (7, "b")] and view.picture.value != before
+    end.value, name.value = 3, "a"
+    assert view.picture.value == before
+    bundle = view._repr_mimebundle_()
+    assert WIDGET in bundle and base64.b64decode(bundle["image/png"]) == before
+    assert before.startswith(b"\x89PNG")
+    assert not plt.get_fignums(), "a figure that is open is shown twice"

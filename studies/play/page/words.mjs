@@ -1,12 +1,41 @@
-// One line that says what the reader's picks or a run did, computed from what was measured.
+// What the page says of each step and of settings between the steps, and its verdict: one line that
+// says what the reader's picks or a run did, computed from what was measured.
 
-import { limits, preferences } from "./measures.mjs";
+import { limits, preferences } from "./policy.mjs";
 
 const ROSE = 0.8; // rate of an agent that has learned, although it errs
 const FELL = 0.2; // by how much a rate has sunk
 const STUCK = 0.5; // share of picks that repeat one that has just failed
 const MISLED = 0.1; // by how much a rate rises if x and y are blank
 const SIDES = [["the rear", "the front"], ["the left side", "the right side"]];
+
+/** Names of the five steps in their order; those of `PRESETS` train with these settings. */
+export const STEPS = ["unload", "positions", "paper", "blank", "shuffled"];
+
+export const SENTENCES = {
+  unload:
+    "A pick pulls one of the 128 boxes nearest to the entrance upwards: " +
+    "click one on which no other lies.",
+  positions:
+    "In 64 containers an agent, which sees the boxes’ positions, " +
+    "learns from its own picks which box to take.",
+  paper:
+    "Now it sees, as in the paper, only ranks: " +
+    "each box’s number in the order along x, y and z.",
+  blank:
+    "Nothing is trained: the same weights choose in fresh containers, with x and y set to 0.",
+  shuffled:
+    "It learns anew, with shuffled places: in each remembered pick the boxes exchange theirs, " +
+    "so that no place can be learned.",
+  stuck: "Without the mask, a box that has just failed may be chosen again, and again.",
+  own: "Your own settings: Train goes on with them, Reset brings back the first weights.",
+};
+
+/** The verdict of a step that needs a trained network where there is none. */
+export const UNTRAINED = "There is no trained network yet: take step 3 first.";
+
+/** The first step that has not been done; undefined after all. */
+export const nextStep = (done) => STEPS.find((step) => !done.has(step));
 
 export const percent = (share) => `${Math.round(100 * share)} %`;
 const mean = (values) => values.reduce((a, b) => a + b, 0) / values.length;
