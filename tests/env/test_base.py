@@ -32,11 +32,9 @@ ALL = [container, HighestItemEnv, ContainerVectorEnv, HighestItemVectorEnv]
         ({"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
         ({"ties": "coin"}, ValueError, "ties is 'coin'"),
         ({"max_picks": 0}, ValueError, "max_picks is 0"),
-        ({"max_picks": 1.5}, TypeError, "max_picks is 1.5"),
         ({"max_picks": 2**63}, ValueError, "max_picks is 9223372036854775808; .* <= "),
-        ({"position_noise": -1}, ValueError, "position_noise is -1"),
-        ({"position_noise": float("nan")}, ValueError, "position_noise is nan"),
         ({"position_noise": 1e300}, ValueError, r"position_noise is 1e\+300; .*\[0, 10.0\]"),
+        ({"render_mode": "human"}, ValueError, "render_mode is 'human'"),
     ],
 )
 def test_bad_settings_are_refused(make, kwargs, error, message):
@@ -52,11 +50,7 @@ def test_bad_settings_are_refused(make, kwargs, error, message):
         (ContainerEnv, {"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected 'rest"),
         (ContainerVectorEnv, {"physics": "local"}, ValueError, "physics is 'local'; expected"),
         *((make, {"stack": 3}, TypeError, "stack is 3") for make in (ContainerEnv, ALL[2])),
-        *((make, {"render_mode": "human"}, ValueError, "render_mode is 'human'") for make in ALL),
-        *(
-            (make, {"render_mode": "rgb_array"}, ValueError, "expected one of None")
-            for make in ALL[1:]
-        ),
+        (ContainerVectorEnv, {"render_mode": "rgb_array"}, ValueError, "expected one of None"),
     ],
 )
 def test_bad_settings_of_some_are_refused(make, kwargs, error, message):
@@ -90,8 +84,15 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
 
 
-@pytest.mark.parametrize("make", [container, HighestItemEnv])
-def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
+@pytest.mark.parametrize(
+    ("make", "action", "function"),
+    [
+        (container, 0, "env.observation.nearest"),
+        (HighestItemEnv, 0, "env.observation.nearest"),
+        (partial(ContainerVectorEnv, 2), [0, 0], "fast.containers.pick"),
+    ],
+)
+def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, action, function, monkeypatch):
     env, same = make(), make()
     env.reset(seed=0)
 
@@ -99,12 +100,13 @@ def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("unload.env.observation.nearest", interrupted)
-        env.step(0)
-    for call in (lambda: env.step(0), env.action_masks):
+        patch.setattr(f"unload.{function}", interrupted)
+        env.step(action)
+    for call in (lambda: env.step(action), env.action_masks):
         with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
             call()
-    assert (env.reset(seed=4)[0] == same.reset(seed=4)[0]).all()
+    assert_same(env.reset(seed=4), same.reset(seed=4))
+    assert_same(env.step(action), same.step(action))
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, pickle.dumps])
@@ -186,8 +188,6 @@ def test_seeds():
         ("actions", [0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
         ("actions", [0.0, 1.0], TypeError, "actions has dtype float64"),
         ("seed", -1, ValueError, "seed is -1"),
-        ("seed", 0.5, TypeError, "seed is 0.5"),
-        ("seed", [1], ValueError, "seed holds 1 seeds; expected 2"),
         ("seed", [1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
         ("seed", [1, "2"], TypeError, "seed is '2'"),
         ("seed", [1, -1], ValueError, "seed is -1; expected an integer >= 0"),
@@ -215,7 +215,6 @@ def test_bad_numbers_of_environments_are_refused(make, num_envs, error):
 @pytest.mark.parametrize(
     ("env_id", "options", "error", "message"),
     [
-        (CONTAINER, {"load": 1}, TypeError, "load is 1; expected an unload.Load"),
         (CONTAINER, {"load": None}, TypeError, "load is None; expected an unload.Load"),
         (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
         (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
@@ -235,20 +234,25 @@ def test_bad_options_leave_the_episodes_as_they_were(make, env_id, options, erro
     assert_same(env.reset(), other.reset())
 
 
-@pytest.mark.parametrize("failing", [1, 3, 5])
-def test_a_call_whose_stack_fails_needs_a_reset(failing):
-    """The first reset, the second one, and the next episode in a step."""
-    envs, other = ContainerVectorEnv(2, max_picks=1, stack=FailingStack(failing)), None
-    other = ContainerVectorEnv(2, max_picks=1)
+@pytest.mark.parametrize("failing", [1, 2, 3])
+@pytest.mark.parametrize(
+    ("make", "action"),
+    [(container, 0), (partial(ContainerVectorEnv, 1), [0])],
+    ids=["single", "vector"],
+)
+def test_a_call_whose_stack_fails_needs_a_reset(make, action, failing):
+    """The first reset, the second one, and the next one, which an array makes in a step."""
+    env, other = make(max_picks=1, stack=FailingStack(failing)), make(max_picks=1)
     with pytest.raises(OSError, match="the stack failed"):
-        envs.reset(seed=0)
-        envs.reset(seed=0)
-        envs.step(np.zeros(2, int))
-    for call in (lambda: envs.step(np.zeros(2, int)), envs.state, envs.action_masks):
+        env.reset(seed=0)
+        env.reset(seed=0)
+        env.step(action)
+        env.reset(seed=0)
+    for call in (lambda: env.step(action), env.action_masks):
         with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
             call()
-    assert_same(envs.reset(seed=0), other.reset(seed=0))
-    assert_same(envs.step(np.zeros(2, int)), other.step(np.zeros(2, int)))
+    assert_same(env.reset(seed=0), other.reset(seed=0))
+    assert_same(env.step(action), other.step(action))
 
 
 # --- state --------------------------------------------------------------------------

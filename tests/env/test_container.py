@@ -9,7 +9,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from tests.env.comparing import FailingStack, assert_same, state_of
+from tests.env.comparing import assert_same, state_of
 from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
 from unload.env.vector import ContainerVectorEnv
@@ -96,17 +96,7 @@ def test_a_failure_changes_nothing_but_the_mask(make_env):
     assert masks.dtype == bool and (masks == expected).all()
 
 
-def test_the_first_box_of_a_load_fails_like_any_other(make_env, boxes):
-    env = make_env(position_noise=0.0)
-    env.reset(seed=0, options={"load": boxes((1.2, 0.2), (1.2, 0.6))})
-    row = env.unwrapped.visible.tolist().index(0)
-    _, reward, _, _, info = env.step(row)
-    assert reward == -1 and info["item"] == 0 and info["action_mask"][row] == 0
-    env.reset(options={"load": boxes((1.2, 0.2), (2.0, 0.2))})
-    assert env.unwrapped.liftable().sum() == 2
-
-
-def test_failures_add_up_and_a_success_forgives_them(make_env):
+def test_failures_add_up_and_a_success_forgives_them(make_env, boxes):
     env = make_env()
     seen, _ = env.reset(seed=0)
     for row in np.argsort(seen[:, 2])[:3]:
@@ -114,6 +104,9 @@ def test_failures_add_up_and_a_success_forgives_them(make_env):
     assert info["action_mask"].sum() == 125
     _, reward, _, _, info = env.step(int(np.argmax(seen[:, 2])))
     assert reward == 1 and info["action_mask"].tolist() == [1] * 128
+    env.reset(options={"load": boxes((1.2, 0.2), (1.2, 0.6))})
+    row = env.unwrapped.visible.tolist().index(0)
+    assert env.step(row)[4]["action_mask"][row] == 0, "also the first box of a load"
 
 
 def test_liftable_says_what_would_succeed(make_env):
@@ -134,14 +127,14 @@ def test_the_reward_needs_the_threshold(make_env, monkeypatch):
         assert env.step(0)[1] == reward
 
 
-def test_truncation_after_max_picks(make_env):
+def test_truncation_after_max_picks(make_env, few_items):
     env = make_env(max_picks=3)
     env.reset(seed=0)
     assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (False, True)]
     with pytest.raises(ResetNeeded, match="the episode is finished; call reset first"):
         env.unwrapped.step(0)
-    env.reset()
-    env.step(0)
+    env.reset(options={"load": few_items(np.random.default_rng(0), 3)})
+    assert [env.step(0)[2:4] for _ in range(3)][-1] == (True, True), "the last item, too"
 
 
 def test_drifting_boxes_are_seen_where_they_are(make_env):
@@ -218,13 +211,6 @@ def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing(small_env):
     assert_same(state_of(env), state | {"_picks": 1})
 
 
-def test_the_last_item_may_go_with_the_last_pick(small_env):
-    env = small_env(2, max_picks=2)
-    env.reset(seed=0)
-    env.step(0)
-    assert env.step(0)[2:4] == (True, True)
-
-
 @pytest.mark.parametrize(
     "kwargs",
     [{"physics": "local"}, {"physics": "full"}, {"physics": "full", "after_pick": "keep"}],
@@ -249,19 +235,15 @@ def test_every_physics_goes_to_the_last_item(small_env, kwargs):
 
 @pytest.mark.parametrize(
     ("action", "error"),
-    [(128, ValueError), (-1, ValueError), (3.5, TypeError), (float("nan"), TypeError),
-     (True, TypeError), (None, TypeError), ("3", TypeError), (np.array([3]), TypeError)],
-)  # fmt: skip
+    [(128, ValueError), (-1, ValueError), (3.5, TypeError), (np.array([3]), TypeError)],
+)
 def test_bad_actions_change_nothing(action, error):
     env, untouched = (ContainerEnv(physics="table") for _ in range(2))
     for container in (env, untouched):
         container.reset(seed=0)
     with pytest.raises(error, match="action is .*; expected an integer >= 0 and <= 127"):
         env.step(action)
-    outcomes = [container.step(5) for container in (env, untouched)]
-    assert (outcomes[0][0] == outcomes[1][0]).all() and outcomes[0][1] == outcomes[1][1]
-    env.close()
-    untouched.close()
+    assert_same(env.step(5), untouched.step(5))
 
 
 @pytest.mark.parametrize("make", [ContainerEnv, partial(ContainerVectorEnv, 2)])
@@ -273,19 +255,6 @@ def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
         make(stack=lambda rng: tower).reset(seed=0)
     with pytest.raises(ValueError, match="floats in load"):
         make().reset(options={"load": tower})
-
-
-@pytest.mark.parametrize("number", [1, 2])
-def test_a_reset_whose_stack_fails_needs_another_one(number):
-    env, other = ContainerEnv("table", stack=FailingStack(number)), ContainerEnv("table")
-    for _ in range(1, number):
-        env.reset(seed=0)
-    with pytest.raises(OSError, match="the stack failed"):
-        env.reset(seed=0)
-    with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
-        env.step(0)
-    assert_same(env.reset(seed=0), other.reset(seed=0))
-    assert_same(env.step(3), other.step(3))
 
 
 def test_an_environment_that_draws_nothing_imports_nothing_that_draws():

@@ -183,11 +183,6 @@ def test_episodes_that_end_at_once(few_items, mode):
     assert 3 in together and {1, 2} & set(together.tolist())
 
 
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
-def test_other_modes_of_other_tasks(mode):
-    play_both(HIGHEST, 2, 12, max_picks=3, autoreset_mode=mode)
-
-
 def test_an_episode_that_is_over_waits_for_its_reset():
     envs = gymnasium.make_vec(HIGHEST, 2, max_picks=2, autoreset_mode=AutoresetMode.DISABLED)
     with pytest.raises(ResetNeeded):
@@ -220,27 +215,18 @@ def test_a_state_is_that_between_two_episodes():
     others.close()
 
 
-@pytest.mark.filterwarnings("ignore:overflow encountered in cast")  # of Gymnasium's, for float64
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 def test_gymnasiums_wrappers(env_id, mode):
-    plain, wrapped = (gymnasium.make_vec(env_id, 2, autoreset_mode=mode) for _ in range(2))
-    wrapped = wrappers.vector.RescaleObservation(wrapped, np.float32(0), np.float32(1))
+    envs = gymnasium.make_vec(env_id, 2, autoreset_mode=mode, max_picks=2)
     if mode is AutoresetMode.NEXT_STEP:  # the only one that it takes
-        wrapped = wrappers.vector.NormalizeObservation(wrapped)
-    wrapped = wrappers.vector.FlattenObservation(wrapped)
-    wrapped = wrappers.vector.DtypeObservation(wrapped, np.float64)
-    wrapped = wrappers.vector.RecordEpisodeStatistics(wrapped)
-    plain.reset(seed=0)
-    seen, _ = wrapped.reset(seed=0)
-    for _ in range(3):
-        expected, actions = plain.step(np.zeros(2, int))[0], np.zeros(2, int)
-        seen = wrapped.step(actions)[0]
-        assert seen.shape == (2, 384) and seen.dtype == np.float64
-    if mode is AutoresetMode.DISABLED:
-        assert np.allclose(seen, (expected.reshape(2, 384) + 1) / 2, atol=1e-6)
-    plain.close()
-    wrapped.close()
+        envs = wrappers.vector.NormalizeObservation(envs)
+    envs = wrappers.vector.RecordEpisodeStatistics(wrappers.vector.FlattenObservation(envs))
+    seen, _ = envs.reset(seed=0)
+    for _ in range(2):
+        seen, *_, infos = envs.step(np.zeros(2, int))
+    assert seen.shape == (2, 384) and infos["episode"]["l"].tolist() == [2, 2]
+    envs.close()
 
 
 # --- the table ----------------------------------------------------------------------
@@ -259,22 +245,3 @@ def test_unknown_lifts_are_simulated_once_and_remembered(monkeypatch):
         assert envs.table is table and len(table) > 10
         monkeypatch.setattr("unload.physics.local.lift", None)
     assert runs[0] == runs[1]
-
-
-def test_a_pick_that_is_interrupted_needs_a_reset(monkeypatch, boxes):
-    envs = ContainerVectorEnv(2, stack=lambda rng: boxes((1.2, 0.2), (1.2, 0.6)))
-    envs.table = LiftTable()
-    envs.reset(seed=0)
-
-    def interrupted(*arguments):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("unload.physics.bullet.World.pull", interrupted)
-        envs.step(np.array([1, 1]))  # the lower box, which is not known
-    with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
-        envs.step(np.array([0, 0]))
-    assert len(envs.table) == 0
-    envs.reset(seed=0)
-    assert envs.step(np.array([0, 0]))[4]["unloaded"].tolist() == [1, 1]
-    envs.close()
