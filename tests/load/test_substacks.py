@@ -84,13 +84,7 @@ def test_build_load_places_the_walls_from_the_rear():
 
 @pytest.mark.parametrize(
     ("scale", "fit"),
-    [
-        (1, (12, 3, 4)),
-        (0.8, (15, 4, 4)),
-        (1.2, (10, 3, 3)),
-        (0.5, (24, 7, 7)),
-        (1.5, (8, 2, 2)),
-    ],
+    [(1, (12, 3, 4)), (0.8, (15, 4, 4)), (1.2, (10, 3, 3)), (0.5, (24, 7, 7)), (1.5, (8, 2, 2))],
 )
 def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
     walls, rows, columns = fit
