@@ -53,8 +53,8 @@ LIBRARIES = {
 COVERED_BY = {
     "__main__.py": "agent/test_order.py",
     "fast/kernel.py": "fast/test_fused.py",  # its loops
+    "network/peq.py": "network/test_variants.py",
 }
-# Modules of the studies that no test imports, and why.
 
 
 def module_name(path: Path) -> str:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.load.strategies import corners, load_of
+from tests.load.walls import corners, load_of
 from unload import task
 from unload.load.boxes import (
     ABOVE,
