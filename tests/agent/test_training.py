@@ -9,19 +9,8 @@ import pandas as pd
 import pytest
 import torch
 
-from tests.agent.runs import (
-    CONTAINER,
-    RUNS,
-    Breakdown,
-    HeightNetwork,
-    assert_same,
-    at,
-    at_step,
-    begun,
-    crash,
-    interrupt,
-    interrupt_run,
-)
+from tests.agent import runs
+from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt
 from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
@@ -78,7 +67,7 @@ def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
     """Row 5 again and again: it changes only when it is unloaded."""
     small = {"num_envs": 1, "picks": 11, "log_interval": 11, "gradient_steps": 0}
     config = TrainConfig(**CONTAINER | small)
-    with begun(config) as run:
+    with runs.begun(config) as run:
         run.agent.choose = lambda *arguments: np.array([5])
         for _ in range(11):
             run.step()
@@ -110,7 +99,7 @@ def test_every_network_is_trained_and_gone_on_with(tmp_path, network):
     table = evaluate(result.policy, 1, max_picks=20)
     torch.set_default_dtype(torch.float64)
     try:
-        interrupt_run(config, tmp_path / "broken", 17)
+        runs.interrupt_run(config, tmp_path / "broken", 17)
         train(config, tmp_path / "broken", progress=False)
         loaded = load_policy(tmp_path / "broken" / "policy.safetensors")
         pd.testing.assert_frame_equal(evaluate(loaded, 1, max_picks=20), table)
@@ -123,7 +112,7 @@ def test_a_network_of_ones_own_is_trained(tmp_path):
     config = TrainConfig(**CONTAINER | {"network": own_network, "epsilon_fraction": 0.1})
     result = train(config, tmp_path / "straight", progress=False)
     assert result.policy.network.weight.item() > 0.12  # it was 0.1: to pick high ones pays
-    interrupt_run(config, tmp_path / "broken", 17)
+    runs.interrupt_run(config, tmp_path / "broken", 17)
     train(config, tmp_path / "broken", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "broken")
     assert result.policy.card["configuration"]["network"].startswith(
@@ -188,7 +177,7 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     with open(tmp_path / "log.txt", "w") as log:
         train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
     assert "200/200" in (tmp_path / "log.txt").read_text()
-    interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)
+    runs.interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)
     train(TrainConfig(**CONTAINER), tmp_path / "resumed")
     shown = capsys.readouterr().out
     assert "80.0/200" in shown and "0.00/200" not in shown and "200/200" in shown
@@ -218,7 +207,7 @@ def test_a_run_can_be_watched(tmp_path, monkeypatch):
 def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
     written = []
     monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
-    with at_step(49, crash), pytest.raises(Breakdown):  # after nine points
+    with at_step(49, runs.crash), pytest.raises(runs.Breakdown):  # after nine points
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert 1 <= len(written) < 9
 
@@ -226,7 +215,7 @@ def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
 def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
     copied = []
-    with begun(TrainConfig(**CONTAINER | {"gamma": gamma})) as run:
+    with runs.begun(TrainConfig(**CONTAINER | {"gamma": gamma})) as run:
         monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
         while not run.rollout.finished:
             run.step()
@@ -266,7 +255,7 @@ def test_lifts_that_are_damaged_at_the_end_lose_no_run(tmp_path):
     damage = at_step(50, lambda: lifts.write_bytes(b"no table"))
     with damage, pytest.raises(ValueError, match="lifts: .*lifts.npz is not a readable"):
         train(config, tmp_path / "run", progress=False, lifts=lifts)
-    with at_step(1, crash):
+    with at_step(1, runs.crash):
         assert len(train(config, tmp_path / "run", progress=False, lifts=lifts).curve) == 10
 
 
@@ -279,10 +268,10 @@ def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path, monkeypa
     def stack(rng):
         loads.append(own_load(rng, "continuous sizes"))
         if len(loads) == 12:
-            raise Breakdown
+            raise runs.Breakdown
         return loads[-1]
 
-    with pytest.raises(Breakdown):
+    with pytest.raises(runs.Breakdown):
         train(config, tmp_path / "run", progress=False, stack=stack, lifts=lifts)
     assert len(LiftTable.load(lifts)) == len(table) > 0
     assert not (tmp_path / "run" / "checkpoint.npz").exists()
@@ -290,7 +279,7 @@ def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path, monkeypa
 
 def test_without_updates_the_weights_stay():
     config = TrainConfig(**CONTAINER | {"gradient_steps": 0})
-    with begun(config) as run:
+    with runs.begun(config) as run:
         before = run.agent.state()
         for _ in range(20):
             run.step()
@@ -301,7 +290,7 @@ def test_without_updates_the_weights_stay():
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
 def test_a_run_of_the_fewest_picks_makes_one_update(replay_size, picks):
     config = TrainConfig(**CONTAINER | {"replay_size": replay_size, "picks": picks})
-    with begun(config) as run:
+    with runs.begun(config) as run:
         while not run.rollout.finished:
             before = run.curve.sums["updates"]
             run.step()
@@ -394,7 +383,7 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
     """Nothing is written any more; the run goes on from the checkpoint before."""
     config = TrainConfig(**CONTAINER)
     train(config, tmp_path / "straight", progress=False)
-    interrupt_run(config, tmp_path / "broken", 10)
+    runs.interrupt_run(config, tmp_path / "broken", 10)
 
     def twice(point=None) -> None:
         interrupt()
@@ -442,7 +431,7 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
 @pytest.mark.parametrize("method", ["finish", "result"])
 def test_ctrl_c_in_the_last_moments_is_not_swallowed(tmp_path, method):
     config = TrainConfig(**CONTAINER)
-    with at(RunFolder, method, 1, interrupt), pytest.raises(KeyboardInterrupt):
+    with runs.at(RunFolder, method, 1, interrupt), pytest.raises(KeyboardInterrupt):
         train(config, tmp_path, progress=False)
-    with at_step(1, crash):  # it is finished
+    with at_step(1, runs.crash):  # it is finished
         assert len(train(config, tmp_path, progress=False).curve) == 10
