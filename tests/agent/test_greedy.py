@@ -16,25 +16,16 @@ def observations(rng) -> np.ndarray:
     return rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
 
 
-def test_greedy_equalizes_what_its_network_expects(observations, rng):
-    masks = np.ones(observations.shape[:2])
-    for ties in ("noise", "average"):
-        policy = Greedy(peq(), equalize=True, ties=ties)
-        expected = greedy_actions(policy.network, equalize(observations, ties), masks)
-        assert (policy(observations, masks, rng) == expected).all()
-    raw = Greedy(peq(), equalize=False)(observations, masks, rng)
-    assert (raw == greedy_actions(peq(), observations, masks)).all()
-    assert (raw != expected).any()
-
-
-@pytest.mark.parametrize("equalized", [True, False])
-def test_values_are_those_of_the_network(observations, equalized):
-    network = peq()
-    seen = equalize(observations).astype(np.float32) if equalized else observations
-    expected = network(torch.from_numpy(seen)).detach().numpy()
-    assert (Greedy(network, equalized).values(observations.astype(float)) == expected).all()
+@pytest.mark.parametrize("ties", ["noise", "average", "not equalized"])
+def test_greedy_equalizes_what_its_network_expects(observations, rng, ties):
+    masks, equalized = np.ones(observations.shape[:2]), ties != "not equalized"
+    policy = Greedy(peq(), True, ties) if equalized else Greedy(peq(), False)
+    seen = equalize(observations, ties).astype(np.float32) if equalized else observations
+    expected = peq()(torch.from_numpy(seen)).detach().numpy()
+    assert (policy.values(observations.astype(float)) == expected).all()
+    assert (policy(observations, masks, rng) == greedy_actions(peq(), seen, masks)).all()
     with pytest.raises(ValueError, match="observations"):
-        Greedy(network, equalized).values(observations[0])
+        policy.values(observations[0])
 
 
 @pytest.mark.parametrize("name", [name for name in NETWORKS if name != "peq"])

@@ -177,9 +177,6 @@ def test_seeds():
     assert not (unseeded[0] == unseeded[1]).all()
 
 
-# --- bad input ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "value", "error", "message"),
     [
@@ -255,14 +252,13 @@ def test_a_call_whose_stack_fails_needs_a_reset(make, action, failing):
     assert_same(env.step(action), other.step(action))
 
 
-# --- state --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
-@pytest.mark.parametrize("picks", [0, 10, 13])
-def test_environments_go_on_from_a_state(env_id, picks, rng):
+@pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP])
+@pytest.mark.parametrize("picks", [0, 10, 13])  # before, between and within episodes
+def test_environments_go_on_from_a_state(env_id, mode, picks, rng):
     """Others do, whatever they hold, and the same ones, whose state was not changed by picks."""
-    envs, other = (gymnasium.make_vec(env_id, 3, max_picks=10).unwrapped for _ in range(2))
+    made = (gymnasium.make_vec(env_id, 3, max_picks=10, autoreset_mode=mode) for _ in range(2))
+    envs, other = (each.unwrapped for each in made)
     shown = envs.reset(seed=1)
     actions = rng.integers(128, size=(picks + 25, 3))
     for action in actions[:picks]:

@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from functools import partial
 from pathlib import Path
 
@@ -25,9 +23,6 @@ ENV_ID = "unload/Container-v0"
 def tall_load() -> Load:
     """Few enough items to be quick, also where each of them is simulated."""
     return build_load(np.zeros((2, 3, 4), dtype=int))
-
-
-# --- Gymnasium's interface ----------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -59,9 +54,6 @@ def test_positions_are_blurred_and_sunk_once_per_load(make_env, full_load):
     assert blur.mean(axis=0) == pytest.approx([0, 0, -0.001], abs=1e-4)
     env.step(0)
     assert (env.unwrapped.observed_positions() - full_load.positions == blur).all()
-
-
-# --- picking ------------------------------------------------------------------------
 
 
 def test_a_success_removes_the_item_and_shows_the_next(make_env):
@@ -158,9 +150,6 @@ def test_drifting_boxes_are_seen_where_they_are(make_env):
         container.liftable()
 
 
-# --- unloading to the last item -----------------------------------------------------
-
-
 @pytest.fixture
 def small_env(make_env, few_items):
     """``small_env(count, **kwargs)``: an environment whose loads hold so many items."""
@@ -230,9 +219,6 @@ def test_every_physics_goes_to_the_last_item(small_env, kwargs):
     assert (env.render() != before).any()
 
 
-# --- bad input ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("action", "error"),
     [(128, ValueError), (-1, ValueError), (3.5, TypeError), (np.array([3]), TypeError)],
@@ -255,10 +241,3 @@ def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
         make(stack=lambda rng: tower).reset(seed=0)
     with pytest.raises(ValueError, match="floats in load"):
         make().reset(options={"load": tower})
-
-
-def test_an_environment_that_draws_nothing_imports_nothing_that_draws():
-    """They take as long to import as all the rest."""
-    code = "import sys, unload; unload.ContainerEnv; print(*sys.modules)"
-    names = subprocess.check_output([sys.executable, "-c", code], cwd=ROOT, text=True).split()
-    assert not {"PIL", "matplotlib", "pandas", "plotly", "torch"} & set(names)

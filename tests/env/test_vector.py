@@ -200,21 +200,6 @@ def test_an_episode_that_is_over_waits_for_its_reset():
     envs.close()
 
 
-def test_a_state_is_that_between_two_episodes():
-    envs, others = (
-        gymnasium.make_vec(HIGHEST, 2, max_picks=2, autoreset_mode=AutoresetMode.NEXT_STEP)
-        for _ in range(2)
-    )
-    envs.reset(seed=0)
-    for _ in range(2):
-        envs.step(np.zeros(2, int))
-    others.unwrapped.load_state(envs.unwrapped.state())
-    for _ in range(3):
-        assert_same(envs.step(np.ones(2, int)), others.step(np.ones(2, int)))
-    envs.close()
-    others.close()
-
-
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 def test_gymnasiums_wrappers(env_id, mode):
@@ -227,9 +212,6 @@ def test_gymnasiums_wrappers(env_id, mode):
         seen, *_, infos = envs.step(np.zeros(2, int))
     assert seen.shape == (2, 384) and infos["episode"]["l"].tolist() == [2, 2]
     envs.close()
-
-
-# --- the table ----------------------------------------------------------------------
 
 
 def test_unknown_lifts_are_simulated_once_and_remembered(monkeypatch):

@@ -87,9 +87,6 @@ def test_the_box_that_sticks_out_is_named():
     assert len(Load(positions, sizes, label, label)) == 3
 
 
-# --- properties of random loads -----------------------------------------------------
-
-
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(corners())
 def test_disjoint_boxes_are_accepted_and_those_that_touch_are_known(boxes):
@@ -161,9 +158,6 @@ def test_crossed_boxes_have_more_contacts_than_expected():
     for bar in range(count):
         assert sorted(found.of(ABOVE, bar)) == list(range(count, 2 * count))
         assert sorted(found.of(BELOW, count + bar)) == list(range(count))
-
-
-# --- loads from outside -------------------------------------------------------------
 
 
 def test_packages_and_walls_follow_from_the_boxes(full_load):

@@ -49,9 +49,6 @@ def test_the_smallest_boxes_of_a_load_are_simulated(make, kind):
     assert (np.array(lifts(physics, range(4))) >= 0).all()
 
 
-# --- bad input ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("call", ["lift", "remove"])
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def test_a_table_grows_and_forgets_nothing(table):
     assert len(table) == 2000 and table.find(situation(7)) == 0.007
 
 
-def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng):
+def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng, tmp_path):
     other = LiftTable()
     for number in rng.permutation(50).tolist():
         other.add(situation(number), number / 1000)
@@ -161,6 +161,12 @@ def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng):
     assert digests.dtype == np.uint64 and micrometres.dtype == np.int32
     assert (digests[1:] > digests[:-1]).all() and set(micrometres) == set(range(0, 50_000, 1000))
     assert entries_of(other) == entries_of(table)
+    table.save(tmp_path / "lifts.npz")
+    other.save(tmp_path / "other.npz")
+    assert (tmp_path / "lifts.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+    read = LiftTable.load(tmp_path / "lifts.npz")
+    read.add(situation(50), 0.05)
+    assert len(read) == 51 and all(read.find(situation(k)) == k / 1000 for k in range(51))
 
 
 def test_threads_find_and_add_at_the_same_time(monkeypatch):
@@ -193,20 +199,6 @@ def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(mon
 
     monkeypatch.setattr(unload.physics.table, "slot_of", then_filled)
     assert table.find(situation(0)) is None
-
-
-# --- files --------------------------------------------------------------------------
-
-
-def test_a_saved_table_finds_the_same(table, tmp_path):
-    table.save(tmp_path / "lifts.npz")
-    read = LiftTable.load(tmp_path / "lifts.npz")
-    assert all(read.find(situation(number)) == number / 1000 for number in range(50))
-    assert len(read) == 50
-    read.save(tmp_path / "again.npz")
-    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "lifts.npz").read_bytes()
-    read.add(situation(50), 0.05)
-    assert len(read) == 51 and read.find(situation(50)) == 0.05
 
 
 def free_box(number: int) -> Situation:
@@ -270,9 +262,6 @@ def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatc
     monkeypatch.undo()
     table.exchange(path)
     assert len(LiftTable.load(path)) == 2
-
-
-# --- files that are refused ---------------------------------------------------------
 
 
 def changed(path: Path, **changes: np.ndarray | None) -> None:

@@ -17,11 +17,13 @@ from unload.support import checks
         *((checks.real, value, (0, 1)) for value in (0, 1, 0.25, np.float32(0.25), np.int8(1))),
         (checks.real, np.longdouble(0.25), (0, 1)),
         *((checks.boolean, value, ()) for value in (True, False, np.True_)),
+        *((checks.one_of, value, (("red", None),)) for value in ("red", None)),
+        *((check, Path("a/b"), ()) for check in (checks.path, checks.file)),
     ],
 )
 def test_numbers_are_returned_as_pythons_own(check, value, arguments):
     result = check("n", value, *arguments)
-    kind = {checks.real: float, checks.boolean: bool}.get(check, int)
+    kind = {checks.real: float, checks.boolean: bool, checks.integer: int}.get(check, type(value))
     assert result == value and type(result) is kind
 
 
@@ -50,6 +52,8 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
             (checks.boolean, value, (), TypeError, "True or False")
             for value in (1, 0, 1.0, None, "yes", np.array([True]))
         ),
+        (checks.path, 3, (), TypeError, "a path"),
+        (checks.entries, ["a"], ((),), TypeError, "a dict"),
         *((checks.file, value, (), ValueError, "the name of a file") for value in ("", "/")),
         *(
             (checks.one_of, value, (("red", None, 1),), ValueError, "one of 'red', None, 1")
@@ -61,24 +65,6 @@ def test_what_does_not_fit_is_refused_by_name_and_value(check, value, arguments,
     with pytest.raises(error) as caught:
         check("n", value, *arguments)
     assert str(caught.value) == f"n is {value!r}; expected {wanted}"
-
-
-def test_options_paths_and_generators(rng):
-    for option in ("red", None):
-        checks.one_of("colour", option, ("red", None))
-    assert checks.path("x", "a/b") == checks.file("x", "a/b") == Path("a/b")
-    assert checks.generator("x", rng) is rng
-    for check, wanted in ((checks.path, "path"), (checks.generator, "numpy.random.Generator")):
-        with pytest.raises(TypeError, match=f"x is 3; expected a {wanted}"):
-            check("x", 3)
-
-
-def test_entries_names_what_is_missing():
-    checks.entries("state", {"a": 1, "b": 2, "c": 3}, ("a", "b"))
-    with pytest.raises(ValueError, match="state has no a, b; expected b, a"):
-        checks.entries("state", {"c": 3}, ("b", "a"))
-    with pytest.raises(TypeError, match=r"state is \['a'\]; expected a dict"):
-        checks.entries("state", ["a"], ())
 
 
 def test_finite_array_returns_a_float64_copy():
