@@ -41,7 +41,6 @@ def test_every_pick_is_what_pybullet_says(policy):
         assert row.behind == load.behind(physics.present)[row.item]
         if row.unloaded:
             physics.remove(row.item)
-    physics.close()
     assert order["behind"].any() == (policy != "reachable")
 
 

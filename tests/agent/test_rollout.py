@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from tests.agent.runs import CONTAINER, RUNS, begun, few_walls
+from tests.agent.runs import CONTAINER, RUNS, few_walls
 from unload import TrainConfig, train
+from unload.agent.training import Training
 from unload.env.vector import ContainerVectorEnv
 
 
@@ -10,9 +11,9 @@ from unload.env.vector import ContainerVectorEnv
 def test_the_bootstrap_maximum_obeys_the_mask(mask):
     """A failed item is out of the next state's maximum, whether training masks choices or not."""
     config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
-    with begun(config) as run:
-        for _ in range(20):
-            run.step()
+    run = Training(config)
+    for _ in range(20):
+        run.step()
     stored = run.replay.arrays
     failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
     assert len(failed) > 10
@@ -44,11 +45,11 @@ def test_a_pick_says_how_far_it_has_lifted(monkeypatch):
         return rewards
 
     monkeypatch.setattr(ContainerVectorEnv, "_pick", watched)
-    with begun(TrainConfig(**CONTAINER | {"max_picks": 3})) as run:
-        for _ in range(7):
-            picks, distances = run.rollout.pick(np.array([0, 20, 40, 60]))
-            assert (distances == lifted[-1]).all()
-            assert ((distances >= 0.2) == (picks["rewards"] > 0)).all()
+    run = Training(TrainConfig(**CONTAINER | {"max_picks": 3}))
+    for _ in range(7):
+        picks, distances = run.rollout.pick(np.array([0, 20, 40, 60]))
+        assert (distances == lifted[-1]).all()
+        assert ((distances >= 0.2) == (picks["rewards"] > 0)).all()
     assert np.unique(lifted).size > 1
-    with begun(TrainConfig(**RUNS["highest item"])) as run:
-        assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()
+    run = Training(TrainConfig(**RUNS["highest item"]))
+    assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()

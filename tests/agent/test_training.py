@@ -67,10 +67,10 @@ def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
     """Row 5 again and again: it changes only when it is unloaded."""
     small = {"num_envs": 1, "picks": 11, "log_interval": 11, "gradient_steps": 0}
     config = TrainConfig(**CONTAINER | small)
-    with runs.begun(config) as run:
-        run.agent.choose = lambda *arguments: np.array([5])
-        for _ in range(11):
-            run.step()
+    run = Training(config)
+    run.agent.choose = lambda *arguments: np.array([5])
+    for _ in range(11):
+        run.step()
     rewards = run.replay.arrays["rewards"]
     point = run.curve.points[-1]
     assert 0 < (rewards[:-1] < 0).sum() < 10
@@ -85,7 +85,7 @@ def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, coun
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         for seed in (0, 1):
-            Training(TrainConfig(**CONTAINER, seed=seed)).rollout.close()
+            Training(TrainConfig(**CONTAINER, seed=seed))
     assert len(said) == count
     assert all(f"PyTorch uses {found} instructions" in str(each.message) for each in said)
 
@@ -149,7 +149,6 @@ def test_a_reward_of_ones_own_gets_the_distance():
     run = Training(TrainConfig(**CONTAINER), change=metres)
     for _ in range(20):
         run.step()
-    run.rollout.close()
     learned = run.replay.arrays["rewards"][:80]
     assert (learned >= 0).all() and len(np.unique(learned)) > 1
     successes = run.curve.table()["success_rate"].iloc[-1]
@@ -215,10 +214,10 @@ def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
 def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
     copied = []
-    with runs.begun(TrainConfig(**CONTAINER | {"gamma": gamma})) as run:
-        monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
-        while not run.rollout.finished:
-            run.step()
+    run = Training(TrainConfig(**CONTAINER | {"gamma": gamma}))
+    monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
+    while not run.rollout.finished:
+        run.step()
     assert copied == picks
 
 
@@ -279,21 +278,21 @@ def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path, monkeypa
 
 def test_without_updates_the_weights_stay():
     config = TrainConfig(**CONTAINER | {"gradient_steps": 0})
-    with runs.begun(config) as run:
-        before = run.agent.state()
-        for _ in range(20):
-            run.step()
-        after = run.agent.state()
+    run = Training(config)
+    before = run.agent.state()
+    for _ in range(20):
+        run.step()
+    after = run.agent.state()
     assert all(np.array_equal(before[name], after[name]) for name in before)
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
 def test_a_run_of_the_fewest_picks_makes_one_update(replay_size, picks):
     config = TrainConfig(**CONTAINER | {"replay_size": replay_size, "picks": picks})
-    with runs.begun(config) as run:
-        while not run.rollout.finished:
-            before = run.curve.sums["updates"]
-            run.step()
+    run = Training(config)
+    while not run.rollout.finished:
+        before = run.curve.sums["updates"]
+        run.step()
     assert before == 0 and np.isfinite(run.curve.points[-1].loss)
     with pytest.raises(ValueError, match=f"picks is {picks - 4}; expected at least {picks}, bec"):
         replace(config, picks=picks - 4)

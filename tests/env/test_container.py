@@ -34,7 +34,6 @@ def tall_load() -> Load:
 def test_check_env(kwargs):
     env = gymnasium.make(ENV_ID, **kwargs)
     check_env(env.unwrapped, skip_render_check=True)
-    env.close()
 
 
 def test_reset_shows_the_nearest_items_scaled(make_env, full_load):

@@ -14,7 +14,6 @@ ENV_ID = "unload/HighestItem-v0"
 def test_check_env(equalized):
     env = gymnasium.make(ENV_ID, equalize=equalized)
     check_env(env.unwrapped, skip_render_check=True)
-    env.close()
 
 
 def test_only_items_at_the_greatest_height_are_rewarded(make_env):

@@ -41,8 +41,6 @@ def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -
             begun = array.reset(**given, options=dict(options))
             assert_same(begun, side_by_side.reset(**given, options=options))
             results = begun
-    array.close()
-    side_by_side.close()
     return np.array(ends)
 
 
@@ -66,8 +64,6 @@ def test_what_can_be_seen_and_lifted_is_that_of_the_single_environments():
         observed = array.step(actions)[0]
         side_by_side.step(actions)
     assert 0 < expected.sum() < expected.size
-    array.close()
-    side_by_side.close()
 
 
 def test_a_load_may_be_given(few_items, rng):
@@ -78,8 +74,6 @@ def test_a_load_may_be_given(few_items, rng):
     for _ in range(4):  # beyond the end of the episode, after which the load is drawn by lot
         assert_same(array.step(np.array([0, 3])), side_by_side.step(np.array([0, 3])))
     assert array.unwrapped._containers.left.min() > 700
-    array.close()
-    side_by_side.close()
 
 
 def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
@@ -88,7 +82,6 @@ def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
     liftable = envs.liftable()
     monkeypatch.setattr(unload.task, "LIFT_THRESHOLD", FREE_LIFT)
     assert_same(envs.liftable(), liftable)
-    envs.close()
 
 
 def test_fewer_boxes_may_have_more_contacts():
@@ -121,7 +114,6 @@ def test_containers_of_other_sizes_stand_side_by_side(few_items):
     older = {name: array for name, array in state.items() if name != "sizes"}
     envs.load_state(older)
     assert (envs.state()["sizes"] == unload.task.CONTAINER).all()
-    envs.close()
 
 
 @settings(derandomize=True, deadline=None, max_examples=20)
@@ -145,8 +137,6 @@ def test_random_actions_seeds_and_options(env_id, options, num_envs, seed, steps
     for actions in np.array(steps, int).reshape(-1, 3)[:, :num_envs]:
         assert_same(array.step(actions), side_by_side.step(actions))
     assert_same(array.reset(), side_by_side.reset())
-    array.close()
-    side_by_side.close()
 
 
 @pytest.fixture
@@ -197,7 +187,6 @@ def test_an_episode_that_is_over_waits_for_its_reset():
         envs.reset(options={"reset_mask": np.ones(3, bool)})
     assert envs.reset(options={"reset_mask": np.array([False, True])})[1]["_action_mask"].tolist()
     envs.step(np.zeros(2, int))
-    envs.close()
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
@@ -211,7 +200,6 @@ def test_gymnasiums_wrappers(env_id, mode):
     for _ in range(2):
         seen, *_, infos = envs.step(np.zeros(2, int))
     assert seen.shape == (2, 384) and infos["episode"]["l"].tolist() == [2, 2]
-    envs.close()
 
 
 def test_unknown_lifts_are_simulated_once_and_remembered(monkeypatch):
@@ -223,7 +211,6 @@ def test_unknown_lifts_are_simulated_once_and_remembered(monkeypatch):
         envs.table = table
         envs.reset(seed=3)
         runs.append([envs.step(action)[1].tolist() for action in actions])
-        envs.close()
         assert envs.table is table and len(table) > 10
         monkeypatch.setattr("unload.physics.local.lift", None)
     assert runs[0] == runs[1]

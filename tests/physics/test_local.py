@@ -31,8 +31,6 @@ def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
         interrupted.simulate(situations[0])
     for situation in situations[:10]:
         assert interrupted.simulate(situation) == fresh.simulate(situation)
-    interrupted.close()
-    fresh.close()
 
 
 def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
@@ -43,8 +41,6 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
     assert fresh._world.bodies > 100
-    physics.close()
-    fresh.close()
 
 
 @pytest.mark.slow
@@ -60,4 +56,3 @@ def test_the_memory_of_many_lifts_is_flat(monkeypatch):
             pages = int(Path("/proc/self/statm").read_text().split()[1])
             resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
     assert max(resident[2:]) - resident[1] < 10, "MiB"
-    physics.close()

@@ -128,4 +128,3 @@ def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
     assert physics.simulate_all(hard) == alone
     assert shared == [16] and len(physics.table) == 16
     assert np.allclose([physics.table.find(each) for each in hard], alone)
-    physics.close()

@@ -36,8 +36,7 @@ def known(situations):
     """Situations with one or two boxes on top, and their distances in ``LocalPhysics``."""
     local = LocalPhysics()
     light = [each for each in situations if 0 < each.on_top < HELD_DOWN]
-    yield [(situation, local.simulate(situation)) for situation in light]
-    local.close()
+    return [(situation, local.simulate(situation)) for situation in light]
 
 
 def test_table_equals_local_exactly(make, rng):
@@ -66,8 +65,6 @@ def test_a_situation_is_simulated_once(known, monkeypatch):
     with pytest.raises(pytest.fail.Exception):
         fresh.simulate(known[0][0])
     assert len(fresh.table) == 0
-    for physics in (first, second, fresh):
-        physics.close()
 
 
 def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
@@ -77,7 +74,6 @@ def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
     assert physics.simulate(around.situation(0)) == 0 and len(physics.table) == 0
     distance = physics.simulate(around.situation(1))
     assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
-    physics.close()
 
 
 @pytest.mark.slow
@@ -92,7 +88,6 @@ def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
             if not around.on_top(item) and asked < 1667:
                 assert local.simulate(around.situation(item)) == FREE_LIFT
                 asked += 1
-    local.close()
 
 
 @pytest.mark.parametrize(("overlap", "free"), [(GAP, True), (GAP + 1e-4, False)])
@@ -103,7 +98,6 @@ def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap
     boxes = np.array([[0, y, 0, 400_000, 400_000, 400_000] for y in (0, side, -side)], np.int32)
     local = LocalPhysics()
     assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
-    local.close()
 
 
 def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):
