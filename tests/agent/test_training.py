@@ -43,14 +43,9 @@ def test_what_a_run_leaves(tmp_path, fields):
     assert tuple(curve.columns) == Point._fields
     interval = config.log_interval * config.num_envs
     assert curve["picks"].tolist() == list(range(interval, config.picks + 1, interval))
-    assert curve["success_rate"].tolist() == ((curve["mean_reward"] + 1) / 2).tolist()
     assert curve["loss"].iloc[1:].between(0, 2).all()
-    assert curve["deadlocked"].between(0, 1).all()
-    assert (curve["wall_time"].diff().dropna() >= 0).all()
-    last_step = curve["picks"] - config.num_envs
-    assert curve["epsilon"].tolist() == pytest.approx(
-        [config.epsilon(picks) for picks in last_step]
-    )
+    epsilons = [config.epsilon(picks - config.num_envs) for picks in curve["picks"]]
+    assert curve["epsilon"].tolist() == pytest.approx(epsilons)
     loaded = load_policy(folder / "policy.safetensors")
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
     assert curve["success_rate"].nunique() > 2
@@ -64,18 +59,17 @@ def test_what_a_run_leaves(tmp_path, fields):
 
 
 def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
-    """Row 5 again and again: it changes only when it is unloaded."""
-    small = {"num_envs": 1, "picks": 11, "log_interval": 11, "gradient_steps": 0}
-    config = TrainConfig(**CONTAINER | small)
-    run = Training(config)
+    """Row 5 again and again: it changes only when it is unloaded. Nothing is learned."""
+    small = {"num_envs": 1, "picks": 30, "max_picks": 30, "log_interval": 30, "gradient_steps": 0}
+    run = Training(TrainConfig(**CONTAINER | small))
     run.agent.choose = lambda *arguments: np.array([5])
-    for _ in range(11):
+    while not run.rollout.finished:
         run.step()
-    rewards = run.replay.arrays["rewards"]
+    rewards = run.replay.arrays["rewards"][:30]
     point = run.curve.points[-1]
-    assert 0 < (rewards[:-1] < 0).sum() < 10
-    assert point.deadlocked == pytest.approx((rewards[:-1] < 0).sum() / 11)
-    assert point.mean_reward == pytest.approx(rewards.mean())
+    assert 0 < (rewards[:-1] < 0).sum() < 29
+    assert point.deadlocked == pytest.approx((rewards[:-1] < 0).sum() / 30)
+    assert point.mean_reward == pytest.approx(rewards.mean()) and np.isnan(point.loss)
 
 
 @pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])
@@ -110,19 +104,13 @@ def test_every_network_is_trained_and_gone_on_with(tmp_path, network):
 
 def test_a_network_of_ones_own_is_trained(tmp_path):
     config = TrainConfig(**CONTAINER | {"network": own_network, "epsilon_fraction": 0.1})
-    result = train(config, tmp_path / "straight", progress=False)
+    result = train(config, tmp_path, progress=False)
     assert result.policy.network.weight.item() > 0.12  # it was 0.1: to pick high ones pays
-    runs.interrupt_run(config, tmp_path / "broken", 17)
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-    assert result.policy.card["configuration"]["network"].startswith(
-        "tests.agent.test_training.own"
-    )
-    plain = replace(config, network="peq")
-    with pytest.raises(
-        ValueError, match="another configuration: network .*own_network .* not 'peq"
-    ):
-        train(plain, tmp_path / "broken", progress=False)
+    name = result.policy.card["configuration"]["network"]
+    assert name.startswith("tests.agent.test_training.own_network ")
+    message = "another configuration: network .*own_network .* not 'peq"
+    with pytest.raises(ValueError, match=message):
+        train(replace(config, network="peq"), tmp_path, progress=False)
 
 
 @pytest.mark.parametrize(
@@ -237,53 +225,38 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     assert_same(tmp_path / "first", tmp_path / "second")
 
 
-def test_lifts_are_kept_when_a_run_is_stopped_and_refused_before_it_begins(tmp_path):
+def test_lifts_are_kept_when_a_run_is_stopped_and_refused_where_they_are_damaged(tmp_path):
+    """Before a run begins; at its end it counts as finished, and is read back without them."""
     config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    usual = {"progress": False, "lifts": lifts}
     with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "run", progress=False, lifts=lifts)
+        train(config, tmp_path / "run", **usual)
     assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
-    lifts.write_bytes(b"no table")
-    with pytest.raises(ValueError, match="lifts: .*lifts.npz is not a readable"):
-        train(config, tmp_path / "other", progress=False, lifts=lifts)
+    message = "lifts: .*lifts.npz is not a readable"
+    damage = at_step(30, lambda: lifts.write_bytes(b"no table"))
+    with damage, pytest.raises(ValueError, match=message):
+        train(config, tmp_path / "run", **usual)
+    with at_step(1, runs.crash):
+        assert len(train(config, tmp_path / "run", **usual).curve) == 10
+    with pytest.raises(ValueError, match=message):
+        train(config, tmp_path / "other", **usual)
     assert not (tmp_path / "other").exists()
 
 
-def test_lifts_that_are_damaged_at_the_end_lose_no_run(tmp_path):
-    """It counts as finished, and is then read back without them."""
-    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
-    damage = at_step(50, lambda: lifts.write_bytes(b"no table"))
-    with damage, pytest.raises(ValueError, match="lifts: .*lifts.npz is not a readable"):
-        train(config, tmp_path / "run", progress=False, lifts=lifts)
-    with at_step(1, runs.crash):
-        assert len(train(config, tmp_path / "run", progress=False, lifts=lifts).curve) == 10
-
-
-def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path, monkeypatch):
-    config, lifts, table = TrainConfig(**CONTAINER), tmp_path / "lifts.npz", LiftTable()
-    for place in ("unload.agent.training", "unload.env.vector"):
-        monkeypatch.setattr(f"{place}.shared_table", lambda: table)
-    loads = []
+def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path):
+    lifts, loads = tmp_path / "lifts.npz", []
 
     def stack(rng):
-        loads.append(own_load(rng, "continuous sizes"))
+        loads.append(stack_load(rng, walls=1))
         if len(loads) == 12:
             raise runs.Breakdown
         return loads[-1]
 
+    config = TrainConfig(**CONTAINER)
     with pytest.raises(runs.Breakdown):
         train(config, tmp_path / "run", progress=False, stack=stack, lifts=lifts)
-    assert len(LiftTable.load(lifts)) == len(table) > 0
+    assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
     assert not (tmp_path / "run" / "checkpoint.npz").exists()
-
-
-def test_without_updates_the_weights_stay():
-    config = TrainConfig(**CONTAINER | {"gradient_steps": 0})
-    run = Training(config)
-    before = run.agent.state()
-    for _ in range(20):
-        run.step()
-    after = run.agent.state()
-    assert all(np.array_equal(before[name], after[name]) for name in before)
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
