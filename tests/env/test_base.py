@@ -4,6 +4,7 @@ import copy
 import gc
 import pickle
 from functools import partial
+from itertools import count
 
 import gymnasium
 import numpy as np
@@ -12,8 +13,8 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
 
-from tests.env.comparing import CONTAINER, HIGHEST, FailingStack, assert_same
-from unload import ContainerEnv, HighestItemEnv
+from tests.env.comparing import CONTAINER, HIGHEST, assert_same
+from unload import ContainerEnv, HighestItemEnv, stack_load
 from unload.env.vector import ContainerVectorEnv, HighestItemVectorEnv
 from unload.physics.table import LiftTable
 
@@ -239,7 +240,15 @@ def test_bad_options_leave_the_episodes_as_they_were(make, env_id, options, erro
 )
 def test_a_call_whose_stack_fails_needs_a_reset(make, action, failing):
     """The first reset, the second one, and the next one, which an array makes in a step."""
-    env, other = make(max_picks=1, stack=FailingStack(failing)), make(max_picks=1)
+    calls = count(1)
+
+    def stack(rng):
+        load = stack_load(rng)
+        if next(calls) == failing:
+            raise OSError("the stack failed")
+        return load
+
+    env, other = make(max_picks=1, stack=stack), make(max_picks=1)
     with pytest.raises(OSError, match="the stack failed"):
         env.reset(seed=0)
         env.reset(seed=0)

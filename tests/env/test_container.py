@@ -7,9 +7,10 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from tests.env.comparing import assert_same, state_of
+from tests.env.comparing import CONTAINER, HIGHEST, assert_same
 from unload import ContainerEnv, Load, equalize, task
 from unload.env import observation
+from unload.env.highest_item import GRID
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.picture import snapshot
@@ -17,22 +18,17 @@ from unload.load.substacks import build_load
 
 ROOT = Path(__file__).resolve().parents[2]
 
-ENV_ID = "unload/Container-v0"
-
 
 def tall_load() -> Load:
     """Few enough items to be quick, also where each of them is simulated."""
     return build_load(np.zeros((2, 3, 4), dtype=int))
 
 
-@pytest.mark.parametrize(
-    "kwargs",
-    [{"physics": "table"}, {"physics": "table", "equalize": True}, {"physics": "local"}],
-    ids=["table", "equalized", "local"],
-)
+@pytest.mark.parametrize("equalize", [False, True])
+@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
 @pytest.mark.filterwarnings("error")
-def test_check_env(kwargs):
-    env = gymnasium.make(ENV_ID, **kwargs)
+def test_check_env(env_id, equalize):
+    env = gymnasium.make(env_id, equalize=equalize)
     check_env(env.unwrapped, skip_render_check=True)
 
 
@@ -187,16 +183,16 @@ def test_a_container_is_unloaded_to_the_last_item(small_env, kwargs):
 
 
 def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing(small_env):
-    env = small_env(5)
+    env, untouched = small_env(5), small_env(5)
     seen, info = env.reset(seed=0)
-    state = state_of(env)
+    untouched.reset(seed=0)
     after, reward, terminated, truncated, following = env.step(5)
     assert (reward, terminated, truncated) == (-1.0, False, False)
     assert following["item"] == -1 and following["distance"] == 0.0
     assert (after == seen).all()
     for name in ("action_mask", "item_mask", "unloaded"):
         assert np.array_equal(following[name], info[name])
-    assert_same(state_of(env), state | {"_picks": 1})
+    assert_same(env.step(0), untouched.step(0))
 
 
 @pytest.mark.parametrize(
@@ -240,3 +236,34 @@ def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
         make(stack=lambda rng: tower).reset(seed=0)
     with pytest.raises(ValueError, match="floats in load"):
         make().reset(options={"load": tower})
+
+
+def test_only_items_at_the_greatest_height_are_rewarded(make_env):
+    sharp, blurred = make_env(HIGHEST, position_noise=0.0), make_env(HIGHEST)
+    for env in (sharp, blurred):
+        seen, info = env.reset(seed=0)
+        for number in range(200):
+            assert info["action_mask"].dtype == np.int8 and info["action_mask"].all()
+            highest = seen[:, 2] > seen[:, 2].max() - 0.01  # levels are 0.028 apart
+            row = int(np.flatnonzero(highest == number % 2)[number % 5])
+            seen, reward, terminated, _, info = env.step(row)
+            assert reward == (1.0 if highest[row] else -1.0) and not terminated
+
+
+def test_items_are_at_places_of_a_load(make_env, full_load):
+    places = {tuple(place) for place in np.rint(GRID / 1e-6).astype(int).tolist()}
+    items = np.rint(full_load.positions / 1e-6).astype(int).tolist()
+    assert all(tuple(item) in places for item in items)
+    seen, _ = make_env(HIGHEST, position_noise=0.0).reset(seed=0)
+    grid = observation.scale(GRID)
+    nearest = np.abs(seen[:, None] - grid).max(axis=2).min(axis=1)
+    assert seen.shape == (128, 3) and nearest.max() == 0
+
+
+def test_items_are_blurred_and_nearest_first(make_env):
+    sharp, _ = make_env(HIGHEST, position_noise=0.0).reset(seed=0)
+    blurred, _ = make_env(HIGHEST).reset(seed=0)
+    assert len(np.unique(blurred[:, 2])) > 120 > len(np.unique(sharp[:, 2]))
+    for seen in (sharp, blurred):
+        distances = observation.distance((seen + 1) / 2 * [7.0, 2.5, 2.5])
+        assert (np.diff(distances) > -1e-5).all()

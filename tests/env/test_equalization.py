@@ -13,16 +13,6 @@ def test_table_one():
     assert equalize(values[:, None])[:, 0] == pytest.approx(expected, abs=0.01)
 
 
-def test_each_axis_and_each_batch_is_its_own(rng):
-    positions = rng.normal(size=(2, 3, 10, 3))
-    result = equalize(positions)
-    assert result.shape == positions.shape and result.dtype == np.float32
-    for index in np.ndindex(2, 3):
-        for axis in range(3):
-            alone = equalize(positions[index][:, [axis]])
-            assert (result[index][:, [axis]] == alone).all()
-
-
 def ranks_one_by_one(values: list[float], ties: str, tolerance: float) -> list[float]:
     """Algorithm 1 for the items of one axis, as one would do it by hand."""
     last, result = len(values) - 1, [0.0] * len(values)

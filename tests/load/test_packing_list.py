@@ -108,22 +108,16 @@ def test_a_table_is_a_list_too(written):
         read_load(3)
 
 
-def test_x_may_count_from_the_entrance(written):
-    expected = read_load(written(*STACK))
+def test_x_may_count_from_the_entrance_of_a_container_of_ones_own(written):
     corners = "a,0.5,0.1,0,0.5,0.4,0.3", "b,0.5,0.1,0.3,0.5,0.4,0.2"
     centres = "a,0.75,0.3,0.15,0.5,0.4,0.3", "b,0.75,0.3,0.4,0.5,0.4,0.2"
-    assert_same(read_load(written(*corners), x_from="door"), expected)
-    columns = f"id,x,y,z{CORNERS[17:]}"
-    assert_same(read_load(written(*centres, columns=columns), x_from="door"), expected)
-
-
-def test_a_container_of_ones_own(written):
+    for lines, columns in ((corners, f"id,{CORNERS}"), (centres, f"id,x,y,z{CORNERS[17:]}")):
+        load = read_load(written(*lines, columns=columns), x_from="door")
+        assert_same(load, read_load(written(*STACK)))
     path = written("a,11,0.1,0,0.5,0.4,0.3")
     load = read_load(path, container=(12.03, 2.35, 2.39))
     assert load.container.tolist() == [12.03, 2.35, 2.39] and load.positions[0, 0] == 11.25
-    with pytest.raises(
-        ValueError, match=r"row 1 \(id 'a'\): reaches .*inside the container, \[0 0"
-    ):
+    with pytest.raises(ValueError, match=r"reaches .*inside the container, \[0 0"):
         read_load(path)
     assert read_load(path, container=(12, 2, 2), x_from="door").positions[0, 0] == 0.75
 

@@ -67,6 +67,11 @@ def test_what_does_not_fit_is_refused_by_name_and_value(check, value, arguments,
     assert str(caught.value) == f"n is {value!r}; expected {wanted}"
 
 
+def test_entries_names_what_is_missing():
+    with pytest.raises(ValueError, match="state has no a, b; expected b, a"):
+        checks.entries("state", {"c": 3}, ("b", "a"))
+
+
 def test_finite_array_returns_a_float64_copy():
     given = np.array([[1, 2, 3]])
     array = checks.finite_array("a", given, (None, 3))
