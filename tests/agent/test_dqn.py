@@ -1,3 +1,5 @@
+from inspect import signature
+
 import numpy as np
 import pytest
 import torch
@@ -110,15 +112,10 @@ def test_a_state_goes_on_bit_by_bit(rng, fused):
     assert agent.state().keys() == other.state().keys()
 
 
-def test_the_defaults_are_those_of_the_paper(rng):
-    batch = make_batch(rng)
-    batch["rewards"] *= 3  # errors on both sides of beta
+def test_the_defaults_are_those_of_the_paper():
+    defaults = {name: each.default for name, each in signature(DQN).parameters.items()}
     paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0}
-    states = []
-    for agent in (DQN(peq()), DQN(peq(), **paper)):
-        losses = [agent.update(batch) for _ in range(20)]
-        states.append([losses, *(array.tobytes() for array in agent.state().values())])
-    assert states[0] == states[1]
+    assert paper.items() <= defaults.items()
 
 
 def test_what_is_no_network_setting_or_batch_is_refused(rng):

@@ -121,6 +121,10 @@ def test_a_card_comes_back_and_is_shown(tmp_path):
     assert "\n  loads: my own\n  msr: {'these': 0.5}" in repr(loaded)
     save_policy(loaded, tmp_path / "again.safetensors")
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
+    old = Greedy(peq(), True)  # from before there were cards
+    write_weights(path, "policy", settings_of(old), old.network.state_dict())
+    assert load_policy(path).card is None
+    assert repr(load_policy(path)) == "Greedy(PEQNetwork, equalize=True, ties='noise'), no card"
     with pytest.raises(TypeError, match="card is 'good'; expected a dict"):
         Greedy(peq(), True, card="good")
     with pytest.raises(TypeError, match="policy is <function highest.*; expected an unload.Greedy"):
@@ -128,14 +132,6 @@ def test_a_card_comes_back_and_is_shown(tmp_path):
     for card in ({"msr": np.float32(0.5)}, {3: "seed"}, {"seeds": {10: 0.5, 9: 1.0}}):
         with pytest.raises(TypeError, match="card is {.*; expected what JSON can hold"):
             save_policy(Greedy(peq(), True, card=card), path)
-
-
-def test_a_file_from_before_there_were_cards_says_so(tmp_path):
-    path = tmp_path / "old.safetensors"
-    old = Greedy(peq(), True)
-    write_weights(path, "policy", settings_of(old), old.network.state_dict())
-    assert load_policy(path).card is None
-    assert repr(load_policy(path)) == "Greedy(PEQNetwork, equalize=True, ties='noise'), no card"
 
 
 def test_policies_that_ship_have_names(tmp_path, monkeypatch):

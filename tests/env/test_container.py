@@ -32,23 +32,19 @@ def test_check_env(env_id, equalize):
     check_env(env.unwrapped, skip_render_check=True)
 
 
-def test_reset_shows_the_nearest_items_scaled(make_env, full_load):
-    env = make_env(position_noise=0.0)
-    seen, info = env.reset(seed=0, options={"load": full_load})
+def test_reset_shows_the_nearest_items_scaled_blurred_and_sunk_once_per_load(make_env, full_load):
+    sharp, blurred, given = make_env(position_noise=0.0), make_env(), {"load": full_load}
+    seen, info = sharp.reset(seed=0, options=given)
     rows = observation.nearest(full_load.positions)
-    assert (env.unwrapped.visible == rows).all()
+    assert (sharp.unwrapped.visible == rows).all()
     assert (seen == observation.scale(full_load.positions[rows])).all()
     assert seen.dtype == np.float32 and info["unloaded"] == 0
-
-
-def test_positions_are_blurred_and_sunk_once_per_load(make_env, full_load):
-    env = make_env()
-    env.reset(seed=0, options={"load": full_load})
-    blur = env.unwrapped.observed_positions() - full_load.positions
+    blurred.reset(seed=0, options=given)
+    blur = blurred.unwrapped.observed_positions() - full_load.positions
     assert blur.std(axis=0) == pytest.approx(0.0005, rel=0.1)
     assert blur.mean(axis=0) == pytest.approx([0, 0, -0.001], abs=1e-4)
-    env.step(0)
-    assert (env.unwrapped.observed_positions() - full_load.positions == blur).all()
+    blurred.step(0)
+    assert (blurred.unwrapped.observed_positions() - full_load.positions == blur).all()
 
 
 def test_a_success_removes_the_item_and_shows_the_next(make_env):

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_pair
+from tests.load.walls import crossed_bars
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import FREE_LIFT, LiftTable
 
@@ -86,15 +87,8 @@ def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
 
 def test_fewer_boxes_may_have_more_contacts():
     """60 boxes apart, and 40 bars, 20 of them across the others."""
-    count, places = 20, (np.arange(20) + 0.5) / 20
-    bars = np.vstack([
-        np.column_stack([np.full(count, 3.5), 2.5 * places, np.full(count, 0.15)]),
-        np.column_stack([7 * places, np.full(count, 1.25), np.full(count, 0.45)]),
-    ])  # fmt: skip
-    sizes = np.repeat([[7, 2.5 / count, 0.3], [7 / count, 2.5, 0.3]], count, axis=0)
-    crossed = unload.Load(bars, sizes, *np.zeros((2, 2 * count), int))
     grid = np.stack(np.meshgrid(0.5 * np.arange(12) + 0.4, 0.5 * np.arange(5) + 0.25, 0.15), -1)
-    apart = unload.Load(grid.reshape(60, 3), np.full((60, 3), 0.3), *np.zeros((2, 60), int))
+    apart, crossed = unload.Load(grid.reshape(60, 3), np.full((60, 3), 0.3)), crossed_bars(20)
     assert len(crossed.contacts.boxes) > 800 and len(apart.contacts.boxes) == 0
     loads = apart, crossed
     play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])

@@ -3,14 +3,13 @@
 import pickle
 from dataclasses import FrozenInstanceError
 from decimal import Decimal
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.load.walls import corners, load_of
+from tests.load.walls import corners, crossed_bars, load_of
 from unload import task
 from unload.load.boxes import (
     ABOVE,
@@ -145,16 +144,8 @@ def test_the_two_that_overlap_are_named_in_their_order():
 
 
 def test_crossed_boxes_have_more_contacts_than_expected():
-    """20 bars side by side, and 20 across them, each on all of the first."""
-    count = 20
-    places = np.arange(count) / count
-    zeros = np.zeros(count)
-    low = np.vstack(
-        [np.column_stack([zeros, places, zeros]), np.column_stack([places, zeros, zeros + 1])]
-    )
-    sizes = np.repeat([[1, 1 / count, 1], [1 / count, 1, 1]], count, axis=0)
-    found = contacts(low, low + sizes)
-    assert len(found.boxes) == 2 * (count**2 + count - 1) > 2 * 8 * len(low)
+    found, count = crossed_bars(20).contacts, 20
+    assert len(found.boxes) == 2 * (count**2 + count - 1) > 2 * 8 * 2 * count
     for bar in range(count):
         assert sorted(found.of(ABOVE, bar)) == list(range(count, 2 * count))
         assert sorted(found.of(BELOW, count + bar)) == list(range(count))
@@ -178,21 +169,12 @@ def test_the_container_is_the_papers_or_ones_own():
 
 
 def test_what_a_packer_returns_becomes_a_load_in_one_call():
-    """The attributes are those of ``py3dbp``, whose numbers are decimals."""
-
-    def item(name, position, size):
-        position, size = ([*map(Decimal, each)] for each in (position, size))
-        return SimpleNamespace(name=name, position=position, get_dimension=lambda: size)
-
-    packed = SimpleNamespace(
-        width=Decimal(6), height=Decimal(2), depth=Decimal("2.2"),
-        items=[item("a", "000", ("0.5", "0.4", "0.3")), item("b", ("0", "0", "0.3"), "111")],
-    )  # fmt: skip
+    """Corners, and numbers that are decimals, as those of ``py3dbp`` are."""
     load = Load.from_corners(
-        [item.position for item in packed.items],
-        [item.get_dimension() for item in packed.items],
-        ids=[item.name for item in packed.items],
-        container=[packed.width, packed.height, packed.depth],
+        [[Decimal(0)] * 3, [Decimal(0), Decimal(0), Decimal("0.3")]],
+        [[Decimal("0.5"), Decimal("0.4"), Decimal("0.3")], [Decimal(1)] * 3],
+        ids=["a", "b"],
+        container=[Decimal(6), Decimal(2), Decimal("2.2")],
         extras={"stop": [2, 1]},
     )
     assert load.positions.tolist() == [[0.25, 0.2, 0.15], [0.5, 0.5, 0.8]]

@@ -56,6 +56,15 @@ def _cut(rng: np.random.Generator, kind: str, axis: int) -> list[tuple[float, fl
         ends.append(ends[-1] + step)
 
 
+def crossed_bars(count: int) -> Load:
+    """Bars side by side, and as many across them, each on all of the first."""
+    places, ones = (np.arange(count) + 0.5) / count, np.ones(count)
+    along = np.column_stack([3.5 * ones, 2.5 * places, 0.15 * ones])
+    across = np.column_stack([7 * places, 1.25 * ones, 0.45 * ones])
+    sizes = np.repeat([[7, 2.5 / count, 0.3], [7 / count, 2.5, 0.3]], count, axis=0)
+    return Load(np.vstack([along, across]), sizes)
+
+
 @st.composite
 def cut(draw, axis: int, most: int) -> np.ndarray:
     """Up to ``most`` neighbouring intervals of a container's axis; their ends in m."""

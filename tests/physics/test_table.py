@@ -290,15 +290,14 @@ def test_files_that_are_no_lift_table_are_refused_and_stay(tmp_path):
 
 
 def test_a_table_of_another_physics_or_without_an_array_is_refused(tmp_path):
-    path = tmp_path / "lifts.npz"
-    other = np.array(json.dumps(SETTINGS | {"friction": 0.7}))
-    for changes, message in (
-        ({"settings": other}, "another physics, .*0.7"),
-        ({"settings": np.zeros(2)}, "another physics"),
-        ({"samples": None}, r"holds \['digest', .*\]; expected a lift table"),
+    path, other = tmp_path / "lifts.npz", np.array(json.dumps(SETTINGS | {"friction": 0.7}))
+    for name, value, message in (
+        ("settings", other, "another physics, .*0.7"),
+        ("settings", np.zeros(2), "another physics"),
+        ("samples", None, r"holds \['digest', .*\]; expected a lift table"),
     ):
         true_table([1]).save(path)
-        changed(path, **changes)
+        changed(path, **{name: value})
         check_refused(path, f"lifts.npz .*{message}")
 
 
