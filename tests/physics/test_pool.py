@@ -69,17 +69,13 @@ def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
 
 def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
     alone = pool.simulate(hard, local.simulate)
+    for worker in pool._workers:
+        worker.send_signal(signal.SIGINT)
+    assert pool.simulate(hard, local.simulate) == alone, "Ctrl-C is not for them"
     pool._workers[1].kill()
     pool._workers[1].wait()
     with pytest.raises(RuntimeError, match="a process that simulates lifts has died"):
         pool.simulate(hard, local.simulate)
-    assert pool.simulate(hard, local.simulate) == alone
-
-
-def test_ctrl_c_is_not_for_them(pool, local, hard):
-    alone = pool.simulate(hard, local.simulate)
-    for worker in pool._workers:
-        worker.send_signal(signal.SIGINT)
     assert pool.simulate(hard, local.simulate) == alone
 
 

@@ -220,14 +220,12 @@ def test_the_package_can_be_imported_where_windows_lacks_something():
                 delattr(module, name)
         import unload
 
-        found = [each.name for each in pkgutil.walk_packages(unload.__path__, "unload.")]
-        for name in found:
-            importlib.import_module(name)
-        print(len(found), *unload.Load.__module__.split("."))
+        for each in pkgutil.walk_packages(unload.__path__, "unload."):
+            importlib.import_module(each.name)
+        print("unload.agent.training" in sys.modules)
     """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT)
-    assert done.stdout.endswith(" unload load boxes\n"), done.stderr
-    assert int(done.stdout.split()[0]) > 40
+    assert done.stdout == "True\n", done.stderr
 
 
 @pytest.mark.parametrize("name", ["lock", "owner"])
