@@ -18,7 +18,6 @@ from unload.physics.local import LocalPhysics
 from unload.task import LIFT_THRESHOLD
 
 ROOT = Path(__file__).resolve().parents[2]
-
 # Allowed at first, until it fails or holds no box; it ends in case nothing stops the policy.
 STUBBORN = iter([127] * 999)
 
@@ -106,33 +105,23 @@ def test_a_container_that_is_stuck_ends_the_order(boxes, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("policy", "error", "message"),
+    ("given", "error", "message"),
     [
-        (3, TypeError, "policy is 3; expected a name, a path or a function"),
-        ("hihgest", FileNotFoundError, "policy is 'hihgest'; expected .*'highest', .*'paper'"),
-        ("", FileNotFoundError, "policy is ''; expected"),
-        (lambda *_: np.array([128]), ValueError, "what policy returned is 128; expected a row"),
-        (lambda *_: np.array([next(STUBBORN)]), ValueError, "is 127; expected a row that the mask"),
-        (lambda *_: 0, ValueError, r"what policy returned has shape \(\)"),
-    ],
-)
-def test_what_is_no_policy_is_refused(policy, error, message):
-    with pytest.raises(error, match=message):
-        picking_order(read_load(), policy)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error", "message"),
-    [
+        ({"policy": 3}, TypeError, "policy is 3; expected a name, a path or a function"),
+        ({"policy": "hihgest"}, FileNotFoundError, "is 'hihgest'; expected .*'highest', .*'paper'"),
+        ({"policy": ""}, FileNotFoundError, "policy is ''; expected"),
+        ({"policy": lambda *_: np.array([128])}, ValueError, "returned is 128; expected a row"),
+        ({"policy": lambda *_: np.array([next(STUBBORN)])}, ValueError, "is 127; expected a row"),
+        ({"policy": lambda *_: 0}, ValueError, r"what policy returned has shape \(\)"),
         ({"rule": "reachable"}, TypeError, "rule is 'reachable'; expected a function"),
         ({"rule": reachable, "policy": "highest"}, TypeError, "and no policy beside it"),
         ({"rule": lambda load, _: load.sizes}, ValueError, r"returned has shape \(136, 3"),
-        ({"rule": lambda load, _: [load.ids == ""] * np.array(np.nan)}, ValueError, "holds nan"),
+        ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
     ],
 )
-def test_what_is_no_rule_is_refused(arguments, error, message):
+def test_what_is_no_policy_or_rule_is_refused(given, error, message):
     with pytest.raises(error, match=message):
-        picking_order(read_load(), **arguments)
+        picking_order(read_load(), **given)
 
 
 def test_what_floats_is_not_unloaded(boxes):

@@ -26,6 +26,11 @@ def own_network(n_features, generator):
     return HeightNetwork(0.1)
 
 
+def of(network) -> dict:
+    """The argument of ``train`` for a network that a factory returns."""
+    return {"config": TrainConfig(**CONTAINER | {"network": lambda n, generator: network})}
+
+
 def metres(run) -> None:
     run.reward = lambda picks, distances: distances
 
@@ -112,25 +117,6 @@ def test_a_network_of_ones_own_is_trained(tmp_path):
     message = "another configuration: network .*own_network .* not 'peq"
     with pytest.raises(ValueError, match=message):
         train(replace(config, network="peq"), tmp_path, progress=False)
-
-
-@pytest.mark.parametrize(
-    ("network", "error", "message"),
-    [
-        (lambda n, generator: None, TypeError, "network returned None; expected a torch.nn.Module"),
-        (
-            lambda n, generator: HeightNetwork().double(), TypeError,
-            "network has weight of dtype torch.float64; expected torch.float32",
-        ),
-        (
-            lambda n, generator: HeightNetwork(torch.ones(2, 1, 1)), ValueError,
-            r"network returned values of shape \(2, 2, 3\); expected \(2, 3\)",
-        ),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_trained_is_refused_at_the_start(tmp_path, network, error, message):
-    with pytest.raises(error, match=message):
-        train(TrainConfig(**CONTAINER | {"network": network}), tmp_path, progress=False)
 
 
 def test_a_reward_of_ones_own_gets_the_distance():
@@ -290,6 +276,9 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     ("given", "error", "message"),
     [
         ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
+        (of(None), TypeError, "network returned None; expected a torch.nn.Module"),
+        (of(HeightNetwork().double()), TypeError, "weight of dtype torch.float64; expected"),
+        (of(HeightNetwork(torch.ones(2, 1, 1))), ValueError, r"\(2, 2, 3\); expected \(2, 3\)"),
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),

@@ -49,6 +49,9 @@ def test_bad_settings_are_refused(make, kwargs, error, message):
         (ContainerEnv, {"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
         (ContainerEnv, {"physics": "full", "after_pick": "x"}, ValueError, "after_pick is 'x'"),
         (ContainerEnv, {"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected 'rest"),
+        (ContainerVectorEnv, {"num_envs": 0}, ValueError, "num_envs is 0"),
+        (ContainerVectorEnv, {"num_envs": 2**16 + 1}, ValueError, "num_envs is 65537"),
+        (HighestItemVectorEnv, {"num_envs": 2.5}, TypeError, "num_envs is 2.5"),
         (ContainerVectorEnv, {"physics": "local"}, ValueError, "physics is 'local'; expected"),
         *((make, {"stack": 3}, TypeError, "stack is 3") for make in (ContainerEnv, ALL[2])),
         (ContainerVectorEnv, {"render_mode": "rgb_array"}, ValueError, "expected one of None"),
@@ -195,15 +198,6 @@ def test_bad_actions_and_seeds_change_nothing(name, value, error, message):
     with pytest.raises(error, match=message):
         envs.step(value) if name == "actions" else envs.reset(seed=value)
     assert_same((envs.unwrapped.state(), envs.unwrapped.visible), before)
-
-
-@pytest.mark.parametrize(
-    ("num_envs", "error"), [(0, ValueError), (2.5, TypeError), (2**16 + 1, ValueError)]
-)
-@pytest.mark.parametrize("make", [ContainerVectorEnv, HighestItemVectorEnv])
-def test_bad_numbers_of_environments_are_refused(make, num_envs, error):
-    with pytest.raises(error, match=f"num_envs is {num_envs}"):
-        make(num_envs)
 
 
 @pytest.mark.parametrize("make", [gymnasium.make, partial(gymnasium.make_vec, num_envs=2)])
