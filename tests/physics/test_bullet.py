@@ -17,18 +17,14 @@ def maximal(request) -> bool:
 @pytest.fixture
 def make_world(maximal):
     """``make_world(boxes, ...)``: a world with a floor and a tower of cubes of 0.3 m."""
-    made = []
 
     def make(boxes: int = 1, mass: float = task.MASS) -> tuple[World, list[int]]:
         world = World(maximal_coordinates=maximal)
-        made.append(world)
         world.add_box((0, 0, -0.5), (9, 9, 1), 0)
         centres = [(0, 0, 0.15 + 0.3 * level) for level in range(boxes)]
         return world, [world.add_box(centre, (0.3, 0.3, 0.3), mass) for centre in centres]
 
-    yield make
-    for world in made:
-        world.close()
+    return make
 
 
 @pytest.mark.parametrize("force", [9.0, 12.0, 30.0])
