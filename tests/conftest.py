@@ -1,6 +1,6 @@
 """Fixtures that several test modules share: loads and environments."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import gymnasium
 import numpy as np
@@ -60,17 +60,13 @@ def boxes() -> Callable[..., unload.Load]:
     return build
 
 
-@pytest.fixture
-def make_env() -> Iterator[Callable[..., gymnasium.Env]]:
-    """``make_env(id, **kwargs)``: ``gymnasium.make`` that is closed after the test."""
-    made = []
+@pytest.fixture(scope="session")
+def make_env() -> Callable[..., gymnasium.Env]:
+    """``make_env(id, **kwargs)``: ``gymnasium.make``, with a table of lifts if none is named."""
 
     def make(env_id: str = "unload/Container-v0", **kwargs) -> gymnasium.Env:
         if env_id == "unload/Container-v0":
             kwargs.setdefault("physics", "table")
-        made.append(gymnasium.make(env_id, **kwargs))
-        return made[-1]
+        return gymnasium.make(env_id, **kwargs)
 
-    yield make
-    for env in made:
-        env.close()
+    return make

@@ -18,7 +18,7 @@ OWN = {"notebooks", "studies", "tests", "unload"}
 # Extras for one command each, pinned in pyproject.toml.
 ON_DEMAND = ("book", "browser")
 # Imported by tests that are skipped where they are not installed.
-SKIPPED = {"mujoco", "onnx", "onnxruntime", "onnxscript"}
+SKIPPED = {"mujoco"}
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",

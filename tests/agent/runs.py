@@ -97,16 +97,6 @@ def kill_run(fields: dict, folder: Path, picks: int, stack: str = "None") -> Non
     assert done.returncode == -signal.SIGKILL
 
 
-@contextmanager
-def begun(config: TrainConfig) -> Iterator[Training]:
-    """A run in progress, in memory alone."""
-    run = Training(config)
-    try:
-        yield run
-    finally:
-        run.rollout.close()
-
-
 def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
     """What a run leaves, but for the time of day."""
     curve = pd.read_csv(folder / "curve.csv").drop(columns="wall_time")

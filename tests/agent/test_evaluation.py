@@ -58,9 +58,6 @@ def test_the_seed_decides():
     assert not first.equals(other)
 
 
-# --- complete unloading --------------------------------------------------------------
-
-
 def test_whole_containers_are_unloaded_by_picking_the_highest_item():
     frame = evaluate(policies.highest, episodes=3, max_picks=None)
     assert list(frame.columns) == [*COLUMNS, "picks", "emptied"]

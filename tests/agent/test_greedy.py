@@ -16,25 +16,16 @@ def observations(rng) -> np.ndarray:
     return rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
 
 
-def test_greedy_equalizes_what_its_network_expects(observations, rng):
-    masks = np.ones(observations.shape[:2])
-    for ties in ("noise", "average"):
-        policy = Greedy(peq(), equalize=True, ties=ties)
-        expected = greedy_actions(policy.network, equalize(observations, ties), masks)
-        assert (policy(observations, masks, rng) == expected).all()
-    raw = Greedy(peq(), equalize=False)(observations, masks, rng)
-    assert (raw == greedy_actions(peq(), observations, masks)).all()
-    assert (raw != expected).any()
-
-
-@pytest.mark.parametrize("equalized", [True, False])
-def test_values_are_those_of_the_network(observations, equalized):
-    network = peq()
-    seen = equalize(observations).astype(np.float32) if equalized else observations
-    expected = network(torch.from_numpy(seen)).detach().numpy()
-    assert (Greedy(network, equalized).values(observations.astype(float)) == expected).all()
+@pytest.mark.parametrize("ties", ["noise", "average", "not equalized"])
+def test_greedy_equalizes_what_its_network_expects(observations, rng, ties):
+    masks, equalized = np.ones(observations.shape[:2]), ties != "not equalized"
+    policy = Greedy(peq(), True, ties) if equalized else Greedy(peq(), False)
+    seen = equalize(observations, ties).astype(np.float32) if equalized else observations
+    expected = peq()(torch.from_numpy(seen)).detach().numpy()
+    assert (policy.values(observations.astype(float)) == expected).all()
+    assert (policy(observations, masks, rng) == greedy_actions(peq(), seen, masks)).all()
     with pytest.raises(ValueError, match="observations"):
-        Greedy(network, equalized).values(observations[0])
+        policy.values(observations[0])
 
 
 @pytest.mark.parametrize("name", [name for name in NETWORKS if name != "peq"])
@@ -130,6 +121,10 @@ def test_a_card_comes_back_and_is_shown(tmp_path):
     assert "\n  loads: my own\n  msr: {'these': 0.5}" in repr(loaded)
     save_policy(loaded, tmp_path / "again.safetensors")
     assert (tmp_path / "again.safetensors").read_bytes() == path.read_bytes()
+    old = Greedy(peq(), True)  # from before there were cards
+    write_weights(path, "policy", settings_of(old), old.network.state_dict())
+    assert load_policy(path).card is None
+    assert repr(load_policy(path)) == "Greedy(PEQNetwork, equalize=True, ties='noise'), no card"
     with pytest.raises(TypeError, match="card is 'good'; expected a dict"):
         Greedy(peq(), True, card="good")
     with pytest.raises(TypeError, match="policy is <function highest.*; expected an unload.Greedy"):
@@ -137,14 +132,6 @@ def test_a_card_comes_back_and_is_shown(tmp_path):
     for card in ({"msr": np.float32(0.5)}, {3: "seed"}, {"seeds": {10: 0.5, 9: 1.0}}):
         with pytest.raises(TypeError, match="card is {.*; expected what JSON can hold"):
             save_policy(Greedy(peq(), True, card=card), path)
-
-
-def test_a_file_from_before_there_were_cards_says_so(tmp_path):
-    path = tmp_path / "old.safetensors"
-    old = Greedy(peq(), True)
-    write_weights(path, "policy", settings_of(old), old.network.state_dict())
-    assert load_policy(path).card is None
-    assert repr(load_policy(path)) == "Greedy(PEQNetwork, equalize=True, ties='noise'), no card"
 
 
 def test_policies_that_ship_have_names(tmp_path, monkeypatch):

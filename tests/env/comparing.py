@@ -1,12 +1,8 @@
 """Comparison of environments, and stacks that fail."""
 
-from copy import copy
-
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
-
-import unload
 
 CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
 
@@ -42,27 +38,3 @@ def assert_same(one, other) -> None:
         assert one.tobytes() == other.tobytes()
     else:
         assert one == other
-
-
-class FailingStack:
-    """``stack_load`` that raises ``OSError`` at some of its calls, counted from 1."""
-
-    def __init__(self, *failing: int, walls: int | None = None) -> None:
-        self.failing, self.walls, self.calls = failing, walls, 0
-
-    def __call__(self, rng: np.random.Generator) -> unload.Load:
-        self.calls += 1
-        load = unload.stack_load(rng, self.walls)
-        if self.calls in self.failing:
-            raise OSError("the stack failed")
-        return load
-
-
-def state_of(env) -> dict:
-    """All that the next steps of a container depend on."""
-    env = env.unwrapped
-    names = ("_observation", "_blur", "_failed", "visible", "_picks", "_unloaded", "_state")
-    return {name: copy(getattr(env, name)) for name in names} | {
-        "present": env.physics.present.copy(),
-        "rng": str(env.np_random.bit_generator.state),
-    }

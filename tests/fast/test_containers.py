@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.load.strategies import loads
+from tests.load.walls import loads
 from unload import Load, stack_load
 from unload.fast import containers
 from unload.load.boxes import CONTACT_TOLERANCE

@@ -61,20 +61,9 @@ def check(net, batch, beta=1.0, tolerance=1e-5):
     assert np.abs(found - flat).max() < tolerance * min(np.abs(flat).max(), 1)
 
 
-@pytest.mark.parametrize("n_features", [1, 16, 37, 64, 65, 130])
-@pytest.mark.parametrize("beta", [0.3, 1.0])
-def test_gradients_are_those_of_pytorch(batch, n_features, beta):
-    check(network(n_features), batch, beta)
-
-
-@pytest.mark.parametrize("bias", [3.0, -3.0])
-@pytest.mark.parametrize("items", [5, 200])
-def test_gradients_where_all_items_are_active_or_none(rng, bias, items):
-    batch, net = random_batch(rng, BATCH, items), network(70)
-    with torch.no_grad():
-        net.extractor.bias[:] = bias
-        net.scorer.weight /= 10  # so that tanh does not saturate
-    check(net, batch)
+@pytest.mark.parametrize("n_features", [64, 65, 130])
+def test_gradients_are_those_of_pytorch(batch, n_features):
+    check(network(n_features), batch, 0.3)
 
 
 def test_arrays_that_are_not_contiguous_will_do(batch):
@@ -111,14 +100,6 @@ def test_a_near_tie_is_decided_as_in_double_precision(sign, first):
         check(net, batch, tolerance=1e-6)
 
 
-def test_a_dead_network_has_no_gradients_but_the_last_bias(batch):
-    net = network(16)
-    with torch.no_grad():
-        net.extractor.weight[:] = 0
-        net.extractor.bias[:] = 0
-    check(net, batch)
-
-
 def test_double_precision_decides_whether_a_feature_is_active():
     """Its value is 2⁻²⁶ - 2⁻³⁶; single precision rounds the first part away."""
     net = network(1)
@@ -139,13 +120,13 @@ def two_threads():
 
 
 def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
-    submitted = []
-    submit = ThreadPoolExecutor.submit
-    monkeypatch.setattr(
-        ThreadPoolExecutor,
-        "submit",
-        lambda pool, *work: submitted.append(submit(pool, *work)) or submitted[-1],
-    )
+    submitted, submit = [], ThreadPoolExecutor.submit
+
+    def noted(pool, *work):
+        submitted.append(submit(pool, *work))
+        return submitted[-1]
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", noted)
     net, batch = network(64), random_batch(rng, FOR_TWO_THREADS)
     two = gradients(net, batch).tobytes()
     assert len(submitted) == 1 and submitted[0].done()
@@ -237,30 +218,30 @@ def test_rule_of_where_it_applies(other):
         DQN(other, fused_update=True)
 
 
-@pytest.mark.parametrize(
-    "rows", [np.array([0, BATCH]), np.array([-1, 0]), np.array([0.0, 1.0]), np.zeros((2, 2), int)]
-)
-def test_bad_rows_are_refused_by_name(batch, rows):
-    with pytest.raises(ValueError, match="rows"):
-        gradients(network(4), batch, 1.0, rows)
+def test_bad_rows_are_refused_by_name(batch):
+    for rows in ([0, BATCH], [-1, 0], [0.0, 1.0], np.zeros((2, 2), int)):
+        with pytest.raises(ValueError, match="rows"):
+            gradients(network(4), batch, 1.0, np.array(rows))
 
 
 @given(
     shape=st.tuples(st.integers(1, 70), st.integers(1, 40)),  # batch, items
     n_features=st.integers(1, 80),
-    scale=st.sampled_from([0.1, 1.0, 4.0]),  # of the weights
+    scale=st.sampled_from([0.0, 0.1, 1.0, 4.0]),  # of the weights; with 0 the network is dead
+    bias=st.sampled_from([0.0, 3.0, -3.0]),  # of all features: then all items are active, or none
     levels=st.sampled_from([2, 5, 1000]),  # of coordinates: few make ties
     beta=st.floats(0.1, 2),
     seed=st.integers(0, 2**31),
 )
-@settings(max_examples=60)
-def test_any_update_is_that_of_double_precision(shape, n_features, scale, levels, beta, seed):
+@settings(max_examples=100)
+def test_any_update_is_that_of_double_precision(shape, n_features, scale, bias, levels, beta, seed):
     size, items = shape
     rng = np.random.default_rng(seed)
     net = network(n_features, seed)
     with torch.no_grad():
         for parameter in net.parameters():
             parameter *= scale
+        net.extractor.bias += bias * scale
     batch = {
         "observations": (rng.integers(levels, size=(size, items, 3)) / levels).astype(np.float32),
         "actions": rng.integers(items, size=size),

@@ -30,7 +30,7 @@ def test_ranks_are_those_of_a_stable_sort(items):
         assert (ranks == ranks_of(values)).all()
 
 
-def test_replaced_items_leave_the_ranks_of_a_stable_sort(items, rng):
+def test_replaced_and_removed_items_leave_the_ranks_of_a_stable_sort(items, rng):
     values = items[0].copy()
     ranks = ranks_of(values).astype(np.int32)
     for _ in range(300):
@@ -38,15 +38,19 @@ def test_replaced_items_leave_the_ranks_of_a_stable_sort(items, rng):
         wanted = np.append(np.delete(values, row), value)
         replace(values, ranks, row, value)
         assert (values == wanted).all() and (ranks == ranks_of(wanted)).all()
+    for count in range(127, -1, -1):
+        row = int(rng.integers(count + 1))
+        wanted = np.delete(values[: count + 1], row)
+        remove(values[: count + 1], ranks[: count + 1], row)
+        assert (values[:count] == wanted).all() and (ranks[:count] == ranks_of(wanted)).all()
 
 
 @pytest.mark.parametrize("tolerance", [0.25, 0.2499, 0.0])
 def test_values_as_far_apart_as_the_tolerance_are_a_tie(tolerance):
     values = np.tile(np.arange(128, dtype=np.float32) // 2 / 4, (3, 1))  # 0, 0, 0.25, 0.25, 0.5, …
     observation = np.empty((128, 3), np.float32)
-    features(
-        values, ranks_of(values).astype(np.int32), True, True, np.float32(tolerance), observation
-    )
+    ranks = ranks_of(values).astype(np.int32)
+    features(values, ranks, True, True, np.float32(tolerance), observation)
     assert observation.tobytes() == equalize(values.T, "average", tolerance).tobytes()
     assert (observation == 0).all() == (tolerance == 0.25)
 
@@ -61,17 +65,6 @@ def test_nearest_first_sorts_by_distance(items, rng, ties):
         order = np.argsort(distances[env], kind="stable")
         assert observations[env].tobytes() == equalize(seen[env, order], ties).tobytes()
         assert (rows[env] == flags[env, order]).all()
-
-
-def test_removed_items_leave_the_ranks_of_a_stable_sort(items, rng):
-    values = items[0].copy()
-    ranks = ranks_of(values).astype(np.int32)
-    for count in range(128, 0, -1):
-        row = int(rng.integers(count))
-        wanted = np.delete(values[:count], row)
-        remove(values[:count], ranks[:count], row)
-        assert (values[: count - 1] == wanted).all()
-        assert (ranks[: count - 1] == ranks_of(wanted)).all()
 
 
 @pytest.mark.parametrize("ties", ["noise", "average"])

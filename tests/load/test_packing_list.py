@@ -10,6 +10,9 @@ from unload import Load, read_load, stack_load
 from unload.load.boxes import SMALLEST_EDGE
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
+LENGTHS = "length_cm,width_cm,height_cm"
+UNIT = "a,0,0,0,1,1,1"
+STACK = "a,6,0.1,0,0.5,0.4,0.3", "b,6,0.1,0.3,0.5,0.4,0.2"
 
 
 @pytest.fixture
@@ -31,25 +34,19 @@ def test_the_example_is_a_load_of_three_walls():
 
 
 def test_centres_and_corners_are_the_same_boxes(written):
-    corners = read_load(written("a,6,0.1,0,0.5,0.4,0.3", "b,6,0.1,0.3,0.5,0.4,0.2"))
+    corners = read_load(written(*STACK))
     columns = "note, size_z, id, x, y, z, size_x, size_y"
     lines = "heavy, 0.3, a, 6.25, 0.3, 0.15, 0.5, 0.4", ", 0.2, b, 6.25, 0.3, 0.4, 0.5, 0.4"
     centres = read_load(written(*lines, columns=columns))
-    for name in ("positions", "sizes", "packages", "walls"):
-        assert getattr(centres, name) == pytest.approx(getattr(corners, name))
-    assert corners.ids.tolist() == centres.ids.tolist() == ["a", "b"]
+    assert_same(centres, corners)
 
 
-def test_without_ids_boxes_are_called_by_their_rows(written):
-    assert read_load(written("0,0,0,1,1,1", "1,0,0,1,1,1", columns=CORNERS)).ids.tolist() == [
-        "1", "2"
-    ]  # fmt: skip
-
-
-def test_ids_stay_as_they_are_written(written):
-    ids = "007", "NA", "7"
-    load = read_load(written(*(f"{name},{row},0,0,1,1,1" for row, name in enumerate(ids))))
-    assert load.ids.tolist() == list(ids)
+def test_ids_stay_as_they_are_written_and_are_else_the_rows(written):
+    rows = [f"{row},0,0,1,1,1" for row in range(3)]
+    for ids in (["007", "NA", "7"], ["1", "2", "3"]):
+        lines = [f"{name},{row}" for name, row in zip(ids, rows)]
+        assert read_load(written(*lines)).ids.tolist() == ids
+    assert read_load(written(*rows, columns=CORNERS)).ids.tolist() == ids
 
 
 def test_a_load_that_is_written_is_read_again(written, rng):
@@ -60,10 +57,6 @@ def test_a_load_that_is_written_is_read_again(written, rng):
     assert np.array_equal(read.positions, load.positions)
     assert np.array_equal(read.sizes, load.sizes)
     assert np.array_equal(read.walls, load.walls)
-
-
-STACK = "a,6,0.1,0,0.5,0.4,0.3", "b,6,0.1,0.3,0.5,0.4,0.2"
-LENGTHS = ",".join(f"{name}_cm" for name in ("length", "width", "height"))
 
 
 def assert_same(one: Load, other: Load) -> None:
@@ -115,22 +108,16 @@ def test_a_table_is_a_list_too(written):
         read_load(3)
 
 
-def test_x_may_count_from_the_entrance(written):
-    expected = read_load(written(*STACK))
+def test_x_may_count_from_the_entrance_of_a_container_of_ones_own(written):
     corners = "a,0.5,0.1,0,0.5,0.4,0.3", "b,0.5,0.1,0.3,0.5,0.4,0.2"
     centres = "a,0.75,0.3,0.15,0.5,0.4,0.3", "b,0.75,0.3,0.4,0.5,0.4,0.2"
-    assert_same(read_load(written(*corners), x_from="door"), expected)
-    columns = f"id,x,y,z{CORNERS[17:]}"
-    assert_same(read_load(written(*centres, columns=columns), x_from="door"), expected)
-
-
-def test_a_container_of_ones_own(written):
+    for lines, columns in ((corners, f"id,{CORNERS}"), (centres, f"id,x,y,z{CORNERS[17:]}")):
+        load = read_load(written(*lines, columns=columns), x_from="door")
+        assert_same(load, read_load(written(*STACK)))
     path = written("a,11,0.1,0,0.5,0.4,0.3")
     load = read_load(path, container=(12.03, 2.35, 2.39))
     assert load.container.tolist() == [12.03, 2.35, 2.39] and load.positions[0, 0] == 11.25
-    with pytest.raises(
-        ValueError, match=r"row 1 \(id 'a'\): reaches .*inside the container, \[0 0"
-    ):
+    with pytest.raises(ValueError, match=r"reaches .*inside the container, \[0 0"):
         read_load(path)
     assert read_load(path, container=(12, 2, 2), x_from="door").positions[0, 0] == 0.75
 
@@ -215,30 +202,16 @@ def test_wrong_arguments_are_refused(written, arguments, message):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (
-            ["a,0,0,0,1,1,1", "b,0,0.5,0,1,1,1"],
-            r"row 1 \(id 'a'\), row 2 \(id 'b'\): overlap by",
-        ),
-        (
-            ["a,0,0,0,1,1,1", "b,0,0,1.01,1,1,1"],
-            r": row 2 \(id 'b'\): floats in load, its lower face at 1.01 m; .* z_min '1.01'",
-        ),
-        (["a,0,0,0,1,1,1", "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
+        ([UNIT, "b,0,0.5,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'b'\): overlap by"),
+        ([UNIT, "b,0,0,1.01,1,1,1"], r"row 2 .*: floats in load, .* at 1.01 m; .* z_min '1.01'"),
+        ([UNIT, "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
         (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
-        (
-            ["a,0,0,0,1,1,1", "b,6.5,0,0,1,1,1"],
-            r"'b'\): reaches from .* x_min '6.5'",
-        ),
-        (["a,0,0,0,1,1,1", "b,1,0,-0.1,1,1,1"], r": row 2 \(id 'b'\): reaches from"),
-        (["a,0,0,0,1,1,1", "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
+        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .* x_min '6.5'"),
+        ([UNIT, "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
         (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z ''"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
-        (
-            [f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"],
-            r"'a'\): edges of .* m; .* size_z '0.001'",
-        ),
-        (["a,0,0,0,1,1,-1"], r": row 1 \(id 'a'\): edges of"),
+        ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: reaches from"),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with either"),
         (["a,0,0,0,1,1,1,5,5"], "is not a readable CSV file: .*Expected 7 fields in line 2, saw 9"),

@@ -19,17 +19,11 @@ def settle(low, sizes, tolerance=TOLERANCE):
 
 
 @pytest.mark.parametrize("kind", ["the paper's", "continuous sizes", "few sizes"])
-def test_boxes_that_fit_stay_where_they_are(rng, kind):
-    load = stack_load(rng, walls=6) if kind == "the paper's" else own_load(rng, kind)
-    low = load.positions - load.sizes / 2
-    assert (settle(low, load.sizes) == low).all()
-
-
-@pytest.mark.parametrize("kind", ["the paper's", "continuous sizes", "few sizes"])
-def test_measured_boxes_become_a_load(rng, kind):
+def test_boxes_that_fit_stay_where_they_are_and_measured_ones_become_a_load(rng, kind):
     """Rows from wall to wall, in which no box has room to spare."""
     load = stack_load(rng, walls=6) if kind == "the paper's" else own_load(rng, kind)
     low = load.positions - load.sizes / 2
+    assert (settle(low, load.sizes) == low).all()
     measured = low + rng.uniform(-0.002, 0.002, low.shape)
     found = settle(measured, load.sizes)
     check_stacked(Load.from_corners(found, load.sizes))

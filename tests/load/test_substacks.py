@@ -7,10 +7,8 @@ from unload import task
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
-    COLUMNS,
     DEPTH,
     PACKAGES,
-    ROWS,
     ROWS_HIGH,
     WALLS,
     build_load,
@@ -31,21 +29,10 @@ def test_every_combination_tiles_a_row(variants):
 
 
 def test_all_variants_of_all_substacks_occur(full_load):
-    low = full_load.positions - full_load.sizes / 2
-    cells = np.column_stack([full_load.packages, full_load.walls, np.rint(low[:, 1:] / CELL)])
-    items = {tuple(item) for item in cells.astype(int).tolist()}  # package, wall, left, lower
-    for column_left, substacks in COLUMNS:
-        seen = [
-            number
-            for number, variant in enumerate(substacks)
-            for wall, row in itertools.product(range(WALLS), range(ROWS))
-            if all(
-                (package, wall, column_left + left, row * ROWS_HIGH + lower) in items
-                for package, left, lower in variant
-            )
-        ]
-        assert set(seen) == {0, 1, 2}
-        assert len(seen) == WALLS * ROWS  # each place holds exactly one variant
+    low = np.rint((full_load.positions - full_load.sizes / 2)[:, 1:] / CELL).astype(int)
+    items = zip(full_load.packages.tolist(), low[:, 0].tolist(), (low[:, 1] % ROWS_HIGH).tolist())
+    same_everywhere = (wall_cells([[variant] * 4]) for variant in range(3))
+    assert {*items} == {tuple(item) for items in same_everywhere for item in items.tolist()}
 
 
 def test_a_load_keeps_the_papers_range_and_the_container(rng):
@@ -79,18 +66,9 @@ def test_build_load_places_the_walls_from_the_rear():
     assert load.positions[:, 2].max() < 3 * ROWS_HIGH * CELL
 
 
-# --- other scales -------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("scale", "fit"),
-    [
-        (1, (12, 3, 4)),
-        (0.8, (15, 4, 4)),
-        (1.2, (10, 3, 3)),
-        (0.5, (24, 7, 7)),
-        (1.5, (8, 2, 2)),
-    ],
+    [(1, (12, 3, 4)), (0.8, (15, 4, 4)), (1.2, (10, 3, 3)), (0.5, (24, 7, 7)), (1.5, (8, 2, 2))],
 )
 def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
     walls, rows, columns = fit
@@ -107,9 +85,6 @@ def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
     assert width + 10 * CELL * scale > 2.5 and height + ROWS_HIGH * CELL * scale > 2.5
     expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
     assert load.sizes == pytest.approx(scale * expected)
-
-
-# --- bad input ----------------------------------------------------------------------
 
 
 BAD_INPUT = {

@@ -46,25 +46,22 @@ def test_triangles_are_the_faces_of_their_box(boxes):
     assert area == pytest.approx(2 * 6 * 0.388**2, rel=0.01)
 
 
-def test_the_container_has_its_true_proportions(small_load):
-    scene = view(small_load).layout.scene
-    drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
-    assert scene.aspectmode == "manual"
-    assert drawn / drawn[1] == pytest.approx([2.8, 1, 1])
-    ranges = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
-    assert ranges == pytest.approx(drawn * 2.5)
-    eye = np.array([scene.camera.eye[axis] for axis in "xyz"])  # from the container's middle
-    assert eye * 2.5 + (3.5, 1.25, 1.25) == pytest.approx(EYE)
-
-
-def test_another_container_is_drawn_in_its_own_proportions(boxes):
+@pytest.mark.parametrize("length", [7.0, 14.0])
+def test_the_container_has_its_true_proportions(boxes, length):
     load = boxes((1.0, 0.2))
-    figure = view(Load(load.positions, load.sizes, container=(14.0, 2.5, 2.5)))
+    figure = view(Load(load.positions, load.sizes, container=(length, 2.5, 2.5)))
     scene = figure.layout.scene
     drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
-    assert drawn / drawn[1] == pytest.approx([5.6, 1, 1]) and scene.xaxis.range == (0, 14)
-    assert scene.camera.eye.x * drawn[0] / 2.8 > drawn[0] / 2, "from outside"
-    assert figure.picture() != view(load).picture()
+    assert scene.aspectmode == "manual"
+    assert drawn / drawn[1] == pytest.approx([length / 2.5, 1, 1])
+    ranges = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
+    assert ranges == pytest.approx([length, 2.5, 2.5])
+    eye = np.array([scene.camera.eye[axis] for axis in "xyz"])  # from the container's middle
+    if length == 7:
+        assert eye * 2.5 + (3.5, 1.25, 1.25) == pytest.approx(EYE)
+    else:
+        assert eye[0] * drawn[0] / 2.8 > drawn[0] / 2, "from outside"
+        assert figure.picture() != view(load).picture()
 
 
 def test_present_chooses_what_is_drawn(small_load):
@@ -120,11 +117,9 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
         ({"load": "walls"}, TypeError, "load is 'walls'; expected an unload.Load"),
         ({"present": np.ones(3, dtype=bool)}, ValueError, r"present has shape \(3,\)"),
         ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to"),
-        ({"groups": {"a": [10**6]}}, ValueError, r"groups\['a'\] holds 1000000 to 1000000"),
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
         ({"groups": {}, "order": [0]}, ValueError, "groups and order are given; expected one"),
         ({"order": [0.5]}, TypeError, "order has dtype float64"),
-        ({"order": [0, -1]}, ValueError, "order holds -1 to 0; expected 0 to"),
         ({"groups": [1]}, TypeError, r"groups is \[1\]; expected a dict"),
         ({"groups": {"a": [0.5]}}, TypeError, r"groups\['a'\] has dtype float64"),
         ({"height": "tall"}, TypeError, "height is 'tall'; expected an integer"),

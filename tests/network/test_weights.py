@@ -44,12 +44,16 @@ def test_every_flipped_bit_is_noticed(path, rng):
             read_weights(path, "pair", lambda *made: made)
 
 
-def test_files_without_a_digest_or_of_another_kind_are_refused(path):
+def test_files_without_a_digest_or_of_another_kind_or_not_finite_are_refused(path):
     with pytest.raises(ValueError, match="w.safetensors holds no policy of unload"):
         read_weights(path, "policy", print)
     for metadata in (None, {"pair": '{"sizes": [3, 2]}'}):
         save_file(load_file(path), path, metadata)
         with pytest.raises(ValueError, match="w.safetensors holds no pair of unload"):
+            read_weights(path, "pair", print)
+    for value in (float("nan"), float("inf")):
+        write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, value])})
+        with pytest.raises(ValueError, match="w.safetensors holds no pair .* is not finite"):
             read_weights(path, "pair", print)
 
 
@@ -65,10 +69,3 @@ def test_what_is_no_path_is_refused(tmp_path):
             write_weights(path, "pair", {}, WEIGHTS)
     with pytest.raises(FileNotFoundError, match=r"expected a .safetensors file \(pair\)"):
         read_weights(tmp_path, "pair", print)
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_weights_that_are_not_finite_are_refused(path, value):
-    write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, value])})
-    with pytest.raises(ValueError, match="w.safetensors holds no pair .* is not finite"):
-        read_weights(path, "pair", print)

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,19 +9,16 @@ from unload.physics.base import Physics
 from unload.physics.situation import Situation, Surroundings
 
 
-@pytest.fixture
-def make() -> Iterator[Callable[..., Physics]]:
-    """``make(kind, load)``: a physics that holds ``load``; closed after the test."""
-    made = []
+@pytest.fixture(scope="package")
+def make() -> Callable[..., Physics]:
+    """``make(kind, load)``: a physics that holds ``load``."""
 
     def build(kind: str, load: Load, **kwargs) -> Physics:
-        made.append(KINDS[kind](**kwargs))
-        made[-1].reset(load)
-        return made[-1]
+        physics = KINDS[kind](**kwargs)
+        physics.reset(load)
+        return physics
 
-    yield build
-    for physics in made:
-        physics.close()
+    return build
 
 
 @pytest.fixture(scope="package")

@@ -69,17 +69,13 @@ def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
 
 def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
     alone = pool.simulate(hard, local.simulate)
+    for worker in pool._workers:
+        worker.send_signal(signal.SIGINT)
+    assert pool.simulate(hard, local.simulate) == alone, "Ctrl-C is not for them"
     pool._workers[1].kill()
     pool._workers[1].wait()
     with pytest.raises(RuntimeError, match="a process that simulates lifts has died"):
         pool.simulate(hard, local.simulate)
-    assert pool.simulate(hard, local.simulate) == alone
-
-
-def test_ctrl_c_is_not_for_them(pool, local, hard):
-    alone = pool.simulate(hard, local.simulate)
-    for worker in pool._workers:
-        worker.send_signal(signal.SIGINT)
     assert pool.simulate(hard, local.simulate) == alone
 
 
@@ -128,4 +124,3 @@ def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
     assert physics.simulate_all(hard) == alone
     assert shared == [16] and len(physics.table) == 16
     assert np.allclose([physics.table.find(each) for each in hard], alone)
-    physics.close()

@@ -3,7 +3,6 @@ import pytest
 
 from unload import task
 from unload.load.boxes import CONTACT_TOLERANCE, Load
-from unload.load.substacks import CELL
 from unload.physics.situation import Surroundings
 
 
@@ -37,6 +36,11 @@ def test_floor_and_side_walls(boxes):
     assert around.situation(1).floor is None and around.situation(1).sides == (-200_000,)
     assert around.situation(2).sides == ()
     assert around.situation(3).sides == (200_000,)
+    narrow = Load(load.positions[:1] + (0, 1.8, 0), load.sizes[:1], container=(7.0, 2.2, 2.5))
+    assert surroundings(narrow).situation(0).sides == (200_000,)
+    y = task.CONTAINER[1] - CONTACT_TOLERANCE - 0.25  # exact in bits, and so is y + 0.25
+    at_the_tolerance = surroundings(Load([[3.5, y, 0.25]], np.full((1, 3), 0.5)))
+    assert at_the_tolerance.situation(0).sides == (250_100,)
 
 
 def test_side_walls_that_only_a_box_on_top_touches(boxes):
@@ -59,54 +63,14 @@ def test_floor_and_side_walls_are_touched_within_the_tolerance(boxes, share):
     assert second.sides == ((200_000 + micrometres,) if near else ())
 
 
-def test_a_box_exactly_at_the_tolerance_touches_the_side_wall():
-    y = task.CONTAINER[1] - CONTACT_TOLERANCE - 0.25  # exact in bits, and so is y + 0.25
-    label = np.zeros(1, int)
-    around = surroundings(Load(np.array([[3.5, y, 0.25]]), np.full((1, 3), 0.5), label, label))
-    assert around.situation(0).sides == (250_100,)
-
-
-def test_side_walls_are_those_of_the_container(boxes):
-    load = boxes((2.0, 0.2))
-    narrow = Load(load.positions, load.sizes, container=(7.0, 2.2, 2.5))
-    assert surroundings(narrow).situation(0).sides == (200_000,)
-    assert surroundings(load).situation(0).sides == ()
-
-
-def test_equal_situations_at_different_places_have_equal_keys(boxes):
+def test_equal_situations_have_equal_keys_and_whatever_may_matter_is_in_them(boxes):
     around = surroundings(boxes((0.8, 0.2), (1.0, 0.6), (1.6, 0.2), (1.8, 0.6)))
     first, second = around.situation(0), around.situation(2)
     assert first.key == second.key and first != second  # no comparison of arrays
     around.present[3] = False
     assert around.situation(2).key != first.key
-    assert around.situation(1).key != around.situation(0).key
-
-
-@pytest.mark.parametrize("change", ["a neighbour", "a side wall", "no floor", "on top"])
-def test_whatever_may_matter_is_in_the_key(boxes, change):
     alone = surroundings(boxes((1.0, 0.2))).situation(0)
-    changed = {
-        "a neighbour": (boxes((1.0, 0.2), (1.4, 0.2)), 0),
-        "a side wall": (boxes((0.2, 0.2)), 0),
-        "no floor": (boxes((1.0, 0.6), (2.0, 0.2)), 0),
-        "on top": (boxes((1.0, 0.2), (1.0, 0.6)), 0),
-    }
-    load, item = changed[change]
-    assert surroundings(load).situation(item).key != alone.key
-
-
-def test_on_top_agrees_with_a_plain_definition(small_load):
-    low = small_load.positions - small_load.sizes / 2
-    high = small_load.positions + small_load.sizes / 2
-    count = len(small_load)
-    stands_on = np.zeros((count, count), dtype=bool)
-    for i in range(count):
-        for j in range(count):
-            stretch = min(high[i, 1], high[j, 1]) - max(low[i, 1], low[j, 1])
-            stands_on[i, j] = stretch > CELL / 2 and abs(low[i, 2] - high[j, 2]) < CELL / 2
-    reach = stands_on.copy()
-    for _ in range(count):  # transitive closure
-        reach |= (reach.astype(int) @ stands_on.astype(int)) > 0
-    around = surroundings(small_load)
-    for item in range(count):
-        assert around.on_top(item) == np.flatnonzero(reach[:, item]).tolist()
+    beside, at_the_wall = boxes((1.0, 0.2), (1.4, 0.2)), boxes((0.2, 0.2))
+    above_the_floor, covered = boxes((1.0, 0.6), (2.0, 0.2)), boxes((1.0, 0.2), (1.0, 0.6))
+    for load in (beside, at_the_wall, above_the_floor, covered):
+        assert surroundings(load).situation(0).key != alone.key

@@ -36,8 +36,7 @@ def known(situations):
     """Situations with one or two boxes on top, and their distances in ``LocalPhysics``."""
     local = LocalPhysics()
     light = [each for each in situations if 0 < each.on_top < HELD_DOWN]
-    yield [(situation, local.simulate(situation)) for situation in light]
-    local.close()
+    return [(situation, local.simulate(situation)) for situation in light]
 
 
 def test_table_equals_local_exactly(make, rng):
@@ -66,8 +65,6 @@ def test_a_situation_is_simulated_once(known, monkeypatch):
     with pytest.raises(pytest.fail.Exception):
         fresh.simulate(known[0][0])
     assert len(fresh.table) == 0
-    for physics in (first, second, fresh):
-        physics.close()
 
 
 def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
@@ -77,7 +74,6 @@ def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
     assert physics.simulate(around.situation(0)) == 0 and len(physics.table) == 0
     distance = physics.simulate(around.situation(1))
     assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
-    physics.close()
 
 
 @pytest.mark.slow
@@ -92,7 +88,6 @@ def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
             if not around.on_top(item) and asked < 1667:
                 assert local.simulate(around.situation(item)) == FREE_LIFT
                 asked += 1
-    local.close()
 
 
 @pytest.mark.parametrize(("overlap", "free"), [(GAP, True), (GAP + 1e-4, False)])
@@ -103,7 +98,6 @@ def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap
     boxes = np.array([[0, y, 0, 400_000, 400_000, 400_000] for y in (0, side, -side)], np.int32)
     local = LocalPhysics()
     assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
-    local.close()
 
 
 def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):
@@ -153,7 +147,7 @@ def test_a_table_grows_and_forgets_nothing(table):
     assert len(table) == 2000 and table.find(situation(7)) == 0.007
 
 
-def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng):
+def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng, tmp_path):
     other = LiftTable()
     for number in rng.permutation(50).tolist():
         other.add(situation(number), number / 1000)
@@ -161,6 +155,12 @@ def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng):
     assert digests.dtype == np.uint64 and micrometres.dtype == np.int32
     assert (digests[1:] > digests[:-1]).all() and set(micrometres) == set(range(0, 50_000, 1000))
     assert entries_of(other) == entries_of(table)
+    table.save(tmp_path / "lifts.npz")
+    other.save(tmp_path / "other.npz")
+    assert (tmp_path / "lifts.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
+    read = LiftTable.load(tmp_path / "lifts.npz")
+    read.add(situation(50), 0.05)
+    assert len(read) == 51 and all(read.find(situation(k)) == k / 1000 for k in range(51))
 
 
 def test_threads_find_and_add_at_the_same_time(monkeypatch):
@@ -193,20 +193,6 @@ def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(mon
 
     monkeypatch.setattr(unload.physics.table, "slot_of", then_filled)
     assert table.find(situation(0)) is None
-
-
-# --- files --------------------------------------------------------------------------
-
-
-def test_a_saved_table_finds_the_same(table, tmp_path):
-    table.save(tmp_path / "lifts.npz")
-    read = LiftTable.load(tmp_path / "lifts.npz")
-    assert all(read.find(situation(number)) == number / 1000 for number in range(50))
-    assert len(read) == 50
-    read.save(tmp_path / "again.npz")
-    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "lifts.npz").read_bytes()
-    read.add(situation(50), 0.05)
-    assert len(read) == 51 and read.find(situation(50)) == 0.05
 
 
 def free_box(number: int) -> Situation:
@@ -272,9 +258,6 @@ def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatc
     assert len(LiftTable.load(path)) == 2
 
 
-# --- files that are refused ---------------------------------------------------------
-
-
 def changed(path: Path, **changes: np.ndarray | None) -> None:
     """Change arrays of a file, or take them out; its digest is right."""
     arrays = files.read_arrays(path) | changes
@@ -307,17 +290,14 @@ def test_files_that_are_no_lift_table_are_refused_and_stay(tmp_path):
 
 
 def test_a_table_of_another_physics_or_without_an_array_is_refused(tmp_path):
-    path = tmp_path / "lifts.npz"
-    for changes, message in (
-        (
-            {"settings": np.array(json.dumps(SETTINGS | {"friction": 0.7}))},
-            "another physics, .*0.7",
-        ),
-        ({"settings": np.zeros(2)}, "another physics"),
-        ({"samples": None}, r"holds \['digest', .*\]; expected a lift table"),
+    path, other = tmp_path / "lifts.npz", np.array(json.dumps(SETTINGS | {"friction": 0.7}))
+    for name, value, message in (
+        ("settings", other, "another physics, .*0.7"),
+        ("settings", np.zeros(2), "another physics"),
+        ("samples", None, r"holds \['digest', .*\]; expected a lift table"),
     ):
         true_table([1]).save(path)
-        changed(path, **changes)
+        changed(path, **{name: value})
         check_refused(path, f"lifts.npz .*{message}")
 
 
