@@ -163,7 +163,7 @@ function showPreferences(points) {
   element("dot").setAttribute("transform", `translate(${right} ${down})`);
   element("dot").style.opacity = last ? 1 : 0;
   element("preferences").textContent = last ? `x ${signed(x)}, y ${signed(y)}` : "";
-  const none = "For positions no limit is known.";
+  const none = "On positions, a rule errs only above 0.67 along y.";
   element("limits").textContent = above ? `Shaded: nearly all runs err (above ${above}).` : none;
 }
 
