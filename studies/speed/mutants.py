@@ -135,7 +135,7 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=20, help="mutants of a room")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
     options, trees = parser.parse_args(), SimpleQueue()
-    left_out = shutil.ignore_patterns(".*", "build", "runs", "__pycache__")
+    left_out = shutil.ignore_patterns(".git", ".venv", "*cache*", "build", "runs")
     with tempfile.TemporaryDirectory() as folder:
         for number in range(WORKERS):
             trees.put(Path(shutil.copytree(ROOT, Path(folder) / f"{number}", ignore=left_out)))

@@ -8,7 +8,6 @@ import json
 import logging
 import os
 import socket
-import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -103,12 +102,8 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
     """Read an ``.npz`` file of plain arrays."""
     try:
         # NumPy leaves a damaged file open that it has opened itself.
-        with open(path, "rb") as file:
-            if not zipfile.is_zipfile(file):
-                raise ValueError("it is no zip archive")
-            file.seek(0)
-            with np.load(file, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
     except FileNotFoundError:
         raise
     except Exception as error:  # zipfile, zlib, tokenize and NumPy each raise errors of their own
