@@ -1,7 +1,9 @@
 """Grids of runs, and sweeps: what is kept, published and reported, and who does the work."""
 
+import gc
 import itertools
 import os
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -98,6 +100,23 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     before = [path.stat().st_mtime_ns for path in written]
     sweep.run_sweep(configs, tmp_path / "many", n_jobs=1)
     assert [path.stat().st_mtime_ns for path in written] == before
+
+
+def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):
+    """Also where a change ties the run in a circle, which reference counts never free."""
+    alive = weakref.WeakSet()
+
+    def change(run):
+        assert not alive
+        alive.add(run.replay)
+        run.replay.owner = run
+
+    gc.disable()
+    try:
+        report = sweep.run_sweep(configs, tmp_path, 1, dict.fromkeys(configs, change))
+    finally:
+        gc.enable()
+    assert (report["error"] == "").all() and len(report) > 1
 
 
 def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path, monkeypatch):
