@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from unload import equalize
+from unload import equalize, task
 
 
 def test_table_one():
@@ -11,6 +11,12 @@ def test_table_one():
     # The table cuts off after two digits.
     expected = [-1, -0.33, -0.66, 0.66, 0.33, 0, 1]
     assert equalize(values[:, None])[:, 0] == pytest.approx(expected, abs=0.01)
+
+
+def test_average_bridges_the_noise_and_not_a_cell_of_the_grid():
+    noise, cell = 2 * 0.003 / 2.5, 2 * 0.5 * task.CONTAINER[1] / 36 / 2.5  # scaled to [-1, 1]
+    values = np.array([0.1, 0.1 + noise, 0.1 + noise + cell])
+    assert equalize(values[:, None], "average")[:, 0] == pytest.approx([-0.5, -0.5, 1])
 
 
 def ranks_one_by_one(values: list[float], ties: str, tolerance: float) -> list[float]:
