@@ -16,6 +16,7 @@ from studies.grid import read_policies
 from studies.paper.training import PAPER
 from studies.results import read_provenance
 from unload import evaluate, policies
+from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
@@ -38,6 +39,20 @@ def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
     assert trace["picks"].iloc[0] == laboratory.EVERY - 64
     assert read_provenance(folder, "laboratory")["reduced"]
     assert not (tmp_path / "falls").exists()
+
+
+@pytest.mark.parametrize(
+    ("part", "module", "rows"),
+    [
+        ("laboratory", laboratory, laboratory.read_laboratory),
+        ("fresh", fresh, fresh.read_fresh),
+    ],
+)
+def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(part, module, rows):
+    seeds = {cell: sorted(group["seed"]) for cell, group in rows().groupby("cell")}
+    assert seeds == {name: list(cell.seeds) for name, cell in module.CELLS.items()}
+    published = read_provenance(paths.DATA / "falls", part)["settings"]["config"]
+    assert TrainConfig(**published).plain() == CONFIG.plain()
 
 
 def test_cells_differ_from_the_first_in_what_they_are_named_for():
