@@ -427,6 +427,24 @@ def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
     assert min(fewest) < 70  # of 128 rows
 
 
+@pytest.mark.parametrize("gamma", [0.0, 0.9])
+def test_a_container_in_which_every_item_has_failed_is_played_to_its_end(gamma, boxes, monkeypatch):
+    """With the mask, too: its items may then be picked again."""
+    look_up = ContainerVectorEnv._look_up
+    monkeypatch.setattr(
+        ContainerVectorEnv, "_look_up", lambda *each: (look_up(*each)[0], np.zeros(4))
+    )
+    three = boxes((0.4, 0.2), (1.2, 0.2), (2.0, 0.2))
+    config = TrainConfig(**CONTAINER | {"mask": True, "gamma": gamma, "epsilon_fraction": 0.2})
+    run = Training(config, stack=lambda rng: three)
+    for step in range(config.picks // config.num_envs):
+        tried = step % config.max_picks
+        assert (run.rollout.allowed.sum(axis=1) == (3 - tried if tried < 3 else 3)).all()
+        run.step()
+    assert run.curve.table()["success_rate"].eq(0).all()
+    assert not run.replay.arrays.get("next_masks", np.zeros((1, 4)))[:, 3:].any()
+
+
 def test_a_pick_says_how_far_it_has_lifted(monkeypatch):
     """Also where it was an episode's last one, whose infos stand apart; NaN without lifts."""
     lifted, pick = [], ContainerVectorEnv._pick

@@ -10,6 +10,15 @@ from unload.agent.config import TrainConfig
 from unload.agent.replay import shuffle_places
 
 
+def choosable(masks: np.ndarray, present: np.ndarray) -> np.ndarray:
+    """The masks, and where they exclude all, the items that are present; (batch, 128) bool each.
+
+    A neat load always has a box that can be lifted; in others a container may get stuck, and its
+    episode still has picks to make.
+    """
+    return masks | present & ~masks.any(axis=1, keepdims=True)
+
+
 class Rollout:
     """The environments of a run, at some point of it.
 
@@ -22,7 +31,7 @@ class Rollout:
         observations: (num_envs, 128, 3) float32, what is seen now.
         masks: (num_envs, 128) int8, ``info["action_mask"]``.
         allowed: (num_envs, 128) bool, what may be picked in training: rows that hold an item,
-            with ``config.mask`` only those that have not failed.
+            with ``config.mask`` only those that have not failed, as long as there are some.
         steps: made so far; one pick in each environment per step.
     """
 
@@ -43,7 +52,8 @@ class Rollout:
     def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
         self.observations, self.masks = observations, infos["action_mask"]
         self._present = infos["item_mask"].astype(bool)
-        self.allowed = self.masks.astype(bool) if self._config.mask else self._present
+        masks = self.masks.astype(bool)
+        self.allowed = choosable(masks, self._present) if self._config.mask else self._present
 
     @property
     def picks(self) -> int:
@@ -83,12 +93,13 @@ class Rollout:
         distances = np.where(ended, last.get("distance", unknown), infos.get("distance", unknown))
         if self._config.gamma > 0:
             observations, masks = following.copy(), infos["action_mask"].astype(bool)
+            present = infos["item_mask"].astype(bool)
             for env in np.flatnonzero(ended):
                 observations[env] = infos["final_obs"][env]
-                masks[env] = last["action_mask"][env]
+                masks[env], present[env] = last["action_mask"][env], last["item_mask"][env]
             picks |= {
                 "next_observations": observations,
-                "next_masks": masks,
+                "next_masks": choosable(masks, present),
                 "terminations": terminations,
             }
         self.steps += 1
