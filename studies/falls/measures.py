@@ -144,11 +144,10 @@ def surface(policy: Policy, picks: int = 300, containers: int = 8) -> np.ndarray
     """
     along, across = ((np.arange(count) + 0.5) / 10 for count in (70, 25))
     heights = np.zeros((containers, len(along), len(across)))
-    for container in range(containers):
-        load = left(policy, picks, seed=container)
+    for seed, highest in enumerate(heights):
+        load = left(policy, picks, seed=seed)
         for centre, size in zip(load.positions, load.sizes):
             deep, wide = np.abs(along - centre[0]), np.abs(across - centre[1])
             covered = np.outer(deep < size[0] / 2, wide < size[1] / 2)
-            top = np.maximum(heights[container], centre[2] + size[2] / 2)
-            heights[container] = np.where(covered, top, heights[container])
+            highest[covered] = np.maximum(highest[covered], centre[2] + size[2] / 2)
     return heights.mean(axis=0)

@@ -10,6 +10,7 @@ import pandas as pd
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 from unload import task
+from unload.agent.policies import choosable
 from unload.env.container import ContainerEnv
 from unload.env.vector import ContainerVectorEnv
 from unload.support import checks
@@ -126,7 +127,7 @@ def _play(
 
         # A policy needs a choice in every row, also where the episode is over; what it returns
         # is checked before anything is picked, because it may be anybody's.
-        allowed = np.where(hopeless[:, np.newaxis], infos["item_mask"], allowed)
+        allowed = choosable(allowed, infos["item_mask"])
         actions = checks.integer_array(
             "what policy returned", policy(observations, allowed, rng), rows.shape
         )

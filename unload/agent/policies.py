@@ -38,6 +38,16 @@ def any_allowed(allowed: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return draws.argmax(axis=1)
 
 
+def choosable(masks: np.ndarray, present: np.ndarray) -> np.ndarray:
+    """The masks, and where one excludes all, the items that are present.
+
+    Both are (batch, 128), bool or 0 and 1, and so is what is returned. A neat load always has a
+    box that can be lifted; in others a container may get stuck, and its episode still has picks to
+    make.
+    """
+    return masks | present & ~masks.any(axis=1, keepdims=True)
+
+
 def nearest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """The allowed item nearest to the entrance, by the distance of Sec. III-B."""
     _, allowed = check_batch(observations, masks)

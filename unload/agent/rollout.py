@@ -7,16 +7,8 @@ import gymnasium
 import numpy as np
 
 from unload.agent.config import TrainConfig
+from unload.agent.policies import choosable
 from unload.agent.replay import shuffle_places
-
-
-def choosable(masks: np.ndarray, present: np.ndarray) -> np.ndarray:
-    """The masks, and where they exclude all, the items that are present; (batch, 128) bool each.
-
-    A neat load always has a box that can be lifted; in others a container may get stuck, and its
-    episode still has picks to make.
-    """
-    return masks | present & ~masks.any(axis=1, keepdims=True)
 
 
 class Rollout:
