@@ -94,6 +94,7 @@ def train_grid(
 
     Raises:
         RuntimeError: runs failed; the message says which and why. The others are published.
+        ValueError: fewer runs would be finished than are published; nothing is trained.
     """
     for cell in cells or ():
         checks.one_of("cells", cell, grid.cells)
@@ -104,27 +105,33 @@ def train_grid(
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
     kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
+    place = Path(folder) / ("" if picks is None else "reduced") / grid.name
+    finished = {name for name in configs if (kept / name / "record.json").exists()}
+    _check_count(place, kept, len(finished | set(wanted)))
     report = run_sweep(wanted, kept, n_jobs, changes=changes)
-    _publish(grid, configs, kept, Path(folder), picks is not None, fingerprint)
+    _publish(grid, configs, kept, place, picks is not None, fingerprint)
     failed = report[report["error"] != ""]
     if len(failed):
         raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
     return kept
 
 
-def _publish(grid, configs, kept: Path, folder: Path, reduced: bool, fingerprint: str) -> None:
-    """Publish the finished runs in ``kept``, no fewer than there are, and their provenance."""
-    place = folder / "reduced" / grid.name if reduced else folder / grid.name
-    records = {name: kept / name / "record.json" for name in configs}
-    done = {name: config for name, config in configs.items() if records[name].exists()}
+def _check_count(place: Path, kept: Path, runs: int) -> None:
+    """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
     provenance = place.parent / f"{place.name}.provenance.json"
     there = read_provenance(place.parent, place.name)["runs"] if provenance.exists() else 0
-    # Runs take hours: none may be lost where a folder that holds fewer is published.
-    if len(done) < there:
+    if runs < there:
         raise ValueError(
-            f"{kept} holds {len(done)} finished runs; expected at least as many as the {there} "
+            f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "
             f"that {place}.csv holds"
         )
+
+
+def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint: str) -> None:
+    """Publish the finished runs in ``kept``, no fewer than there are, and their provenance."""
+    records = {name: kept / name / "record.json" for name in configs}
+    done = {name: config for name, config in configs.items() if records[name].exists()}
+    _check_count(place, kept, len(done))
     if not done:
         return
 
