@@ -4,8 +4,6 @@ Whether a box jams is a function of the run's seed and of what it stands in, not
 state, so that a resumed run goes on with the same jams.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from unload import task
@@ -119,13 +117,12 @@ def neighbours(state: containers.Containers, items: np.ndarray) -> tuple[np.ndar
     return covered, beside.sum(axis=1)
 
 
-def weigh(run: Training, z: float, change: Callable[[Training], None] | None = None) -> None:
+def weigh(run: Training, z: float) -> None:
     """Let the distance to the viewpoint weigh z otherwise than the paper's W does (Sec. III-B).
 
     Args:
         run: in containers with loads, which are filled again.
         z: the last entry of W's diagonal; 4 in the paper.
-        change: another one that is made, too.
     """
     envs = run.rollout.envs.unwrapped
     weights, put = task.DISTANCE_WEIGHTS * [1, 1, z / task.DISTANCE_WEIGHTS[2]], envs._put
@@ -139,5 +136,3 @@ def weigh(run: Training, z: float, change: Callable[[Training], None] | None = N
 
     envs._put = put_in_order
     run.rollout._see(*envs.reset(seed=run.config.seeds()[0]))
-    if change is not None:
-        change(run)
