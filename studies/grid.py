@@ -5,7 +5,8 @@ and perhaps something changed in its runs that no configuration offers. All runs
 published together: a table of each measure, in which a run is a column; one file of policies;
 one record of where they come from.
 
-A run is called ``<cell>/seed_<seed>``.
+A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<table>/<name>``, its
+curves are in tables of that name, so that no table of a large grid becomes large.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -144,8 +145,12 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
     if grid.measure is None:
         picks = next(iter(curves.values()))["picks"]  # the same for all
         for column, digits in COLUMNS.items():
-            table = {"picks": picks} | {name: curve[column] for name, curve in curves.items()}
-            write_table(_table_path(place, column), pd.DataFrame(table), digits)
+            tables: dict[Path, dict[str, pd.Series]] = {}
+            for name, curve in curves.items():
+                path = _table_path(place, cell_of(name), column)
+                tables.setdefault(path, {"picks": picks})[name] = curve[column]
+            for path, table in tables.items():
+                write_table(path, pd.DataFrame(table), digits)
         if grid.policies:
             write_policies(place.with_name(f"{place.name}.safetensors"), policies)
     else:
@@ -170,9 +175,10 @@ def cell_of(run: str) -> str:
     return run.rpartition("/seed_")[0]
 
 
-def _table_path(place: Path, column: str) -> Path:
-    """Of the table of a column of the curves: a row per point, its ``picks``; a column per run."""
-    return place.with_name(f"{place.name}_{column}.csv")
+def _table_path(place: Path, cell: str, column: str) -> Path:
+    """Of the table with a column of a cell's curves: a row per point, its ``picks``; a column
+    per run."""
+    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}.csv")
 
 
 def read_grid(
@@ -191,12 +197,14 @@ def read_grid(
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
-    columns = []
+    place, columns = Path(folder) / grid.name, []
     for column in COLUMNS:
-        path = _table_path(Path(folder) / grid.name, column)
-        table = read_table(path, grid.command, ["picks"])
-        table = table[[name for name in table if name == "picks" or cell_of(name) in wanted]]
-        columns.append(table.melt("picks", var_name="run", value_name=column))
+        parts = []
+        for path in dict.fromkeys(_table_path(place, cell, column) for cell in wanted):
+            table = read_table(path, grid.command, ["picks"])
+            table = table[[name for name in table if name == "picks" or cell_of(name) in wanted]]
+            parts.append(table.melt("picks", var_name="run", value_name=column))
+        columns.append(pd.concat(parts, ignore_index=True))
     curves = columns[0].assign(loss=columns[1]["loss"])
     names = curves.pop("run").str.rpartition("/seed_")
     curves.insert(0, "cell", names[0])

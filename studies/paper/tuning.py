@@ -68,8 +68,8 @@ def tuning_config(
 
 
 def tuning_cell(batch_size: int, learning_rate: float, equalize: bool) -> str:
-    """The name of a cell of the search, such as ``with_fe_b64/lr_0.1``."""
-    return f"{'with' if equalize else 'without'}_fe_b{batch_size}/lr_{learning_rate:g}"
+    """The name of a cell of the search, such as ``b64/with_fe_lr_0.1``."""
+    return f"b{batch_size}/{'with' if equalize else 'without'}_fe_lr_{learning_rate:g}"
 
 
 def tuning_grid(

@@ -21,15 +21,15 @@ def small(monkeypatch):
     return small
 
 
-def test_a_search_is_published_in_two_tables(small, tmp_path):
+def test_a_search_is_published_in_two_tables_a_batch_size(small, tmp_path):
     tuning.tuning_data(tmp_path, tmp_path / "runs", n_jobs=1)
     names = {path.name for path in (tmp_path / "tuning").iterdir()}
-    tables = {f"tuning_{column}.csv" for column in ("loss", "success_rate")}
+    tables = {f"b{size}_{column}.csv" for size in (8, 16) for column in ("loss", "success_rate")}
     assert names == tables | {"tuning.provenance.json"}
-    table = pd.read_csv(tmp_path / "tuning/tuning_success_rate.csv")
-    assert table.shape == (20, 1 + 8)
+    table = pd.read_csv(tmp_path / "tuning/b8_success_rate.csv")
+    assert table.shape == (20, 1 + 4)
     curves = tuning.read_curves("success_rate", 8, 1e-3, folder=tmp_path)
-    assert np.array_equal(curves[1], table["with_fe_b8/lr_0.001/seed_1"])
+    assert np.array_equal(curves[1], table["b8/with_fe_lr_0.001/seed_1"])
     summary = tuning.tuning_summary(tmp_path).set_index(["batch_size", "learning_rate"])
     assert summary["runs"].tolist() == [2] * 4
     mean = np.mean([run.mean() for run in curves.values()])
