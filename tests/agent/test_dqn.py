@@ -18,9 +18,11 @@ def test_epsilon_is_the_share_of_random_actions(rng):
     observations = np.zeros((20_000, 4, 3), np.float32)
     observations[:, 2:, 2] = 1, 2
     masks = np.tile([True, True, True, False], (20_000, 1))
-    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
-    shares = np.bincount(actions, minlength=4) / 20_000
+    agent = DQN(HeightNetwork())
+    shares = np.bincount(agent.choose(observations, masks, 0.3, rng), minlength=4) / 20_000
     assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
+    with pytest.raises(ValueError, match="allowed is False in a whole row; expected"):
+        agent.choose(observations, np.zeros_like(masks), 1.0, rng)
 
 
 @pytest.mark.parametrize("beta", [1.0, 0.3])

@@ -14,10 +14,13 @@ import io
 import json
 import os
 import re
+import secrets
 import shutil
+import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -249,22 +252,35 @@ def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
         "JUPYTER_CONFIG_DIR": "config", "JUPYTER_RUNTIME_DIR": "runtime", "IPYTHONDIR": "ipython",
     }  # fmt: skip
     env = os.environ | {name: str(home / folder) for name, folder in folders.items()}
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    token = secrets.token_hex(16)
     command = [
         *(sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root"),
+        *(f"--port={port}", "--ServerApp.port_retries=0", f"--IdentityProvider.token={token}"),
         *(f"--ServerApp.root_dir={notebooks}", "--LabApp.expose_app_in_browser=True"),
     ]
     with open(home / "jupyterlab.log", "w") as log:
         server = subprocess.Popen(command, stdout=log, stderr=log, env=env)
-        # It writes down where it listens once it does.
-        info = home / "runtime" / f"jpserver-{server.pid}.json"
         try:
-            if not wait_until(info.exists, START_LIMIT):
-                sys.exit(f"JupyterLab does not start; see {log.name}")
-            running = json.loads(info.read_text())
-            yield f"{running['url']}lab/tree/{{}}?token={running['token']}&reset"
+            _wait_for(f"http://127.0.0.1:{port}/api/status?token={token}", server, log.name)
+            yield f"http://127.0.0.1:{port}/lab/tree/{{}}?token={token}&reset"
         finally:
             server.terminate()
             server.wait(30)
+
+
+def _wait_for(address: str, server: subprocess.Popen, log: str) -> None:
+    for _ in range(2 * START_LIMIT):
+        if server.poll() is not None:
+            break
+        try:
+            urllib.request.urlopen(address, timeout=5).close()
+            return
+        except OSError:
+            time.sleep(0.5)
+    sys.exit(f"JupyterLab does not start; see {log}")
 
 
 if __name__ == "__main__":

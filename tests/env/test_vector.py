@@ -22,6 +22,7 @@ def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -
         (steps, 2, num_envs) bool, where episodes were terminated, and where truncated.
     """
     array, side_by_side = make_pair(env_id, num_envs, **kwargs)
+    assert array.metadata["autoreset_mode"] is side_by_side.metadata["autoreset_mode"]
     rng = np.random.default_rng(seed)
     results = array.reset(seed=seed)
     assert_same(results, side_by_side.reset(seed=seed))
