@@ -1,12 +1,10 @@
 """The site's own code: how it reads notebooks and docstrings, and its check of links."""
 
 import re
-from pathlib import Path
 
 import nbformat
 import pytest
 
-import unload
 from notebooks.book import links, pages
 
 
@@ -44,14 +42,6 @@ def test_a_widget_gives_way_to_what_needs_no_kernel():
     alone, with_picture = read(widget, widget | {"image/png": "AA=="})
     assert alone["text/markdown"] == pages.NEEDS_KERNEL
     assert set(with_picture) == {"text/plain", "image/png"}
-
-
-def test_the_reference_has_each_public_name():
-    text = (Path(pages.__file__).parent / "reference.md").read_text()
-    described = re.findall(
-        r"auto(?:class|function|module):: unload\.(?:agent\.)?(\w+)$", text, re.M
-    )
-    assert sorted([*described, "__version__"]) == sorted(unload.__all__)
 
 
 def test_a_reference_that_describes_nothing_is_found(tmp_path):

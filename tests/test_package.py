@@ -7,6 +7,7 @@ import ast
 import re
 import sys
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -110,13 +111,12 @@ def room(module: str) -> str:
 
 def levels(graph: dict[str, set[str]]) -> list[list[str]]:
     """Sort a graph's nodes so that each needs only those of earlier levels."""
-    left, sorted_levels = dict(graph), []
-    while left:
-        level = sorted(node for node, wanted in left.items() if not wanted & left.keys())
-        assert level, f"imports run in a circle among {sorted(left)}"
-        sorted_levels.append(level)
-        for node in level:
-            del left[node]
+    sorter, sorted_levels = TopologicalSorter(graph), []
+    sorter.prepare()  # raises an error that names those of a circle
+    while sorter.is_active():
+        level = sorter.get_ready()
+        sorted_levels.append(sorted(level))
+        sorter.done(*level)
     return sorted_levels
 
 

@@ -41,7 +41,7 @@ def kill(point):
     if point["picks"] == {picks}:
         os.kill(os.getpid(), signal.SIGKILL)
 
-train(TrainConfig(**{fields!r}), {folder!r}, False, callback=kill, stack={stack})
+train(TrainConfig(**{fields!r}), {folder!r}, False, callback=kill, stack=runs.few_walls)
 """
 
 
@@ -90,9 +90,9 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
         train(config, folder, progress=False)
 
 
-def kill_run(fields: dict, folder: Path, picks: int, stack: str = "None") -> None:
+def kill_run(fields: dict, folder: Path, picks: int) -> None:
     """Start a run in another process, which is killed at a point of its curve."""
-    code = KILLED.format(picks=picks, fields=fields, folder=str(folder), stack=stack)
+    code = KILLED.format(picks=picks, fields=fields, folder=str(folder))
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ)
     assert done.returncode == -signal.SIGKILL
 
@@ -107,6 +107,20 @@ def assert_same(one: Path, other: Path) -> None:
     (weights, curve), (other_weights, other_curve) = content(one), content(other)
     pd.testing.assert_frame_equal(curve, other_curve, check_exact=True)
     assert weights == other_weights
+
+
+def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> dict:
+    """Random arrays as those of a ``ReplayBuffer`` with next states."""
+    masks = rng.integers(2, size=(size, items)).astype(bool)
+    masks[:, 0] = True
+    return {
+        "observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
+        "actions": rng.integers(items, size=size),
+        "rewards": rng.choice([-1.0, 1.0], size=size).astype(np.float32),
+        "next_observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
+        "next_masks": masks,
+        "terminations": rng.random(size) < 0.2,
+    }
 
 
 class HeightNetwork(torch.nn.Module):

@@ -1,5 +1,5 @@
 import json
-from dataclasses import asdict
+from dataclasses import asdict, fields
 
 import numpy as np
 import pytest
@@ -36,46 +36,33 @@ def test_epsilon_falls_linearly_and_stays():
 
 
 def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
-    for fields in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64, "picks": 128}):
-        seeds = TrainConfig(seed=3, **fields).seeds()
+    for given in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64, "picks": 128}):
+        seeds = TrainConfig(seed=3, **given).seeds()
         assert seeds == (1645421708, 4294262074, 3363538554)
 
 
+COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interval", "max_picks")
+
+
 @pytest.mark.parametrize(
-    ("field", "value", "error"),
+    ("field", "value"),
     [
-        ("env", "CartPole-v1", ValueError),
-        ("ties", "coin", ValueError),
-        ("picks", 0, ValueError),
-        ("picks", 100, ValueError),  # no multiple of 64
-        ("picks", 2048, ValueError),  # not enough for an update by 2048
-        ("seed", -1, ValueError),
-        ("num_envs", 0, ValueError),
-        ("learning_rate", -1e-3, ValueError),
-        ("learning_rate", 10**400, ValueError),  # beyond the largest float
-        ("batch_size", 0, ValueError),
-        ("replay_size", 63, ValueError),  # less than a step of all environments
-        ("epsilon_init", 1.1, ValueError),
-        ("epsilon_final", -0.1, ValueError),
-        ("epsilon_fraction", 2, ValueError),
-        ("gamma", float("nan"), ValueError),
-        ("beta", float("inf"), ValueError),
-        ("position_noise", -1e-3, ValueError),
-        ("network", "mlp", ValueError),
-        ("network", 3, ValueError),
-        ("n_features", 0, ValueError),
-        ("n_features", 33, ValueError),  # attention has two heads
-        ("equalize", "no", TypeError),
-        ("mask", None, TypeError),
-        ("gradient_steps", -1, ValueError),
-        ("target_update_interval", 0, ValueError),
-        ("log_interval", -1, ValueError),
-        ("checkpoint_interval", -1, ValueError),
+        *((field.name, -1) for field in fields(TrainConfig)),
+        *((field, 0) for field in COUNTS),
+        *((f"epsilon_{name}", 1.1) for name in ("init", "final", "fraction")),
+        ("picks", 100),  # no multiple of 64
+        ("picks", 2048),  # not enough for an update by 2048
+        ("learning_rate", 10**400),  # beyond the largest float
+        ("replay_size", 63),  # less than a step of all environments
+        ("gamma", float("nan")),
+        ("beta", float("inf")),
+        ("network", "mlp"),
+        ("n_features", 33),  # attention has two heads
     ],
 )
-def test_bad_values_are_refused_by_name(field, value, error):
+def test_bad_values_are_refused_by_name(field, value):
     other = {"network": "attention"} if field == "n_features" else {}
-    with pytest.raises(error, match=f"^{field} is "):
+    with pytest.raises((TypeError, ValueError), match=f"^{field} is "):
         TrainConfig(**{field: value} | other)
 
 

@@ -5,54 +5,42 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import HeightNetwork, peq, weights
+from tests.agent.runs import HeightNetwork, make_batch, peq, weights
 from unload import DQN, Greedy
-
-
-def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> dict:
-    masks = rng.integers(2, size=(size, items)).astype(bool)
-    masks[:, 0] = True
-    return {
-        "observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
-        "actions": rng.integers(items, size=size),
-        "rewards": rng.choice([-1.0, 1.0], size=size).astype(np.float32),
-        "next_observations": rng.uniform(-1, 1, (size, items, 3)).astype(np.float32),
-        "next_masks": masks,
-        "terminations": rng.random(size) < 0.2,
-    }
 
 
 def without_next(batch: dict) -> dict:
     return {name: batch[name] for name in ("observations", "actions", "rewards")}
 
 
-def test_without_exploration_the_best_allowed_item_is_chosen(rng):
-    observations = np.zeros((3, 4, 3), np.float32)
-    observations[..., 2] = [-0.9, 0.1, 0.8, 0.2]
-    masks = np.array([[1, 1, 1, 1], [1, 1, 0, 1], [1, 0, 0, 0]], bool)
-    assert DQN(HeightNetwork()).choose(observations, masks, 0.0, rng).tolist() == [2, 3, 0]
-    assert DQN(HeightNetwork(-1.0)).choose(observations, masks, 0.0, rng).tolist() == [0, 0, 0]
-
-
 def test_epsilon_is_the_share_of_random_actions(rng):
+    """The others go for the best item that is allowed, which is not the best of all."""
     observations = np.zeros((20_000, 4, 3), np.float32)
-    observations[:, 2, 2] = 1
+    observations[:, 2:, 2] = 1, 2
     masks = np.tile([True, True, True, False], (20_000, 1))
-    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
-    shares = np.bincount(actions, minlength=4) / 20_000
+    agent = DQN(HeightNetwork())
+    shares = np.bincount(agent.choose(observations, masks, 0.3, rng), minlength=4) / 20_000
     assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
+    with pytest.raises(ValueError, match="allowed is False in a whole row; expected"):
+        agent.choose(observations, np.zeros_like(masks), 1.0, rng)
 
 
 @pytest.mark.parametrize("beta", [1.0, 0.3])
 @pytest.mark.parametrize("gamma", [0.0, 0.9])
 @pytest.mark.parametrize("fused", [False, True])
 def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
-    """Against the whole batch at once, written down as the paper's equations have it."""
+    """Against the whole batch at once, written down as the paper's equations have it.
+
+    The target network is a copy, also after it has followed once: learners change weights in place.
+    """
     batch = make_batch(rng)
     agent = DQN(peq(), learning_rate=0.01, gamma=gamma, beta=beta, fused_update=fused)
     reference, target = peq(), peq()
     optimizer = torch.optim.Adam(reference.parameters(), lr=0.01)
-    for _ in range(3):
+    for number in range(3):
+        if number == 1:
+            agent.update_target()
+            target.load_state_dict(reference.state_dict())
         following = target(torch.from_numpy(batch["next_observations"])).detach().numpy()
         best = np.where(batch["next_masks"], following, -np.inf).max(axis=1)
         bootstrap = gamma * best * ~batch["terminations"]
@@ -68,14 +56,6 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
         assert agent.update(memory, np.arange(7, 157)) == pytest.approx(loss.item(), rel=1e-5)
     for mine, theirs in zip(weights(agent.network), weights(reference)):
         assert torch.allclose(mine, theirs, atol=2e-5)
-
-
-def test_choosing_from_nothing_is_refused(rng):
-    """By whoever chooses, the random numbers or the network."""
-    observations, allowed = np.zeros((2, 5, 3), np.float32), np.zeros((2, 5), bool)
-    for epsilon, error in ((1.0, ValueError), (0.0, FloatingPointError)):
-        with pytest.raises(error, match="expected"):
-            DQN(peq()).choose(observations, allowed, epsilon, rng)
 
 
 @pytest.mark.parametrize("fused", [False, True])
@@ -99,19 +79,6 @@ def test_a_loss_that_is_not_finite_leaves_the_weights(rng, fused, name):
         agent.check_finite()
 
 
-@pytest.mark.parametrize("fused", [False, True])
-def test_a_state_goes_on_bit_by_bit(rng, fused):
-    batch = make_batch(rng)
-    agent, other = (DQN(peq(seed), gamma=0.5, fused_update=fused) for seed in (0, 1))
-    for _ in range(2):
-        agent.update(batch)
-    other.load_state(agent.state())
-    losses = [(a.update(batch), a.update(batch)) for a in (agent, other)]
-    assert losses[0] == losses[1]
-    assert all(torch.equal(a, b) for a, b in zip(weights(agent.network), weights(other.network)))
-    assert agent.state().keys() == other.state().keys()
-
-
 def test_the_defaults_are_those_of_the_paper():
     defaults = {name: each.default for name, each in signature(DQN).parameters.items()}
     paper = {"learning_rate": 1e-3, "gamma": 0.0, "beta": 1.0}
@@ -131,17 +98,6 @@ def test_what_is_no_network_setting_or_batch_is_refused(rng):
         DQN(peq(), gamma=0.9).update(without_next(make_batch(rng)))
     with pytest.raises(TypeError, match="equalize is 1.0; expected True or False"):
         Greedy(peq(), equalize=1.0)
-
-
-@pytest.mark.parametrize("fused", [True, False])
-def test_the_target_network_is_a_copy(rng, fused):
-    """Both learners change the network's weights in place."""
-    agent = DQN(peq(), learning_rate=0.05, gamma=0.9, fused_update=fused)
-    for _ in range(2):
-        before = {name: value.clone() for name, value in agent.target.items()}
-        agent.update(make_batch(rng))
-        assert all(torch.equal(agent.target[name], before[name]) for name in before)
-        agent.update_target()
 
 
 def test_a_next_state_without_a_choice_is_refused(rng):

@@ -22,13 +22,7 @@ def test_one_row_per_episode():
     assert list(frame.columns) == COLUMNS and len(frame) == 3
     assert (frame["success_rate"] == frame["unloaded"] / 40).all()
     assert frame["success_rate"].between(0.05, 0.7).all()
-
-
-def test_a_stubborn_policy_sits_in_a_deadlock_without_the_mask():
-    frame = evaluate(lowest, episodes=2, mask=False, max_picks=20)
-    assert (frame["success_rate"] == 0).all()
-    assert frame["deadlocked"].tolist() == [19 / 20] * 2
-    assert frame["longest_deadlock"].tolist() == [19, 19]
+    assert not frame.equals(evaluate(policies.random, episodes=3, seed=2, max_picks=40))
 
 
 def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
@@ -48,14 +42,6 @@ def test_a_load_does_not_depend_on_how_many_there_are():
     pd.testing.assert_frame_equal(few, many.iloc[:2])
     one, two = (evaluate(policies.random, n, physics="local", max_picks=9) for n in (1, 2))
     pd.testing.assert_frame_equal(one, two.iloc[:1])
-
-
-def test_the_seed_decides():
-    first, same, other = (
-        evaluate(policies.random, 3, seed=seed, max_picks=60) for seed in (1, 1, 2)
-    )
-    pd.testing.assert_frame_equal(first, same)
-    assert not first.equals(other)
 
 
 def test_whole_containers_are_unloaded_by_picking_the_highest_item():

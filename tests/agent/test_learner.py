@@ -3,7 +3,7 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import peq
+from tests.agent.runs import make_batch, peq
 from unload import DQN
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.fast.learner import FusedLearner
@@ -11,17 +11,18 @@ from unload.fast.learner import FusedLearner
 SIZE, ITEMS = ROWS_PER_PASS + 30, 9  # more than one chunk
 
 
-def batch_of(rng: np.random.Generator) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    batch = {
-        "observations": rng.uniform(-1, 1, (SIZE, ITEMS, 3)).astype(np.float32),
-        "actions": rng.integers(ITEMS, size=SIZE),
-    }
-    return batch, rng.uniform(-1, 1, SIZE).astype(np.float32)
+@pytest.fixture
+def batch(rng) -> dict[str, np.ndarray]:
+    return make_batch(rng, SIZE, ITEMS)
 
 
-def test_gradients_are_those_of_the_mean_loss(rng):
+@pytest.fixture
+def targets(rng) -> np.ndarray:
+    return rng.uniform(-1, 1, SIZE).astype(np.float32)
+
+
+def test_gradients_are_those_of_the_mean_loss(batch, targets):
     """Adam hides a constant factor, so the gradients themselves are compared."""
-    batch, targets = batch_of(rng)
     learner, reference = PlainLearner(peq(), 1e-3, 0.5), peq()
     loss = learner.start(batch, targets)()
     values = reference(torch.from_numpy(batch["observations"]))
@@ -34,8 +35,7 @@ def test_gradients_are_those_of_the_mean_loss(rng):
 
 
 @pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
-def test_learners_have_one_interface(rng, kind):
-    batch, targets = batch_of(rng)
+def test_learners_have_one_interface(rng, batch, targets, kind):
     one, other = kind(peq(), 1e-3, 1.0), kind(peq(), 1e-3, 1.0)
     rows = rng.integers(SIZE, size=70)
     picked = {name: array[rows] for name, array in batch.items()}
@@ -48,23 +48,21 @@ def test_learners_have_one_interface(rng, kind):
 
 
 @pytest.mark.parametrize("kind", [PlainLearner, FusedLearner])
-def test_the_fused_update_takes_tanh_in_double_precision(rng, kind):
+def test_the_fused_update_takes_tanh_in_double_precision(batch, kind):
     """Where the value is nearly 1, the slope of tanh in single precision is 0."""
     saturated = peq()
     with torch.no_grad():
         saturated.scorer.bias.fill_(12.0)
-    batch, _ = batch_of(rng)
     learner = kind(saturated, 1e-3, 1.0)
     for _ in range(3):
         learner.start(batch, np.full(SIZE, -1, np.float32))()
     assert (saturated.scorer.bias.item() < 12) == (kind is FusedLearner)
 
 
-def test_plain_means_plain_everywhere(rng, monkeypatch):
+def test_plain_means_plain_everywhere(rng, batch, monkeypatch):
     """Without the fused update, nothing of it is called, neither to learn nor to choose."""
     for name in ("start_gradients", "best_actions"):
         monkeypatch.setattr(f"unload.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain"))
-    batch, targets = batch_of(rng)
     agent = DQN(peq(), fused_update=False)
-    agent.update(batch | {"rewards": targets})
+    agent.update(batch)
     agent.choose(batch["observations"], np.ones((SIZE, ITEMS), bool), 0.0, rng)

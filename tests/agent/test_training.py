@@ -14,7 +14,7 @@ from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_ste
 from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
-from unload.agent.training import Curve, Point, Training, warn_of_other_bits
+from unload.agent.training import Point, Training, warn_of_other_bits
 from unload.env.vector import ContainerVectorEnv
 from unload.network.variants import NETWORKS
 from unload.physics.table import LiftTable, shared_table
@@ -90,12 +90,20 @@ def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, coun
     assert all(f"PyTorch uses {found} instructions" in str(each.message) for each in said)
 
 
-@pytest.mark.parametrize("network", NETWORKS)
-def test_every_network_is_trained_and_gone_on_with(tmp_path, network):
+@pytest.mark.parametrize(
+    "fields",
+    [
+        *({"network": network} for network in NETWORKS),
+        *RUNS.values(),
+        {"shuffle_places": True},
+    ],
+    ids=str,
+)
+def test_every_run_is_gone_on_with(tmp_path, fields):
     """With the same bits where PyTorch's default is double precision."""
-    config = TrainConfig(**CONTAINER | {"network": network})
+    config = TrainConfig(**CONTAINER | fields)
     result = train(config, tmp_path / "straight", progress=False)
-    assert type(result.policy.network) is NETWORKS[network]
+    assert type(result.policy.network) is NETWORKS[config.network]
     table = evaluate(result.policy, 1, max_picks=20)
     torch.set_default_dtype(torch.float64)
     try:
@@ -120,27 +128,19 @@ def test_a_network_of_ones_own_is_trained(tmp_path):
 
 
 def test_a_reward_of_ones_own_gets_the_distance():
-    """In metres; what is learned from changes, and the curve does not."""
-    run = Training(TrainConfig(**CONTAINER), change=metres)
+    """In metres; what is learned from changes, and the curve does not.
+
+    Also of an episode's last pick, whose infos stand apart; NaN in a task without lifts.
+    """
+    run = Training(TrainConfig(**CONTAINER | {"max_picks": 3}), change=metres)
     for _ in range(20):
         run.step()
-    learned = run.replay.arrays["rewards"][:80]
+    learned = run.replay.arrays["rewards"][:80].reshape(4, 20)  # of the four points so far
     assert (learned >= 0).all() and len(np.unique(learned)) > 1
-    successes = run.curve.table()["success_rate"].iloc[-1]
-    assert successes == pytest.approx((learned[-20:] >= 0.2).mean())
-
-
-@pytest.mark.slow
-def test_the_agent_learns_to_choose_the_highest_item(tmp_path):
-    config = TrainConfig(
-        env="unload/HighestItem-v0", picks=64 * 700, batch_size=512, replay_size=20_000,
-        learning_rate=1e-2, n_features=16, log_interval=50, equalize=False,
-    )  # fmt: skip
-    curve = train(config, tmp_path, progress=False).curve
-    assert curve["success_rate"].iloc[0] < 0.2
-    assert curve["success_rate"].iloc[-1] > 0.8
-    frame = evaluate(load_policy(tmp_path / "policy.safetensors"), episodes=1, max_picks=60)
-    assert frame["success_rate"].item() > 0.8
+    successes = run.curve.table()["success_rate"].tolist()
+    assert successes == pytest.approx((learned >= 0.2).mean(axis=1).tolist())
+    run = Training(HIGHEST)
+    assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()
 
 
 def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
@@ -159,31 +159,13 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_a_run_can_be_watched(tmp_path, monkeypatch):
-    """At each point, by a callback and on disk; and what is resumed goes on with the next one."""
-    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
-    config, points, on_disk = TrainConfig(**CONTAINER), [], []
-
-    def callback(point):
-        points.append(point)
-        on_disk.append(len(pd.read_csv(tmp_path / "curve.csv")))
-
-    with at_step(33, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path, progress=False, callback=callback)
-    assert len(points) == 6
-    result = train(config, tmp_path, progress=False, callback=callback)
-    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
-    assert on_disk == list(range(1, 11))
-    train(config, tmp_path, progress=False, callback=callback)  # it is finished
-    assert len(points) == 10
-
-
 def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
     written = []
     monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
     with at_step(49, runs.crash), pytest.raises(runs.Breakdown):  # after nine points
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert 1 <= len(written) < 9
+    assert not (tmp_path / "checkpoint.npz").exists(), "the step was broken off"
 
 
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
@@ -228,22 +210,6 @@ def test_lifts_are_kept_when_a_run_is_stopped_and_refused_where_they_are_damaged
     with pytest.raises(ValueError, match=message):
         train(config, tmp_path / "other", **usual)
     assert not (tmp_path / "other").exists()
-
-
-def test_an_error_in_a_stack_keeps_the_lifts_and_no_half_step(tmp_path):
-    lifts, loads = tmp_path / "lifts.npz", []
-
-    def stack(rng):
-        loads.append(stack_load(rng, walls=1))
-        if len(loads) == 12:
-            raise runs.Breakdown
-        return loads[-1]
-
-    config = TrainConfig(**CONTAINER)
-    with pytest.raises(runs.Breakdown):
-        train(config, tmp_path / "run", progress=False, stack=stack, lifts=lifts)
-    assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
-    assert not (tmp_path / "run" / "checkpoint.npz").exists()
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
@@ -307,29 +273,17 @@ def test_a_folder_in_use_is_refused(tmp_path):
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
-def test_a_point_holds_the_means_since_the_last_one():
-    curve = Curve()
-    curve.add(np.array([1.0, -1.0]), np.array([False, True]), [])
-    curve.end_point(2, 1.0)
-    curve.add(np.array([1.0, 1.0]), np.array([False, False]), [0.5, 0.25])
-    curve.add(np.array([1.0, -1.0]), np.array([True, True]), [0.0])
-    curve.end_point(6, 0.5)
-    table = curve.table()
-    assert table["picks"].tolist() == [2, 6]
-    assert table["mean_reward"].tolist() == [0, 0.5]
-    assert table["success_rate"].tolist() == [0.5, 0.75]
-    assert table["deadlocked"].tolist() == [0.5, 0.5]
-    assert np.isnan(table["loss"][0]) and table["loss"][1] == pytest.approx(0.25)
-    assert table["epsilon"].tolist() == [1.0, 0.5]
-    assert table["wall_time"].is_monotonic_increasing
+def test_a_callback_may_end_a_run(tmp_path, monkeypatch):
+    """By False, not by None or 0; the policy and the curve until then are its result.
 
-
-def test_a_callback_may_end_a_run(tmp_path):
-    """By False, not by None or 0; the policy and the curve until then are its result."""
+    At each point the curve is on disk, too, where that was not done a moment before.
+    """
+    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
     config, points = TrainConfig(**CONTAINER), []
 
     def callback(point):
         points.append(point)
+        assert len(pd.read_csv(tmp_path / "curve.csv")) == len(points)
         return False if len(points) == 4 else 0 if len(points) == 3 else None
 
     result = train(config, tmp_path, progress=False, callback=callback)
@@ -363,7 +317,7 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-@pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt, OSError, GeneratorExit])
+@pytest.mark.parametrize("raised", [SystemExit, OSError])
 @pytest.mark.parametrize("picks", [100, 200])
 def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
     """Also after the last pick; and wherever the callback has gone meanwhile."""
@@ -413,53 +367,24 @@ def test_the_bootstrap_maximum_obeys_the_mask(mask):
     assert (run.rollout.allowed & (run.rollout.masks == 0)).any() == (not mask)
 
 
-def test_training_without_the_mask_picks_items_only(tmp_path, monkeypatch):
-    fewest, pick = [], ContainerVectorEnv._pick
-
-    def watched(envs, actions, playing):
-        fewest.append((envs.visible >= 0).sum(axis=1).min())
-        assert (envs.visible[np.arange(len(actions)), actions] >= 0).all()
-        return pick(envs, actions, playing)
-
-    monkeypatch.setattr(ContainerVectorEnv, "_pick", watched)
-    config = TrainConfig(picks=800, num_envs=4, batch_size=32, n_features=4, mask=False)
-    train(config, tmp_path, progress=False, stack=runs.few_walls)
-    assert min(fewest) < 70  # of 128 rows
-
-
 @pytest.mark.parametrize("gamma", [0.0, 0.9])
-def test_a_container_in_which_every_item_has_failed_is_played_to_its_end(gamma, boxes, monkeypatch):
-    """With the mask, too: its items may then be picked again."""
+@pytest.mark.parametrize("mask", [False, True])
+def test_a_container_in_which_every_item_has_failed_is_played_to_its_end(
+    gamma, mask, boxes, monkeypatch
+):
+    """With the mask, too: its items may then be picked again. Rows without one never are."""
     look_up = ContainerVectorEnv._look_up
     monkeypatch.setattr(
         ContainerVectorEnv, "_look_up", lambda *each: (look_up(*each)[0], np.zeros(4))
     )
     three = boxes((0.4, 0.2), (1.2, 0.2), (2.0, 0.2))
-    config = TrainConfig(**CONTAINER | {"mask": True, "gamma": gamma, "epsilon_fraction": 0.2})
+    config = TrainConfig(**CONTAINER | {"mask": mask, "gamma": gamma, "epsilon_fraction": 0.2})
     run = Training(config, stack=lambda rng: three)
     for step in range(config.picks // config.num_envs):
         tried = step % config.max_picks
-        assert (run.rollout.allowed.sum(axis=1) == (3 - tried if tried < 3 else 3)).all()
+        left = 3 - tried if mask and tried < 3 else 3
+        assert (run.rollout.allowed[:, :3].sum(axis=1) == left).all()
+        assert not run.rollout.allowed[:, 3:].any()
         run.step()
     assert run.curve.table()["success_rate"].eq(0).all()
     assert not run.replay.arrays.get("next_masks", np.zeros((1, 4)))[:, 3:].any()
-
-
-def test_a_pick_says_how_far_it_has_lifted(monkeypatch):
-    """Also where it was an episode's last one, whose infos stand apart; NaN without lifts."""
-    lifted, pick = [], ContainerVectorEnv._pick
-
-    def watched(envs, actions, playing):
-        rewards = pick(envs, actions, playing)
-        lifted.append(envs._distances.copy())
-        return rewards
-
-    monkeypatch.setattr(ContainerVectorEnv, "_pick", watched)
-    run = Training(TrainConfig(**CONTAINER | {"max_picks": 3}))
-    for _ in range(7):
-        picks, distances = run.rollout.pick(np.array([0, 20, 40, 60]))
-        assert (distances == lifted[-1]).all()
-        assert ((distances >= 0.2) == (picks["rewards"] > 0)).all()
-    assert np.unique(lifted).size > 1
-    run = Training(TrainConfig(**RUNS["highest item"]))
-    assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()

@@ -88,15 +88,8 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
 
 
-@pytest.mark.parametrize(
-    ("make", "action", "function"),
-    [
-        (container, 0, "env.observation.nearest"),
-        (HighestItemEnv, 0, "env.observation.nearest"),
-        (partial(ContainerVectorEnv, 2), [0, 0], "fast.containers.pick"),
-    ],
-)
-def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, action, function, monkeypatch):
+@pytest.mark.parametrize("make", [container, HighestItemEnv])
+def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
     env, same = make(), make()
     env.reset(seed=0)
 
@@ -104,13 +97,13 @@ def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, action, functio
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(f"unload.{function}", interrupted)
-        env.step(action)
-    for call in (lambda: env.step(action), env.action_masks):
+        patch.setattr("unload.env.observation.nearest", interrupted)
+        env.step(0)
+    for call in (lambda: env.step(0), env.action_masks):
         with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
             call()
     assert_same(env.reset(seed=4), same.reset(seed=4))
-    assert_same(env.step(action), same.step(action))
+    assert_same(env.step(0), same.step(0))
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, pickle.dumps])

@@ -16,26 +16,11 @@ def test_distance_is_the_papers_formula_from_the_containers_own_entrance(rng, co
     assert observation.scale(np.array(container) / 4, *own).tolist() == [-0.5, -0.5, -0.5]
 
 
-def test_nearest_are_the_nearest_nearest_first(full_load):
-    distances = observation.distance(full_load.positions)
-    rows = observation.nearest(full_load.positions)
-    assert rows.shape == (128,) and rows.dtype == np.int64
-    assert (np.diff(distances[rows]) >= 0).all()
-    assert distances[rows].max() <= np.delete(distances, rows).min()
-
-
 def test_ties_go_to_the_smaller_index():
     positions = np.tile([5.0, 1.0, 1.0], (6, 1))
     positions[:, 1] = [0.1, 2.0, 0.5, 1.0, 1.5, 0.3]  # y does not count
     positions[4, 0] = 6.0
     assert observation.nearest(positions, 4).tolist() == [4, 0, 1, 2]
-
-
-def test_scale_maps_the_container_to_the_cube():
-    corners = np.array([[0, 0, 0], [7, 2.5, 2.5], [3.5, 1.25, 0.625]])
-    scaled = observation.scale(corners)
-    assert scaled.dtype == np.float32
-    assert scaled.tolist() == [[-1, -1, -1], [1, 1, 1], [0, 0, -0.5]]
 
 
 @pytest.mark.parametrize("function", [observation.distance, observation.nearest])

@@ -1,5 +1,3 @@
-import itertools
-
 import numpy as np
 import pytest
 
@@ -16,16 +14,6 @@ from unload.load.substacks import (
     substacks_that_fit,
     wall_cells,
 )
-
-
-@pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
-def test_every_combination_tiles_a_row(variants):
-    covered = np.zeros((ROWS_HIGH, CELLS_WIDE), dtype=int)
-    for package, left, lower in wall_cells([variants]):
-        width, height = PACKAGES[package]
-        assert left + width <= CELLS_WIDE and lower + height <= ROWS_HIGH
-        covered[lower : lower + height, left : left + width] += 1
-    assert (covered == 1).all()
 
 
 def test_all_variants_of_all_substacks_occur(full_load):

@@ -52,15 +52,6 @@ def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
     assert values.abs().max() < 1
 
 
-def test_a_network_can_be_exported(items):
-    """For any number of observations and items; ``torch.onnx.export`` begins with this."""
-    peq, free = make(PEQNetwork).eval(), torch.export.Dim.DYNAMIC
-    shapes = [{0: free, 1: free}]
-    exported = torch.export.export(peq, (items(2, 128),), dynamic_shapes=shapes).module()
-    for batch in (items(3, 128), items(5, 60)):
-        torch.testing.assert_close(exported(batch), peq(batch))
-
-
 def test_permuting_the_items_permutes_the_values(kind, items, rng):
     network, batch = make(kind, 64), items(4, 128)
     assert kind().n_features == 64
@@ -112,19 +103,6 @@ def test_the_attention_network_is_two_blocks_with_normalization_first(items):
     values = torch.tanh(network.scorer(network.norm(own))).squeeze(2)
     assert len(network.blocks) == 2
     torch.testing.assert_close(network(batch), values)
-
-
-@pytest.mark.parametrize("n", [2, 64])
-def test_parameter_counts(n):
-    attention = 2 * ((3 * n * n + 3 * n) + (n * n + n) + (4 * n * n + 3 * n) + 4 * n)
-    counts = {
-        PEQNetwork: 8 * n + 1,
-        TwoLayerScorer: 4 * n + (4 * n * n + n) + (n + 1),
-        EquivariantStack: (6 * n + n) + 2 * (2 * n * n + n) + (n + 1),
-        AttentionNetwork: 4 * n + attention + 2 * n + (n + 1),
-    }
-    for kind, count in counts.items():
-        assert sum(parameter.numel() for parameter in kind(n).parameters()) == count, kind
 
 
 def test_the_generator_alone_decides_the_weights(kind):

@@ -24,21 +24,6 @@ def test_what_a_full_lift_leaves_behind(make, boxes, after_pick, item, restored)
     assert physics.exact == (after_pick == "restore")
 
 
-def test_floor_side_walls_and_rear_wall_enclose_the_container(make, boxes):
-    client = make("full", boxes((0.2, 0.2)))._world.client
-    floor, left, right, rear = (np.array(client.getAABB(body)) for body in range(4))
-    length, width, height = task.CONTAINER
-    near = {"abs": 0.02}  # Bullet makes these bounds a little larger
-    assert (floor[1, 2], left[1, 1], right[0, 1], rear[1, 0]) == pytest.approx(
-        (0, 0, width, 0), **near
-    )
-    for low, high in (left, right):
-        assert low[0] < 0 and high[0] > length and low[2] < 0.02 and high[2] > height - 0.02
-    for low, high in (floor, rear):
-        assert low[1] < 0 and high[1] > width
-    assert floor[0, 0] < 0 and floor[1, 0] > length and rear[1, 2] > height - 0.02
-
-
 def test_a_restored_full_world_repeats_its_answers(make, small_load):
     physics = make("full", small_load)
     items = range(0, len(small_load), 15)

@@ -10,18 +10,15 @@ import pandas as pd
 import pytest
 
 from studies import paths, results
-from studies.falls import laboratory
 from studies.falls.long import LONG
-from studies.grid import Cell
+from studies.grid import read_measures
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
 from studies.results import kept, measured, publish, read_provenance, read_table, revision
 from unload import TrainConfig
 
-# The cells of what is published, by its name.
-PUBLISHED = {grid.name: grid.cells for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
-PUBLISHED["falls/laboratory"] = {"config": Cell(laboratory.CONFIG, [0])}
+PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
 
 
 @pytest.fixture
@@ -136,6 +133,22 @@ def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
 def test_the_settings_of_published_runs_are_their_configurations(name):
     """Those that stand beside them train the runs again."""
     settings = read_provenance(paths.DATA, name)["settings"]
-    for cell, plan in PUBLISHED[name].items():
+    for cell, plan in PUBLISHED[name].cells.items():
         assert TrainConfig(**settings.pop(cell)) == replace(plan.config, seed=plan.seeds[0])
-    assert set(settings) <= {"runs"}
+    assert not settings
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_all_planned_runs_are_published_in_full_length(name):
+    grid, provenance = PUBLISHED[name], read_provenance(paths.DATA, name)
+    planned = grid.configs()
+    assert provenance["runs"] == provenance["planned"] == len(planned)
+    assert not provenance["reduced"]
+    if grid.measure is not None:
+        rows = read_measures(grid)
+        runs = [f"{cell}/seed_{seed}" for cell, seed in zip(rows["cell"], rows["seed"])]
+    else:
+        table = pd.read_csv(paths.DATA / f"{name}_loss.csv").set_index("picks")
+        assert {config.picks for config in planned.values()} == {table.index[-1]}
+        runs = list(table)
+    assert runs == list(planned)

@@ -195,16 +195,6 @@ def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
         ]
 
 
-def test_a_lock_is_released_after_an_error_and_kept_from_another_block(tmp_path):
-    with pytest.raises(KeyError), files.locked(tmp_path):
-        message = f"in use by process {os.getpid()} on"
-        with pytest.raises(RuntimeError, match=message), files.locked(tmp_path):
-            pytest.fail("two blocks hold one lock")
-        raise KeyError
-    with files.locked(tmp_path):
-        pass
-
-
 def test_the_package_can_be_imported_where_windows_lacks_something():
     script = """if True:
         import errno, importlib, os, pkgutil, signal, sys

@@ -53,11 +53,9 @@ def test_committed_files_of_the_papers_plots_are_those_of_the_tables(tmp_path, m
         assert (tmp_path / path).read_bytes() == (paths.DATA / path).read_bytes()
 
 
-def test_committed_search_has_all_runs():
-    groups = read_grid(tuning.TUNING).groupby(["cell", "seed"])["picks"]
-    assert len(groups) == 240 and (groups.size() == 3000).all() and (groups.max() == 192_000).all()
+def test_the_search_has_240_runs_of_which_slow_ones_come_first():
     sizes = [config.batch_size for config in tuning.TUNING.configs().values()]
-    assert sizes == sorted(sizes, reverse=True), "slow runs come first"
+    assert len(sizes) == 240 and sizes == sorted(sizes, reverse=True)
 
 
 def test_summary_of_a_run():

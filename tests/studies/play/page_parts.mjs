@@ -274,25 +274,25 @@ const FALLEN = rates(0.3, 0.1);
 const MORE = "With these jams nothing ends above 60 %.";
 const NOWHERE = "it prefers no place to height.";
 
-// The line that is said, the success rates of a run, and what is not as in other runs.
+// The pattern of the line that is said, the success rates of a run, and what differs from others.
 const RUNS = [
   ["", []],
   ["57 % of its latest picks succeeded.", [0.2, 0.57], { picks: 31_999 }],
   ["100 % of its latest picks succeeded.", ends(1), { running: true }],
   ["It learned: 98 % of its last picks succeeded, after 2.0 s.", ends(0.3, 0.96, 1)],
-  ["It learned: 95 %", ends(0.3, 0.95, 0.95)],
+  ["It learned: 95 %.*", ends(0.3, 0.95, 0.95)],
   [`It did not fall: 95 % at the end, 95 % at best; ${NOWHERE}`, ends(0.3, 0.94, 0.95)],
-  [`It learned: 58 % … ${MORE}`, ends(0.2, 0.58, 0.58), { seamless: true }],
-  [`It did not fall: 50 % … ${MORE}`, ends(0.3, 0.5, 0.5), { seamless: true }],
-  [`It fell … ${MORE}`, ends(0.6, 0.3, 0.3), { ...FALLEN, seamless: true }],
+  [`It learned: 58 %.*${MORE}`, ends(0.2, 0.58, 0.58), { seamless: true }],
+  [`It did not fall: 50 %.*${MORE}`, ends(0.3, 0.5, 0.5), { seamless: true }],
+  [`It fell.*${MORE}`, ends(0.6, 0.3, 0.3), { ...FALLEN, seamless: true }],
   [`It did not learn: 49 % at the end, 49 % at best; ${NOWHERE}`, ends(0.3, 0.49, 0.49)],
-  ["It did not fall: 90 %", ends(0.3, 0.9, 0.9)],
-  ["It fell", ends(0.9, 0.69, 0.69), FALLEN],
-  ["It did not learn", ends(0.9, 0.71, 0.71), FALLEN],
+  ["It did not fall: 90 %.*", ends(0.3, 0.9, 0.9)],
+  ["It fell.*", ends(0.9, 0.69, 0.69), FALLEN],
+  ["It did not learn.*", ends(0.9, 0.71, 0.71), FALLEN],
   ["It is stuck: 89 % of its picks repeat one that has just failed.", FELL, rates(0.1, 0.89)],
-  ["It fell", FELL, rates(0.1, 0.5)],
+  ["It fell.*", FELL, rates(0.1, 0.5)],
   ["It fell, from 94 % to 20 %.", FELL],
-  ["It fell … again: its last weights succeed in 96 % of fresh picks.", FELL, rates(0.96, 0)],
+  ["It fell.*again: its last weights succeed in 96 % of fresh picks.", FELL, rates(0.96, 0)],
   // What was judged with x and y blank says nothing of the run.
   ["It fell, from 94 % to 20 %.", FELL, { rates: { true: { success_rate: 0.96, repeated: 0 } } }],
 ];
@@ -309,13 +309,7 @@ for (const [slopes, why, changes] of [
   [[9, 9, 1], NOWHERE, { equalize: false }],
 ]) RUNS.push([`It fell, from 94 % to 20 %: ${why}`, FELL, { ...FALLEN, slopes, ...changes }]);
 
-/** Whether a line begins as is expected, and ends so if it is whole; "…" stands for any words. */
-function says(line, expected) {
-  const [start, end = start] = expected.split(" … ");
-  const whole = !expected || expected.endsWith(".");
-  const same = line.startsWith(start) && (!whole || line.endsWith(end)) && !line === !expected;
-  assert.ok(same, `${line}; expected ${expected}`);
-}
+const says = (line, expected) => assert.match(line, new RegExp(`^${expected}$`));
 
 test("the verdict of a run", () => {
   for (const [expected, success, changes] of RUNS) {
@@ -332,11 +326,11 @@ test("what blank coordinates show", () => {
   for (const [seen, blank, line, changes] of [
     [0.96, undefined, ""],
     [undefined, 0.96, `${start}96 % of fresh picks.`],
-    [0.34, 1, `${start} … in 34 %: they know height, but a place outweighed it.`],
-    [0.34, 0.8, `${start} … in 34 %: not only a place misled them.`],
-    [0.34, 0.43, `${start} … in 34 %: their mistakes are not those of a place.`],
+    [0.34, 1, `${start}.*in 34 %: they know height, but a place outweighed it.`],
+    [0.34, 0.8, `${start}.*in 34 %: not only a place misled them.`],
+    [0.34, 0.43, `${start}.*in 34 %: their mistakes are not those of a place.`],
     [0.99, 1, `${start}100 % of fresh picks, with x and y in 99 %: no place misleads them.`],
-    [0.3, 0.58, `${start} … : they know height, but a place outweighed it.`, { seamless: true }],
+    [0.3, 0.58, `${start}.*: they know height, but a place outweighed it.`, { seamless: true }],
   ]) {
     const judged = { rates: {} };
     if (seen) judged.rates.false = { success_rate: seen };
