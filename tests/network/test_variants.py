@@ -52,6 +52,15 @@ def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
     assert values.abs().max() < 1
 
 
+def test_a_network_can_be_exported(items):
+    """For any number of observations and items; ``torch.onnx.export`` begins with this."""
+    peq, free = make(PEQNetwork).eval(), torch.export.Dim.DYNAMIC
+    shapes = [{0: free, 1: free}]
+    exported = torch.export.export(peq, (items(2, 128),), dynamic_shapes=shapes).module()
+    for batch in (items(3, 128), items(5, 60)):
+        torch.testing.assert_close(exported(batch), peq(batch))
+
+
 def test_permuting_the_items_permutes_the_values(kind, items, rng):
     network, batch = make(kind, 64), items(4, 128)
     assert kind().n_features == 64

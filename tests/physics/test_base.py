@@ -1,6 +1,8 @@
 """What all three physics have in common, and lifts of a box in its situation."""
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,13 @@ from unload.physics.base import Physics
 from unload.physics.bullet import World
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
-from unload.physics.situation import Surroundings
+from unload.physics.situation import Situation, Surroundings
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_free_box_is_lifted_as_far_as_the_appendix_says(make, boxes, kind):
+    physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
+    assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -139,3 +147,18 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
     assert fresh._world.bodies > 100
+
+
+@pytest.mark.slow
+def test_the_memory_of_many_lifts_is_flat(monkeypatch):
+    """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
+    monkeypatch.setattr(World, "pull", lambda world, body: 0.0)
+    physics, resident = LocalPhysics(), []
+    for number in range(20_001):
+        boxes = np.array([(0, 0, 0, 500_000, 400_000, 300_000 + number)] * 2)
+        boxes[:, 2] = 350_000 * np.arange(2)
+        physics.simulate(Situation(boxes, 1, -200_000, ()))
+        if number % 5_000 == 0:
+            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
+    assert max(resident[2:]) - resident[1] < 10, "MiB"
