@@ -34,16 +34,13 @@ def height_reward(run: Training, share: float) -> None:
         share: h, in [0, 1]. A failed pick is learned from as -1 + h (z + 1) / 2, z as observed;
             the learning curve keeps the rewards of the environment.
     """
-    add = run.replay.add
 
-    def add_shaped(
-        observations: np.ndarray, actions: np.ndarray, rewards: np.ndarray, **rest: np.ndarray
-    ) -> None:
-        heights = (observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
-        shaped = np.where(rewards < 0, rewards + share * heights, rewards)
-        add(observations=observations, actions=actions, rewards=shaped, **rest)
+    def reward(picks: dict[str, np.ndarray], distances: np.ndarray) -> np.ndarray:
+        rewards, rows = picks["rewards"], np.arange(len(picks["actions"]))
+        heights = (picks["observations"][rows, picks["actions"], 2] + 1) / 2  # in [0, 1]
+        return np.where(rewards < 0, rewards + share * heights, rewards)
 
-    run.replay.add = add_shaped
+    run.reward = reward
 
 
 def mirror(
