@@ -22,12 +22,6 @@ NAMES = {  # of what ``PUPILS`` see and store, in their order
     "averaged": "ties averaged",
     "level": "level loads",
 }
-TITLES = {
-    "paper_no_mask": "mask off, b = 256",
-    "paper_mask": "mask on, b = 256",
-    "paper_b2048_no_mask": "mask off, b = 2048",
-    "paper_b2048_mask": "mask on, b = 2048",
-}
 
 
 @styled
@@ -38,8 +32,8 @@ def four_cells(curves: pd.DataFrame) -> Figure:
         curves: see ``read_grid``; other cells are left out.
     """
     figure, panels = plt.subplots(2, 2, figsize=(7, 4.6), sharex=True, sharey=True)
-    for axes, cell in zip(panels.flat, PAPER_CELLS):
-        runs = [run for _, run in curves[curves["cell"] == cell].groupby("seed")]
+    for axes, (name, cell) in zip(panels.flat, PAPER_CELLS.items()):
+        runs = [run for _, run in curves[curves["cell"] == name].groupby("seed")]
         for run in runs:
             axes.plot(run["picks"] / 1e6, 100 * run["success_rate"], "C1", lw=0.5, alpha=0.5)
         ends = 100 * np.array([end_msr(run) for run in runs])
@@ -50,7 +44,8 @@ def four_cells(curves: pd.DataFrame) -> Figure:
             fmt="k_", capsize=3, clip_on=False,
         )  # fmt: skip
         axes.axhline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
-        axes.set(title=f"{TITLES[cell]}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
+        kind = f"mask {'on' if cell.config.mask else 'off'}, b = {cell.config.batch_size}"
+        axes.set(title=f"{kind}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
     figure.supxlabel("million picks; dots: mean over the last tenth, with its 95 % t interval")
     figure.supylabel("MSR while training (%)")
     return figure

@@ -14,7 +14,7 @@ import pandas as pd
 
 from studies import statistics
 from studies.paper import tuning as search
-from studies.paper.training import paper_runs
+from studies.paper.training import PAPER_CELLS, paper_runs
 from studies.paper.visible_items import BINS
 from unload import task
 from unload.agent import policies
@@ -30,12 +30,6 @@ CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper g
 CONTAINERS = 40  # full ones, whose free items and whose bars of Fig. 5 are counted
 FIG5_AXIS = 70  # where the paper's axis ends, in steps of 10
 SETTLED = 200  # tuning steps after which the noise of the loss is measured
-READINGS = {  # of the paper's training: cell → column
-    "paper_no_mask": "without the mask, b = 256",
-    "paper_mask": "with the mask, b = 256",
-    "paper_b2048_no_mask": "without the mask, b = 2048",
-    "paper_b2048_mask": "with the mask, b = 2048",
-}
 
 
 def table(rows: list[tuple]) -> pd.DataFrame:
@@ -234,7 +228,8 @@ def training() -> pd.DataFrame:
     """The training, by the first plan's measures, see ``studies.statistics``.
 
     Returns:
-        ``where`` and ``paper``, and a column for each of ``READINGS``: ours, and whether it agrees.
+        ``where`` and ``paper``, and a column for each of ``PAPER_CELLS``: ours, and whether it
+        agrees.
     """
     runs = paper_runs()
     picks = task.NUM_ENVS * np.arange(1, search.STEPS + 1)
@@ -272,7 +267,9 @@ def training() -> pd.DataFrame:
             (f"{cell.fig11} of {cell.runs} runs", cell.fig11 >= half),
             (slower, max(slopes) < tuned),
         ]
-        frame[READINGS[cell.cell]] = [f"{text}: {word(agrees)}" for text, agrees in here]
+        config = PAPER_CELLS[cell.cell].config
+        reading = f"{'with' if config.mask else 'without'} the mask, b = {config.batch_size}"
+        frame[reading] = [f"{text}: {word(agrees)}" for text, agrees in here]
     return frame
 
 

@@ -48,11 +48,6 @@ def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
     }
 
 
-def _setting(field: str, value: float) -> dict[str, Cell]:
-    """The cell in which one setting is changed; its name says which."""
-    return {f"{field}_{value}": Cell(replace(CONFIG, **{field: value}), SEEDS)}
-
-
 # Attention has fewer seeds, because to train and to judge it takes five times as long.
 NETWORKS = {
     name: Cell(replace(SMALL, network=name), range(2) if name == "attention" else SEEDS)
@@ -63,15 +58,17 @@ CONTROL = {"unchanged": Cell(CONFIG, SEEDS)}
 REWARDS = {
     f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share)) for share in SHARES
 }
-SETTINGS = (
-    _setting("n_features", 16)
-    | _setting("n_features", 256)
-    | _setting("learning_rate", 1e-4)
-    | _setting("learning_rate", 1e-2)
-    | _setting("batch_size", 64)
-    | _setting("batch_size", 2048)
-    | _setting("gradient_steps", 4)
-)
+TRIED = {
+    "n_features": (16, 256),
+    "learning_rate": (1e-4, 1e-2),
+    "batch_size": (64, 2048),
+    "gradient_steps": (4,),
+}
+SETTINGS = {
+    f"{field}_{value}": Cell(replace(CONFIG, **{field: value}), SEEDS)
+    for field, values in TRIED.items()
+    for value in values
+}
 # What is shown together.
 PARTS = {"networks": NETWORKS, "rewards": CONTROL | REWARDS, "settings": CONTROL | SETTINGS}
 _grid = partial(Grid, command=f"{COMMAND} variants", measure=judged)
