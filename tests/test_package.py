@@ -17,7 +17,7 @@ PACKAGES = ("unload", "studies")
 
 # The files and folders that may import a library. ``studies/speed/`` may import all: it compares.
 LIBRARIES = {
-    "PIL": ("unload/load/", "studies/paper/"),
+    "PIL": ("unload/load/", "studies/play/"),
     "anywidget": ("studies/play/",),
     "filelock": ("unload/support/files.py",),
     "gymnasium": (

@@ -74,7 +74,7 @@ class Episode:
     """Picks on one load, one after the other, that can be taken back.
 
     Args:
-        load: the items.
+        load: the items; if None, one that the seed draws.
         seed: of the noise of their observed positions, see ``ContainerEnv``.
 
     Attributes:
@@ -82,13 +82,15 @@ class Episode:
         picks: those made so far, ``Pick`` each.
     """
 
-    def __init__(self, load: Load, seed: int = 0) -> None:
+    def __init__(self, load: Load | None = None, seed: int = 0) -> None:
         self._env = ContainerEnv("table", max_picks=sys.maxsize)
-        self.load, self._seed = load, checks.integer("seed", seed, 0)
+        self._options = {} if load is None else {"load": load}
+        self._seed = checks.integer("seed", seed, 0)
         self._begin()
+        self.load = self._env.physics.load
 
     def _begin(self) -> None:
-        self._now = self._env.reset(seed=self._seed, options={"load": self.load})
+        self._now = self._env.reset(seed=self._seed, options=self._options)
         self.picks: list[Pick] = []
         self._moments: list[Moment] = []
         self._remember(None)
@@ -180,7 +182,9 @@ class Run(Episode):
         mask: as given; may be set anew between picks.
     """
 
-    def __init__(self, player: str | Policy, load: Load, seed: int = 0, mask: bool = True) -> None:
+    def __init__(
+        self, player: str | Policy, load: Load | None, seed: int = 0, mask: bool = True
+    ) -> None:
         self._policy = player if callable(player) else policy_of(player)
         self.mask = mask
         super().__init__(load, seed)
