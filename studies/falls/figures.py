@@ -55,7 +55,7 @@ def four_cells(curves: pd.DataFrame) -> Figure:
 def dug(
     surface: np.ndarray, preferences: tuple[float, float], averaged: bool, msr: float
 ) -> Figure:
-    """What a rule leaves of the loads, seen from above, and its place among ``phase``.
+    """What a rule leaves of the loads, seen from above, and its place in the phase diagram.
 
     Args:
         surface: what ``measures.surface`` returns.
@@ -159,28 +159,16 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return figure
 
 
-@styled
-def phase(panels: Mapping[str, tuple[pd.DataFrame, bool]]) -> Figure:
+def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
     """Networks by their preferences along x and y, coloured by whether they err.
 
+    The shaded region is where the rule of ``fresh.predicted`` says that a network errs.
+
     Args:
-        panels: rows with ``slope_x``, ``slope_y``, ``slope_z`` and ``judged_as_is``, and whether
-            equal x share one rank, by the panel's title. The shaded region is where the rule of
-            ``fresh.predicted`` says that a network errs.
+        axes: where.
+        rows: with ``slope_x``, ``slope_y``, ``slope_z`` and ``judged_as_is``.
+        averaged: whether equal x share one rank.
     """
-    figure, all_axes = plt.subplots(
-        1, len(panels), figsize=(4.2 * len(panels), 3.8), sharex=True, sharey=True, squeeze=False
-    )
-    for axes, (title, (rows, averaged)) in zip(all_axes[0], panels.items()):
-        draw_phase(axes, rows, averaged)
-        axes.set_title(title)
-    all_axes[0, 0].set_ylabel("|preference| along y (across)")
-    all_axes[0, 0].legend(loc="upper right", fontsize=8)
-    return figure
-
-
-def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
-    """Draw the region in which networks err, and networks. Arguments as of ``phase``."""
     along_x, along_y = THRESHOLDS
     axes.axhspan(along_y, MOST_PREFERENCE, color="#f6d5c9", zorder=0)
     if not averaged:

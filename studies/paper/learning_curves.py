@@ -29,7 +29,7 @@ def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
     """
     figure, axes = plt.subplots()
     for (name, (runs, shown)), colour in zip(curves.items(), colours_of(curves)):
-        _draw_runs(axes, name, runs, shown, colour)
+        draw_runs(axes, name, runs, shown, colour)
     steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
     axes.set(xlabel="step $k$", ylabel=label, xlim=(0, steps))
     axes.set(ylim=(0, 0.6) if "loss" in label else (0, 1.02))
@@ -39,20 +39,8 @@ def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
     return figure
 
 
-@styled
-def in_panels(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
-    """As ``over_steps``, in a panel for each configuration: for curves that coincide."""
-    figure, panels = plt.subplots(1, len(curves), figsize=(9.6, 2.9), sharex=True, sharey=True)
-    for axes, (name, (runs, shown)), colour in zip(panels, curves.items(), colours_of(curves)):
-        _draw_runs(axes, name, runs, shown, colour)
-        steps = max(len(values) for values in runs.values())
-        axes.set(title=f"{name}, run {shown}", xlabel="step $k$", xlim=(0, steps), ylim=(0, 1.02))
-    panels[0].set_ylabel(label)
-    return figure
-
-
-def _draw_runs(axes: Axes, name: str, runs: Curves, shown: int, colour) -> None:
-    """Draw the runs of a configuration, one of them as a strong line."""
+def draw_runs(axes: Axes, name: str, runs: Curves, shown: int, colour) -> None:
+    """Draw the runs of a configuration, one of them as a strong line; see ``over_steps``."""
     for run, values in runs.items():
         smooth = running_mean(values)
         if run == shown:

@@ -14,7 +14,7 @@ from studies.falls import figures as falls
 from studies.falls.laboratory import read_laboratory, read_trace
 from studies.falls.long import read_long_trace
 from studies.grid import read_grid
-from studies.paper import diagrams, learning_curves, loads
+from studies.paper import diagrams, learning_curves
 from studies.paper.training import PAPER
 from studies.paper.tuning import running_mean
 from studies.paper.visible_items import scaled_side_view
@@ -40,11 +40,10 @@ FROM_DATA = {
 # The others, with what they are given here.
 FIGURES = FROM_DATA | {
     "fig01_mdp": diagrams.fig01_mdp,
-    "fig03_substacks": loads.fig03_substacks,
+    "fig03_substacks": diagrams.fig03_substacks,
     "fig07_network": diagrams.fig07_network,
     "scaled_side_view": lambda: scaled_side_view({"items": (np.eye(2), "C0")}, "p"),
     "over_steps": lambda: learning_curves.over_steps(RUNS, "MSR"),
-    "in_panels": lambda: learning_curves.in_panels(RUNS, "MSR"),
     "dug": lambda: falls.dug(np.eye(3), (0.5, -0.2), False, 0.6),
 }
 
