@@ -292,6 +292,6 @@ def throughput_falls(folder: str | Path = paths.DATA) -> Figure:
 
 
 def heap_data(n_jobs: int) -> None:
-    """Make all data of heaps, which is what ``data/heap`` holds."""
+    """Make all data of heaps: the heaps, recorded picks, networks, and the policies compared."""
     for step in (make_heaps, make_networks, choose_rules, compare):
         step(n_jobs=n_jobs)
