@@ -138,7 +138,6 @@ def left(policy: Policy, picks: int, seed: int) -> Load:
         action = policy(observation[None], info["action_mask"][None], rng)[0]
         observation, *_, info = env.step(int(action))
     load, present = env.physics.load, env.physics.present
-    env.close()
     return Load(
         *(each[present] for each in (load.positions, load.sizes, load.packages, load.walls))
     )

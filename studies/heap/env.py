@@ -187,9 +187,8 @@ class HeapEnv(EpisodeEnv):
         return picture(self.heap)
 
     def close(self) -> None:
-        """Disconnect both clients; may be called again."""
-        self._rake.close()
-        self._camera.close()
+        """Let go of both clients, which disconnects them; may be called again."""
+        self._rake = self._camera = None
         self._state = "closed"
 
     def _look(self) -> None:

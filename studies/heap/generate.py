@@ -76,7 +76,6 @@ def _dropped(rng: np.random.Generator) -> Heap:
         world.step(LAYER_TIME)
     world.step(SETTLE)
     positions, orientations = (np.array(part) for part in zip(*map(world.pose, bodies)))
-    world.close()
     return Heap(positions, orientations, sizes, packages)
 
 
@@ -108,7 +107,6 @@ def _settled(heap: Heap) -> tuple[Heap, float]:
         fastest = float(np.linalg.norm(moved, axis=1).max()) / PAUSE
         if not outside and fastest <= FASTEST:
             break
-    world.close()
     numbers = list(bodies)
     # Rounded as they are stored, so that a heap is the same before and after.
     positions, orientations = (np.array(part, np.float32).astype(float) for part in zip(*poses))

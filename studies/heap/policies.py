@@ -95,11 +95,6 @@ class Oracle:
         outcome = rake.pick(self.env.heap, int(self.env.visible[row]))
         return float(outcome.unloaded.sum() - self.falls_weight * outcome.fallen.sum())
 
-    def close(self) -> None:
-        """Disconnect its clients; may be called again."""
-        for rake in self._rakes:
-            rake.close()
-
 
 @dataclass(frozen=True, eq=False)
 class Picks:

@@ -114,11 +114,8 @@ def _record(round_number: int, number: int, explorer: str | None) -> str:
         return chosen(observations, masks, rng)
 
     env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
-    try:
-        heap = env.heaps[number % len(env.heaps)]
-        episode = play(env, policy, heap, int(rng.integers(2**32)))
-    finally:
-        env.close()
+    heap = env.heaps[number % len(env.heaps)]
+    episode = play(env, policy, heap, int(rng.integers(2**32)))
     return packed(vars(joined([episode])))
 
 

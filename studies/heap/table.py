@@ -164,12 +164,7 @@ def _play(player: dict, split: str, number: int, physics: str) -> dict[str, floa
         policy = Learned(load_networks(player["networks"]), player["falls_weight"])
     else:
         policy = Oracle(env, player["oracle"], physics)
-    try:
-        episode = play(env, policy, env.heaps[number], seed=number)
-    finally:
-        env.close()
-        if isinstance(policy, Oracle):
-            policy.close()
+    episode = play(env, policy, env.heaps[number], seed=number)
     return {"boxes": float(episode.unloaded.mean()), "falls": float(episode.falls.mean())}
 
 

@@ -157,7 +157,6 @@ def container_states(policy: str, seed: int) -> Iterator[tuple[int, ContainerEnv
         if picks < max(STAGES):
             chosen = UNLOADED_BY[policy](observation[None], info["action_mask"][None], rng)
             observation, _, _, _, info = env.step(chosen[0])
-    env.close()
 
 
 def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]], pd.DataFrame]:
@@ -193,7 +192,6 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
                     row |= {"table": table.lift(item), "local": local.lift(item)}
                     rows.append(named | row)
             states.append((table.load, table.present.copy()))
-    local.close()
     return states, pd.DataFrame(rows)
 
 
@@ -240,6 +238,4 @@ def fresh_distance(load: Load, item: int) -> float:
     """How far ``full`` moves an item of a load that has seen no other lift, in m."""
     physics = FullPhysics()
     physics.reset(load)
-    distance = physics.lift(item)
-    physics.close()
-    return distance
+    return physics.lift(item)

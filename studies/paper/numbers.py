@@ -139,9 +139,7 @@ def lifted_distance(stack: int) -> float:
         world.add_box((0, 0, 0.1 + 0.2 * level), (0.5, 0.4, 0.2), task.MASS)
         for level in range(stack)
     ]
-    distance = world.pull(bodies[0])
-    world.close()
-    return distance
+    return world.pull(bodies[0])
 
 
 def full_containers(count: int) -> pd.DataFrame:
@@ -163,7 +161,6 @@ def full_containers(count: int) -> pd.DataFrame:
         free = np.mean([not on_top(item) for item in range(len(positions))])
         bars = {name: np.histogram(x[items], BINS)[0].max() for name, items in seen.items()}
         rows.append({"free": free, "visible": env.liftable().mean(), **bars})
-    env.close()
     return pd.DataFrame(rows)
 
 

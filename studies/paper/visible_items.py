@@ -45,7 +45,6 @@ def _positions() -> dict[str, np.ndarray]:
     env = gymnasium.make("unload/Container-v0").unwrapped
     observed, _ = env.reset(seed=SEED)
     everything = observation.scale(env.observed_positions())
-    env.close()
     return {
         "all_items": everything,
         "Observation": observed,

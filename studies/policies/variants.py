@@ -20,12 +20,12 @@ from matplotlib.ticker import PercentFormatter
 
 from studies import paths
 from studies.changes import height_reward
+from studies.falls import measures
 from studies.grid import Cell, Grid, read_measures, train_grid
 from studies.results import COMMAND, JOBS
 from studies.statistics import bootstrap_interval
 from studies.style import styled
 from unload.agent.config import TrainConfig
-from unload.agent.evaluation import evaluate
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import checks, files
 
@@ -40,10 +40,8 @@ APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
     """MSR of a trained policy in fresh containers: ``msr_mask`` and ``msr_no_mask``."""
-    ready = Greedy(policy.network, equalize=False)  # the environment equalizes, which is faster
-    seen = {"equalize": config.equalize, "ties": config.ties}
     return {
-        f"msr_{name}": evaluate(ready, mask=mask, **LOADS, **seen)["success_rate"].mean()
+        f"msr_{name}": measures.judged(policy.network, replace(config, mask=mask), loads=LOADS)
         for name, mask in (("mask", True), ("no_mask", False))
     }
 

@@ -75,8 +75,6 @@ def lift_rates(load: unload.Load, full: int = 2, others: int = 100) -> dict[str,
             for name, physics in answering.items()
         }
     )
-    for physics in answering.values():
-        physics.close()
     return {name: counts[name] / seconds for name, seconds in times.items()}
 
 
@@ -114,8 +112,6 @@ def pick_rates(num_envs: int = task.NUM_ENVS, picks: int = 500) -> dict[str, flo
     }
     counts = {name: (picks - 1) * getattr(env, "num_envs", 1) for name, env in envs.items()}
     times = best_times({name: _episode(env, picks) for name, env in envs.items()})
-    for env in envs.values():
-        env.close()
     return {name: counts[name] / seconds for name, seconds in times.items()}
 
 
