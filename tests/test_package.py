@@ -29,7 +29,7 @@ LIBRARIES = {
     "llvmlite": ("unload/fast/kernel.py", "unload/support/compiled.py"),
     "matplotlib": (
         "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", 
-        "studies/paper/", "studies/policies/", "studies/seamless/",
+        "studies/paper/", "studies/play/", "studies/policies/", "studies/seamless/",
     ),
     "mujoco": ("studies/seamless/mujoco_jams.py",),
     "numba": ("unload/fast/kernel.py", "unload/support/compiled.py"),

@@ -62,13 +62,12 @@ def mistakes(
     Returns:
         Both shares, and the mean height of the favourites that cannot be lifted, NaN without any.
     """
-    rows, wrong = np.arange(len(observations)), []
-    for seen in (observations, without(observations)):
-        best = greedy_actions(network, seen, np.ones_like(liftable))
-        wrong.append(~liftable[rows, best])
-        if seen is observations:
-            heights = observations[rows, best, 2][wrong[0]]
-    return wrong[0].mean(), wrong[1].mean(), heights.mean() if len(heights) else np.nan
+    rows, everything = np.arange(len(observations)), np.ones_like(liftable)
+    best = greedy_actions(network, observations, everything)
+    by_height = greedy_actions(network, without(observations), everything)
+    wrong, wrong_by_height = ~liftable[rows, best], ~liftable[rows, by_height]
+    heights = observations[rows, best, 2][wrong]
+    return wrong.mean(), wrong_by_height.mean(), heights.mean() if len(heights) else np.nan
 
 
 def judged(

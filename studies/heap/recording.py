@@ -74,7 +74,7 @@ def make_networks(
         question = {"round": round_number, "explorers": digest(learned), "code": identity(_record)}
         jobs = []
         for number in range(episodes):
-            one = question | {"number": number, "heap": heaps[number % len(heaps)].digest()}
+            one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
             jobs.append((one, partial(_record, round_number, number, explorer)))
         found = keep_all(place / "picks", jobs, n_jobs)

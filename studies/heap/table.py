@@ -120,7 +120,7 @@ def _played(
         if "networks" in player:
             known["networks"] = files.digest(player["networks"])
         for number, heap in enumerate(stored_heaps(split)[:heaps]):
-            question = {"player": known, "heap": heap.digest(), "number": number, "code": code}
+            question = {"player": known, "heap": identity(heap), "number": number, "code": code}
             question |= {"physics": physics, "picks": MAX_PICKS}
             jobs.append((question, partial(_play, player, split, number, physics)))
     answers = iter(keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs))

@@ -7,6 +7,7 @@ from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_s
 from studies.heap.generate import FEWEST, HIGHEST, read_heaps, write_heaps
 from studies.heap.rake import PHYSICS
 from unload import task
+from unload.agent.identity import identity
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,7 @@ def test_a_pick_depends_on_nothing_but_the_heap(pile, make_rake, physics):
     first = used.pick(pile, 3)
     used.pick(pile.only(np.arange(5)), 1)
     for other in (used.pick(pile, 3), fresh.pick(pile, 3)):
-        assert other.heap.digest() == first.heap.digest()
+        assert identity(other.heap) == identity(first.heap)
         assert other.unloaded.tolist() == first.unloaded.tolist()
 
 
@@ -100,4 +101,4 @@ def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
     first, second = read_heaps("train", path)
     (third,) = read_heaps("test", path)
     for read, heap in ((first, real_heap), (second, part), (third, part)):
-        assert read.digest() == heap.digest() and len(read) == len(heap)
+        assert identity(read) == identity(heap) and len(read) == len(heap)
