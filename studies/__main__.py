@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Callable
 from dataclasses import replace
 
-from studies.falls import fresh, laboratory, long
+from studies.falls import laboratory, long
 from studies.heap import table
 from studies.lifts import agreement, lift_table
 from studies.paper import training, tuning, visible_items
@@ -40,7 +40,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
-    "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, JOBS),
+    "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),

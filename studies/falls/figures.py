@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.falls.fresh import ERRS, THRESHOLDS
-from studies.falls.laboratory import PREFERENCES, PUPILS
+from studies.falls.cells import PREFERENCES, PUPILS
+from studies.falls.laboratory import ERRS, THRESHOLDS
 from studies.paper.training import PAPER_CELLS
 from studies.statistics import PAPER_MSR, end_msr, t_interval
 from studies.style import COLOURS, styled
@@ -162,7 +162,7 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
 def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
     """Networks by their preferences along x and y, coloured by whether they err.
 
-    The shaded region is where the rule of ``fresh.predicted`` says that a network errs.
+    The shaded region is where the rule of ``laboratory.predicted`` says that a network errs.
 
     Args:
         axes: where.
