@@ -92,9 +92,12 @@ def point(run: Training, seen: measures.Seen | None = None) -> dict[str, float]:
 def run_cell(name: str, cell: Cell, seed: int) -> dict:
     """Train and measure a run: a row of ``COLUMNS``, and the points of its trace."""
     config, trace, seen = replace(cell.config, seed=seed), [], SEEN.get(name)
-    run = train_in_laboratory(config, cell.change, lambda run: trace.append(point(run, seen)))
+    named = {"cell": name, "seed": seed}
+    run = train_in_laboratory(
+        config, cell.change, lambda run: trace.append(named | point(run, seen))
+    )
     network, curve = run.agent.network, run.curve.table()
-    row = {"cell": name, "seed": seed, "mean": curve["success_rate"].mean(), "end": end_msr(curve)}
+    row = named | {"mean": curve["success_rate"].mean(), "end": end_msr(curve)}
     row |= measures.judged_blanked(network, config, seen)
     points = pd.DataFrame(trace)
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
@@ -147,14 +150,9 @@ def laboratory_data(
     chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
     results = keep_cells(Path(runs_dir) / "laboratory", chosen, run_cell, n_jobs)
     rows = [result.value["row"] for result in results]
-    traces = [
-        pd.DataFrame(result.value["trace"]).assign(cell=row["cell"], seed=row["seed"])
-        for row, result in zip(rows, results)
-        if result.value["trace"]
-    ]
     tables = {"laboratory": pd.DataFrame(rows)[COLUMNS]}
-    if traces:
-        tables["trace"] = pd.concat(traces)[["cell", "seed", *POINT]].astype({"picks": int})
+    if trace := [point for result in results for point in result.value["trace"]]:
+        tables["trace"] = pd.DataFrame(trace)[["cell", "seed", *POINT]].astype({"picks": int})
     reduced = seeds is not None or set(cells) < set(CELLS)
     place = Path(folder) / ("reduced/falls" if reduced else "falls")
     command = f"{COMMAND} laboratory"

@@ -126,7 +126,6 @@ class HeapEnv(EpisodeEnv):
         )
         self.action_space = gymnasium.spaces.Discrete(ROWS)
         self._rake, self._camera = Rake(physics), Camera()
-        self._state = "not started"
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start with one of the heaps; ``options={"heap": heap}`` gives the heap to use."""

@@ -17,7 +17,7 @@ from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
 from studies.heap.generate import BOXES, settled_heap, write_heaps
 from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
 from studies.heap.network import FateNetwork
-from studies.heap.policies import best, linear, play, random
+from studies.heap.policies import RULES, best, linear, play
 from studies.results import COMMAND, Result, digest, keep_all, packed, publish, unpacked
 from unload.agent.identity import identity
 
@@ -110,7 +110,7 @@ def _record(round_number: int, number: int, explorer: str | None) -> str:
         favourite = Learned([_network(explorer)], float(rng.choice(WEIGHTS)))
 
     def policy(observations, masks, rng):
-        chosen = random if rng.random() < 0.5 else favourite
+        chosen = RULES["random"] if rng.random() < 0.5 else favourite
         return chosen(observations, masks, rng)
 
     env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
