@@ -118,18 +118,16 @@ class Episode(Picks):
 
     Attributes:
         boxes: (n,) int64, dragged boxes, by their numbers in the heap before each pick.
-        moved: (n,) float64, m, how far the dragged box came.
         heaps: n + 1 heaps, before each pick and after the last.
         outcomes: n, what each pick has done, box by box.
     """
 
     boxes: np.ndarray
-    moved: np.ndarray
     heaps: tuple[Heap, ...]
     outcomes: tuple[Outcome, ...]
 
 
-_TOLD = "unloaded", "falls", "fates", "box", "moved"  # by the environment, as in ``Episode``
+_TOLD = "unloaded", "falls", "fates", "box"  # by the environment, as in ``Episode``
 
 
 def play(env: HeapEnv, policy: Callable, heap: Heap, seed: int) -> Episode:
