@@ -160,18 +160,16 @@ def laboratory_data(
     publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 
-def fresh_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def fresh_data(n_jobs: int = -1) -> None:
     """Train the cells of the third plan; write ``falls/fresh.csv``, a row per run.
 
     Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
     containers if equal x share one rank when the trained network chooses.
     """
-    results = keep_cells(Path(runs_dir) / "fresh", FRESH, run_fresh, n_jobs)
+    results = keep_cells(paths.RUNS / "fresh", FRESH, run_fresh, n_jobs)
     table = pd.DataFrame([result.value for result in results])[FRESH_COLUMNS]
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
-    place, command = Path(folder) / "falls", f"{COMMAND} fresh"
+    place, command = paths.DATA / "falls", f"{COMMAND} fresh"
     publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")
 
 
@@ -186,9 +184,9 @@ def read_trace(folder: str | Path = paths.DATA) -> pd.DataFrame:
     return read_table(Path(folder) / "falls/trace.csv", f"{COMMAND} laboratory", columns)
 
 
-def read_fresh(folder: str | Path = paths.DATA) -> pd.DataFrame:
+def read_fresh() -> pd.DataFrame:
     """A row per run, see ``fresh_data``."""
-    return read_table(Path(folder) / "falls/fresh.csv", f"{COMMAND} fresh", FRESH_COLUMNS)
+    return read_table(paths.DATA / "falls/fresh.csv", f"{COMMAND} fresh", FRESH_COLUMNS)
 
 
 def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:

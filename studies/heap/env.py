@@ -1,12 +1,10 @@
 """The heap as a Gymnasium environment."""
 
-from functools import cache
-
 import gymnasium
 import numpy as np
 
-from studies.heap import generate
 from studies.heap.boxes import Heap
+from studies.heap.generate import SPLITS, stored_heaps
 from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
 from studies.heap.rake import Outcome, Rake
 from unload.env.base import AllOrReset, EpisodeEnv
@@ -119,7 +117,7 @@ class HeapEnv(EpisodeEnv):
         checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         self.render_mode = render_mode
         self.max_picks = checks.integer("max_picks", max_picks, 1)
-        checks.one_of("split", split, generate.SPLITS)
+        checks.one_of("split", split, SPLITS)
         self.heaps = stored_heaps(split)
         self.observation_space = gymnasium.spaces.Box(
             -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
@@ -210,9 +208,3 @@ class HeapEnv(EpisodeEnv):
             "item_mask": boxes.astype(np.int8),
             "left": np.int64(len(self.heap)),
         }
-
-
-@cache
-def stored_heaps(split: str) -> tuple[Heap, ...]:
-    """The stored heaps of a split, read once."""
-    return tuple(generate.read_heaps(split))

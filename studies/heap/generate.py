@@ -1,6 +1,7 @@
 """Heaps: boxes dropped behind a barrier that is then taken away."""
 
 from fractions import Fraction
+from functools import cache
 from math import sqrt
 from pathlib import Path
 
@@ -131,8 +132,11 @@ def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:
     files.write_arrays(path, arrays)
 
 
-def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz") -> list[Heap]:
-    """The stored heaps of a split, ``"train"`` or ``"test"``."""
+@cache
+def stored_heaps(
+    split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz"
+) -> tuple[Heap, ...]:
+    """The stored heaps of a split, ``"train"`` or ``"test"``, read once."""
     checks.one_of("split", split, SPLITS)
     arrays = files.read_arrays(path)
     wanted = [f"{split}_{name}" for name in ("counts", *STORED)]
@@ -141,7 +145,7 @@ def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz")
     positions, orientations, packages = (
         np.split(arrays[f"{split}_{name}"], ends) for name in STORED
     )
-    return [
+    return tuple(
         Heap(place.astype(float), turn.astype(float), package_sizes(kind), kind.astype(int))
         for place, turn, kind in zip(positions, orientations, packages)
-    ]
+    )

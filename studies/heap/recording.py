@@ -13,8 +13,8 @@ import torch
 
 from studies import paths
 from studies.heap.boxes import Heap, package_sizes
-from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
-from studies.heap.generate import BOXES, settled_heap, write_heaps
+from studies.heap.env import MAX_PICKS, HeapEnv
+from studies.heap.generate import BOXES, settled_heap, stored_heaps, write_heaps
 from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.policies import RULES, best, linear, play

@@ -19,7 +19,8 @@ import torch
 from matplotlib.figure import Figure
 
 from studies import paths
-from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
+from studies.heap.env import MAX_PICKS, HeapEnv
+from studies.heap.generate import stored_heaps
 from studies.heap.learning import Learned, load_networks
 from studies.heap.policies import RULES, Oracle, best, linear, play
 from studies.heap.recording import HEAPS, NAME, WEIGHTS, make_heaps, make_networks
@@ -255,10 +256,10 @@ def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
 
 
 @styled
-def throughput_falls(folder: str | Path = paths.DATA) -> Figure:
+def throughput_falls() -> Figure:
     """Boxes and falls a pick on unseen heaps: a point for each rule, a curve over λ for others."""
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
-    for name, rows in read_heap_table(folder).groupby("policy", sort=False):
+    for name, rows in read_heap_table().groupby("policy", sort=False):
         rows = rows.sort_values("falls_weight")
         colour = LINES.get(name, "0.6")
         x, y = (

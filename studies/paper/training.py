@@ -79,9 +79,9 @@ def training_data(
             save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
 
 
-def paper_runs(folder: str | Path = paths.DATA) -> list[tuple[str, int, pd.DataFrame]]:
+def paper_runs() -> list[tuple[str, int, pd.DataFrame]]:
     """Cell, seed and curve of each published run of the paper's four cells."""
-    curves = read_grid(PAPER, folder, PAPER_CELLS)
+    curves = read_grid(PAPER, cells=PAPER_CELLS)
     groups = curves.groupby(["cell", "seed"], sort=False)
     return [(cell, seed, curve) for (cell, seed), curve in groups]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_sizes
-from studies.heap.generate import FEWEST, HIGHEST, read_heaps, write_heaps
+from studies.heap.generate import FEWEST, HIGHEST, stored_heaps, write_heaps
 from studies.heap.rake import PHYSICS
 from unload import task
 from unload.agent.identity import identity
@@ -98,7 +98,7 @@ def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
     path = tmp_path / "heaps.npz"
     part = real_heap.only(np.arange(7))
     write_heaps(path, {"train": [real_heap, part], "test": [part]})
-    first, second = read_heaps("train", path)
-    (third,) = read_heaps("test", path)
+    first, second = stored_heaps("train", path)
+    (third,) = stored_heaps("test", path)
     for read, heap in ((first, real_heap), (second, part), (third, part)):
         assert identity(read) == identity(heap) and len(read) == len(heap)

@@ -10,8 +10,7 @@ from studies import paths
 from studies.heap import picture, recording
 from studies.heap import table as study
 from studies.heap.boxes import Heap
-from studies.heap.env import stored_heaps
-from studies.heap.generate import read_heaps
+from studies.heap.generate import stored_heaps
 from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.recording import HEAPS, WEIGHTS, make_heaps, make_networks
@@ -182,7 +181,7 @@ def test_heaps_are_those_of_their_seeds(tmp_path, monkeypatch):
         path = tmp_path / name / "heap"
         assert read_provenance(path, "heaps")["settings"]["heaps"] == counts
         for split, count in counts.items():
-            made[name, split] = [identity(heap) for heap in read_heaps(split, path / "heaps.npz")]
+            made[name, split] = [identity(heap) for heap in stored_heaps(split, path / "heaps.npz")]
             assert len(set(made[name, split])) == count
     for split, count in (("train", 2), ("test", 1)):
         assert made["few", split] == made["more", split][:count]
