@@ -4,7 +4,8 @@ import argparse
 from collections.abc import Callable
 from dataclasses import replace
 
-from studies.falls import fresh, laboratory, long
+from studies.falls import laboratory, long
+from studies.heap import table
 from studies.lifts import agreement, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, robustness, variants
@@ -28,13 +29,6 @@ def policies(n_jobs: int) -> None:
     robustness.robustness_data(n_jobs=n_jobs)
 
 
-def heap(n_jobs: int) -> None:
-    """Make all data of heaps: the heaps, recorded picks, networks, and the policies compared."""
-    from studies.heap import table  # no other part needs any of it
-
-    table.heap_data(n_jobs=n_jobs)
-
-
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
@@ -46,11 +40,11 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),
-    "fresh": ("why runs fall: fresh seeds", fresh.fresh_data, JOBS),
+    "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
-    "heap": ("heaps, of which a rake picks several boxes at once", heap, JOBS),
+    "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
 }  # fmt: skip
 
 

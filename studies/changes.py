@@ -34,16 +34,13 @@ def height_reward(run: Training, share: float) -> None:
         share: h, in [0, 1]. A failed pick is learned from as -1 + h (z + 1) / 2, z as observed;
             the learning curve keeps the rewards of the environment.
     """
-    add = run.replay.add
 
-    def add_shaped(
-        observations: np.ndarray, actions: np.ndarray, rewards: np.ndarray, **rest: np.ndarray
-    ) -> None:
-        heights = (observations[np.arange(len(actions)), actions, 2] + 1) / 2  # in [0, 1]
-        shaped = np.where(rewards < 0, rewards + share * heights, rewards)
-        add(observations=observations, actions=actions, rewards=shaped, **rest)
+    def reward(picks: dict[str, np.ndarray], distances: np.ndarray) -> np.ndarray:
+        rewards, rows = picks["rewards"], np.arange(len(picks["actions"]))
+        heights = (picks["observations"][rows, picks["actions"], 2] + 1) / 2  # in [0, 1]
+        return np.where(rewards < 0, rewards + share * heights, rewards)
 
-    run.replay.add = add_shaped
+    run.reward = reward
 
 
 def mirror(
@@ -141,7 +138,6 @@ def left(policy: Policy, picks: int, seed: int) -> Load:
         action = policy(observation[None], info["action_mask"][None], rng)[0]
         observation, *_, info = env.step(int(action))
     load, present = env.physics.load, env.physics.present
-    env.close()
     return Load(
         *(each[present] for each in (load.positions, load.sizes, load.packages, load.walls))
     )
@@ -173,7 +169,6 @@ def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None
         seed: is added to the run's for the first weights and batches of that network.
     """
     active = Training(replace(run.config, seed=run.config.seed + seed))
-    active.rollout.close()
     change(active)
     run.agent.choose, add = active.agent.choose, run.replay.add
 
@@ -192,7 +187,6 @@ def perfect_start(run: Training, change: Callable[[Training], None] = unchanged)
     shuffled(teacher)
     while not teacher.rollout.finished:
         teacher.step()
-    teacher.rollout.close()
     run.agent.network.load_state_dict(teacher.agent.network.state_dict())
     change(run)
 

@@ -1,5 +1,6 @@
 """How a run ends and falls, whether it is like the paper's, and how sure means and shares are."""
 
+import warnings
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -165,6 +166,41 @@ def bootstrap_interval(values: Sequence[float]) -> tuple[float, float]:
     rows = np.random.default_rng(0).integers(values.size, size=(RESAMPLES, values.size))
     low, high = np.quantile(values[rows].mean(axis=1), [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(low), float(high)
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
+    return ratio_interval(values, np.ones(len(values)))
+
+
+def ratio_interval(
+    values: Sequence[float], reference: Sequence[float]
+) -> tuple[float, float, float]:
+    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
+
+    NaN where the reference's mean is not > 0 in every resample, because such a ratio means
+    nothing. If all pairs have the same ratio, the interval has no width. Of fewer than two pairs,
+    it is NaN.
+    """
+    values = checks.finite_array("values", values, (None,))
+    reference = checks.finite_array("reference", reference, values.shape)
+    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
+    if (reference[rows].mean(axis=1) <= 0).any():
+        return np.nan, np.nan, np.nan
+    ratio = float(values.mean() / reference.mean())
+    if np.abs(values - ratio * reference).max() < 1e-12:
+        return ratio, ratio, ratio
+
+    def ratios(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
+        return values.mean(axis=axis) / reference.mean(axis=axis)
+
+    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
+        warnings.simplefilter("ignore")
+        low, high = stats.bootstrap(
+            (values, reference), ratios, n_resamples=RESAMPLES, paired=True, method="BCa",
+            confidence_level=LEVEL, vectorized=True, axis=-1, rng=np.random.default_rng(0),
+        ).confidence_interval  # fmt: skip
+    return ratio, float(low), float(high)
 
 
 def share_interval(count: int, total: int) -> tuple[float, float]:

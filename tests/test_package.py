@@ -18,7 +18,7 @@ PACKAGES = ("unload", "studies")
 
 # The files and folders that may import a library. ``studies/speed/`` may import all: it compares.
 LIBRARIES = {
-    "PIL": ("unload/load/", "studies/paper/"),
+    "PIL": ("unload/load/", "studies/play/"),
     "anywidget": ("studies/play/",),
     "filelock": ("unload/support/files.py",),
     "gymnasium": (
@@ -30,7 +30,7 @@ LIBRARIES = {
     "llvmlite": ("unload/fast/kernel.py", "unload/support/compiled.py"),
     "matplotlib": (
         "unload/load/", "studies/style.py", "studies/falls/", "studies/heap/", 
-        "studies/paper/", "studies/policies/", "studies/seamless/",
+        "studies/paper/", "studies/play/", "studies/policies/", "studies/seamless/",
     ),
     "mujoco": ("studies/seamless/mujoco_jams.py",),
     "numba": ("unload/fast/kernel.py", "unload/support/compiled.py"),

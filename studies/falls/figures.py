@@ -8,8 +8,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.falls.fresh import ERRS, THRESHOLDS
-from studies.falls.laboratory import PREFERENCES, PUPILS
+from studies.falls.cells import PREFERENCES, PUPILS
+from studies.falls.laboratory import ERRS, THRESHOLDS
 from studies.paper.training import PAPER_CELLS
 from studies.statistics import PAPER_MSR, end_msr, t_interval
 from studies.style import COLOURS, styled
@@ -22,12 +22,6 @@ NAMES = {  # of what ``PUPILS`` see and store, in their order
     "averaged": "ties averaged",
     "level": "level loads",
 }
-TITLES = {
-    "paper_no_mask": "mask off, b = 256",
-    "paper_mask": "mask on, b = 256",
-    "paper_b2048_no_mask": "mask off, b = 2048",
-    "paper_b2048_mask": "mask on, b = 2048",
-}
 
 
 @styled
@@ -38,8 +32,8 @@ def four_cells(curves: pd.DataFrame) -> Figure:
         curves: see ``read_grid``; other cells are left out.
     """
     figure, panels = plt.subplots(2, 2, figsize=(7, 4.6), sharex=True, sharey=True)
-    for axes, cell in zip(panels.flat, PAPER_CELLS):
-        runs = [run for _, run in curves[curves["cell"] == cell].groupby("seed")]
+    for axes, (name, cell) in zip(panels.flat, PAPER_CELLS.items()):
+        runs = [run for _, run in curves[curves["cell"] == name].groupby("seed")]
         for run in runs:
             axes.plot(run["picks"] / 1e6, 100 * run["success_rate"], "C1", lw=0.5, alpha=0.5)
         ends = 100 * np.array([end_msr(run) for run in runs])
@@ -50,7 +44,8 @@ def four_cells(curves: pd.DataFrame) -> Figure:
             fmt="k_", capsize=3, clip_on=False,
         )  # fmt: skip
         axes.axhline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
-        axes.set(title=f"{TITLES[cell]}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
+        kind = f"mask {'on' if cell.config.mask else 'off'}, b = {cell.config.batch_size}"
+        axes.set(title=f"{kind}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
     figure.supxlabel("million picks; dots: mean over the last tenth, with its 95 % t interval")
     figure.supylabel("MSR while training (%)")
     return figure
@@ -60,7 +55,7 @@ def four_cells(curves: pd.DataFrame) -> Figure:
 def dug(
     surface: np.ndarray, preferences: tuple[float, float], averaged: bool, msr: float
 ) -> Figure:
-    """What a rule leaves of the loads, seen from above, and its place among ``phase``.
+    """What a rule leaves of the loads, seen from above, and its place in the phase diagram.
 
     Args:
         surface: what ``measures.surface`` returns.
@@ -164,28 +159,16 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return figure
 
 
-@styled
-def phase(panels: Mapping[str, tuple[pd.DataFrame, bool]]) -> Figure:
+def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
     """Networks by their preferences along x and y, coloured by whether they err.
 
+    The shaded region is where the rule of ``laboratory.predicted`` says that a network errs.
+
     Args:
-        panels: rows with ``slope_x``, ``slope_y``, ``slope_z`` and ``judged_as_is``, and whether
-            equal x share one rank, by the panel's title. The shaded region is where the rule of
-            ``fresh.predicted`` says that a network errs.
+        axes: where.
+        rows: with ``slope_x``, ``slope_y``, ``slope_z`` and ``judged_as_is``.
+        averaged: whether equal x share one rank.
     """
-    figure, all_axes = plt.subplots(
-        1, len(panels), figsize=(4.2 * len(panels), 3.8), sharex=True, sharey=True, squeeze=False
-    )
-    for axes, (title, (rows, averaged)) in zip(all_axes[0], panels.items()):
-        draw_phase(axes, rows, averaged)
-        axes.set_title(title)
-    all_axes[0, 0].set_ylabel("|preference| along y (across)")
-    all_axes[0, 0].legend(loc="upper right", fontsize=8)
-    return figure
-
-
-def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
-    """Draw the region in which networks err, and networks. Arguments as of ``phase``."""
     along_x, along_y = THRESHOLDS
     axes.axhspan(along_y, MOST_PREFERENCE, color="#f6d5c9", zorder=0)
     if not averaged:

@@ -1,8 +1,9 @@
 """The laboratory: the fall of the paper's configuration in two seconds a run.
 
     python -m studies laboratory
+    python -m studies fresh
 
-First its cells, as ``data/falls/PLAN.md`` names them; then how a run is trained and measured.
+How its cells are trained and measured, and when a preference becomes a mistake.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,8 +14,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from studies import changes, paths
+from studies import paths
 from studies.falls import measures
+from studies.falls.cells import CELLS, CONFIG, FRESH, SEEN, Change
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
 from studies.results import COMMAND, JOBS, Result, keep_all, publish, read_table
@@ -24,114 +26,6 @@ from unload.agent.config import TrainConfig
 from unload.agent.identity import identity, unchanged
 from unload.agent.training import Training
 
-# The mask is on by default.
-CONFIG = TrainConfig(
-    picks=384_000, batch_size=64, n_features=16, learning_rate=3e-3, replay_size=2**15,
-    mask=True, log_interval=50,
-)  # fmt: skip
-FIRST_SEED = 2000
-SEEDS, REMEDY_SEEDS, FEW_SEEDS = 20, 50, 10
-AVERAGED = {"ties": "average"}
-# What the laboratory changes of the paper's configuration, one at a time taken back.
-TAKEN_BACK = {
-    "learning_rate": {"learning_rate": 1e-3},
-    "batch": {"batch_size": 256},
-    "features": {"n_features": 64},
-    "replay": {"replay_size": 2**19},  # forgets nothing
-}
-# What a network sees where the environments do not offer it, in choosing and in learning.
-SEEN: dict[str, Callable] = {
-    "height_alone": changes.without,
-    "height_alone_no_mask": changes.without,
-    "averaged_x": partial(changes.ranked, averaged=(0,)),
-    "averaged_y": partial(changes.ranked, averaged=(1,)),
-    "averaged_z": partial(changes.ranked, averaged=(2,)),
-}
-PREFERENCES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.2)
-SHORT = {"max_picks": 25}  # episodes in which a load hardly changes
-# Who watches such a policy, and how it learns.
-PUPILS = {
-    "taught": (unchanged, {}),
-    "shuffled_taught": (changes.shuffled, {}),
-    "averaged_taught": (unchanged, AVERAGED),
-    "level_taught": (partial(changes.dug, preference=0.0), SHORT),
-}
-DUG = 0.4  # the preference that has dug the loads to one side
-
-Change = Callable[[Training], None]
-
-
-def _cell(change: Change = unchanged, seeds: int = SEEDS, **fields) -> Cell:
-    return Cell(replace(CONFIG, **fields), range(FIRST_SEED, FIRST_SEED + seeds), change)
-
-
-def _both(name: str, change: Change = unchanged, seeds: int = SEEDS, **fields) -> dict[str, Cell]:
-    """A cell with the mask and one without it."""
-    return {
-        name: _cell(change, seeds, **fields),
-        f"{name}_no_mask": _cell(change, seeds, mask=False, **fields),
-    }
-
-
-def _watching(change: Change) -> Change:
-    """Only watch a network that chooses, and that learns with a change of its own."""
-    return partial(changes.tandem, change=change, seed=50)
-
-
-def _taught(change: Change, preference: float, **fields) -> Cell:
-    """Only watch a policy that prefers a side, and picks one box in five at random."""
-    both = change, partial(changes.taught, preference=preference)
-    exploring = {"epsilon_init": 0.2, "epsilon_final": 0.2}
-    change = partial(changes.several, makes=both)
-    return _cell(change, FEW_SEEDS, picks=128_000, **exploring, **fields)
-
-
-def _perfect(change: Change = unchanged) -> Cell:
-    return _cell(partial(changes.perfect_start, change=change), FEW_SEEDS, epsilon_init=0.0)
-
-
-CELLS: dict[str, Cell] = {
-    **_both("ranks"),
-    **_both("mirrored", changes.mirrored),
-    **_both("shuffled", changes.shuffled, REMEDY_SEEDS),
-    **_both("height_alone", partial(changes.see, change=changes.without), REMEDY_SEEDS),
-    **_both("averaged", seeds=REMEDY_SEEDS, **AVERAGED),
-    **_both("averaged_mirrored", changes.mirrored, **AVERAGED),
-    **_both("positions", equalize=False),
-    **{
-        name: _cell(partial(changes.see, change=SEEN[name]), FEW_SEEDS, equalize=False)
-        for name in ("averaged_x", "averaged_y", "averaged_z")
-    },
-    **{f"ranks_{name}": _cell(**fields) for name, fields in TAKEN_BACK.items()},
-    **{
-        f"shuffled_{name}": _cell(changes.shuffled, **fields) for name, fields in TAKEN_BACK.items()
-    },
-    **{f"episodes_{picks}": _cell(max_picks=picks) for picks in (25, 100, 250)},
-    **_both("watching_shuffled", _watching(changes.shuffled)),
-    "watching_ranks": _cell(_watching(unchanged)),
-    "shuffled_watching_ranks": _cell(
-        partial(changes.several, makes=(changes.shuffled, _watching(unchanged)))
-    ),
-    "perfect": _perfect(),
-    "perfect_shuffled": _perfect(changes.shuffled),
-    "perfect_successes": _perfect(partial(changes.successes_only, start=0)),
-    **{
-        f"{pupil}_{preference}": _taught(change, preference, **fields)
-        for pupil, (change, fields) in PUPILS.items()
-        for preference in PREFERENCES
-    },
-    "dug_to_y": _taught(partial(changes.dug, preference=DUG), 0.0, **SHORT),
-    "dug_from_y": _taught(partial(changes.dug, preference=-DUG), 0.0, **SHORT),
-    "untilted": _cell(changes.untilted),
-    "untilted_y": _cell(partial(changes.untilted, axes=(1,))),
-}
-# Who chooses and who watches in the cells of two networks; the row of a run is of the one that
-# watches, but for ``mean`` and ``end``, which are of the picks and so of the one that chooses.
-WATCHING = {
-    "watching_ranks": "ranks choose, ranks watch",
-    "watching_shuffled": "shuffled places choose, ranks watch",
-    "shuffled_watching_ranks": "ranks choose, shuffled places watch",
-}
 TRACED = ("ranks", "ranks_no_mask", "shuffled", "averaged", "positions")
 EVERY = 16_000  # picks between the points of a trace: half an episode of all containers
 JUDGED = [f"judged_{name}" for name in measures.BLANKED]
@@ -140,6 +34,9 @@ POINT = [
     "picks", "success_rate", *SLOPES, *TILTS, "wrong", "wrong_without_place", "height_of_wrong",
 ]  # fmt: skip
 COLUMNS = ["cell", "seed", "mean", "end", *JUDGED, *SLOPES, *TILTS]
+FRESH_COLUMNS = ["cell", "seed", "end", *JUDGED, "judged_averaged_x", *SLOPES]
+THRESHOLDS = 0.22, 0.42  # preferences along x and y above which a network errs
+ERRS = 0.95  # MSR in fresh containers below which a network errs
 OPTIONS = {
     "--cells": {"nargs": "+", "metavar": "CELL", "choices": CELLS, "default": tuple(CELLS)},
     "--seeds": {"type": int, "help": "of each cell at most; those of the plan if not given"},
@@ -161,7 +58,7 @@ def train_in_laboratory(
         watch: is called with the run once in ``every`` picks, a multiple of ``num_envs``.
 
     Returns:
-        The finished run, its environments closed.
+        The finished run.
     """
     with one_thread():
         run = Training(config, change=change)
@@ -170,7 +67,6 @@ def train_in_laboratory(
             # One step early, because the containers are full again after an episode's last pick.
             if watch is not None and (run.rollout.picks + config.num_envs) % every == 0:
                 watch(run)
-        run.rollout.close()
     return run
 
 
@@ -196,13 +92,28 @@ def point(run: Training, seen: measures.Seen | None = None) -> dict[str, float]:
 def run_cell(name: str, cell: Cell, seed: int) -> dict:
     """Train and measure a run: a row of ``COLUMNS``, and the points of its trace."""
     config, trace, seen = replace(cell.config, seed=seed), [], SEEN.get(name)
-    run = train_in_laboratory(config, cell.change, lambda run: trace.append(point(run, seen)))
+    named = {"cell": name, "seed": seed}
+    run = train_in_laboratory(
+        config, cell.change, lambda run: trace.append(named | point(run, seen))
+    )
     network, curve = run.agent.network, run.curve.table()
-    row = {"cell": name, "seed": seed, "mean": curve["success_rate"].mean(), "end": end_msr(curve)}
+    row = named | {"mean": curve["success_rate"].mean(), "end": end_msr(curve)}
     row |= measures.judged_blanked(network, config, seen)
     points = pd.DataFrame(trace)
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
     return {"row": row, "trace": trace if name in TRACED else []}
+
+
+def run_fresh(name: str, cell: Cell, seed: int) -> dict:
+    """Train and measure a run: a row of ``FRESH_COLUMNS``."""
+    config, points = replace(cell.config, seed=seed), []
+    run = train_in_laboratory(config, cell.change, lambda run: points.append(point(run)))
+    network = run.agent.network
+    row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
+    row |= measures.judged_blanked(network, config)
+    positions = replace(config, equalize=False)  # they are ranked after the environment
+    row["judged_averaged_x"] = measures.judged(network, positions, seen=SEEN["averaged_x"])
+    return row | {name: points[-1][name] for name in SLOPES}
 
 
 def keep_cells(
@@ -239,19 +150,27 @@ def laboratory_data(
     chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
     results = keep_cells(Path(runs_dir) / "laboratory", chosen, run_cell, n_jobs)
     rows = [result.value["row"] for result in results]
-    traces = [
-        pd.DataFrame(result.value["trace"]).assign(cell=row["cell"], seed=row["seed"])
-        for row, result in zip(rows, results)
-        if result.value["trace"]
-    ]
     tables = {"laboratory": pd.DataFrame(rows)[COLUMNS]}
-    if traces:
-        tables["trace"] = pd.concat(traces)[["cell", "seed", *POINT]].astype({"picks": int})
+    if trace := [point for result in results for point in result.value["trace"]]:
+        tables["trace"] = pd.DataFrame(trace)[["cell", "seed", *POINT]].astype({"picks": int})
     reduced = seeds is not None or set(cells) < set(CELLS)
     place = Path(folder) / ("reduced/falls" if reduced else "falls")
     command = f"{COMMAND} laboratory"
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(rows)}, training_fingerprint()
     publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
+
+
+def fresh_data(n_jobs: int = -1) -> None:
+    """Train the cells of the third plan; write ``falls/fresh.csv``, a row per run.
+
+    Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
+    containers if equal x share one rank when the trained network chooses.
+    """
+    results = keep_cells(paths.RUNS / "fresh", FRESH, run_fresh, n_jobs)
+    table = pd.DataFrame([result.value for result in results])[FRESH_COLUMNS]
+    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
+    place, command = paths.DATA / "falls", f"{COMMAND} fresh"
+    publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")
 
 
 def read_laboratory(folder: str | Path = paths.DATA) -> pd.DataFrame:
@@ -263,3 +182,23 @@ def read_trace(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """A row per point of a traced run, see ``point``."""
     columns = ["cell", "seed", *POINT]
     return read_table(Path(folder) / "falls/trace.csv", f"{COMMAND} laboratory", columns)
+
+
+def read_fresh() -> pd.DataFrame:
+    """A row per run, see ``fresh_data``."""
+    return read_table(paths.DATA / "falls/fresh.csv", f"{COMMAND} fresh", FRESH_COLUMNS)
+
+
+def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:
+    """Whether each network errs, by its preferences alone.
+
+    Where equal x share one rank, a preference along x cannot put a box before the one on it.
+
+    Args:
+        table: with ``SLOPES``.
+        config: of the runs.
+    """
+    along = table[["slope_x", "slope_y"]].abs().div(table["slope_z"].abs(), axis=0)
+    along_x, along_y = THRESHOLDS
+    side = along["slope_y"] > along_y
+    return side if config.ties == "average" else side | (along["slope_x"] > along_x)

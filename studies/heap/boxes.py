@@ -1,7 +1,6 @@
 """Turned boxes in a heap: their state, and the geometry that everything else reads from it."""
 
 from dataclasses import dataclass
-from hashlib import blake2b
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -53,11 +52,6 @@ class Heap:
     def only(self, boxes: np.ndarray) -> "Heap":
         """The heap of some of the boxes, given as numbers or as (n,) bool."""
         return Heap(*(array[boxes] for array in vars(self).values()))
-
-    def digest(self) -> str:
-        """A name for this heap: equal for equal heaps."""
-        content = b"".join(array.tobytes() for array in vars(self).values())
-        return blake2b(content, digest_size=8).hexdigest()
 
     def axes(self) -> np.ndarray:
         """(n, 3, 3) float64: in column j, the direction of a box's own axis j."""

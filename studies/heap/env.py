@@ -1,15 +1,12 @@
 """The heap as a Gymnasium environment."""
 
-from functools import cache
-
 import gymnasium
 import numpy as np
-from gymnasium.utils import seeding
 
-from studies.heap import generate
 from studies.heap.boxes import Heap
+from studies.heap.generate import SPLITS, stored_heaps
 from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
-from studies.heap.rake import Rake
+from studies.heap.rake import Outcome, Rake
 from unload.env.base import AllOrReset, EpisodeEnv
 from unload.support import checks
 
@@ -97,7 +94,7 @@ class HeapEnv(EpisodeEnv):
     Attributes:
         heap: the ``Heap`` as it is.
         heaps: those of the split.
-        outcome: what the last pick has done, box by box; None if it was of a row without a box.
+        outcome: what the last pick has done, box by box; None before the first.
         visible: (96,) int64, the box in each row of the observation, -1 in rows without.
 
     Raises:
@@ -120,14 +117,13 @@ class HeapEnv(EpisodeEnv):
         checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
         self.render_mode = render_mode
         self.max_picks = checks.integer("max_picks", max_picks, 1)
-        checks.one_of("split", split, generate.SPLITS)
+        checks.one_of("split", split, SPLITS)
         self.heaps = stored_heaps(split)
         self.observation_space = gymnasium.spaces.Box(
             -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
         )
         self.action_space = gymnasium.spaces.Discrete(ROWS)
         self._rake, self._camera = Rake(physics), Camera()
-        self._state = "not started"
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Start with one of the heaps; ``options={"heap": heap}`` gives the heap to use."""
@@ -135,8 +131,7 @@ class HeapEnv(EpisodeEnv):
         heap = (options or {}).get("heap")
         if heap is not None and not (isinstance(heap, Heap) and len(heap)):
             raise ValueError(f"options['heap'] is {heap!r}; expected a Heap that holds a box")
-        if seed is not None:
-            self._np_random, self._np_random_seed = seeding.np_random(seed)
+        super().reset(seed=seed)
         if heap is None:
             heap = self.heaps[self.np_random.integers(len(self.heaps))]
         with AllOrReset(self):
@@ -151,30 +146,28 @@ class HeapEnv(EpisodeEnv):
         if isinstance(action, np.ndarray) and action.ndim == 0:
             action = action.item()  # what a learned policy may return
         row = checks.integer("action", action, 0, ROWS - 1)
-        box = int(self.visible[row])
-        fates = np.zeros(ROWS, np.int8)
-        pick = {
-            "unloaded": np.int64(0), "falls": np.int64(0), "box": np.int64(box),
-            "moved": np.float64(0), "came": np.False_, "fates": fates,
-        }  # fmt: skip
+        box, seen = int(self.visible[row]), self.visible >= 0
+        none = np.zeros(len(self.heap), bool)
+        outcome = Outcome(self.heap, none, none, 0.0, False)
         with AllOrReset(self):
-            self._picks, self.outcome = self._picks + 1, None
+            self._picks += 1
             if box >= 0:
-                self.outcome = outcome = self._rake.pick(self.heap, box)
-                pick |= {
-                    "unloaded": outcome.unloaded.sum(),
-                    "falls": outcome.fallen.sum(),
-                    "moved": np.float64(outcome.moved),
-                    "came": np.bool_(outcome.came),
-                }
-                seen = self.visible >= 0
-                numbers = self.visible[seen]
-                fates[seen] = UNLOADED * outcome.unloaded[numbers] + FELL * outcome.fallen[numbers]
+                outcome = self._rake.pick(self.heap, box)
                 self._failed[box] = True
-                if outcome.unloaded.any():
-                    self._failed = np.zeros(len(outcome.heap), bool)
-                self.heap = outcome.heap
-                self._look()
+            fates = np.zeros(ROWS, np.int8)
+            fates[seen] = (UNLOADED * outcome.unloaded + FELL * outcome.fallen)[self.visible[seen]]
+            if outcome.unloaded.any():
+                self._failed = np.zeros(len(outcome.heap), bool)
+            self.outcome, self.heap = outcome, outcome.heap
+            self._look()
+        pick = {
+            "unloaded": outcome.unloaded.sum(),
+            "falls": outcome.fallen.sum(),
+            "box": np.int64(box),
+            "moved": np.float64(outcome.moved),
+            "came": np.bool_(outcome.came),
+            "fates": fates,
+        }
         reward = float(pick["unloaded"] - pick["falls"])
         terminated, truncated = len(self.heap) == 0, self._picks >= self.max_picks
         if terminated or truncated:
@@ -191,9 +184,8 @@ class HeapEnv(EpisodeEnv):
         return picture(self.heap)
 
     def close(self) -> None:
-        """Disconnect both clients; may be called again."""
-        self._rake.close()
-        self._camera.close()
+        """Let go of both clients, which disconnects them; may be called again."""
+        self._rake = self._camera = None
         self._state = "closed"
 
     def _look(self) -> None:
@@ -216,9 +208,3 @@ class HeapEnv(EpisodeEnv):
             "item_mask": boxes.astype(np.int8),
             "left": np.int64(len(self.heap)),
         }
-
-
-@cache
-def stored_heaps(split: str) -> tuple[Heap, ...]:
-    """The stored heaps of a split, read once."""
-    return tuple(generate.read_heaps(split))

@@ -1,6 +1,7 @@
 """Heaps: boxes dropped behind a barrier that is then taken away."""
 
 from fractions import Fraction
+from functools import cache
 from math import sqrt
 from pathlib import Path
 
@@ -76,7 +77,6 @@ def _dropped(rng: np.random.Generator) -> Heap:
         world.step(LAYER_TIME)
     world.step(SETTLE)
     positions, orientations = (np.array(part) for part in zip(*map(world.pose, bodies)))
-    world.close()
     return Heap(positions, orientations, sizes, packages)
 
 
@@ -108,7 +108,6 @@ def _settled(heap: Heap) -> tuple[Heap, float]:
         fastest = float(np.linalg.norm(moved, axis=1).max()) / PAUSE
         if not outside and fastest <= FASTEST:
             break
-    world.close()
     numbers = list(bodies)
     # Rounded as they are stored, so that a heap is the same before and after.
     positions, orientations = (np.array(part, np.float32).astype(float) for part in zip(*poses))
@@ -133,8 +132,11 @@ def write_heaps(path: str | Path, heaps: dict[str, list[Heap]]) -> None:
     files.write_arrays(path, arrays)
 
 
-def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz") -> list[Heap]:
-    """The stored heaps of a split, ``"train"`` or ``"test"``."""
+@cache
+def stored_heaps(
+    split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz"
+) -> tuple[Heap, ...]:
+    """The stored heaps of a split, ``"train"`` or ``"test"``, read once."""
     checks.one_of("split", split, SPLITS)
     arrays = files.read_arrays(path)
     wanted = [f"{split}_{name}" for name in ("counts", *STORED)]
@@ -143,7 +145,7 @@ def read_heaps(split: str, path: str | Path = paths.DATA / "heap" / "heaps.npz")
     positions, orientations, packages = (
         np.split(arrays[f"{split}_{name}"], ends) for name in STORED
     )
-    return [
+    return tuple(
         Heap(place.astype(float), turn.astype(float), package_sizes(kind), kind.astype(int))
         for place, turn, kind in zip(positions, orientations, packages)
-    ]
+    )

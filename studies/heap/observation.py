@@ -43,10 +43,6 @@ class Camera:
         owners = boxes[np.ravel(shown)]
         return np.bincount(owners[owners >= 0], minlength=len(heap))
 
-    def close(self) -> None:
-        """Disconnect the client; may be called again."""
-        self._world.close()
-
 
 def visible_boxes(heap: Heap, pixels: np.ndarray) -> np.ndarray:
     """(m,) int64, the up to ``ROWS`` boxes that can be picked, from the door to the rear.

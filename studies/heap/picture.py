@@ -4,8 +4,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
+from studies.heap.rake import Outcome
 from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, pixels, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
@@ -65,6 +67,21 @@ def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray | None = None, title: 
         title=title,
     )
     axes.axis("off")
+
+
+def outcome_colours(outcome: Outcome, box: int) -> np.ndarray:
+    """(n, 3) float, the colour in ``MEANINGS`` of what a pick does to each box before it."""
+    stays, comes, falls, dragged = MEANINGS.values()
+    colours = np.tile(stays, (len(outcome.unloaded), 1))
+    colours[outcome.unloaded] = comes
+    colours[outcome.fallen] = falls
+    colours[box] = dragged
+    return colours
+
+
+def add_legend(figure: Figure) -> None:
+    handles = [Patch(facecolor=c, edgecolor="0.5", label=name) for name, c in MEANINGS.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(MEANINGS), frameon=False)
 
 
 def picture(heap: Heap) -> np.ndarray:

@@ -38,11 +38,6 @@ def linear(weights: Mapping[str, float]) -> Score:
     return lambda observations: observations @ vector
 
 
-def random(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Any allowed box, each with the same probability."""
-    return any_allowed(masks, rng)
-
-
 def _nearness(observations: np.ndarray) -> np.ndarray:
     """Minus the squared distance from the camera, as if the foremost face stood at the door."""
     place = observations[..., [COLUMN["behind"], COLUMN["y"], COLUMN["z"]]]
@@ -56,7 +51,7 @@ def _clear_above(observations: np.ndarray) -> np.ndarray:
 
 
 RULES = {
-    "random": random,
+    "random": lambda observations, masks, rng: any_allowed(masks, rng),
     "highest": best(linear({"z": 1})),
     "nearest": best(_nearness),
     "lowest": best(linear({"z": -1})),
@@ -95,11 +90,6 @@ class Oracle:
         outcome = rake.pick(self.env.heap, int(self.env.visible[row]))
         return float(outcome.unloaded.sum() - self.falls_weight * outcome.fallen.sum())
 
-    def close(self) -> None:
-        """Disconnect its clients; may be called again."""
-        for rake in self._rakes:
-            rake.close()
-
 
 @dataclass(frozen=True, eq=False)
 class Picks:
@@ -128,18 +118,16 @@ class Episode(Picks):
 
     Attributes:
         boxes: (n,) int64, dragged boxes, by their numbers in the heap before each pick.
-        moved: (n,) float64, m, how far the dragged box came.
         heaps: n + 1 heaps, before each pick and after the last.
-        outcomes: n, what each pick has done, box by box; None if it was of a row without a box.
+        outcomes: n, what each pick has done, box by box.
     """
 
     boxes: np.ndarray
-    moved: np.ndarray
     heaps: tuple[Heap, ...]
-    outcomes: tuple[Outcome | None, ...]
+    outcomes: tuple[Outcome, ...]
 
 
-_TOLD = "unloaded", "falls", "fates", "box", "moved"  # by the environment, as in ``Episode``
+_TOLD = "unloaded", "falls", "fates", "box"  # by the environment, as in ``Episode``
 
 
 def play(env: HeapEnv, policy: Callable, heap: Heap, seed: int) -> Episode:

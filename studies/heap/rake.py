@@ -134,7 +134,3 @@ class Rake:
         fallen[box] = False
         after = Heap(positions, orientations, heap.sizes, heap.packages).only(~unloaded)
         return Outcome(after, unloaded, fallen, float(moved), bool(came))
-
-    def close(self) -> None:
-        """Disconnect the client; may be called again."""
-        self._world.close()

@@ -13,11 +13,11 @@ import torch
 
 from studies import paths
 from studies.heap.boxes import Heap, package_sizes
-from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
-from studies.heap.generate import BOXES, settled_heap, write_heaps
+from studies.heap.env import MAX_PICKS, HeapEnv
+from studies.heap.generate import BOXES, settled_heap, stored_heaps, write_heaps
 from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
 from studies.heap.network import FateNetwork
-from studies.heap.policies import best, linear, play, random
+from studies.heap.policies import RULES, best, linear, play
 from studies.results import COMMAND, Result, digest, keep_all, packed, publish, unpacked
 from unload.agent.identity import identity
 
@@ -74,7 +74,7 @@ def make_networks(
         question = {"round": round_number, "explorers": digest(learned), "code": identity(_record)}
         jobs = []
         for number in range(episodes):
-            one = question | {"number": number, "heap": heaps[number % len(heaps)].digest()}
+            one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
             jobs.append((one, partial(_record, round_number, number, explorer)))
         found = keep_all(place / "picks", jobs, n_jobs)
@@ -110,15 +110,12 @@ def _record(round_number: int, number: int, explorer: str | None) -> str:
         favourite = Learned([_network(explorer)], float(rng.choice(WEIGHTS)))
 
     def policy(observations, masks, rng):
-        chosen = random if rng.random() < 0.5 else favourite
+        chosen = RULES["random"] if rng.random() < 0.5 else favourite
         return chosen(observations, masks, rng)
 
     env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
-    try:
-        heap = env.heaps[number % len(env.heaps)]
-        episode = play(env, policy, heap, int(rng.integers(2**32)))
-    finally:
-        env.close()
+    heap = env.heaps[number % len(env.heaps)]
+    episode = play(env, policy, heap, int(rng.integers(2**32)))
     return packed(vars(joined([episode])))
 
 

@@ -7,26 +7,28 @@ stands here. Each episode is kept in ``runs/heap``: a command that was stopped g
 the whole physics takes 0.55 s of CPU, and the whole experiment about a day.
 """
 
-import warnings
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping
 from functools import partial
 from itertools import islice, product
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import torch
-from scipy import stats
+from matplotlib.figure import Figure
 
 from studies import paths
-from studies.heap.env import MAX_PICKS, HeapEnv, stored_heaps
+from studies.heap.env import MAX_PICKS, HeapEnv
+from studies.heap.generate import stored_heaps
 from studies.heap.learning import Learned, load_networks
 from studies.heap.policies import RULES, Oracle, best, linear, play
 from studies.heap.recording import HEAPS, NAME, WEIGHTS, make_heaps, make_networks
 from studies.results import COMMAND, Result, keep_all, publish, read_table
-from studies.statistics import LEVEL, RESAMPLES
+from studies.statistics import mean_interval, ratio_interval
+from studies.style import COLOURS, styled
 from unload.agent.identity import identity
-from unload.support import checks, files
+from unload.support import files
 
 # A box near the front takes many along if others lie before it and on it; how much each of these
 # counts is what the family of linear rules varies.
@@ -46,6 +48,13 @@ REFERENCE, LEARNED, ORACLE = "best rule", "learned", "oracle"
 RULE_COLUMNS = ["rule", "heaps", "boxes", "falls"]
 MEASURES = "boxes", "falls", "net"
 ENDS = "", "_low", "_high"  # of a mean and its interval
+LINES = {REFERENCE: COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
+# Where the names of rules stand that lie close together: offset in points, and alignment.
+NAME_PLACES = {
+    "clear above": ((-2, 9), "center"), "nearest": ((0, -13), "center"),
+    "highest": ((5, -12), "left"), "random": ((5, -12), "left"),
+}  # fmt: skip
+UNITS = {"boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick"}
 
 
 def family() -> dict[str, dict[str, float]]:
@@ -112,7 +121,7 @@ def _played(
         if "networks" in player:
             known["networks"] = files.digest(player["networks"])
         for number, heap in enumerate(stored_heaps(split)[:heaps]):
-            question = {"player": known, "heap": heap.digest(), "number": number, "code": code}
+            question = {"player": known, "heap": identity(heap), "number": number, "code": code}
             question |= {"physics": physics, "picks": MAX_PICKS}
             jobs.append((question, partial(_play, player, split, number, physics)))
     answers = iter(keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs))
@@ -156,12 +165,7 @@ def _play(player: dict, split: str, number: int, physics: str) -> dict[str, floa
         policy = Learned(load_networks(player["networks"]), player["falls_weight"])
     else:
         policy = Oracle(env, player["oracle"], physics)
-    try:
-        episode = play(env, policy, env.heaps[number], seed=number)
-    finally:
-        env.close()
-        if isinstance(policy, Oracle):
-            policy.close()
+    episode = play(env, policy, env.heaps[number], seed=number)
     return {"boxes": float(episode.unloaded.mean()), "falls": float(episode.falls.mean())}
 
 
@@ -244,41 +248,6 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Mean, and its 95 % BCa bootstrap interval; equal values have one of no width."""
-    return ratio_interval(values, np.ones(len(values)))
-
-
-def ratio_interval(
-    values: Sequence[float], reference: Sequence[float]
-) -> tuple[float, float, float]:
-    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
-
-    NaN where the reference's mean is not > 0 in every resample, because such a ratio means
-    nothing. If all pairs have the same ratio, the interval has no width. Of fewer than two pairs,
-    it is NaN.
-    """
-    values = checks.finite_array("values", values, (None,))
-    reference = checks.finite_array("reference", reference, values.shape)
-    rows = np.random.default_rng(0).integers(len(values), size=(RESAMPLES, len(values)))
-    if (reference[rows].mean(axis=1) <= 0).any():
-        return np.nan, np.nan, np.nan
-    ratio = float(values.mean() / reference.mean())
-    if np.abs(values - ratio * reference).max() < 1e-12:
-        return ratio, ratio, ratio
-
-    def ratios(values: np.ndarray, reference: np.ndarray, axis: int) -> np.ndarray:
-        return values.mean(axis=axis) / reference.mean(axis=axis)
-
-    with warnings.catch_warnings():  # samples of few different values: the interval is NaN
-        warnings.simplefilter("ignore")
-        low, high = stats.bootstrap(
-            (values, reference), ratios, n_resamples=RESAMPLES, paired=True, method="BCa",
-            confidence_level=LEVEL, vectorized=True, axis=-1, rng=np.random.default_rng(0),
-        ).confidence_interval  # fmt: skip
-    return ratio, float(low), float(high)
-
-
 def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
     """``heap/table.csv``, see ``compared``."""
     columns = [f"{measure}{end}" for measure in MEASURES for end in ENDS]
@@ -286,7 +255,39 @@ def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
     return read_table(path, command, ["falls_weight", "policy", *columns])
 
 
+@styled
+def throughput_falls() -> Figure:
+    """Boxes and falls a pick on unseen heaps: a point for each rule, a curve over λ for others."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.2))
+    for name, rows in read_heap_table().groupby("policy", sort=False):
+        rows = rows.sort_values("falls_weight")
+        colour = LINES.get(name, "0.6")
+        x, y = (
+            np.abs(rows[[f"{part}_low", f"{part}_high"]].to_numpy().T - rows[part].to_numpy())
+            for part in ("falls", "boxes")
+        )
+        axes.errorbar(rows["falls"], rows["boxes"], y, x, "o", color=colour, ms=4, lw=0.8)
+        label = name if name in LINES else None
+        axes.plot(rows["falls"], rows["boxes"], "o-", color=colour, ms=4, lw=1.6, label=label)
+        marks = {}
+        if name in RULES:
+            marks = {name: rows.iloc[0]}
+        elif name == LEARNED:
+            marks = {f"λ = {row['falls_weight']:g}": row for _, row in rows.iterrows()}
+        for text, row in marks.items():
+            usual = ((5, 4), "left") if name in RULES else ((-4, 5), "right")
+            place, side = NAME_PLACES.get(text, usual)
+            axes.annotate(
+                text, (row["falls"], row["boxes"]), xytext=place, textcoords="offset points",
+                ha=side, fontsize=8, color="0.4" if name in RULES else colour,
+            )  # fmt: skip
+    axes.set(xlabel=UNITS["falls"], ylabel=UNITS["boxes"])
+    axes.set_xlim(left=0)
+    axes.legend(loc="lower right", fontsize=8)
+    return figure
+
+
 def heap_data(n_jobs: int) -> None:
-    """Make all data of heaps, which is what ``data/heap`` holds."""
+    """Make all data of heaps: the heaps, recorded picks, networks, and the policies compared."""
     for step in (make_heaps, make_networks, choose_rules, compare):
         step(n_jobs=n_jobs)

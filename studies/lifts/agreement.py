@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
-from typing import NamedTuple
 
 import gymnasium
 import numpy as np
@@ -26,12 +25,13 @@ from studies.results import COMMAND, keep_all, measured, publish, read_table
 from studies.statistics import share_interval
 from unload import task
 from unload.agent import policies
+from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.substacks import WALLS
 from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
-from unload.physics.table import HELD_DOWN, LIFTS_FILE, TablePhysics, shared_table
+from unload.physics.table import HELD_DOWN, LIFTS_FILE
 
 NAME = "lift_agreement"
 NEAR_WALLS = 5  # the item's own wall and two on each side
@@ -56,17 +56,6 @@ UNLOADED_BY = {
 }
 
 
-class State(NamedTuple):
-    """A container on its way to be unloaded: how it got there, and what it holds."""
-
-    policy: str
-    seed: int
-    picks: int
-    load: Load
-    present: np.ndarray  # (n,) bool, the items that are left
-    visible: np.ndarray  # (128,) int64, the items that can be picked
-
-
 def agreement_data(
     folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
 ) -> None:
@@ -82,7 +71,7 @@ def agreement_data(
     # Full takes seconds for each lift, so that answers are kept one by one.
     asked = frame.index[frame["asked_full"] != ""]
     columns = (frame.loc[asked, name] for name in ("state", "item", "walls"))
-    jobs = [fresh_job(states[state], item, walls) for state, item, walls in zip(*columns)]
+    jobs = [fresh_job(*states[state], item, walls) for state, item, walls in zip(*columns)]
     answers = keep_all(Path(runs_dir) / "agreement", jobs, n_jobs)
     frame["full"] = pd.Series([answer.value for answer in answers], asked, "float64")
     settings = {
@@ -157,56 +146,52 @@ def table_digest() -> str:
     return blake2b(LIFTS_FILE.read_bytes(), digest_size=8).hexdigest()
 
 
-def container_states(policy: str, seed: int) -> Iterator[State]:
-    """The states of one container at each of ``STAGES``, unloaded with ``table``."""
+def container_states(policy: str, seed: int) -> Iterator[tuple[int, ContainerEnv]]:
+    """Picks and environment of one container at each of ``STAGES``, unloaded with ``table``."""
     env = gymnasium.make("unload/Container-v0", physics="table").unwrapped
     rng = np.random.default_rng([seed, 1])  # not what draws the load
     observation, info = env.reset(seed=seed)
     for picks in range(max(STAGES) + 1):
         if picks in STAGES:
-            present, visible = env.physics.present.copy(), env.visible.copy()
-            yield State(policy, seed, picks, env.physics.load, present, visible)
+            yield picks, env
         if picks < max(STAGES):
             chosen = UNLOADED_BY[policy](observation[None], info["action_mask"][None], rng)
             observation, _, _, _, info = env.step(chosen[0])
-    env.close()
 
 
-def collect_lifts(lifts: int, seed: int) -> tuple[list[State], pd.DataFrame]:
+def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]], pd.DataFrame]:
     """At least so many lifts, asked of ``table``, with the lifts that ship, and of ``local``.
 
     Containers take turns in ``UNLOADED_BY``, with the seeds ``seed``, ``seed + 1``, …
 
     Returns:
-        The states, and the columns of ``read_agreement`` without those of ``full`` but
-        with ``state``, an index into the states.
+        The states, of each the load and (n,) bool, which items are left; and the columns of
+        ``read_agreement`` without those of ``full`` but with ``state``, an index into the states.
     """
-    both = {"table": TablePhysics(shared_table()), "local": LocalPhysics()}
-    states, rows, names = [], [], list(UNLOADED_BY)
+    local, states, rows, names = LocalPhysics(), [], [], list(UNLOADED_BY)
     numbers: dict[bytes, int] = {}  # of situations
     rng = np.random.default_rng([seed, 2])
     while len(rows) < lifts:
         container = len(states) // len(STAGES)
-        for state in container_states(names[container % len(names)], seed + container):
-            for physics in both.values():
-                physics.reset(state.load)
-                for item in np.flatnonzero(~state.present):
-                    physics.remove(item)
-            named = {name: getattr(state, name) for name in ("policy", "seed", "picks")}
-            named["state"] = len(states)
-            surroundings = both["local"].surroundings
-            on_top = [len(surroundings.on_top(item)) for item in state.visible]
+        policy = names[container % len(names)]
+        named = {"policy": policy, "seed": seed + container}
+        for picks, env in container_states(policy, seed + container):
+            table, visible = env.physics, env.visible
+            local.reset(table.load)
+            for item in np.flatnonzero(~table.present):
+                local.remove(item)
+            on_top = [len(local.surroundings.on_top(item)) for item in visible]
             kinds = np.minimum(on_top, len(WANTED) - 1)
             for kind, wanted in enumerate(WANTED):
-                items = state.visible[kinds == kind]
+                items = visible[kinds == kind]
                 for item in rng.choice(items, min(wanted, len(items)), replace=False).tolist():
-                    situation = surroundings.situation(item)
+                    situation = local.surroundings.situation(item)
                     number = numbers.setdefault(situation.key, len(numbers))
-                    row = {"item": item, "on_top": situation.on_top, "situation": number}
-                    rows.append(named | row | {name: way.lift(item) for name, way in both.items()})
-            states.append(state)
-    for physics in both.values():
-        physics.close()
+                    row = {"picks": picks, "state": len(states), "item": item}
+                    row |= {"on_top": situation.on_top, "situation": number}
+                    row |= {"table": table.lift(item), "local": local.lift(item)}
+                    rows.append(named | row)
+            states.append((table.load, table.present.copy()))
     return states, pd.DataFrame(rows)
 
 
@@ -232,15 +217,16 @@ def choose_for_full(
     return why, walls
 
 
-def fresh_job(state: State, item: int, walls: int) -> tuple[dict, Callable[[], float]]:
+def fresh_job(
+    load: Load, present: np.ndarray, item: int, walls: int
+) -> tuple[dict, Callable[[], float]]:
     """Question and computation of one lift in a fresh world of some walls, for ``keep_all``.
 
     In a world that has seen other lifts, the answer depends on them (by a millimetre or so),
     and so on the order in which the items are lifted.
     """
-    load = state.load
     near = (abs(load.walls - load.walls[item]) <= NEAR_WALLS // 2) | (walls == WALLS)
-    items = np.flatnonzero(state.present & near)
+    items = np.flatnonzero(present & near)
     fields = load.positions, load.sizes, load.packages, load.walls
     left, box = Load(*(field[items] for field in fields)), int(np.searchsorted(items, item))
     boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
@@ -252,6 +238,4 @@ def fresh_distance(load: Load, item: int) -> float:
     """How far ``full`` moves an item of a load that has seen no other lift, in m."""
     physics = FullPhysics()
     physics.reset(load)
-    distance = physics.lift(item)
-    physics.close()
-    return distance
+    return physics.lift(item)

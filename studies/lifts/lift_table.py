@@ -57,7 +57,6 @@ def _fill(path: Path) -> None:
         for _ in range(task.MAX_PICKS):
             actions = policy(observations, infos["action_mask"], rng)
             observations, _, _, _, infos = envs.step(actions)
-    envs.close()
     envs.table.save(path)
 
 

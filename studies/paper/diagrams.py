@@ -1,4 +1,4 @@
-"""Two diagrams: the task as a Markov decision process (Fig. 1), and the network (Fig. 7)."""
+"""Diagrams: the task as a Markov decision process (Fig. 1), substacks (3), the network (7)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -9,11 +9,13 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from studies.style import styled
 from unload import task
+from unload.load.picture import package_colour
+from unload.load.substacks import CELL, CELLS_WIDE, COLUMNS, LEFT, MID, PACKAGES, RIGHT, ROWS_HIGH
 
 INK = "#333333"
 PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
 WIDTH, HEIGHT = 14, 6.5  # of a block of Fig. 1
-COLUMNS = (15, 35, 55, 75)  # left edges of the blocks
+LEFT_EDGES = (15, 35, 55, 75)  # left edges of the blocks
 # From left to right: what a block is called, and what it does.
 AGENT = (
     ("equalization", "ranks, Alg. 1"),
@@ -27,6 +29,7 @@ ENVIRONMENT = (
     ("moved ≥ 0.2 m?", "yes: unload, no: leave"),
     ("lift", "PyBullet: 20 N, 0.3 s"),
 )
+SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
 ROWS, FEATURES = 7, 6  # of Fig. 7: items and features that are drawn, of 128 and n
 TOP, CELL_HEIGHT = 6.2, 0.36  # of the tensors
 MIDDLE = TOP - ROWS * CELL_HEIGHT / 2  # height of the main line of arrows
@@ -44,13 +47,13 @@ def fig01_mdp() -> Figure:
         axes.text(13.5, low + 15.8, name, fontsize=12, fontweight="bold", va="top")
     upper, lower = 25.5, 3  # lower edges of the blocks
     for blocks, low in ((AGENT, upper), (ENVIRONMENT, lower)):
-        for x, (title, text) in zip(COLUMNS, blocks):
+        for x, (title, text) in zip(LEFT_EDGES, blocks):
             _rounded(axes, x, low, WIDTH, HEIGHT, fc="white", ec=INK, lw=1)
             style = {"ha": "center", "va": "center"}
             axes.text(x + WIDTH / 2, low + 4.2, title, fontweight="bold", fontsize=9, **style)
             axes.text(x + WIDTH / 2, low + 1.9, text, fontsize=7.5, color="#555555", **style)
     middle, below = upper + HEIGHT / 2, lower + HEIGHT / 2
-    for left, right in zip(COLUMNS, COLUMNS[1:]):
+    for left, right in zip(LEFT_EDGES, LEFT_EDGES[1:]):
         _path(axes, [(left + WIDTH, middle), (right, middle)])
         _path(axes, [(right, below), (left + WIDTH, below)])
     axes.text(52, middle + 0.5, r"$\hat{q}$", ha="center", va="bottom", color=INK)
@@ -68,6 +71,39 @@ def fig01_mdp() -> Figure:
     axes.text(57, 14, r"reward $r_{k+1} = \pm 1$", va="center", ha="right")
     _path(axes, [(66, lower + HEIGHT), (66, upper)])
     axes.text(67, 14, "mask of failed items", va="center")
+    return figure
+
+
+@styled
+def fig03_substacks() -> Figure:
+    """Fig. 3: the nine substacks, and how four of them interlock to a row of a wall.
+
+    Numbers are packages 0–12; everything is drawn to the same scale.
+    """
+    figure, axes = plt.subplots(figsize=(8.2, 6.6))
+    across, down, gap = 0.0, 0.88, 0.3  # m
+    for name, variants in SUBSTACKS.items():
+        boxes = np.concatenate(variants)
+        width = (boxes[:, 1] + PACKAGES[boxes[:, 0], 0]).max() * CELL
+        for variant, boxes in enumerate(variants):
+            _draw_substack(axes, boxes, across, (3 - variant) * down)
+        axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
+        across += width + gap
+    for variant in range(3):
+        middle = (3 - variant) * down + ROWS_HIGH * CELL / 2
+        axes.text(-0.08, middle, f"variant {variant}", ha="right", va="center")
+    bar = across - gap + 0.14
+    axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
+    axes.text(bar + 0.05, down + 0.25, "0.5 m", va="center")
+    row = (0, 1, 2, 0)
+    lift = -0.12
+    for (column, variants), variant in zip(COLUMNS, row):
+        _draw_substack(axes, variants[variant], column * CELL, lift)
+    label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
+    axes.text(CELLS_WIDE * CELL + 0.08, lift + ROWS_HIGH * CELL / 2, label, va="center")
+    axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(lift - 0.02, 4 * down + 0.02))
+    axes.set_aspect("equal")
+    axes.axis("off")
     return figure
 
 
@@ -176,3 +212,31 @@ def _path(axes: Axes, corners: list[tuple[float, float]], style: str | tuple = "
     axes.plot(*np.transpose(corners[:-1]), color=INK, lw=1.2, solid_capstyle="butt")
     look = {"arrowstyle": "-|>", "color": INK, "lw": 1.2, "ls": style, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=corners[-1], xytext=corners[-2], arrowprops=look)
+
+
+def _draw_substack(axes: Axes, boxes, x: float, z: float) -> None:
+    """A substack whose own origin is at (x, z) in m, with its border."""
+    for package, left, lower in boxes:
+        width, height = PACKAGES[package] * CELL
+        corner, colour = (x + left * CELL, z + lower * CELL), package_colour(package)
+        axes.add_patch(Rectangle(corner, width, height, fc=colour, ec="white", lw=0.8))
+        bright = np.dot(colour, (0.299, 0.587, 0.114)) > 0.55
+        look = {"ha": "center", "va": "center_baseline", "color": INK if bright else "white"}
+        middle = corner[0] + width / 2, corner[1] + height / 2
+        axes.text(*middle, str(package), fontsize=8, **look)
+    _draw_border(axes, boxes, x, z)
+
+
+def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
+    """Lines between cells of which one belongs to the substack and the other does not."""
+    inside = np.zeros((COLUMNS[-1][0] + 2, ROWS_HIGH + 2), dtype=bool)
+    for package, left, lower in boxes:
+        width, height = PACKAGES[package]
+        inside[left + 1 : left + width + 1, lower + 1 : lower + height + 1] = True
+    style = {"color": INK, "lw": 1.8, "solid_capstyle": "projecting"}
+    for column, row in np.argwhere(inside[1:] != inside[:-1]):
+        across, up = x + column * CELL, z + row * CELL
+        axes.plot([across, across], [up - CELL, up], **style)
+    for column, row in np.argwhere(inside[:, 1:] != inside[:, :-1]):
+        across, up = x + column * CELL, z + row * CELL
+        axes.plot([across - CELL, across], [up, up], **style)

@@ -14,7 +14,7 @@ import pandas as pd
 
 from studies import statistics
 from studies.paper import tuning as search
-from studies.paper.training import paper_runs
+from studies.paper.training import PAPER_CELLS, paper_runs
 from studies.paper.visible_items import BINS
 from unload import task
 from unload.agent import policies
@@ -30,12 +30,6 @@ CHANCE_ERROR = 0.025  # by how much a share may differ from one that the paper g
 CONTAINERS = 40  # full ones, whose free items and whose bars of Fig. 5 are counted
 FIG5_AXIS = 70  # where the paper's axis ends, in steps of 10
 SETTLED = 200  # tuning steps after which the noise of the loss is measured
-READINGS = {  # of the paper's training: cell → column
-    "paper_no_mask": "without the mask, b = 256",
-    "paper_mask": "with the mask, b = 256",
-    "paper_b2048_no_mask": "without the mask, b = 2048",
-    "paper_b2048_mask": "with the mask, b = 2048",
-}
 
 
 def table(rows: list[tuple]) -> pd.DataFrame:
@@ -145,9 +139,7 @@ def lifted_distance(stack: int) -> float:
         world.add_box((0, 0, 0.1 + 0.2 * level), (0.5, 0.4, 0.2), task.MASS)
         for level in range(stack)
     ]
-    distance = world.pull(bodies[0])
-    world.close()
-    return distance
+    return world.pull(bodies[0])
 
 
 def full_containers(count: int) -> pd.DataFrame:
@@ -169,7 +161,6 @@ def full_containers(count: int) -> pd.DataFrame:
         free = np.mean([not on_top(item) for item in range(len(positions))])
         bars = {name: np.histogram(x[items], BINS)[0].max() for name, items in seen.items()}
         rows.append({"free": free, "visible": env.liftable().mean(), **bars})
-    env.close()
     return pd.DataFrame(rows)
 
 
@@ -234,7 +225,8 @@ def training() -> pd.DataFrame:
     """The training, by the first plan's measures, see ``studies.statistics``.
 
     Returns:
-        ``where`` and ``paper``, and a column for each of ``READINGS``: ours, and whether it agrees.
+        ``where`` and ``paper``, and a column for each of ``PAPER_CELLS``: ours, and whether it
+        agrees.
     """
     runs = paper_runs()
     picks = task.NUM_ENVS * np.arange(1, search.STEPS + 1)
@@ -272,7 +264,9 @@ def training() -> pd.DataFrame:
             (f"{cell.fig11} of {cell.runs} runs", cell.fig11 >= half),
             (slower, max(slopes) < tuned),
         ]
-        frame[READINGS[cell.cell]] = [f"{text}: {word(agrees)}" for text, agrees in here]
+        config = PAPER_CELLS[cell.cell].config
+        reading = f"{'with' if config.mask else 'without'} the mask, b = {config.batch_size}"
+        frame[reading] = [f"{text}: {word(agrees)}" for text, agrees in here]
     return frame
 
 

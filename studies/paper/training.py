@@ -10,10 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.ticker import EngFormatter
 
 from studies import paths
 from studies.grid import Cell, Grid, read_grid, read_policies, train_grid
 from studies.results import COMMAND, JOBS
+from studies.style import COLOURS
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, save_policy
@@ -76,9 +79,9 @@ def training_data(
             save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
 
 
-def paper_runs(folder: str | Path = paths.DATA) -> list[tuple[str, int, pd.DataFrame]]:
+def paper_runs() -> list[tuple[str, int, pd.DataFrame]]:
     """Cell, seed and curve of each published run of the paper's four cells."""
-    curves = read_grid(PAPER, folder, PAPER_CELLS)
+    curves = read_grid(PAPER, cells=PAPER_CELLS)
     groups = curves.groupby(["cell", "seed"], sort=False)
     return [(cell, seed, curve) for (cell, seed), curve in groups]
 
@@ -112,3 +115,22 @@ def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
             f"expected a divisor of the {length:,} picks of an episode"
         )
     return groups.mean().assign(**ends)
+
+
+def draw_learning_curve(
+    axes: Axes, curve: pd.DataFrame, name: str, color: str = COLOURS["ranks"]
+) -> None:
+    """Draw the MSR while training: pale at each point of the curve, strong over whole episodes.
+
+    Args:
+        axes: where.
+        curve: of ``unload.train``, see ``episode_means``.
+        name: in the legend.
+        color: of both lines.
+    """
+    axes.plot(curve["picks"], curve["success_rate"], color=color, linewidth=0.7, alpha=0.45)
+    episodes = episode_means(curve)
+    middle = episodes["picks"] - task.NUM_ENVS * task.MAX_PICKS / 2
+    axes.plot(middle, episodes["success_rate"], "o-", color=color, markersize=3.5, label=name)
+    axes.set(xlabel="picks", ylabel="MSR while training", ylim=(0, 1.02), xlim=(0, None))
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))

@@ -1,17 +1,21 @@
-"""The hyperparameter search of Sec. IV-A (Figs. 8–10): its grid, its data, what is measured of it.
+"""The hyperparameter search of Sec. IV-A: its grid, data and measures, and Figs. 8–10.
 
 python -m studies tuning
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from studies import paths
 from studies.grid import Cell, Grid, read_grid, train_grid
 from studies.results import COMMAND
+from studies.style import COLOURS, styled
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.env.highest_item import GRID
@@ -39,6 +43,9 @@ SOLVED = 0.99  # MSR
 REACHED = 0.9  # greedy MSR
 LEAST_GREEDY = 0.05  # share of the picks from which the greedy MSR can be told
 RESAMPLES = 500  # of the runs, for intervals
+
+Curves = dict[int, np.ndarray]  # one value per training step, by the number of the run
+FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
 
 
 def tuning_config(
@@ -256,3 +263,41 @@ def tuning_summary(folder: str | Path = paths.DATA) -> pd.DataFrame:
         solved=groups["solved"].sum(), final_msr_std=groups["final_msr"].std(), runs=groups.size()
     )
     return summary.reset_index()
+
+
+@styled
+def over_steps(curves: Mapping[str, tuple[Curves, int]], label: str) -> Figure:
+    """Running means over 25 steps of all runs, one of each configuration as a strong line.
+
+    Args:
+        curves: by name: the curves of all runs, and the number of the strong one, which stands
+            in the legend if there are others.
+        label: of the vertical axis, an MSR unless it says "loss".
+    """
+    figure, axes = plt.subplots()
+    for (name, (runs, shown)), colour in zip(curves.items(), colours_of(curves)):
+        draw_runs(axes, name, runs, shown, colour)
+    steps = max(len(values) for runs, _ in curves.values() for values in runs.values())
+    axes.set(xlabel="step $k$", ylabel=label, xlim=(0, steps))
+    axes.set(ylim=(0, 0.6) if "loss" in label else (0, 1.02))
+    others = any(len(runs) > 1 for runs, _ in curves.values())
+    note = "thin: the other runs of the same configuration" if others else None
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2, title=note, title_fontsize=8)
+    return figure
+
+
+def draw_runs(axes: Axes, name: str, runs: Curves, shown: int, colour) -> None:
+    """Draw the runs of a configuration, one of them as a strong line; see ``over_steps``."""
+    for run, values in runs.items():
+        smooth = running_mean(values)
+        if run == shown:
+            label_of_run = f"{name}, run {shown}" if len(runs) > 1 else name
+            axes.plot(smooth, color=colour, label=label_of_run, zorder=3)
+        else:
+            axes.plot(smooth, color=colour, linewidth=0.5, alpha=0.4)
+
+
+def colours_of(names: Collection[str]) -> list:
+    """A colour a name: of what an agent sees, else from a scale for the values of a setting."""
+    scale = plt.get_cmap("viridis")(np.linspace(0, 0.85, len(names)))
+    return [FE_COLOURS.get(name, colour) for name, colour in zip(names, scale)]

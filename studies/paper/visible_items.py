@@ -45,7 +45,6 @@ def _positions() -> dict[str, np.ndarray]:
     env = gymnasium.make("unload/Container-v0").unwrapped
     observed, _ = env.reset(seed=SEED)
     everything = observation.scale(env.observed_positions())
-    env.close()
     return {
         "all_items": everything,
         "Observation": observed,
@@ -53,17 +52,16 @@ def _positions() -> dict[str, np.ndarray]:
     }
 
 
-def read_points(name: str, folder: str | Path = paths.DATA) -> np.ndarray:
+def read_points(name: str) -> np.ndarray:
     """Points of one of the paper's scatter plots.
 
     Args:
         name: ``"all_items"``, ``"Observation"`` or ``"Equalized_Observation"``.
-        folder: holds ``obs_hist_equal/name.csv``, columns ``x`` and ``y``.
 
     Returns:
         (n, 2) float64, x and z of each item, scaled to [-1, 1].
     """
-    path = Path(folder) / FOLDER / f"{name}.csv"
+    path = paths.DATA / FOLDER / f"{name}.csv"
     return read_table(path, f"{COMMAND} observation", ["x", "y"])[["x", "y"]].to_numpy()
 
 

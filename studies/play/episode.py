@@ -13,7 +13,6 @@ from unload.agent import policies
 from unload.agent.evaluation import Policy
 from unload.agent.greedy import load_policy
 from unload.env.container import ContainerEnv
-from unload.env.observation import nearest
 from unload.load.boxes import Load
 from unload.physics.situation import Surroundings
 from unload.physics.table import TablePhysics, shared_table
@@ -75,7 +74,7 @@ class Episode:
     """Picks on one load, one after the other, that can be taken back.
 
     Args:
-        load: the items.
+        load: the items; if None, one that the seed draws.
         seed: of the noise of their observed positions, see ``ContainerEnv``.
 
     Attributes:
@@ -83,14 +82,24 @@ class Episode:
         picks: those made so far, ``Pick`` each.
     """
 
-    def __init__(self, load: Load, seed: int = 0) -> None:
+    def __init__(self, load: Load | None = None, seed: int = 0) -> None:
         self._env = ContainerEnv("table", max_picks=sys.maxsize)
-        self.load, self._seed = load, checks.integer("seed", seed, 0)
+        self._options = {} if load is None else {"load": load}
+        self._seed = checks.integer("seed", seed, 0)
         self._begin()
+        self.load = self._env.physics.load
 
     def _begin(self) -> None:
-        self._now = self._env.reset(seed=self._seed, options={"load": self.load})
+        self._now = self._env.reset(seed=self._seed, options=self._options)
         self.picks: list[Pick] = []
+        self._moments: list[Moment] = []
+        self._remember(None)
+
+    def _remember(self, pick: Pick | None) -> None:
+        """Keep the moment after a pick."""
+        visible = self.visible
+        failed = np.sort(visible[self.allowed()[: len(visible)] == 0])
+        self._moments.append(Moment(self._env.physics.present.copy(), visible, failed, pick))
 
     @property
     def observation(self) -> np.ndarray:
@@ -122,6 +131,7 @@ class Episode:
         observation, reward, _, _, info = self._env.step(int(rows[0]))
         self._now = observation, info
         self.picks.append(Pick(item, info["distance"], reward > 0, on_top, bool(deadlocked)))
+        self._remember(self.picks[-1])
         return self.picks[-1]
 
     def back_to(self, count: int) -> None:
@@ -134,19 +144,7 @@ class Episode:
     def moment(self, count: int | None = None) -> Moment:
         """The container after the first ``count`` picks; after all of them if None."""
         count = len(self.picks) if count is None else count
-        count = checks.integer("count", count, 0, len(self.picks))
-        picks = self.picks[:count]
-        present = np.ones(len(self.load), dtype=bool)
-        present[[pick.item for pick in picks if pick.success]] = False
-        failed = []
-        for pick in reversed(picks):
-            if pick.success:
-                break
-            failed.append(pick.item)
-        left = np.flatnonzero(present)
-        visible = left[nearest(self.observed_positions()[left])]
-        last = picks[-1] if picks else None
-        return Moment(present, visible, np.unique(np.array(failed, np.int64)), last)
+        return self._moments[checks.integer("count", count, 0, len(self.picks))]
 
     def liftable(self, count: int | None = None) -> np.ndarray:
         """(k,) int64, the visible items that could be unloaded after the first ``count`` picks."""
@@ -184,7 +182,9 @@ class Run(Episode):
         mask: as given; may be set anew between picks.
     """
 
-    def __init__(self, player: str | Policy, load: Load, seed: int = 0, mask: bool = True) -> None:
+    def __init__(
+        self, player: str | Policy, load: Load | None, seed: int = 0, mask: bool = True
+    ) -> None:
         self._policy = player if callable(player) else policy_of(player)
         self.mask = mask
         super().__init__(load, seed)

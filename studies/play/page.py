@@ -15,7 +15,7 @@ import re
 from pathlib import Path
 
 from studies import paths
-from studies.falls.fresh import ERRS, THRESHOLDS
+from studies.falls.laboratory import ERRS, THRESHOLDS
 from unload import task
 from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import POSITION_NOISE, SINK

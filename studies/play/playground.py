@@ -142,21 +142,10 @@ class Playground(widgets.VBox):
             self._show()
 
     def _change_mask(self) -> None:
-        """Go back to the first pick that would be another one now, and play on from there.
-
-        With the mask that is the first deadlocked pick; without it, the one after the first
-        failure. If there is none before the pick that is shown, go on from this one.
-        """
+        """Let the player pick anew: the same up to the first pick that the mask changes."""
         run = self._run
         if run and run.mask != self.mask.value:
-            start = run.play_to(self.slider.value)
-            picks = run.picks[:start]
-            if self.mask.value:
-                others = [number for number, pick in enumerate(picks) if pick.deadlocked]
-            else:
-                others = [number for number, pick in enumerate(picks, 1) if not pick.success]
-            start = min([start, *others])
-            run.back_to(start)
+            run.back_to(0)
             run.mask = self.mask.value
         self._show()
 

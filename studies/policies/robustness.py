@@ -102,7 +102,6 @@ def play(
         free.append(not around.on_top(int(env.visible[action])))
         observation, reward, _, _, info = env.step(action)
         rewards.append(reward)
-    env.close()
     return {
         "success_rate": success_rate(rewards),
         "free": float(np.mean(free)),

@@ -20,12 +20,12 @@ from matplotlib.ticker import PercentFormatter
 
 from studies import paths
 from studies.changes import height_reward
+from studies.falls import measures
 from studies.grid import Cell, Grid, read_measures, train_grid
 from studies.results import COMMAND, JOBS
 from studies.statistics import bootstrap_interval
 from studies.style import styled
 from unload.agent.config import TrainConfig
-from unload.agent.evaluation import evaluate
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import checks, files
 
@@ -40,17 +40,10 @@ APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
     """MSR of a trained policy in fresh containers: ``msr_mask`` and ``msr_no_mask``."""
-    ready = Greedy(policy.network, equalize=False)  # the environment equalizes, which is faster
-    seen = {"equalize": config.equalize, "ties": config.ties}
     return {
-        f"msr_{name}": evaluate(ready, mask=mask, **LOADS, **seen)["success_rate"].mean()
+        f"msr_{name}": measures.judged(policy.network, replace(config, mask=mask), loads=LOADS)
         for name, mask in (("mask", True), ("no_mask", False))
     }
-
-
-def _setting(field: str, value: float) -> dict[str, Cell]:
-    """The cell in which one setting is changed; its name says which."""
-    return {f"{field}_{value}": Cell(replace(CONFIG, **{field: value}), SEEDS)}
 
 
 # Attention has fewer seeds, because to train and to judge it takes five times as long.
@@ -63,15 +56,17 @@ CONTROL = {"unchanged": Cell(CONFIG, SEEDS)}
 REWARDS = {
     f"height_{share}": Cell(CONFIG, SEEDS, partial(height_reward, share=share)) for share in SHARES
 }
-SETTINGS = (
-    _setting("n_features", 16)
-    | _setting("n_features", 256)
-    | _setting("learning_rate", 1e-4)
-    | _setting("learning_rate", 1e-2)
-    | _setting("batch_size", 64)
-    | _setting("batch_size", 2048)
-    | _setting("gradient_steps", 4)
-)
+TRIED = {
+    "n_features": (16, 256),
+    "learning_rate": (1e-4, 1e-2),
+    "batch_size": (64, 2048),
+    "gradient_steps": (4,),
+}
+SETTINGS = {
+    f"{field}_{value}": Cell(replace(CONFIG, **{field: value}), SEEDS)
+    for field, values in TRIED.items()
+    for value in values
+}
 # What is shown together.
 PARTS = {"networks": NETWORKS, "rewards": CONTROL | REWARDS, "settings": CONTROL | SETTINGS}
 _grid = partial(Grid, command=f"{COMMAND} variants", measure=judged)

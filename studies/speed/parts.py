@@ -23,6 +23,9 @@ FOLDER = paths.DATA / "benchmarks"
 COLUMNS = ["what", "how", "value", "unit", "ratio"]
 CONTAINER = "unload/Container-v0"
 ROUNDS = 4  # in which each call is timed
+LIFTS = {"full": 2, "local": 100, "table": 100}  # of a round; each of full takes seconds
+NUM_ENVS, PICKS = task.NUM_ENVS, task.MAX_PICKS  # of the containers that are many; of an episode
+BATCH_SIZE, N_FEATURES = 2048, 64  # of an update
 
 
 def read_speeds() -> pd.DataFrame:
@@ -53,74 +56,56 @@ def best_times(calls: Mapping[str, Callable[[], object]]) -> dict[str, float]:
     return best
 
 
-def lift_rates(load: unload.Load, full: int = 2, others: int = 100) -> dict[str, float]:
-    """Lifts per second in a full container, all known to the table.
-
-    Args:
-        load: the container's.
-        full: lifts of one round of ``FullPhysics``, which needs seconds for each.
-        others: lifts of one round of the others.
-
-    Returns:
-        By physics.
-    """
+def lift_rates(load: unload.Load) -> dict[str, float]:
+    """Lifts per second in a full container, all known to the table, by physics."""
     items = np.random.default_rng(0).permutation(len(load)).tolist()
     answering = {"full": FullPhysics(), "local": LocalPhysics(), "table": TablePhysics()}
-    counts = {"full": full, "local": others, "table": others}
     for physics in answering.values():
         physics.reset(load)
     times = best_times(
         {
-            name: lambda name=name, physics=physics: list(map(physics.lift, items[: counts[name]]))
+            name: lambda name=name, physics=physics: list(map(physics.lift, items[: LIFTS[name]]))
             for name, physics in answering.items()
         }
     )
-    for physics in answering.values():
-        physics.close()
-    return {name: counts[name] / seconds for name, seconds in times.items()}
+    return {name: LIFTS[name] / seconds for name, seconds in times.items()}
 
 
-def pick_rates(num_envs: int = task.NUM_ENVS, picks: int = 500) -> dict[str, float]:
+def pick_rates() -> dict[str, float]:
     """Random picks per second of one container, and of many in a loop and in arrays.
 
     The same episodes are played in each round, all but for their last pick, so that each
     pick carries its share of one reset; after the first round the table knows all lifts.
-
-    Args:
-        num_envs: how many containers the last three have.
-        picks: of an episode.
 
     Returns:
         By environment.
     """
 
     def one(physics: str) -> gymnasium.Env:
-        return gymnasium.make(CONTAINER, physics=physics, max_picks=picks)
+        return gymnasium.make(CONTAINER, physics=physics, max_picks=PICKS)
 
     def loop(physics: str) -> SyncVectorEnv:
-        makers = [lambda: one(physics)] * num_envs
+        makers = [lambda: one(physics)] * NUM_ENVS
         return SyncVectorEnv(makers, autoreset_mode=AutoresetMode.SAME_STEP)
 
     def arrays(equalize: bool) -> VectorEnv:
-        return gymnasium.make_vec(CONTAINER, num_envs, max_picks=picks, equalize=equalize)
+        return gymnasium.make_vec(CONTAINER, NUM_ENVS, max_picks=PICKS, equalize=equalize)
 
     # From the plain to the fast: a row each of the table.
     envs = {
         "one container, local": one("local"),
         "one container, table": one("table"),
-        f"{num_envs} containers in a loop, table": loop("table"),
-        f"{num_envs} in arrays": arrays(False),
-        f"{num_envs} in arrays, equalized": arrays(True),
+        f"{NUM_ENVS} containers in a loop, table": loop("table"),
+        f"{NUM_ENVS} in arrays": arrays(False),
+        f"{NUM_ENVS} in arrays, equalized": arrays(True),
     }
-    counts = {name: (picks - 1) * getattr(env, "num_envs", 1) for name, env in envs.items()}
-    times = best_times({name: _episode(env, picks) for name, env in envs.items()})
-    for env in envs.values():
-        env.close()
+    counts = {name: (PICKS - 1) * getattr(env, "num_envs", 1) for name, env in envs.items()}
+    times = best_times({name: _episode(env) for name, env in envs.items()})
     return {name: counts[name] / seconds for name, seconds in times.items()}
 
 
-def _episode(env: gymnasium.Env | VectorEnv, picks: int) -> Callable[[], None]:
-    shape = (picks - 1, getattr(env, "num_envs", 1))
+def _episode(env: gymnasium.Env | VectorEnv) -> Callable[[], None]:
+    shape = (PICKS - 1, getattr(env, "num_envs", 1))
     actions = np.random.default_rng(0).integers(task.N_VISIBLE, size=shape)
     if not isinstance(env, VectorEnv):
         actions = actions[:, 0].tolist()
@@ -133,26 +118,22 @@ def _episode(env: gymnasium.Env | VectorEnv, picks: int) -> Callable[[], None]:
     return play
 
 
-def update_times(batch_size: int = 2048, n_features: int = 64) -> dict[str, float]:
+def update_times() -> dict[str, float]:
     """Time of one ``DQN.update``: gradients of a batch, and a step of Adam.
-
-    Args:
-        batch_size: b.
-        n_features: n.
 
     Returns:
         ms, by how it is done.
     """
     rng = np.random.default_rng(0)
     batch = {
-        "observations": rng.uniform(-1, 1, (batch_size, task.N_VISIBLE, 3)).astype(np.float32),
-        "actions": rng.integers(task.N_VISIBLE, size=batch_size),
-        "rewards": rng.choice(np.array([-1, 1], np.float32), batch_size),
+        "observations": rng.uniform(-1, 1, (BATCH_SIZE, task.N_VISIBLE, 3)).astype(np.float32),
+        "actions": rng.integers(task.N_VISIBLE, size=BATCH_SIZE),
+        "rewards": rng.choice(np.array([-1, 1], np.float32), BATCH_SIZE),
     }
 
     # Each way has an agent of its own, so that all take the same steps from the same weights.
     def update(fused: bool, threads: int, rows: int = learner.ROWS_PER_PASS) -> Callable:
-        network = unload.PEQNetwork(n_features, torch.Generator().manual_seed(0))
+        network = unload.PEQNetwork(N_FEATURES, torch.Generator().manual_seed(0))
         agent = unload.DQN(network, fused_update=fused)
 
         def call() -> float:
@@ -164,7 +145,7 @@ def update_times(batch_size: int = 2048, n_features: int = 64) -> dict[str, floa
 
     times = best_times(
         {
-            "PyTorch, whole batch": update(False, 1, batch_size),
+            "PyTorch, whole batch": update(False, 1, BATCH_SIZE),
             f"PyTorch, chunks of {learner.ROWS_PER_PASS}": update(False, 1),
             "fused": update(True, 1),
             "fused, 2 threads": update(True, 2),

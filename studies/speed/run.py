@@ -111,7 +111,6 @@ def _their_rate(picks: int, threads: int) -> float:
     times: list[float] = []
     warm = config.batch_size + 2 * config.num_envs  # two updates do not count
     model.learn(warm + picks, lambda *_: times.append(time.perf_counter()) is None)
-    envs.close()
     steps = np.diff(times)[-(picks // config.num_envs) :]
     return config.num_envs / float(np.median(steps))
 

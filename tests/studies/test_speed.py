@@ -54,11 +54,12 @@ def test_maskable_ppo_finds_the_masks():
 
 
 def test_rates_are_positive_and_printed_with_their_units(small_load, monkeypatch, capsys):
-    monkeypatch.setattr(parts, "ROUNDS", 1)
-    rates = lift_rates(small_load, full=1, others=2)
+    small = {"ROUNDS": 1, "LIFTS": {"full": 1, "local": 2, "table": 2}, "NUM_ENVS": 2, "PICKS": 3}
+    for name, value in (small | {"BATCH_SIZE": 8, "N_FEATURES": 4}).items():
+        monkeypatch.setattr(parts, name, value)
+    rates = lift_rates(small_load)
     assert list(rates) == ["full", "local", "table"]
-    rates |= pick_rates(num_envs=2, picks=3)
-    rates |= update_times(batch_size=8, n_features=4)
+    rates |= pick_rates() | update_times()
     assert len(rates) == 12
     assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
     row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}

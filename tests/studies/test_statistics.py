@@ -134,3 +134,11 @@ def test_share_intervals_are_those_of_the_binomial_distribution():
 def test_bad_values_are_refused_by_name(function, arguments, message):
     with pytest.raises(ValueError, match=message):
         function(*arguments)
+
+
+def test_pairs_make_the_interval_of_a_ratio_narrow():
+    reference = np.array([1.0, 5.0, 2.0, 8.0])
+    ratio, low, high = statistics.ratio_interval(1.3 * reference, reference)
+    assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
+    assert np.isnan(statistics.ratio_interval(reference, -reference)).all()
+    assert np.isnan(statistics.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()

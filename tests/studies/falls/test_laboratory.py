@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -10,7 +9,7 @@ import pytest
 import torch
 
 from studies import changes, paths
-from studies.falls import fresh, laboratory, long, measures
+from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
 from studies.paper.training import PAPER
@@ -20,7 +19,6 @@ from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
-from unload.network.variants import NETWORKS
 
 
 @pytest.mark.slow
@@ -31,7 +29,7 @@ def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
     rows = pd.read_csv(folder / "laboratory.csv")
     assert list(rows.columns) == laboratory.COLUMNS
     ranks, shuffled = rows.itertuples()
-    assert (ranks.cell, ranks.seed, shuffled.cell) == ("ranks", laboratory.FIRST_SEED, "shuffled")
+    assert (ranks.cell, ranks.seed, shuffled.cell) == ("ranks", cells.FIRST_SEED, "shuffled")
     assert ranks.end < 0.9 < 0.98 < shuffled.end
     assert ranks.judged_place == shuffled.judged_place == 1
     trace = pd.read_csv(folder / "trace.csv")
@@ -42,15 +40,15 @@ def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("part", "module", "rows"),
+    ("part", "planned", "rows"),
     [
-        ("laboratory", laboratory, laboratory.read_laboratory),
-        ("fresh", fresh, fresh.read_fresh),
+        ("laboratory", cells.CELLS, laboratory.read_laboratory),
+        ("fresh", cells.FRESH, laboratory.read_fresh),
     ],
 )
-def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(part, module, rows):
+def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(part, planned, rows):
     seeds = {cell: sorted(group["seed"]) for cell, group in rows().groupby("cell")}
-    assert seeds == {name: list(cell.seeds) for name, cell in module.CELLS.items()}
+    assert seeds == {name: list(cell.seeds) for name, cell in planned.items()}
     published = read_provenance(paths.DATA / "falls", part)["settings"]["config"]
     assert TrainConfig(**published).plain() == CONFIG.plain()
 
@@ -61,12 +59,12 @@ def test_cells_differ_from_the_first_in_what_they_are_named_for():
     assert configs["ranks_no_mask"] == replace(plain, mask=False) and plain.mask
     assert configs["averaged"] == replace(plain, ties="average")
     assert configs["positions"] == replace(plain, equalize=False)
-    assert {*laboratory.SEEN, *laboratory.TRACED} < set(laboratory.CELLS)
-    for name, fields in laboratory.TAKEN_BACK.items():
+    assert {*cells.SEEN, *laboratory.TRACED} < set(laboratory.CELLS)
+    for name, fields in cells.TAKEN_BACK.items():
         assert configs[f"ranks_{name}"] == replace(plain, **fields) != plain
 
 
-@pytest.mark.parametrize(("cell", "label"), laboratory.WATCHING.items())
+@pytest.mark.parametrize(("cell", "label"), cells.WATCHING.items())
 def test_a_label_says_who_chooses_and_who_watches(cell, label):
     """By what the two networks store, and by how the choosing one ends in the published runs."""
     chooser, watcher = (part.split() for part in label.split(", "))
@@ -97,18 +95,18 @@ def test_the_rule_of_two_thresholds():
         [(0.2, 0.4, 1.0), (0.3, 0.0, 1.0), (0.0, -0.5, 1.0), (-0.3, 0.0, -1.0)],
         columns=laboratory.SLOPES,
     )
-    assert fresh.predicted(table).tolist() == [False, True, True, True]
-    averaged = fresh.CELLS["averaged"].config
-    assert fresh.predicted(table, averaged).tolist() == [False, False, True, False]
+    assert laboratory.predicted(table).tolist() == [False, True, True, True]
+    averaged = cells.FRESH["averaged"].config
+    assert laboratory.predicted(table, averaged).tolist() == [False, False, True, False]
 
 
 def test_the_rule_was_fitted_on_the_published_networks():
     """Of 290 networks with the mask and ties of x broken by noise."""
     fitted = ["ranks", "mirrored", "shuffled", "untilted", "untilted_y", "averaged_y", "averaged_z"]
     fitted += [f"episodes_{picks}" for picks in (25, 100, 250)]
-    fitted += [f"ranks_{name}" for name in laboratory.TAKEN_BACK]
+    fitted += [f"ranks_{name}" for name in cells.TAKEN_BACK]
     rows = laboratory.read_laboratory().query("cell in @fitted")
-    right = fresh.predicted(rows) == (rows["judged_as_is"] < fresh.ERRS)
+    right = laboratory.predicted(rows) == (rows["judged_as_is"] < laboratory.ERRS)
     assert len(rows) == 290 and right.sum() == 278
 
 
@@ -116,7 +114,7 @@ def test_the_rule_was_fitted_on_the_published_networks():
 def test_a_slope_is_kept_from_sinking(axes, scaled):
     config = replace(laboratory.CONFIG, picks=64 * 40, batch_size=64, seed=1)
     weights = {}
-    for name, change in (("held", partial(fresh.held, start=0, axes=axes)), ("plain", unchanged)):
+    for name, change in (("held", partial(cells.held, start=0, axes=axes)), ("plain", unchanged)):
         run = Training(config, change=change)
         for step in range(31):
             run.step()
@@ -127,7 +125,7 @@ def test_a_slope_is_kept_from_sinking(axes, scaled):
         weights[name] = run.agent.network.extractor.weight.detach().abs().sum(dim=0)
     # What is learned in eleven steps in between differs a little, too.
     ratio = (weights["held"] / weights["plain"]).numpy()
-    assert ratio == pytest.approx(1 + np.array(scaled) * (fresh.MOST_HELD - 1), abs=0.02)
+    assert ratio == pytest.approx(1 + np.array(scaled) * (cells.MOST_HELD - 1), abs=0.02)
 
 
 def test_runs_are_traced(tmp_path, monkeypatch):
@@ -189,23 +187,6 @@ def observations():
 
 def test_slopes_are_those_of_the_score(network, observations):
     assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
-
-
-@pytest.mark.parametrize("name", ["two_layer", "stack", "attention"])
-def test_slopes_of_other_networks_are_those_of_their_values(name, observations):
-    """Their first weights are no slopes, and not all of them have an extractor."""
-    seen, step = observations[:2, :7].astype(float), 1e-5
-    network = NETWORKS[name](8, torch.Generator().manual_seed(0)).double()
-    upper = np.argwhere(seen[..., 2] > np.median(seen[..., 2]))
-    expected = np.zeros(3)
-    for (row, item), axis, sign in product(upper, range(3), (1, -1)):
-        moved = seen.copy()
-        moved[row, item, axis] += sign * step
-        with torch.no_grad():
-            value = network(torch.from_numpy(moved))[row, item].item()
-        expected[axis] += sign * value / (2 * step) / len(upper)
-    assert measures.slopes(network, seen) == pytest.approx(expected, abs=1e-7)
-    assert np.abs(expected).max() > 1e-3
 
 
 def test_tilt_is_the_effect_of_place_at_equal_height(observations):

@@ -1,6 +1,6 @@
 """Small heaps that are made at once: towers of upright cubes, and a real one."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -46,16 +46,8 @@ def real_heap() -> Heap:
 
 
 @pytest.fixture
-def make_rake() -> Iterator[Callable[..., Rake]]:
-    made = []
-
-    def make(physics: str = "coarse") -> Rake:
-        made.append(Rake(physics))
-        return made[-1]
-
-    yield make
-    for rake in made:
-        rake.close()
+def make_rake() -> Callable[..., Rake]:
+    return lambda physics="coarse": Rake(physics)
 
 
 @pytest.fixture
@@ -70,15 +62,11 @@ def set_friction(monkeypatch) -> Callable[[float], None]:
 
 
 @pytest.fixture
-def make_heap_env(pile, monkeypatch) -> Iterator[Callable[..., HeapEnv]]:
-    """``make_heap_env(*heaps, ...)``: an environment of the small pile or others, then closed."""
-    made = []
+def make_heap_env(pile, monkeypatch) -> Callable[..., HeapEnv]:
+    """``make_heap_env(*heaps, ...)``: an environment of the small pile or others."""
 
     def make(*heaps: Heap, **settings) -> HeapEnv:
         monkeypatch.setattr("studies.heap.env.stored_heaps", lambda split: heaps or (pile,))
-        made.append(HeapEnv(**({"physics": "coarse"} | settings)))
-        return made[-1]
+        return HeapEnv(**({"physics": "coarse"} | settings))
 
-    yield make
-    for env in made:
-        env.close()
+    return make

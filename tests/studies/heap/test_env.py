@@ -6,7 +6,7 @@ import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from studies.heap.generate import SPLITS, read_heaps, settled_heap
+from studies.heap.generate import SPLITS, settled_heap, stored_heaps
 from studies.heap.learning import Learned, fit
 from studies.heap.network import FateNetwork
 from studies.heap.observation import ROWS
@@ -137,7 +137,7 @@ BAD_INPUT = {
     "physics is 'full'; expected one of 'whole'": lambda r: r.rake("full"),
     "box is 1; expected an integer >= 0 and <= 0": lambda r: r.rake().pick(r.cube, 1),
     "rng is 0; expected a numpy.random.Generator": lambda r: settled_heap(0),
-    "split is 'all'; expected one of 'train'": lambda r: read_heaps("all"),
+    "split is 'all'; expected one of 'train'": lambda r: stored_heaps("all"),
     "max_picks is 0": lambda r: r.env(max_picks=0),
     "render_mode is 'human'": lambda r: r.env(render_mode="human"),
     "expected a Heap that holds a box": lambda r: r.env().reset(

@@ -60,15 +60,12 @@ def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes
     nothing = oracle._rakes[0].pick(cubes((4.5, 1, 0)), 0)
     monkeypatch.setattr(oracle._rakes[0], "pick", lambda heap, box: nothing)
     episode = play(env, oracle, heap, 0)
-    oracle.close()
     assert int(episode.boxes[0]) == 1 and episode.unloaded[0] == 3
 
 
 @pytest.fixture(scope="module")
 def camera():
-    made = Camera()
-    yield made
-    made.close()
+    return Camera()
 
 
 def test_a_box_behind_another_is_not_visible(camera, cubes):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_sizes
-from studies.heap.generate import FEWEST, HIGHEST, read_heaps, write_heaps
+from studies.heap.generate import FEWEST, HIGHEST, stored_heaps, write_heaps
 from studies.heap.rake import PHYSICS
 from unload import task
+from unload.agent.identity import identity
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,7 @@ def test_a_pick_depends_on_nothing_but_the_heap(pile, make_rake, physics):
     first = used.pick(pile, 3)
     used.pick(pile.only(np.arange(5)), 1)
     for other in (used.pick(pile, 3), fresh.pick(pile, 3)):
-        assert other.heap.digest() == first.heap.digest()
+        assert identity(other.heap) == identity(first.heap)
         assert other.unloaded.tolist() == first.unloaded.tolist()
 
 
@@ -97,7 +98,7 @@ def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
     path = tmp_path / "heaps.npz"
     part = real_heap.only(np.arange(7))
     write_heaps(path, {"train": [real_heap, part], "test": [part]})
-    first, second = read_heaps("train", path)
-    (third,) = read_heaps("test", path)
+    first, second = stored_heaps("train", path)
+    (third,) = stored_heaps("test", path)
     for read, heap in ((first, real_heap), (second, part), (third, part)):
-        assert read.digest() == heap.digest() and len(read) == len(heap)
+        assert identity(read) == identity(heap) and len(read) == len(heap)

@@ -23,6 +23,9 @@ def test_picks_are_those_of_the_environment(full_load, episode, make_env):
         assert (pick.item, pick.distance) == (info["item"], info["distance"])
         assert (pick.success, pick.deadlocked) == (reward > 0, deadlocked)
     assert episode.unloaded() == info["unloaded"] == episode.unloaded(6)
+    drawn = Episode(seed=3)
+    assert np.array_equal(drawn.observation, make_env().unwrapped.reset(seed=3)[0])
+    assert len(drawn.load) == len(unload.stack_load(np.random.default_rng(3)))
 
 
 def test_a_pick_names_what_rests_on_it_and_fails_until_the_next_success(boxes):

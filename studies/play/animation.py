@@ -1,19 +1,18 @@
 """The README's moving picture: agents unload the same load side by side."""
 
 from collections.abc import Mapping
+from itertools import takewhile
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 from PIL import Image
 
+from studies.play.episode import Run
 from studies.style import styled
 from unload import task
 from unload.agent.evaluation import Policy
-from unload.env import observation
-from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.picture import COLOURS, back_to_front, corners, draw, pixels
 from unload.support import files
@@ -28,41 +27,24 @@ PALETTE = 127  # colours of all frames, besides white
 LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
 
 
-class Episode(NamedTuple):
-    """What an agent picked in one container, until it was empty or the agent was stuck."""
-
-    load: Load
-    positions: np.ndarray  # (n, 3) float64, where the agent saw the items, m
-    items: np.ndarray  # (picks,) int64, the item of each pick
-    unloaded: np.ndarray  # (picks,) bool, whether it was unloaded
-
-
-def record_episode(policy: Policy, seed: int, **env_kwargs) -> Episode:
+def record_episode(policy: Policy, seed: int, load: Load | None = None) -> Run:
     """Let an agent unload a container without the mask.
 
     The episode ends when the container is empty, or after 128 failed picks in a row.
 
     Args:
         policy: see ``unload.policies``.
-        seed: of the load and of the policy's random numbers.
-        **env_kwargs: arguments of ``ContainerEnv``, such as ``stack``.
+        seed, load: see ``Run``.
     """
-    env = ContainerEnv(physics="table", max_picks=10**6, **env_kwargs)
-    rng = np.random.default_rng(seed)
-    seen, info = env.reset(seed=seed)
-    positions = env.observed_positions()
-    items, unloaded, emptied = [], [], False
-    while not emptied and (len(items) < STUCK or any(unloaded[-STUCK:])):
-        action = int(policy(seen[None], info["item_mask"][None], rng)[0])
-        seen, reward, emptied, _, info = env.step(action)
-        items.append(info["item"])
-        unloaded.append(reward > 0)
-    load = env.physics.load
-    env.close()
-    return Episode(load, positions, np.array(items), np.array(unloaded))
+    run = Run(policy, load, seed, mask=False)
+    while run.allowed(mask=False).any() and (
+        len(run.picks) < STUCK or any(pick.success for pick in run.picks[-STUCK:])
+    ):
+        run.pick(run.choose())
+    return run
 
 
-def save_unloading(episodes: Mapping[str, Episode], path: str | Path) -> list[Image.Image]:
+def save_unloading(episodes: Mapping[str, Run], path: str | Path) -> list[Image.Image]:
     """Write a GIF of agents that pick at the same pace; the same bytes for the same episodes.
 
     Args:
@@ -72,7 +54,7 @@ def save_unloading(episodes: Mapping[str, Episode], path: str | Path) -> list[Im
     Returns:
         Its frames.
     """
-    counts = picks_of_frames(max(len(episode.items) for episode in episodes.values()))
+    counts = picks_of_frames(max(len(run.picks) for run in episodes.values()))
     frames = [_frame(episodes, *span) for span in zip([0, *counts], counts)]
     palette = _palette(frames)
     first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
@@ -107,56 +89,54 @@ def _palette(frames: list[Image.Image]) -> Image.Image:
 
 
 @styled
-def _frame(episodes: Mapping[str, Episode], before: int, now: int) -> Image.Image:
+def _frame(episodes: Mapping[str, Run], before: int, now: int) -> Image.Image:
     """All agents after ``now`` picks; those after the first ``before`` are marked."""
     figure = Figure((WIDTH * len(episodes), HEIGHT), dpi=100, layout="none")
     halves = figure.subfigures(1, len(episodes), squeeze=False)[0]
-    for half, (title, episode) in zip(halves, episodes.items()):
-        _draw_half(half, title, episode, before, now)
+    for half, (title, run) in zip(halves, episodes.items()):
+        _draw_half(half, title, run, before, now)
     handles = [Patch(color=COLOURS[meaning], label=text) for meaning, text in LEGEND.items()]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles))
     return Image.fromarray(pixels(figure))
 
 
-def _draw_half(half: Figure, title: str, episode: Episode, before: int, now: int) -> None:
+def _draw_half(half: Figure, title: str, run: Run, before: int, now: int) -> None:
     """One agent: its title, how far it has come, what its last pick was, and its container."""
-    load, _, items, unloaded = episode
-    count, bold = int(unloaded[:now].sum()), {"fontsize": 13, "fontweight": "bold"}
+    count, bold = run.unloaded(now), {"fontsize": 13, "fontweight": "bold"}
     half.text(0.04, 0.94, title, **bold)
-    half.text(0.96, 0.94, f"{count} of {len(load)}", ha="right", **bold)
-    for length, colour in ((1, RAIL), (count / len(load), COLOURS["liftable"])):
+    half.text(0.96, 0.94, f"{count} of {len(run.load)}", ha="right", **bold)
+    for length, colour in ((1, RAIL), (count / len(run.load), COLOURS["liftable"])):
         half.add_artist(Rectangle((0.04, 0.9), 0.92 * length, 0.015, color=colour))
-    text, colour = _state(episode, now)
+    text, colour = _state(run, now)
     half.text(0.04, 0.84, text, color=colour, fontsize=11)
-    low, high, colours = _boxes(episode, before, now)
+    low, high, colours = _boxes(run, before, now)
     draw(half.add_axes((0.02, 0.08, 0.96, 0.75)), low, high, colours)
 
 
-def _state(episode: Episode, now: int) -> tuple[str, str | tuple]:
+def _state(run: Run, now: int) -> tuple[str, str | tuple]:
     """What to say of the last pick, and the colour to say it in."""
-    items, unloaded = episode.items, episode.unloaded
-    if unloaded[-1] and now >= len(items):
-        text = f"empty after {len(items)} picks, {(~unloaded).sum()} of them failed"
+    count, picks = len(run.picks), run.picks[:now]
+    if run.picks[-1].success and now >= count:
+        text = f"empty after {count} picks, {count - run.unloaded()} of them failed"
         return text, COLOURS["liftable"]
-    picked = items[:now]
-    others = np.flatnonzero(unloaded[:now] | (picked != picked[-1:]))
-    fails = now - (int(others[-1]) + 1 if len(others) else 0)  # of the same box, at the end
+    same = takewhile(lambda pick: pick.item == picks[-1].item and not pick.success, picks[::-1])
+    fails = len(list(same)) + max(0, now - count)
     if fails > 1:
         return f"deadlock: the same box fails, {fails} times", COLOURS["failed"]
     return f"pick {now}", FAINT
 
 
-def _boxes(episode: Episode, before: int, now: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _boxes(run: Run, before: int, now: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners and colours of the boxes in the order in which they are drawn, see ``draw``."""
-    load, positions, items, unloaded = episode
-    present = np.ones(len(load), dtype=bool)
-    present[items[:before][unloaded[:before]]] = False
-    rising = items[before:now][unloaded[before:now]]
-    left = np.flatnonzero(present)
-    seen = left[observation.nearest(positions[left])] if len(left) else left
-    failed = items[-1:] if now > len(items) else items[before:now][~unloaded[before:now]]
+    load, count = run.load, len(run.picks)
+    moment = run.moment(min(before, count))
+    present, picks = moment.present, run.picks[before:now]
+    rising = np.array([pick.item for pick in picks if pick.success], int)
+    # Of an agent that is stuck, the last pick is shown as long as the others go on.
+    tried = picks if now <= count else run.picks[-1:]
+    failed = np.array([pick.item for pick in tried if not pick.success], int)
     colours = np.tile(COLOURS["unseen"], (len(load), 1))
-    for meaning, those in (("visible", seen), ("liftable", rising), ("failed", failed)):
+    for meaning, those in (("visible", moment.visible), ("liftable", rising), ("failed", failed)):
         colours[those] = COLOURS[meaning]
     low, high = corners(load, np.arange(len(load)))
     order = back_to_front(low, high)

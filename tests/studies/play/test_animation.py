@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from studies import paths
-from studies.paper import animation
+from studies.play import animation
 from studies.policies.robustness import front_walls
 from tests.agent.runs import lowest
 from unload import policies
@@ -13,25 +13,21 @@ from unload.load import picture
 from unload.load.substacks import stack_load
 
 
-def small(rng):
-    """One wall of a load."""
-    return front_walls(stack_load(rng), 1)
-
-
 @pytest.fixture(scope="module")
 def episodes():
+    """Two agents with one wall of a load."""
+    wall = front_walls(stack_load(np.random.default_rng(3)), 1)
     return {
-        "stuck": animation.record_episode(lowest, 3, stack=small),
-        "empty": animation.record_episode(policies.highest, 3, stack=small),
+        "stuck": animation.record_episode(lowest, 3, wall),
+        "empty": animation.record_episode(policies.highest, 3, wall),
     }
 
 
 def test_episode_ends_when_the_container_is_empty_or_the_agent_stuck(episodes):
     stuck, empty = episodes["stuck"], episodes["empty"]
-    assert empty.unloaded.all() and sorted(empty.items) == list(range(len(empty.load)))
-    assert len(set(stuck.items)) == 1 and not stuck.unloaded.any()
-    assert len(stuck.items) == animation.STUCK
-    assert np.array_equal(stuck.load.positions, empty.load.positions)
+    assert empty.unloaded() == len(empty.load) == len(empty.picks)
+    assert len({pick.item for pick in stuck.picks}) == 1 and not stuck.unloaded()
+    assert len(stuck.picks) == animation.STUCK
 
 
 def test_frames_begin_slowly_and_show_the_end_twice():
@@ -53,7 +49,7 @@ def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_pat
     monkeypatch.setattr(animation, "draw", lambda *all: drawn.append(all[1:]) or picture.draw(*all))
     first, second = tmp_path / "a.gif", tmp_path / "b.gif"
     frames = animation.save_unloading(episodes, first)
-    picks, boxes = len(episodes["stuck"].items), len(episodes["empty"].load)
+    picks, boxes = len(episodes["stuck"].picks), len(episodes["empty"].load)
     for said in (
         f"deadlock: the same box fails, {picks} times",
         f"0 of {boxes}",
