@@ -41,7 +41,7 @@ ROOMS = {room: f"tests/{room.removeprefix('unload/')}" for room in ROOMS} | {
     "studies/speed": "tests/studies/test_speed.py",
 }
 # Tests that take long or start processes of their own.
-SLOW = "full or program_ends or processes or 64_containers or agent_learns or saved_as_the_same"
+SLOW = "full or program_ends or processes or 16_containers or saved_as_the_same"
 OPTIONS = ["-q", "-x", "-m", "not slow", "-k", f"not ({SLOW})"]
 PAIRS = {
     ast.Lt: ast.LtE, ast.Gt: ast.GtE, ast.Eq: ast.NotEq, ast.Is: ast.IsNot, ast.In: ast.NotIn,
