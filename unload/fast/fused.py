@@ -27,7 +27,7 @@ from typing import NamedTuple, TypeGuard
 import numpy as np
 import torch
 
-from unload.fast.kernel import CHUNK, add_chunks, best_items, sum_chunks
+from unload.fast.kernel import CHUNK, add_chunks, best_items
 from unload.network.peq import PEQNetwork
 
 CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
@@ -120,7 +120,7 @@ def start_gradients(
         for other in others:
             other.result()
 
-        total = sum_chunks(partial) / rows.size
+        total = partial.sum(axis=0, dtype=np.float64) / rows.size
         if not np.isfinite(total).all():
             raise FloatingPointError(
                 f"the loss is {total[-1]} and its gradients are not all finite; "

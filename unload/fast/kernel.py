@@ -175,15 +175,6 @@ def _look_up(rows, actions, targets, picked, wanted):
 
 
 @compiled
-def sum_chunks(partial):
-    """The sum of the rows, in double precision."""
-    total = np.zeros(partial.shape[1])
-    for row in partial:
-        total += row
-    return total
-
-
-@compiled
 def _blocks(weight, bias, score):
     """The weights in blocks of ``BLOCK`` features.
 
