@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from studies import paths
+from studies.lifts.lift_table import mixed
 from studies.results import COMMAND, keep_all, measured, publish, read_table
 from studies.statistics import share_interval
 from unload import task
@@ -52,7 +53,7 @@ UNLOADED_BY = {
     "random": policies.random,
     "nearest": policies.nearest,
     "highest": policies.highest,
-    "mixed": policies.mixed(policies.highest, 0.3),
+    "mixed": mixed(policies.highest, 0.3),
 }
 
 

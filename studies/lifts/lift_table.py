@@ -65,12 +65,26 @@ def _filling_policies(rng: np.random.Generator) -> list[Callable]:
     return [
         *[policies.random] * RANDOM_SHARE,
         *(
-            policies.mixed(favourite, share)
+            mixed(favourite, share)
             for favourite in (policies.highest, policies.nearest)
             for share in (0.0, 0.1, 0.3, 0.6)
         ),
-        *(policies.mixed(partial(_farthest, direction=rng.normal(size=3)), 0.2) for _ in range(12)),
+        *(mixed(partial(_farthest, direction=rng.normal(size=3)), 0.2) for _ in range(12)),
     ]
+
+
+def mixed(favourite: Callable, share: float) -> Callable:
+    """A policy that picks at random with probability ``share``, and as ``favourite`` else."""
+
+    def policy(observations, masks, rng):
+        at_random = rng.random(len(masks)) < share
+        actions = np.empty(len(masks), np.int64)
+        for rows, chosen in ((at_random, policies.random), (~at_random, favourite)):
+            if rows.any():
+                actions[rows] = chosen(observations[rows], masks[rows], rng)
+        return actions
+
+    return policy
 
 
 def _farthest(observations, masks, rng, direction: np.ndarray) -> np.ndarray:

@@ -7,8 +7,6 @@ least in rows that hold no item; ``rng`` a ``numpy.random.Generator``; actions (
 ``unload.Greedy`` is a learned one.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from unload.support import checks
@@ -58,18 +56,3 @@ def highest(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generato
     """The allowed item whose centre is highest; in a neat load nothing lies on it."""
     observations, allowed = check_batch(observations, masks)
     return np.where(allowed, observations[..., 2], -np.inf).argmax(axis=1)
-
-
-def mixed(favourite: Callable, share: float) -> Callable:
-    """A policy that picks at random with probability ``share``, and as ``favourite`` else."""
-    checks.real("share", share, 0, 1)
-
-    def policy(observations, masks, rng):
-        at_random = checks.generator("rng", rng).random(len(masks)) < share
-        actions = np.empty(len(masks), np.int64)
-        for rows, chosen in ((at_random, random), (~at_random, favourite)):
-            if rows.any():
-                actions[rows] = chosen(observations[rows], masks[rows], rng)
-        return actions
-
-    return policy
