@@ -1,7 +1,10 @@
+import itertools
+
 import numpy as np
 import pytest
 
 from unload import task
+from unload.load.boxes import Load
 from unload.load.substacks import (
     CELL,
     CELLS_WIDE,
@@ -12,15 +15,29 @@ from unload.load.substacks import (
     build_load,
     stack_load,
     substacks_that_fit,
-    wall_cells,
 )
 
 
+def wall_cells(load: Load) -> list[tuple[int, int, int]]:
+    """Package, and left and lower edge in cells, of the items of a load."""
+    low = np.rint((load.positions - load.sizes / 2)[:, 1:] / CELL).astype(int)
+    return [*zip(load.packages.tolist(), *low.T.tolist())]
+
+
+@pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
+def test_every_combination_tiles_a_row(variants):
+    covered = np.zeros((ROWS_HIGH, CELLS_WIDE), dtype=int)
+    for package, left, lower in wall_cells(build_load([[variants]])):
+        width, height = PACKAGES[package]
+        assert left + width <= CELLS_WIDE and lower + height <= ROWS_HIGH
+        covered[lower : lower + height, left : left + width] += 1
+    assert (covered == 1).all()
+
+
 def test_all_variants_of_all_substacks_occur(full_load):
-    low = np.rint((full_load.positions - full_load.sizes / 2)[:, 1:] / CELL).astype(int)
-    items = zip(full_load.packages.tolist(), low[:, 0].tolist(), (low[:, 1] % ROWS_HIGH).tolist())
-    same_everywhere = (wall_cells([[variant] * 4]) for variant in range(3))
-    assert {*items} == {tuple(item) for items in same_everywhere for item in items.tolist()}
+    items = {(package, left, low % ROWS_HIGH) for package, left, low in wall_cells(full_load)}
+    same_everywhere = (wall_cells(build_load([[[variant] * 4]])) for variant in range(3))
+    assert items == {item for items in same_everywhere for item in items}
 
 
 def test_a_load_keeps_the_papers_range_and_the_container(rng):

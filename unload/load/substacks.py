@@ -55,18 +55,6 @@ COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
 LEFT_CELLS, OTHER_CELLS = 6, 10  # width of a left substack, and of each other one
 
 
-def wall_cells(variants: np.ndarray) -> np.ndarray:
-    """One item wall on the grid.
-
-    Args:
-        variants: (rows, 4) int, variant 0–2 of each substack, bottom row first.
-
-    Returns:
-        (n, 3) int64: package number, left edge and lower edge of each item in cells.
-    """
-    return _cells([variants], len(COLUMNS))[:, 1:]
-
-
 def _cells(variants: object, columns: int) -> np.ndarray:
     """Wall, package, left and lower edge of the items of (walls, rows, columns), (n, 4) int64."""
     variants = checks.integer_array("variants", variants, (None, None, columns))
