@@ -46,12 +46,7 @@ def nearest(
         same distance the one with the smaller index comes first.
     """
     checks.integer("count", count, 1)
-    distances = distance(positions, container)
-    order = np.argsort(distances)
-    ranked = distances[order]
-    if (ranked[1:] == ranked[:-1]).any():  # a stable order takes three times as long to find
-        order = np.argsort(distances, kind="stable")
-    return order[:count]
+    return np.argsort(distance(positions, container), kind="stable")[:count]
 
 
 def scale(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
