@@ -11,7 +11,7 @@ from unload.env.observation import POSITION_NOISE
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.full import AFTER_PICK, FullPhysics
+from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
@@ -220,7 +220,6 @@ class ContainerEnv(PickingEnv):
 
 def _make_physics(name: str, after_pick: str) -> Physics:
     checks.one_of("physics", name, ("local", "full", "table"))
-    checks.one_of("after_pick", after_pick, AFTER_PICK)
     if name == "full":
         return FullPhysics(after_pick)
     if after_pick != "restore":

@@ -9,7 +9,6 @@ from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
 from unload.physics.situation import RESOLUTION
 from unload.support import checks
 
-AFTER_PICK = ("restore", "keep")
 DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
 
@@ -24,7 +23,7 @@ class FullPhysics(Physics):
     """
 
     def __init__(self, after_pick: str = "restore") -> None:
-        checks.one_of("after_pick", after_pick, AFTER_PICK)
+        checks.one_of("after_pick", after_pick, ("restore", "keep"))
         super().__init__()
         self.after_pick = after_pick
         self.exact = after_pick == "restore"
