@@ -156,8 +156,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         return self._containers._asdict()
 
     def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        # Older checkpoints know only the paper's container.
-        arrays.setdefault("sizes", np.tile(task.CONTAINER, (self.num_envs, 1)))
         self._containers = containers.Containers(**arrays)
         self._around.clear()
 
