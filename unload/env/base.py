@@ -122,14 +122,8 @@ class Picking:
         self.max_picks = checks.integer("max_picks", max_picks, 1, sys.maxsize)
         self.position_noise = checks.real("position_noise", position_noise, 0, MOST_NOISE)
         self.render_mode = render_mode
-        self._set_spaces(
-            gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32),
-            gymnasium.spaces.Discrete(task.N_VISIBLE),
-        )
-
-    def _set_spaces(self, observations: gymnasium.Space, actions: gymnasium.Space) -> None:
-        """Take the spaces of one environment."""
-        self.observation_space, self.action_space = observations, actions
+        self.observation_space = gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32)
+        self.action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
 
 
 class PickingEnv(Picking, EpisodeEnv):
@@ -189,16 +183,15 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
     ) -> None:
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         super().__init__(**settings)
+        self.single_observation_space = self.observation_space
+        self.single_action_space = self.action_space
+        self.observation_space = batch_space(self.observation_space, self.num_envs)
+        self.action_space = batch_space(self.action_space, self.num_envs)
         self.autoreset_mode = checks.one_of("autoreset_mode", autoreset_mode, AutoresetMode)
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self._rngs: list[np.random.Generator] = []
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
-
-    def _set_spaces(self, observations: gymnasium.Space, actions: gymnasium.Space) -> None:
-        self.single_observation_space, self.single_action_space = observations, actions
-        self.observation_space = batch_space(observations, self.num_envs)
-        self.action_space = batch_space(actions, self.num_envs)
 
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: dict | None = None):
         """Start an episode in every environment.
