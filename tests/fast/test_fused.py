@@ -189,7 +189,7 @@ def test_weights_and_inputs_that_are_not_finite_are_refused(batch, place, value)
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("actions", np.full(BATCH, ITEMS), "actions holds 128; expected 0 to 127"),
+        ("actions", np.full(BATCH, ITEMS), "actions holds 128 to 128; expected 0 to 127"),
         ("actions", np.full(BATCH, -1), "actions holds -1"),
         ("actions", np.zeros(BATCH, np.int32), "actions has shape .* dtype int32"),
         ("rewards", np.zeros(BATCH), "targets has shape .* dtype float64"),

@@ -16,8 +16,6 @@ from unload.env.vector import ContainerVectorEnv
 from unload.support import checks
 
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
-# Arguments of ``ContainerEnv`` that ``evaluate`` passes on.
-ENV_KWARGS = ("after_pick", "equalize", "position_noise", "stack", "ties")
 MOST_EPISODES = 10**6
 # Failed picks in a row after which an episode without a limit is given up.
 GIVE_UP = 10 * task.N_VISIBLE
@@ -83,8 +81,6 @@ def evaluate(
         max_picks = checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
-    for name in env_kwargs:
-        checks.one_of("an argument of evaluate", name, ENV_KWARGS)
     if physics == "table":
         checks.one_of("after_pick", env_kwargs.pop("after_pick", "restore"), ("restore",))
 
@@ -128,11 +124,8 @@ def _play(
         # A policy needs a choice in every row, also where the episode is over; what it returns
         # is checked before anything is picked, because it may be anybody's.
         allowed = choosable(allowed, infos["item_mask"])
-        actions = checks.integer_array(
-            "what policy returned", policy(observations, allowed, rng), rows.shape
-        )
-        for action in (int(actions.min()), int(actions.max())):
-            checks.integer("what policy returned", action, 0, task.N_VISIBLE - 1)
+        chosen, last = policy(observations, allowed, rng), task.N_VISIBLE - 1
+        actions = checks.integer_array("what policy returned", chosen, rows.shape, 0, last)
 
         # The masks of before the pick say whether its item had failed already.
         deadlocked.append(infos["action_mask"][rows, actions] == 0)

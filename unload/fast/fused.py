@@ -29,6 +29,7 @@ import torch
 
 from unload.fast.kernel import CHUNK, add_chunks, best_items
 from unload.network.peq import PEQNetwork
+from unload.support import checks
 
 CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
 
@@ -104,8 +105,8 @@ def start_gradients(
             )
 
     # Compiled code reads and writes wherever it is told to, therefore all is checked before.
-    _check_range("rows", rows, count)
-    _check_range("actions", actions[rows], items)
+    checks.integer_array("rows", rows, (None,), 0, count - 1)
+    checks.integer_array("actions", actions[rows], (None,), 0, items - 1)
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
@@ -178,13 +179,6 @@ def _check(observations: np.ndarray) -> tuple[int, int]:
             "expected (batch, items, 3) float32, not empty"
         )
     return shape[:2]
-
-
-def _check_range(name: str, numbers: np.ndarray, end: int) -> None:
-    """Raise ValueError unless all numbers are in 0 … end-1; compiled code does not look."""
-    wrong = numbers[(numbers < 0) | (numbers >= end)]
-    if wrong.size:
-        raise ValueError(f"{name} holds {wrong[0]}; expected 0 to {end - 1}")
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.Tensor, ...]:

@@ -8,7 +8,8 @@ from unload.fast import fused
 from unload.network.peq import PEQNetwork
 from unload.support.compiled import compiled
 
-BETAS = 0.9, 0.999  # of Adam, PyTorch's defaults
+# Of Adam, PyTorch's defaults; a step is divided by the root mean square of gradients plus epsilon.
+BETAS, EPSILON = (0.9, 0.999), 1e-8
 
 
 class FusedLearner:
@@ -57,14 +58,10 @@ class Adam:
     Args:
         weights: (k,) float32 each.
         learning_rate: the step size.
-        epsilon: is added to the root mean square of the gradients, by which a step is divided.
     """
 
-    def __init__(
-        self, weights: Sequence[np.ndarray], learning_rate: float, epsilon: float = 1e-8
-    ) -> None:
-        self.weights = tuple(weights)
-        self.learning_rate, self.epsilon, self.steps = learning_rate, epsilon, 0
+    def __init__(self, weights: Sequence[np.ndarray], learning_rate: float) -> None:
+        self.weights, self.learning_rate, self.steps = tuple(weights), learning_rate, 0
         # Running means of the gradients and of their squares.
         self.moments = np.zeros((2, sum(map(len, self.weights))))
 
@@ -72,8 +69,7 @@ class Adam:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - beta**self.steps for beta in BETAS]
-        settings = self.learning_rate, self.epsilon, *corrections
-        _step(self.weights, gradients, self.moments, *settings)
+        _step(self.weights, gradients, self.moments, self.learning_rate, *corrections)
 
     def state(self) -> dict[str, np.ndarray]:
         """What ``load_state`` needs to go on from here."""
@@ -86,7 +82,7 @@ class Adam:
 
 
 @compiled
-def _step(weights, gradients, moments, learning_rate, epsilon, correction, correction2):
+def _step(weights, gradients, moments, learning_rate, correction, correction2):
     mean, square = moments
     i = 0
     for part in weights:
@@ -94,6 +90,6 @@ def _step(weights, gradients, moments, learning_rate, epsilon, correction, corre
             gradient = gradients[i]
             mean[i] += (1 - BETAS[0]) * (gradient - mean[i])
             square[i] += (1 - BETAS[1]) * (gradient * gradient - square[i])
-            size = np.sqrt(square[i] / correction2) + epsilon
+            size = np.sqrt(square[i] / correction2) + EPSILON
             part[place] -= learning_rate * (mean[i] / correction) / size
             i += 1

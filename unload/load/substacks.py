@@ -57,11 +57,9 @@ LEFT_CELLS, OTHER_CELLS = 6, 10  # width of a left substack, and of each other o
 
 def _cells(variants: object, columns: int) -> np.ndarray:
     """Wall, package, left and lower edge of the items of (walls, rows, columns), (n, 4) int64."""
-    variants = checks.integer_array("variants", variants, (None, None, columns))
+    variants = checks.integer_array("variants", variants, (None, None, columns), 0, 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
-    if not (0 <= variants.min() and variants.max() <= 2):
-        raise ValueError(f"variants holds {variants.min()} to {variants.max()}; expected 0 to 2")
     counts, cells = (each[np.arange(columns), variants] for each in _row(columns))
     filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
     wall, row, _, _ = np.nonzero(filled)

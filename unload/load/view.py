@@ -89,7 +89,7 @@ def view(
     if order is not None:
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
-        first = _items("order", order, count)[:FIRST_PICKS]
+        first = checks.integer_array("order", order, (None,), 0, count - 1)[:FIRST_PICKS]
         groups = {f"pick {k + 1}": first[k : k + 1] for k in range(len(first))}
         colours, rest = PICK_COLOURS, "picked later"
     elif groups is None:
@@ -106,7 +106,8 @@ def view(
     # Of two groups that share an item the later one wins; a last group holds the rest.
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
-        of_item[_items(f"groups[{name!r}]", items, count)] = number
+        items = checks.integer_array(f"groups[{name!r}]", items, (None,), 0, count - 1)
+        of_item[items] = number
     if (present & (of_item < 0)).any():
         names += [rest] if rest not in names else []
         of_item[of_item < 0] = names.index(rest)
@@ -121,14 +122,6 @@ def view(
     boxes = *picture.corners(load, drawn), np.array([*legend.values()])[of_item[drawn]]
     figure.picture = partial(picture.still, *boxes, legend, height / 100, load.container)
     return figure
-
-
-def _items(name: str, items: object, count: int) -> np.ndarray:
-    """Return ``items`` as an int64 array; raise unless it holds numbers of the ``count`` items."""
-    items = checks.integer_array(name, items, (None,))
-    if items.size and not (0 <= items.min() and items.max() < count):
-        raise ValueError(f"{name} holds {items.min()} to {items.max()}; expected 0 to {count - 1}")
-    return items
 
 
 def mesh(

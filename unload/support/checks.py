@@ -108,9 +108,17 @@ def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
     return array
 
 
-def integer_array(name: str, value: object, shape: Shape) -> np.ndarray:
-    """Return ``value`` as an int64 array; raise unless it holds integers and has ``shape``."""
-    return _array(name, value, shape, "iu", "integers").astype(np.int64)
+def integer_array(
+    name: str, value: object, shape: Shape, low: int = 0, high: int | None = None
+) -> np.ndarray:
+    """Return ``value`` as an int64 array; raise unless it holds integers and has ``shape``.
+
+    If ``high`` is given, they must lie in [low, high].
+    """
+    array = _array(name, value, shape, "iu", "integers").astype(np.int64)
+    if high is not None and array.size and not (low <= array.min() and array.max() <= high):
+        raise ValueError(f"{name} holds {array.min()} to {array.max()}; expected {low} to {high}")
+    return array
 
 
 def flag_array(name: str, value: object, shape: Shape) -> np.ndarray:
