@@ -121,13 +121,12 @@ def add_chunks(
 
     # Each thread takes the next chunk until none is left, and knows the one after it in advance.
     blocks = _blocks(weight, bias, score)
-    picked, wanted = np.empty(CHUNK, np.int64), np.empty(CHUNK, np.float32)
     chunk = next_number(counter)
     while chunk < len(partial):
         following = next_number(counter)
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
         coming = rows[following * CHUNK : (following + 1) * CHUNK]
-        _look_up(chosen, actions, targets, picked, wanted)
+        picked, wanted = actions[chosen], targets[chosen]  # asks the memory for all at once
         largest = _largest(samples, chosen)
         for b in range(len(blocks)):
             _start_chunk(largest, precision, blocks[b])
@@ -136,7 +135,9 @@ def add_chunks(
         sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias[0]  # NaN if not finite
         for number, row in enumerate(chosen):
             later = coming[number] if number < len(coming) else row
-            _copy(samples[row], x)
+            x[: 3 * items] = samples[row]
+            for i in range(3 * items, len(x)):  # its last item again, until x is full
+                x[i] = x[i - 3]
             logit = np.float64(score_bias[0])  # double: 1 - tanh² loses its digits near 1
             for b in range(len(blocks)):
                 _reduce_items(fours, numbers, items, mask, samples, later, blocks[b])
@@ -165,13 +166,6 @@ def add_chunks(
                 partial[chunk, row * n + f] = block[GRADIENT + row * BLOCK + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
         chunk = following
-
-
-@compiled
-def _look_up(rows, actions, targets, picked, wanted):
-    """Copy the actions and targets of a chunk, so that the memory is asked for all at once."""
-    for number, row in enumerate(rows):
-        picked[number], wanted[number] = actions[row], targets[row]
 
 
 @compiled
@@ -217,15 +211,6 @@ def _start_chunk(largest, precision, block):
         scale = abs(block[WX + f]) + abs(block[WY + f]) + abs(block[WZ + f])
         scale = scale * largest + abs(block[BIAS + f])  # no value is larger
         block[SLACK + f] = scale * precision + np.float32(1e-30)
-
-
-@compiled
-def _copy(inputs, x):
-    """Copy one sample and repeat its last item until ``x`` is full."""
-    for i in range(len(inputs)):
-        x[i] = inputs[i]
-    for i in range(len(inputs), len(x)):
-        x[i] = x[i - 3]
 
 
 @compiled

@@ -55,19 +55,6 @@ COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
 LEFT_CELLS, OTHER_CELLS = 6, 10  # width of a left substack, and of each other one
 
 
-def _cells(variants: object, columns: int) -> np.ndarray:
-    """Wall, package, left and lower edge of the items of (walls, rows, columns), (n, 4) int64."""
-    variants = checks.integer_array("variants", variants, (None, None, columns), 0, 2)
-    if not variants.size:
-        raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
-    counts, cells = (each[np.arange(columns), variants] for each in _row(columns))
-    filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
-    wall, row, _, _ = np.nonzero(filled)
-    items = cells[filled]
-    items[:, 2] += row * ROWS_HIGH
-    return np.column_stack([wall, items])
-
-
 @cache
 def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
     """A row with one left substack, ``columns - 2`` mid ones and one right one, in arrays.
@@ -108,12 +95,18 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
-    cells = _cells(variants, substacks_that_fit(scale)[2])
-    walls, packages = cells[:, 0], cells[:, 1]
+    columns = substacks_that_fit(scale)[2]
+    variants = checks.integer_array("variants", variants, (None, None, columns), 0, 2)
+    if not variants.size:
+        raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
+    counts, cells = (each[np.arange(columns), variants] for each in _row(columns))
+    filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
+    walls, rows, _, _ = np.nonzero(filled)
+    packages, left, low = cells[filled].T
     # In walls and cells, and in m: a wall is as deep as each of its boxes.
     edges = np.insert(PACKAGES, 0, 1, axis=1)[packages]
     units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL * scale, CELL * scale])
-    positions = (np.delete(cells, 1, axis=1) + edges / 2) * units
+    positions = (np.column_stack([walls, left, low + rows * ROWS_HIGH]) + edges / 2) * units
     return Load(positions, edges * units, packages, walls)
 
 
