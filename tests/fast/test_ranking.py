@@ -5,7 +5,7 @@ import pytest
 
 from unload import equalize
 from unload.env.equalization import TIE_TOLERANCE
-from unload.fast.ranking import features, nearest_first, rank, remove, replace
+from unload.fast.ranking import features, rank, remove, replace
 
 TOLERANCE = np.float32(TIE_TOLERANCE)
 
@@ -53,18 +53,6 @@ def test_values_as_far_apart_as_the_tolerance_are_a_tie(tolerance):
     features(values, ranks, True, True, np.float32(tolerance), observation)
     assert observation.tobytes() == equalize(values.T, "average", tolerance).tobytes()
     assert (observation == 0).all() == (tolerance == 0.25)
-
-
-@pytest.mark.parametrize("ties", ["noise", "average"])
-def test_nearest_first_sorts_by_distance(items, rng, ties):
-    distances, flags = rng.random((2, 128)).round(2), rng.random((2, 128)) < 0.5
-    seen = np.stack([items.T, items.T[::-1]])
-    observations, rows = np.empty_like(seen), np.empty_like(flags)
-    nearest_first(distances, seen, flags, True, ties == "average", TOLERANCE, observations, rows)
-    for env in range(2):
-        order = np.argsort(distances[env], kind="stable")
-        assert observations[env].tobytes() == equalize(seen[env, order], ties).tobytes()
-        assert (rows[env] == flags[env, order]).all()
 
 
 @pytest.mark.parametrize("ties", ["noise", "average"])

@@ -23,7 +23,7 @@ from gymnasium.vector.utils import batch_space
 
 from unload import task
 from unload.env import observation
-from unload.env.equalization import TIE_TOLERANCE, TIES, equalize
+from unload.env.equalization import TIES, equalize
 from unload.env.observation import MOST_NOISE
 from unload.load.boxes import Load, check_stacked
 from unload.support import checks
@@ -189,7 +189,6 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         self.action_space = batch_space(self.action_space, self.num_envs)
         self.autoreset_mode = checks.one_of("autoreset_mode", autoreset_mode, AutoresetMode)
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
-        self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self._rngs: list[np.random.Generator] = []
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
 

@@ -7,10 +7,10 @@ import numpy as np
 from unload import task
 from unload.env import observation
 from unload.env.base import PickingVectorEnv, stacked
+from unload.env.equalization import TIE_TOLERANCE, equalize
 from unload.env.highest_item import GRID, highest_places
 from unload.env.observation import drift, scaled
 from unload.fast import containers
-from unload.fast.ranking import nearest_first
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.situation import Surroundings
@@ -46,6 +46,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         super().__init__(num_envs, **settings)
         checks.one_of("physics", physics, ("table",))
         check_stack(stack)
+        self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self.stack, self.table = stack, shared_table()
         self._physics = TablePhysics(self.table)
         self._containers = containers.allocate(self.num_envs, 0, 0)
@@ -181,16 +182,11 @@ class HighestItemVectorEnv(PickingVectorEnv):
 
         # The rest is done for all environments at once.
         positions = (places + offsets).reshape(-1, 3)
-        observations, highest = np.empty((*shape, 3), np.float32), np.empty(shape, bool)
-        nearest_first(
-            observation.distance(positions).reshape(shape),
-            scaled(positions).reshape(*shape, 3),
-            highest_places(places),
-            *self._features,
-            observations,
-            highest,
-        )
-        self._observations[envs], self._highest[envs] = observations, highest
+        order = observation.distance(positions).reshape(shape).argsort(axis=1, kind="stable")
+        rows = order[:, :, np.newaxis]
+        seen = np.take_along_axis(scaled(positions).reshape(*shape, 3), rows, axis=1)
+        self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
+        self._highest[envs] = np.take_along_axis(highest_places(places), order, axis=1)
 
     def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
         envs = np.arange(self.num_envs)

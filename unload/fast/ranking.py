@@ -99,30 +99,3 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
                 twice[i] = 2 * ranks[axis, i]
         for i in range(items):
             observation[i, axis] = levels[twice[i]]
-
-
-@compiled
-def nearest_first(distances, seen, flags, equalize, average, tolerance, observations, rows):
-    """Observations of items that are not yet sorted by distance.
-
-    Args:
-        distances, seen, flags: (E, items) float64, (E, items, axes) float32 and (E, items)
-            bool: how far each item is, where it is seen, and a flag, such as whether it is the
-            highest.
-        equalize, average, tolerance: see ``features``.
-        observations, rows: (E, items, axes) float32 and (E, items) bool, filled: what is
-            seen and the flags, nearest item first.
-    """
-    _, items, axes = seen.shape
-    places, ranks = np.empty(items, np.int32), np.empty((axes, items), np.int32)
-    values = np.empty((axes, items), np.float32)
-    for env in range(len(distances)):
-        rank(distances[env], places)
-        for i in range(items):
-            rows[env, places[i]] = flags[env, i]
-            for axis in range(axes):
-                values[axis, places[i]] = seen[env, i, axis]
-        if equalize:
-            for axis in range(axes):
-                rank(values[axis], ranks[axis])
-        features(values, ranks, equalize, average, tolerance, observations[env], items)
