@@ -201,7 +201,7 @@ def test_lifts_are_kept_when_a_run_is_stopped_and_refused_where_they_are_damaged
     with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
         train(config, tmp_path / "run", **usual)
     assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
-    message = "lifts: .*lifts.npz is not a readable"
+    message = "lifts.npz is not a readable"
     damage = at_step(30, lambda: lifts.write_bytes(b"no table"))
     with damage, pytest.raises(ValueError, match=message):
         train(config, tmp_path / "run", **usual)
