@@ -105,6 +105,8 @@ class Picking:
         options: names of the options that ``reset`` takes.
     """
 
+    observation_space: gymnasium.Space
+    action_space: gymnasium.Space
     options: tuple[str, ...] = ()
     metadata: dict[str, Any] = {"render_modes": []}
 
@@ -238,8 +240,8 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         began = self._over()  # in the mode NEXT_STEP; SAME_STEP leaves no episode that is over
         if began.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
-        last = task.N_VISIBLE - 1
-        actions = checks.integer_array("actions", actions, (self.num_envs,), 0, last)
+        highest = task.N_VISIBLE - 1
+        actions = checks.integer_array("actions", actions, (self.num_envs,), 0, highest)
 
         with AllOrReset(self):
             rewards, picked = self._pick(actions, ~began), self._pick_infos()
