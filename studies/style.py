@@ -1,6 +1,7 @@
 """The look of the figures, and where they are kept."""
 
 import io
+import logging
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -9,6 +10,9 @@ import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 from studies import paths
+
+# It warns of the date in the fonts that come with Matplotlib, at each PDF.
+logging.getLogger("fontTools").setLevel(logging.ERROR)
 
 STYLE = Path(__file__).resolve().parent / "unload.mplstyle"
 # One colour, one meaning: what an agent sees or stores, or the rule that picks. Dashed or hollow
@@ -32,10 +36,11 @@ def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
 
 def save(figure: Figure, name: str, folder: Path = paths.FIGURES) -> None:
-    """Write ``folder/name.png``, the same bytes for the same figure."""
+    """Write ``folder/name.png`` and ``.pdf``, the same bytes for the same figure."""
     folder.mkdir(parents=True, exist_ok=True)
     with plt.style.context(STYLE):
         figure.savefig(folder / f"{name}.png", metadata={"Software": None})
+        figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
 
 
 def as_png(figure: Figure) -> bytes:

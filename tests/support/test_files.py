@@ -2,6 +2,7 @@ import errno
 import json
 import os
 import re
+import stat
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -228,3 +229,19 @@ def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     with nullcontext() if allowed else refused, files.locked(tmp_path / "run"):
         assert allowed
     assert (tmp_path / "notes").read_text() == "precious"
+
+
+@pytest.mark.parametrize("refused", [False, True])
+def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
+    synced, fsync = [], os.fsync
+
+    def sync(descriptor: int) -> None:
+        is_folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
+        synced.append("folder" if is_folder else "file")
+        if is_folder and refused:
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    files.write_text(tmp_path / "x", "whole")
+    assert (tmp_path / "x").read_text() == "whole" and synced == ["file", "folder"]

@@ -16,6 +16,8 @@ from unload.env.vector import ContainerVectorEnv
 from unload.support import checks
 
 Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
+# Arguments of ``ContainerEnv`` that ``evaluate`` passes on.
+ENV_KWARGS = ("after_pick", "equalize", "position_noise", "stack", "ties")
 MOST_EPISODES = 10**6
 # Failed picks in a row after which an episode without a limit is given up.
 GIVE_UP = 10 * task.N_VISIBLE
@@ -81,6 +83,8 @@ def evaluate(
         max_picks = checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
+    for name in env_kwargs:
+        checks.one_of("an argument of evaluate", name, ENV_KWARGS)
     if physics == "table":
         checks.one_of("after_pick", env_kwargs.pop("after_pick", "restore"), ("restore",))
 

@@ -317,8 +317,11 @@ def train_changed(
     table = None if lifts is None else checks.file("lifts", lifts).absolute()
 
     def keep_lifts() -> None:
-        if table is not None:
-            shared_table().exchange(table)
+        try:
+            if table is not None:
+                shared_table().exchange(table)
+        except ValueError as error:
+            raise ValueError(f"lifts: {error}") from error
 
     folder = RunFolder(run_dir)
     if folder.finished:  # to be read only, perhaps where nothing can be written

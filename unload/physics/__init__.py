@@ -1,6 +1,6 @@
 """PyBullet, and three physics that say whether a box can be lifted: local, table and full.
 
 Read ``bullet``, ``situation``, ``base``, ``local``, ``pool``, ``table`` and ``full``, in order.
-``bullet`` alone imports PyBullet. Without a load, a physics raises a RuntimeError; an item that is
-not in the container is a ValueError.
+``bullet`` alone imports PyBullet. A physics that is closed raises a RuntimeError, an item that is
+not in the container a ValueError.
 """

@@ -19,11 +19,11 @@ class Physics(ABC):
 
     Attributes:
         exact: True where unlifted boxes stay exactly where the load put them.
-        load: the load, None before the first ``reset`` and after ``close``.
+        load: the load, None before the first ``reset``.
         present: (n,) bool, False for items that have been removed.
 
     Raises:
-        RuntimeError: an item is asked for before ``reset`` or after ``close``.
+        RuntimeError: a method is called before ``reset`` or after ``close``.
         TypeError: the load is not a ``Load``, or the item is no integer.
         ValueError: the item does not exist or has been removed.
     """
@@ -33,11 +33,13 @@ class Physics(ABC):
     def __init__(self) -> None:
         self.load: Load | None = None
         self.present = np.zeros(0, dtype=bool)
+        self._closed = False
         self._world: World | None = None  # started when it is first needed
 
     def reset(self, load: Load) -> None:
         """Fill the container with ``load``."""
         check_load(load)
+        self._check_open()
         self.load = None  # until it is filled: nothing may be lifted in a half-filled container
         self.present = np.ones(len(load), dtype=bool)
         self._reset(load)
@@ -59,8 +61,8 @@ class Physics(ABC):
         return self.load.positions
 
     def close(self) -> None:
-        """Empty the container and free the simulator; may be called again."""
-        self.load = None
+        """Free the simulator; may be called again."""
+        self._closed = True
         self._stop()
 
     def _stop(self) -> None:
@@ -68,7 +70,12 @@ class Physics(ABC):
             self._world.close()
             self._world = None
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise RuntimeError("the physics is closed; make a new one")
+
     def _check_filled(self) -> None:
+        self._check_open()
         if self.load is None:
             raise RuntimeError("the physics holds no load; call reset first")
 

@@ -22,6 +22,7 @@ class LocalPhysics(Physics):
 
     def simulate(self, situation: Situation) -> float:
         """Lift the chosen box of a situation; return how far it moved, in m."""
+        self._check_open()
         if self._world is None:
             self._world = World()
         elif self._world.bodies > MOST_BODIES:

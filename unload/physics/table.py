@@ -218,6 +218,7 @@ class TablePhysics(LocalPhysics):
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
+        self._check_open()
         if situation.on_top == 0:
             return FREE_LIFT
         if situation.on_top >= HELD_DOWN:
@@ -243,7 +244,6 @@ class TablePhysics(LocalPhysics):
 
     def _stop(self) -> None:
         self._pool.close()
-        self._pool = Pool()
         super()._stop()
 
 

@@ -9,7 +9,7 @@ import logging
 import os
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime
 from hashlib import blake2b, file_digest
 from importlib import resources
@@ -41,11 +41,22 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
             file.flush()
             os.fsync(file.fileno())
         os.replace(partial, path)
+        with suppress(OSError):  # some file systems refuse it; the file itself is on disk
+            _sync(path.parent)
     except OSError as error:
         reason = f"cannot write this file: {error.strerror or error}"
         raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
+
+
+def _sync(folder: Path) -> None:
+    """Let the new name of a file outlast a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def write_text(path: str | Path, text: str) -> None:
