@@ -169,6 +169,7 @@ def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None
         seed: is added to the run's for the first weights and batches of that network.
     """
     active = Training(replace(run.config, seed=run.config.seed + seed))
+    active.rollout.close()
     change(active)
     run.agent.choose, add = active.agent.choose, run.replay.add
 
@@ -187,6 +188,7 @@ def perfect_start(run: Training, change: Callable[[Training], None] = unchanged)
     shuffled(teacher)
     while not teacher.rollout.finished:
         teacher.step()
+    teacher.rollout.close()
     run.agent.network.load_state_dict(teacher.agent.network.state_dict())
     change(run)
 

@@ -58,7 +58,7 @@ def train_in_laboratory(
         watch: is called with the run once in ``every`` picks, a multiple of ``num_envs``.
 
     Returns:
-        The finished run.
+        The finished run, its environments closed.
     """
     with one_thread():
         run = Training(config, change=change)
@@ -67,6 +67,7 @@ def train_in_laboratory(
             # One step early, because the containers are full again after an episode's last pick.
             if watch is not None and (run.rollout.picks + config.num_envs) % every == 0:
                 watch(run)
+        run.rollout.close()  # a change may tie the run in a circle, which frees nothing by itself
     return run
 
 
