@@ -107,14 +107,19 @@ def train_grid(
     kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
     place = Path(folder) / ("" if picks is None else "reduced") / grid.name
-    finished = {name for name in configs if (kept / name / "record.json").exists()}
-    _check_count(place, kept, len(finished | set(wanted)))
+    _check_count(place, kept, len(_records(kept, configs).keys() | wanted.keys()))
     report = run_sweep(wanted, kept, n_jobs, changes=changes)
     _publish(grid, configs, kept, place, picks is not None, fingerprint)
     failed = report[report["error"] != ""]
     if len(failed):
         raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
     return kept
+
+
+def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
+    """The records of those runs that are finished, by name."""
+    records = {name: kept / name / "record.json" for name in names}
+    return {name: path for name, path in records.items() if path.exists()}
 
 
 def _check_count(place: Path, kept: Path, runs: int) -> None:
@@ -130,11 +135,11 @@ def _check_count(place: Path, kept: Path, runs: int) -> None:
 
 def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint: str) -> None:
     """Publish the finished runs in ``kept``, no fewer than there are, and their provenance."""
-    records = {name: kept / name / "record.json" for name in configs}
-    done = {name: config for name, config in configs.items() if records[name].exists()}
-    _check_count(place, kept, len(done))
-    if not done:
+    records = _records(kept, configs)
+    _check_count(place, kept, len(records))
+    if not records:
         return
+    done = {name: configs[name] for name in records}
 
     # All that is published is read back from the folders of the runs, whenever they were trained.
     policies, curves = {}, {}
@@ -165,7 +170,7 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
     first = {
         name: configs[f"{name}/seed_{cell.seeds[0]}"].plain() for name, cell in grid.cells.items()
     }
-    record = joined(files.read_json(records[name]) for name in done)
+    record = joined(map(files.read_json, records.values()))
     record |= {"fingerprint": fingerprint, "planned": len(configs)}
     write_provenance(place.parent, place.name, grid.command, first, reduced, record)
 
@@ -176,8 +181,7 @@ def cell_of(run: str) -> str:
 
 
 def _table_path(place: Path, cell: str, column: str) -> Path:
-    """Of the table with a column of a cell's curves: a row per point, its ``picks``; a column
-    per run."""
+    """Of the table of a column of a cell's curves: a row per point, a column per run."""
     return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}.csv")
 
 

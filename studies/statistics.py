@@ -176,7 +176,7 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
 def ratio_interval(
     values: Sequence[float], reference: Sequence[float]
 ) -> tuple[float, float, float]:
-    """Ratio of two means over the same heaps, and its 95 % BCa bootstrap interval over pairs.
+    """Ratio of two means of paired values, and its 95 % BCa bootstrap interval over pairs.
 
     NaN where the reference's mean is not > 0 in every resample, because such a ratio means
     nothing. If all pairs have the same ratio, the interval has no width. Of fewer than two pairs,
