@@ -24,6 +24,12 @@ def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
     assert printed == promised == ["136 True", "1.0", "1.0 128"]
 
 
+def test_links_lead_to_files():
+    links = re.findall(r"\]\(([^)]+)\)", README)
+    assert len(links) > 10
+    assert all((ROOT / link).exists() for link in links)
+
+
 def test_commands_are_those_of_the_makefile():
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     text = README + (ROOT / "CONTRIBUTING.md").read_text()

@@ -18,11 +18,9 @@ def test_epsilon_is_the_share_of_random_actions(rng):
     observations = np.zeros((20_000, 4, 3), np.float32)
     observations[:, 2:, 2] = 1, 2
     masks = np.tile([True, True, True, False], (20_000, 1))
-    agent = DQN(HeightNetwork())
-    shares = np.bincount(agent.choose(observations, masks, 0.3, rng), minlength=4) / 20_000
+    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
+    shares = np.bincount(actions, minlength=4) / 20_000
     assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
-    with pytest.raises(ValueError, match="allowed is False in a whole row; expected"):
-        agent.choose(observations, np.zeros_like(masks), 1.0, rng)
 
 
 @pytest.mark.parametrize("beta", [1.0, 0.3])
@@ -56,6 +54,14 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
         assert agent.update(memory, np.arange(7, 157)) == pytest.approx(loss.item(), rel=1e-5)
     for mine, theirs in zip(weights(agent.network), weights(reference)):
         assert torch.allclose(mine, theirs, atol=2e-5)
+
+
+def test_choosing_from_nothing_is_refused(rng):
+    """By whoever chooses, the random numbers or the network."""
+    observations, allowed = np.zeros((2, 5, 3), np.float32), np.zeros((2, 5), bool)
+    for epsilon, error in ((1.0, ValueError), (0.0, FloatingPointError)):
+        with pytest.raises(error, match="expected"):
+            DQN(peq()).choose(observations, allowed, epsilon, rng)
 
 
 @pytest.mark.parametrize("fused", [False, True])

@@ -14,7 +14,7 @@ from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_ste
 from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, stack_load, train
 from unload.agent.checkpoint import RunFolder
-from unload.agent.training import Point, Training, warn_of_other_bits
+from unload.agent.training import Curve, Point, Training, warn_of_other_bits
 from unload.env.vector import ContainerVectorEnv
 from unload.network.variants import NETWORKS
 from unload.physics.table import LiftTable, shared_table
@@ -159,6 +159,25 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     assert capsys.readouterr() == ("", "")
 
 
+def test_a_run_can_be_watched(tmp_path, monkeypatch):
+    """At each point, by a callback and on disk; and what is resumed goes on with the next one."""
+    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
+    config, points, on_disk = TrainConfig(**CONTAINER), [], []
+
+    def callback(point):
+        points.append(point)
+        on_disk.append(len(pd.read_csv(tmp_path / "curve.csv")))
+
+    with at_step(33, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path, progress=False, callback=callback)
+    assert len(points) == 6
+    result = train(config, tmp_path, progress=False, callback=callback)
+    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
+    assert on_disk == list(range(1, 11))
+    train(config, tmp_path, progress=False, callback=callback)  # it is finished
+    assert len(points) == 10
+
+
 def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
     written = []
     monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
@@ -201,7 +220,7 @@ def test_lifts_are_kept_when_a_run_is_stopped_and_refused_where_they_are_damaged
     with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
         train(config, tmp_path / "run", **usual)
     assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
-    message = "lifts.npz is not a readable"
+    message = "lifts: .*lifts.npz is not a readable"
     damage = at_step(30, lambda: lifts.write_bytes(b"no table"))
     with damage, pytest.raises(ValueError, match=message):
         train(config, tmp_path / "run", **usual)
@@ -273,17 +292,29 @@ def test_a_folder_in_use_is_refused(tmp_path):
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
-def test_a_callback_may_end_a_run(tmp_path, monkeypatch):
-    """By False, not by None or 0; the policy and the curve until then are its result.
+def test_a_point_holds_the_means_since_the_last_one():
+    curve = Curve()
+    curve.add(np.array([1.0, -1.0]), np.array([False, True]), [])
+    curve.end_point(2, 1.0)
+    curve.add(np.array([1.0, 1.0]), np.array([False, False]), [0.5, 0.25])
+    curve.add(np.array([1.0, -1.0]), np.array([True, True]), [0.0])
+    curve.end_point(6, 0.5)
+    table = curve.table()
+    assert table["picks"].tolist() == [2, 6]
+    assert table["mean_reward"].tolist() == [0, 0.5]
+    assert table["success_rate"].tolist() == [0.5, 0.75]
+    assert table["deadlocked"].tolist() == [0.5, 0.5]
+    assert np.isnan(table["loss"][0]) and table["loss"][1] == pytest.approx(0.25)
+    assert table["epsilon"].tolist() == [1.0, 0.5]
+    assert table["wall_time"].is_monotonic_increasing
 
-    At each point the curve is on disk, too, where that was not done a moment before.
-    """
-    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
+
+def test_a_callback_may_end_a_run(tmp_path):
+    """By False, not by None or 0; the policy and the curve until then are its result."""
     config, points = TrainConfig(**CONTAINER), []
 
     def callback(point):
         points.append(point)
-        assert len(pd.read_csv(tmp_path / "curve.csv")) == len(points)
         return False if len(points) == 4 else 0 if len(points) == 3 else None
 
     result = train(config, tmp_path, progress=False, callback=callback)
@@ -317,7 +348,7 @@ def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-@pytest.mark.parametrize("raised", [SystemExit, OSError])
+@pytest.mark.parametrize("raised", [SystemExit, KeyboardInterrupt, OSError, GeneratorExit])
 @pytest.mark.parametrize("picks", [100, 200])
 def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
     """Also after the last pick; and wherever the callback has gone meanwhile."""

@@ -4,9 +4,10 @@
     python tests/browser/look.py 00 04         notebooks whose names start so
     python tests/browser/look.py page          the page alone
 
-Copies of the notebooks are run, at reduced counts except for 00. Checked are: all cells have been
-run; formulas are typeset; 3D views hold pixels; in 00 a click changes the score and the play button
-moves. Pictures of all are kept in build/browser/.
+Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
+nothing on stderr; formulas are typeset; 3D views hold pixels; figures under sliders change when
+one is moved; in 00 a click changes the score and the play buttons move, with a kernel and
+without. Pictures of all are kept in build/browser/.
 """
 
 import argparse
@@ -46,6 +47,7 @@ PLAYGROUND = "00_playground"
 RUN_LIMIT = 400  # s, for all cells of a notebook
 DRAW_LIMIT = 60  # s, for a picture, without a graphics card
 CLICKS = 4
+PLOTLY = ".jp-RenderedPlotly"
 SIZE = {"width": 1500, "height": 1000}
 LAB = {
     "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
@@ -54,6 +56,8 @@ LAB = {
 }
 START_LIMIT = 120  # s
 
+OUTPUTS = """() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells
+    .flatMap((cell, number) => (cell.outputs ?? []).map((output) => ({number, ...output})))"""
 NOT_RUN = """() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells
     .map((cell, number) => cell.execution_count === null && cell.source.length ? number : -1)
     .filter((number) => number >= 0)"""
@@ -104,6 +108,8 @@ def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
     """Yield what is wrong with a notebook, as it is stored and after a run."""
     page.wait_for_selector(".jp-Notebook .jp-MarkdownOutput", timeout=60_000)
     page.wait_for_timeout(3000)
+    if name == PLAYGROUND and theme == "Light":
+        yield from replay_moves(page, pictures)
     yield from drawn(page, f"{name}, as stored", pictures)
     if theme == "Dark" and name != PLAYGROUND:  # of the others, the stored outputs are enough
         return
@@ -119,15 +125,21 @@ def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
     page.wait_for_timeout(3000)
     if left := page.evaluate(NOT_RUN):
         yield f"{name}: cells {left} have not been run"
+    for output in page.evaluate(OUTPUTS):
+        if output["output_type"] == "error" or output.get("name") == "stderr":
+            text = str(output.get("evalue") or output.get("text"))
+            if not text.startswith("compiling "):  # said once, after a fresh installation
+                yield f"{name}: cell {output['number']} says {text[:300]!r}"
     yield from typeset(page, name)
     yield from drawn(page, name, pictures)
+    yield from sliders_answer(page, name, pictures)
     if name == PLAYGROUND and theme == "Light":
         yield from clicks_count(page, pictures)
         yield from play_moves(page, pictures)
 
 
 def typeset(page: Page, name: str) -> Iterator[str]:
-    """Yield whether formulas are missing: the text has dollar signs."""
+    """Yield whether formulas are missing: the text has dollar signs, or no formula is drawn."""
     cells = page.evaluate(
         """() => [...document.querySelectorAll(".jp-MarkdownOutput")].map((cell) => {
             const copy = cell.cloneNode(true);
@@ -138,12 +150,16 @@ def typeset(page: Page, name: str) -> Iterator[str]:
     left = [text for text in cells if re.search(r"\$[^$]+\$", text)]
     if left:
         yield f"{name}: a formula is not typeset in {left[0][:200]!r}"
+    sources = (COPIES / f"{name}.ipynb").read_text()
+    count = page.locator("mjx-container").count()
+    if re.search(r"\$[^$\n]*\\\\[a-z]", sources) and not count:
+        yield f"{name}: no formula is drawn"
 
 
 def drawn(page: Page, name: str, pictures: Path) -> Iterator[str]:
     """Yield which 3D views are blank, and keep a picture of each and of the page's parts."""
     stem = re.sub(r"\W+", "-", name)
-    views = page.locator(".jp-RenderedPlotly, canvas.unload-canvas")
+    views = page.locator(f"{PLOTLY}, canvas.unload-canvas")
     for number in range(views.count()):
         view = views.nth(number)
         if view.evaluate("(view) => view.matches('.jp-RenderedPlotly')"):
@@ -188,6 +204,37 @@ def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:
             return False
         time.sleep(0.5)
     return True
+
+
+def sliders_answer(page: Page, name: str, pictures: Path) -> Iterator[str]:
+    """Yield which figures stay as they are when their first slider is moved by a key."""
+    figures = page.locator(".jp-OutputArea-output:has(img.widget-image)")
+    for number in range(figures.count()):
+        figure = figures.nth(number)
+        figure.scroll_into_view_if_needed()
+        image = figure.locator("img.widget-image")
+        before = image.get_attribute("src")
+        figure.locator(".noUi-handle").first.press("ArrowRight")
+        if not wait_until(lambda image=image, old=before: image.get_attribute("src") != old):
+            yield f"{name}: a slider does not change figure {number}"
+        shot(figure, pictures / f"{name}-slider-{number}.png")
+
+
+def replay_moves(page: Page, pictures: Path) -> Iterator[str]:
+    """Yield whether the stored replay, which needs no kernel, stands still."""
+    replay = page.locator(PLOTLY).first
+    interact(replay)
+    if not wait_until(lambda: is_drawn(shot(replay))):
+        yield "00: the replay is blank"
+        return
+    label = replay.locator(".slider-label").first
+    before, pixels = label.text_content(), shot(replay, pictures / "replay-before.png")
+    replay.locator(".updatemenu-button").first.click()
+    moved = wait_until(lambda: label.text_content() != before)
+    page.wait_for_timeout(4000)
+    after = shot(replay, pictures / "replay-after.png")
+    if not moved or (np.abs(after - pixels).max(axis=2) > 40).mean() < 0.01:
+        yield f"00: the replay's play button moves nothing; it shows {label.text_content()!r}"
 
 
 def clicks_count(page: Page, pictures: Path) -> Iterator[str]:

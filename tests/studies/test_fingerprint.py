@@ -6,7 +6,7 @@ import torch
 from studies import fingerprint, paths
 from studies.fingerprint import short_runs, training_fingerprint
 from studies.policies.variants import GRIDS
-from unload import PEQNetwork
+from unload import PEQNetwork, TrainConfig
 from unload.network.variants import NETWORKS
 from unload.support import files
 
@@ -38,14 +38,15 @@ def test_data_is_of_todays_training():
 
 @pytest.fixture
 def changed(monkeypatch):
-    """``changed(reset)``: the fingerprint of one short run with other first weights."""
+    """``changed(owner, name, value)``: the fingerprint of one short run with this change."""
     run = short_runs("peq")[1]
     monkeypatch.setattr(fingerprint, "short_runs", lambda network: [run])
 
-    def compute(reset=PEQNetwork.reset_parameters):
+    def compute(owner=None, name="", value=None):
         fingerprint._curves.cache_clear()
         with monkeypatch.context() as patch:
-            patch.setattr(PEQNetwork, "reset_parameters", reset)
+            if owner is not None:
+                patch.setattr(owner, name, value)
             return training_fingerprint()
 
     yield compute
@@ -68,8 +69,12 @@ def scaled_weights(factor: float):
 def test_only_what_changes_training_changes_the_fingerprint(changed):
     today = changed()
     assert today == changed()
-    assert today == changed(scaled_weights(1 + 1e-7))
-    assert today != changed(scaled_weights(1.01))
+    assert today == changed(PEQNetwork, "reset_parameters", scaled_weights(1 + 1e-7))
+    assert today != changed(PEQNetwork, "reset_parameters", scaled_weights(1.01))
+    epsilon = TrainConfig.epsilon
+    assert today != changed(TrainConfig, "epsilon", lambda self, picks: epsilon(self, picks + 64))
+    seeds = TrainConfig.seeds
+    assert today != changed(TrainConfig, "seeds", lambda self: seeds(self)[::-1])
 
 
 def test_each_network_has_its_fingerprint(monkeypatch):
