@@ -41,9 +41,9 @@ def numpy_forward(peq: PEQNetwork, items: np.ndarray) -> np.ndarray:
     return np.array(scores)
 
 
-@pytest.mark.parametrize("items", [1, 2, 7, 128, 300])
-def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items):
-    peq = make(PEQNetwork)
+@pytest.mark.parametrize(("items", "n_features"), [(1, 16), (2, 1), (7, 16), (128, 64), (300, 16)])
+def test_forward_is_the_papers_equations_for_any_number_of_items(rng, items, n_features):
+    peq = make(PEQNetwork, n_features)
     batch = rng.uniform(-1, 1, (3, items, 3)).astype(np.float32)
     values = peq(torch.from_numpy(batch)).detach()
     assert values.shape == (3, items) and values.dtype == torch.float32

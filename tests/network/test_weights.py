@@ -7,6 +7,7 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from unload.network import weights
 from unload.network.weights import read_weights, write_weights
 
 SETTINGS = {"sizes": [3, 2], "ends": "open"}
@@ -55,6 +56,17 @@ def test_files_without_a_digest_or_of_another_kind_or_not_finite_are_refused(pat
         write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, value])})
         with pytest.raises(ValueError, match="w.safetensors holds no pair .* is not finite"):
             read_weights(path, "pair", print)
+
+
+def test_a_file_of_another_dtype_is_refused(path, monkeypatch):
+    halves = {name: weight.half() for name, weight in WEIGHTS.items()}
+    with pytest.raises(TypeError, match="a.bias of dtype torch.float16; expected torch.float32"):
+        write_weights(path, "pair", {}, halves)
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(weights, "_check_dtypes", lambda name, tensors: None)
+        write_weights(path, "pair", {}, halves)
+    with pytest.raises(ValueError, match="holds no pair .* a.bias of dtype torch.float16"):
+        read_weights(path, "pair", print)
 
 
 def test_what_is_no_path_is_refused(tmp_path):
