@@ -68,8 +68,9 @@ def fig12_reward(panels: Mapping[str, Panel]) -> Figure:
 def _panels(panels: Mapping[str, Panel], value) -> tuple[Figure, np.ndarray]:
     """A panel for each way to stack, with ``value`` of every run's curve."""
     figure, (all_axes,) = plt.subplots(
-        1, len(panels), figsize=(8.2, 3.6), sharex=True, sharey=True, squeeze=False
-    )
+        1, len(panels), figsize=(3 + 2.6 * len(panels), 3.6), sharex=True, sharey=True,
+        squeeze=False,
+    )  # fmt: skip
     for axes, (title, panel) in zip(all_axes, panels.items()):
         for name, colour in zip(panel, ("C1", "C0")):
             for number, run in enumerate(panel[name]):
