@@ -35,7 +35,7 @@ def runs_of(curves: pd.DataFrame, cells: Mapping[str, str]) -> Panel:
 
 @styled
 def fig11_loss(panels: Mapping[str, Panel]) -> Figure:
-    """Training loss over picks (Fig. 11), a panel for each way to stack.
+    """Training loss over picks (Fig. 11), a panel for each setting.
 
     Args:
         panels: by their titles. Thin lines are means over episodes of all containers, strong
@@ -48,7 +48,7 @@ def fig11_loss(panels: Mapping[str, Panel]) -> Figure:
 
 @styled
 def fig12_reward(panels: Mapping[str, Panel]) -> Figure:
-    """Mean reward of the 64 environments over picks (Fig. 12), a panel for each way to stack.
+    """Mean reward of the 64 environments over picks (Fig. 12), a panel for each setting.
 
     The marks are the paper's: −0.7 at the start, 0.2 at the end. Arguments as of ``fig11_loss``.
     """
@@ -66,7 +66,7 @@ def fig12_reward(panels: Mapping[str, Panel]) -> Figure:
 
 
 def _panels(panels: Mapping[str, Panel], value) -> tuple[Figure, np.ndarray]:
-    """A panel for each way to stack, with ``value`` of every run's curve."""
+    """A panel for each setting, with ``value`` of every run's curve."""
     figure, (all_axes,) = plt.subplots(
         1, len(panels), figsize=(3 + 2.6 * len(panels), 3.6), sharex=True, sharey=True,
         squeeze=False,
