@@ -61,7 +61,7 @@ FRICTION = 0.5
 # Bullet's default for multibodies, stated here because maximal coordinates default to 0.
 DAMPING = 0.04
 # Boxes are made this much narrower (x and y), so that neighbours do not rub: side by
-# side without a gap, free boxes rise less, and in a full simulation many jam.
+# side without a gap, free boxes rise less, and at a higher friction many jam.
 GAP = 0.001  # m
 # All that a lift's outcome depends on besides the boxes.
 SETTINGS = {
