@@ -67,18 +67,28 @@ def test_the_result_is_that_of_the_data():
 
 def test_the_runs_with_jams_are_those_of_the_data():
     text = " ".join(README.split())
-    large, by_order, by_noise = (
-        verdicts.by_run(read_grid(SEAMLESS, cells=cells))
-        for cells in (
-            ["b2048_mask_order"],
-            ["mask_order", "no_mask_order"],
-            ["mask_noise", "no_mask_noise"],
-        )
+    runs = verdicts.by_run(read_grid(SEAMLESS))
+    cells = dict(list(runs.groupby("cell")))
+
+    def means(*names):
+        first, second = (f"{100 * cells[name]['end'].mean():.0f}" for name in names)
+        return f"| on average {first} and {second} %"
+
+    def like(*names):
+        return [int(cells[name]["fig12"].sum()) for name in names]
+
+    large, small = (
+        [f"{batch}{mask}_order" for mask in ("no_mask", "mask")] for batch in ("b2048_", "")
     )
-    numbers = f"{len(large)} runs with ties by order, b = 2048 and the mask; "
-    numbers += f"b = 256: {len(by_order)} by order, {len(by_noise)} by noise"
-    means = [f"{100 * each['end'].mean():.0f}" for each in (large, by_order, by_noise)]
-    assert f"{numbers} | on average {', '.join(means[:2])} and {means[2]} %" in text
-    assert f"{large['fig12'].sum()} of {len(large)} runs are like Fig. 12" in text
-    masked, unmasked = (each["fig12"].sum() for _, each in by_order.groupby("cell", sort=False))
-    assert f"With b = 256 {masked} of 5 are, without the mask {unmasked} of 5" in text
+    assert [len(cells[name]) for name in large + small] == 4 * [5]
+    assert f"5 runs without and 5 with the mask {means(*large)}" in text
+    small_means = f"{means(*small)[:-2]}, {means('no_mask_noise', 'mask_noise')[13:]}"
+    assert f"batch 256; then ties by noise {small_means}" in text
+    without, masked = like(*large)
+    assert f"{without} of 5 runs without the mask and {masked} of 5 with it are like" in text
+    without, masked = like(*small)
+    assert f"With batch 256 it is {without} and {masked} of 5" in text
+    assert not any(like("no_mask_noise", "mask_noise"))
+    measured = [name for name in cells if name.startswith("measured")]
+    assert not any(like(*measured)) and sum(len(cells[name]) for name in measured) == 12
+    assert f"[all {len(runs)}]" in text
