@@ -72,7 +72,7 @@ def test_the_runs_with_jams_are_those_of_the_data():
 
     def means(*names):
         first, second = (f"{100 * cells[name]['end'].mean():.0f}" for name in names)
-        return f"| on average {first} and {second} %"
+        return f"{first} and {second}"
 
     def like(*names):
         return [int(cells[name]["fig12"].sum()) for name in names]
@@ -81,9 +81,9 @@ def test_the_runs_with_jams_are_those_of_the_data():
         [f"{batch}{mask}_order" for mask in ("no_mask", "mask")] for batch in ("b2048_", "")
     )
     assert [len(cells[name]) for name in large + small] == 4 * [5]
-    assert f"5 runs without and 5 with the mask {means(*large)}" in text
-    small_means = f"{means(*small)[:-2]}, {means('no_mask_noise', 'mask_noise')[13:]}"
-    assert f"batch 256; then ties by noise {small_means}" in text
+    assert f"5 runs without and 5 with the mask | on average {means(*large)} %" in text
+    then = f"{means(*small)}, {means('no_mask_noise', 'mask_noise')} %"
+    assert f"batch 256; then ties by noise | on average {then}" in text
     without, masked = like(*large)
     assert f"{without} of 5 runs without the mask and {masked} of 5 with it are like" in text
     without, masked = like(*small)

@@ -177,16 +177,17 @@ def tuning() -> pd.DataFrame:
         rows.append((f"tuning, b = 1024, μ = {rate:g}", "IV-A, Fig. 8", claim, here, agrees))
 
     sizes = [(size, True) for size in search.BATCH_SIZES]
-    steps, noise, rough = {}, {}, {}  # by batch size and feature engineering
+    steps, noise = {}, {"loss": {}, "MSR": {}}  # by batch size and feature engineering
     for size, equalized in [*sizes, (2048, False)]:
         msr, losses = (
             search.read_curves(name, size, 1e-3, equalized).values()
             for name in ("success_rate", "loss")
         )
         steps[size, equalized] = search.greedy_reached(msr)
-        noise[size, equalized], rough[size, equalized] = _noise(losses), _noise(msr)
+        noise["loss"][size, equalized] = _noise(losses)
+        noise["MSR"][size, equalized] = _noise(msr)
     noises, calmer = [], []
-    for name, by_size in ("loss", noise), ("MSR", rough):
+    for name, by_size in noise.items():
         spreads = [statistics.t_interval(by_size[size]) for size in sizes]
         calmer.append(all(larger[1] < smaller[0] for smaller, larger in pairwise(spreads)))
         means = ", ".join(f"{by_size[size].mean():.4f}" for size in sizes)
@@ -209,8 +210,9 @@ def tuning() -> pd.DataFrame:
     with_fe, without_fe = (2048, True), (2048, False)
     shorter = f"from step {_steps(steps[with_fe])} on; without, {_steps(steps[without_fe])}"
     significantly = steps[with_fe]["high"] < steps[without_fe]["low"]
-    low, high = statistics.welch_interval(noise[with_fe], noise[without_fe])
-    stabler = f"noise {noise[with_fe].mean():.4f} with FE, {noise[without_fe].mean():.4f} without "
+    of_fe, of_none = noise["loss"][with_fe], noise["loss"][without_fe]
+    low, high = statistics.welch_interval(of_fe, of_none)
+    stabler = f"noise {of_fe.mean():.4f} with FE, {of_none.mean():.4f} without "
     stabler += f"(difference {low:+.4f} to {high:+.4f})"
     shown = "not shown" if low <= 0 <= high else high < 0
     rows += [
