@@ -1,4 +1,4 @@
-"""What experiments change in a ``Training``, see ``train_changed``.
+"""What experiments change in a ``Training``, see ``unload.train``.
 
 Each change is made before the first pick, and those of long runs depend on the pick alone, so that
 a resumed run stays the same.

@@ -14,7 +14,7 @@ from studies.changes import height_reward
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
-from unload.agent.training import Training, train_changed
+from unload.agent.training import Training, train
 
 
 def training_fingerprint(networks: Iterable[str] = ("peq",)) -> str:
@@ -34,7 +34,7 @@ def training_fingerprint(networks: Iterable[str] = ("peq",)) -> str:
 
 
 def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None]]]:
-    """The runs of a network, and what is changed in each (see ``train_changed``).
+    """The runs of a network, and what is changed in each (see ``train``).
 
     The paper's network has its configurations and the factors of the studies.
     """
@@ -57,7 +57,7 @@ def _curves(network: str) -> str:
     text = ""
     for config, change in short_runs(network):
         with TemporaryDirectory() as folder:
-            curve = train_changed(config, folder, change, progress=False).curve
+            curve = train(config, folder, progress=False, change=change).curve
         columns = ["picks", "success_rate", "deadlocked", "loss"]
         text += curve[columns].to_csv(index=False, float_format="%.3g")
     return text

@@ -39,7 +39,7 @@ class Cell(NamedTuple):
     Attributes:
         config: of the runs; its own seed does not count.
         seeds: of the runs that are planned.
-        change: what is changed in each run, see ``unload.agent.training.train_changed``.
+        change: what is changed in each run, see ``unload.train``.
     """
 
     config: TrainConfig

@@ -15,7 +15,7 @@ import time
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
@@ -28,6 +28,7 @@ from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies import paths
+from unload.agent.identity import identity
 from unload.support import checks, files
 
 PACKAGES = ("gymnasium", "joblib", "numba", "numpy", "pandas", "pybullet", "torch")
@@ -100,13 +101,22 @@ def unpacked(text: str) -> dict[str, np.ndarray]:
 
 
 def keep_all(
-    folder: str | Path, jobs: Sequence[tuple[dict, Callable[[], Any]]], n_jobs: int
+    folder: str | Path, compute: Callable, asked: Sequence[tuple[dict, tuple]], n_jobs: int
 ) -> list[Result]:
-    """``kept`` for several pairs of ``question`` and ``compute``, side by side."""
+    """``kept`` for several questions to the same code, side by side.
+
+    Args:
+        folder: see ``kept``.
+        compute: gives an answer; its ``identity`` is a part of each question.
+        asked: the rest of each question, and the arguments of ``compute``.
+        n_jobs: processes.
+    """
+    code = {"code": identity(compute)}
     answers = Parallel(n_jobs, return_as="generator")(
-        delayed(kept)(folder, question, compute) for question, compute in jobs
+        delayed(kept)(folder, question | code, partial(compute, *arguments))
+        for question, arguments in asked
     )
-    bar = {"total": len(jobs), "unit": "result", "ncols": 100}
+    bar = {"total": len(asked), "unit": "result", "ncols": 100}
     return list(tqdm(answers, file=sys.stdout, **bar))
 
 

@@ -1,7 +1,7 @@
 """How a run ends and falls, whether it is like the paper's, and how sure means and shares are."""
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -14,6 +14,7 @@ WINDOW_PICKS = 500_000
 HIGH, LOW = 0.95, 0.8  # MSR that a fall begins at, and ends at
 STEADY = 0.05  # MSR that a steady rise may lose
 PAPER_MSR = 0.6  # at the end of its Fig. 12
+LIKE_THE_START = (0.13, 0.17)  # MSR over the first episode that counts as the paper's 15 %
 LIKE_THE_PAPER = (0.5, 0.7)  # MSR at the end that counts as the paper's 60 %
 LEVEL = 0.95  # of the intervals
 RESAMPLES = 10_000
@@ -84,8 +85,14 @@ def after_loss_peak(curve: pd.DataFrame) -> tuple[bool, bool]:
     return bool(after.mean() < before.mean()), bool(after.std() > before.std())
 
 
-def run_measures(curve: pd.DataFrame) -> dict:
-    """Return the measures of one run that ``cell_table`` joins."""
+def first_plan(curve: pd.DataFrame) -> dict:
+    """Return the measures of one run in ``data/falls/FIRST_PLAN.md``.
+
+    Returns:
+        ``end``, the MSR over the last tenth; whether the run ``fell`` at least once and rises
+        ``steady``; ``slower`` and ``noisier``, see ``after_loss_peak``; whether it is like the
+        paper's ``fig11``, ``fig12`` and ``both``.
+    """
     fig11, fig12 = resembles_fig11(curve), resembles_fig12(curve)
     slower, noisier = after_loss_peak(curve)
     return {
@@ -100,29 +107,67 @@ def run_measures(curve: pd.DataFrame) -> dict:
     }
 
 
-def cell_table(runs: Iterable[tuple[str, int, pd.DataFrame]]) -> pd.DataFrame:
-    """Return one row per cell, with the statistics of the plan.
+def seamless_plan(curve: pd.DataFrame) -> dict:
+    """Return the measures of one run in ``data/seamless/PLAN.md``.
 
     Args:
-        runs: cell, seed and curve of each, see ``paper_runs``.
+        curve: a row per episode of all containers.
 
     Returns:
-        ``cell``, ``runs``, ``mean`` of the MSR over the last tenth with ``low`` and ``high``,
-        ``lowest`` and ``highest`` run; ``fell``, the runs that fall at least once; ``steady``,
-        those that rise steadily; ``slower`` and ``noisier``, see ``after_loss_peak``; ``fig11``,
-        ``fig12`` and ``both``, the runs like the paper's.
+        ``start``, MSR over the first episode of all containers; ``end``, over the last tenth of
+        the picks; ``best``, of the best window; whether the run is ``steady`` and like ``fig12``
+        and ``fig11``.
     """
-    measured = pd.DataFrame([{"cell": cell, **run_measures(curve)} for cell, _, curve in runs])
-    groups = measured.groupby("cell", sort=False)
-    ends = groups["end"].agg(
+    start, end = curve["success_rate"].iloc[0], end_msr(curve)
+    starts_so = LIKE_THE_START[0] <= start <= LIKE_THE_START[1]
+    ends_so = LIKE_THE_PAPER[0] <= end <= LIKE_THE_PAPER[1]
+    return {
+        "start": start,
+        "end": end,
+        "best": windows(curve)["success_rate"].max(),
+        "steady": steady(curve),
+        "fig12": bool(starts_so and ends_so and steady(curve)),
+        "fig11": loss_rises_for_good(curve),
+    }
+
+
+def loss_rises_for_good(curve: pd.DataFrame) -> bool:
+    """Whether the loss falls, rises, and then sinks by less than half of what it rose."""
+    loss = curve["loss"].dropna()
+    means = windows(curve)["loss"].dropna()
+    lowest, peak = loss.min(), means.max()
+    falls_first = loss.idxmin() > loss.index[0] and loss.idxmin() < loss.index[len(loss) // 4]
+    last = loss[curve["picks"] > 0.9 * curve["picks"].iloc[-1]].mean()
+    return bool(falls_first and last < peak and peak - last < (peak - lowest) / 2)
+
+
+def by_run(curves: pd.DataFrame, plan: Callable[[pd.DataFrame], dict]) -> pd.DataFrame:
+    """A plan's measures of each run by ``cell`` and ``seed``, of curves as of ``read_grid``."""
+    groups = curves.groupby(["cell", "seed"], sort=False)
+    return pd.DataFrame([{"cell": cell, "seed": seed, **plan(run)} for (cell, seed), run in groups])
+
+
+def by_cell(runs: pd.DataFrame) -> pd.DataFrame:
+    """A row per cell of what ``by_run`` gives.
+
+    Returns:
+        The number of ``runs``; the mean ``end`` with ``low`` and ``high``, its 95 % t interval;
+        the ``lowest`` and ``highest`` end; of all other measures the mean, or the number of runs
+        that they hold for.
+    """
+    cells = runs.groupby("cell", sort=False)
+    ends = cells["end"].agg(
         runs="size",
-        mean="mean",
+        end="mean",
         low=lambda values: t_interval(values)[0],
         high=lambda values: t_interval(values)[1],
         lowest="min",
         highest="max",
     )
-    return ends.join(groups.sum().drop(columns="end")).reset_index()
+    others = runs.dtypes.drop(["cell", "seed", "end"])
+    return ends.join(
+        cells.agg({name: "sum" if kind == "bool" else "mean" for name, kind in others.items()})
+    )
 
 
 def t_interval(values: Sequence[float]) -> tuple[float, float]:
@@ -134,38 +179,6 @@ def t_interval(values: Sequence[float]) -> tuple[float, float]:
     if error == 0:
         return values[0], values[0]
     return tuple(map(float, stats.t.interval(LEVEL, len(values) - 1, values.mean(), error)))
-
-
-def welch_interval(first: Sequence[float], second: Sequence[float]) -> tuple[float, float]:
-    """Return the 95 % interval of the difference of two means, first minus second, by Welch.
-
-    NaN if there are fewer than two values of either.
-    """
-    first, second = (
-        checks.finite_array(name, values, (None,))
-        for name, values in (("first", first), ("second", second))
-    )
-    if min(len(first), len(second)) < 2:
-        return np.nan, np.nan
-    test = stats.ttest_ind(first, second, equal_var=False)
-    return tuple(map(float, test.confidence_interval(LEVEL)))
-
-
-def bootstrap_interval(values: Sequence[float]) -> tuple[float, float]:
-    """Return the 95 % percentile bootstrap interval of the mean.
-
-    Few values make it too narrow: of normally distributed ones, it holds the true mean in 75 %
-    of all cases with three values, 84 % with five, 89 % with ten.
-
-    Args:
-        values: (n,) one number per seed or container, n ≥ 1.
-    """
-    values = checks.finite_array("values", values, (None,))
-    if not values.size:
-        raise ValueError("values is empty; expected at least one number")
-    rows = np.random.default_rng(0).integers(values.size, size=(RESAMPLES, values.size))
-    low, high = np.quantile(values[rows].mean(axis=1), [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return float(low), float(high)
 
 
 def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:

@@ -1,6 +1,5 @@
 """The look of the figures, and where they are kept."""
 
-import io
 import logging
 from collections.abc import Callable
 from functools import wraps
@@ -41,12 +40,3 @@ def save(figure: Figure, name: str, folder: Path = paths.FIGURES) -> None:
     with plt.style.context(STYLE):
         figure.savefig(folder / f"{name}.png", metadata={"Software": None})
         figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
-
-
-def as_png(figure: Figure) -> bytes:
-    """Draw a figure as PNG and close it, so that no notebook shows it once more."""
-    content = io.BytesIO()
-    with plt.style.context(STYLE):
-        figure.savefig(content, dpi="figure", format="png", metadata={"Software": None})
-    plt.close(figure)
-    return content.getvalue()

@@ -22,7 +22,7 @@ from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.replay import ReplayBuffer
-from unload.agent.training import Training, train_changed
+from unload.agent.training import Training, train
 from unload.support import checks, files
 
 BASE = 500 * 2**20  # bytes of a run besides its replay memory
@@ -53,7 +53,7 @@ def run_sweep(
         folder: the run ``name`` is kept in ``folder/name``. Machines of a cluster must share it.
         n_jobs: processes, -1 for one per core; 1 runs all in this process. Dask uses its whole
             cluster.
-        changes: what is changed in some of the runs, by name, see ``training.train_changed``;
+        changes: what is changed in some of the runs, by name, see ``unload.train``;
             functions that can be pickled.
 
     Returns:
@@ -118,7 +118,7 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
         log_path = os.devnull if RunFolder(folder).finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
         with open(log_path, "a") as log, one_thread():
-            train_changed(config, folder, change, log, callback=stop_if_alone)
+            train(config, folder, log, callback=stop_if_alone, change=change)
         if not (folder / "record.json").exists():
             record = run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)

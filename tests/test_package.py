@@ -39,7 +39,7 @@ LIBRARIES = {
     "plotly": ("unload/load/view.py", "studies/play/replay.py"),
     "pybullet": ("unload/physics/bullet.py",),
     "safetensors": ("unload/network/weights.py",),
-    "scipy": ("studies/heap/", "studies/statistics.py"),
+    "scipy": ("studies/heap/", "studies/paper/numbers.py", "studies/statistics.py"),
     "torch": (
         "unload/network/", "unload/fast/", "unload/agent/", "studies/grid.py", "studies/sweep.py",
         "studies/falls/", "studies/heap/",

@@ -5,10 +5,9 @@ from pathlib import Path
 
 from studies.falls.long import read_published
 from studies.grid import read_grid
-from studies.paper.training import paper_runs
-from studies.seamless import verdicts
+from studies.paper.training import PAPER, PAPER_CELLS
 from studies.seamless.training import SEAMLESS
-from studies.statistics import cell_table, end_msr, fell
+from studies.statistics import by_cell, by_run, first_plan, seamless_plan
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
@@ -46,18 +45,17 @@ def test_the_way_to_contribute_names_files_that_exist():
 
 
 def test_the_result_is_that_of_the_data():
-    table = cell_table(paper_runs()).set_index("cell")
+    runs = by_run(read_grid(PAPER, cells=PAPER_CELLS), first_plan)
+    table = by_cell(runs)
     order = ["paper_no_mask", "paper_mask", "paper_b2048_no_mask", "paper_b2048_mask"]
-    means = [f"{100 * mean:.0f}" for mean in table.loc[order, "mean"]]
+    means = [f"{100 * mean:.0f}" for mean in table.loc[order, "end"]]
     assert f"on average {', '.join(means[:3])} and {means[3]} %" in README
     text = " ".join(README.split())
     masked = table.loc[["paper_mask", "paper_b2048_mask"]]
     low, high = 100 * masked["lowest"].min(), 100 * masked["highest"]
-    fallen = [
-        100 * end_msr(run) for cell, _, run in paper_runs() if cell in masked.index and fell(run)
-    ]
+    fallen = 100 * runs.loc[runs["cell"].isin(masked.index) & runs["fell"], "end"]
     sentence = f"with the mask {len(fallen)} of {masked['runs'].sum()} reach 95–100 %, collapse, "
-    assert sentence + f"and end at {low:.0f}–{max(fallen):.0f} %" in text
+    assert sentence + f"and end at {low:.0f}–{fallen.max():.0f} %" in text
     assert high.max() > 99  # the one that stays up
     assert f"none of {table['runs'].sum()} runs rises steadily" in text and not table["fig12"].any()
     published = read_published()
@@ -67,7 +65,7 @@ def test_the_result_is_that_of_the_data():
 
 def test_the_runs_with_jams_are_those_of_the_data():
     text = " ".join(README.split())
-    runs = verdicts.by_run(read_grid(SEAMLESS))
+    runs = by_run(read_grid(SEAMLESS), seamless_plan)
     cells = dict(list(runs.groupby("cell")))
 
     def means(*names):

@@ -8,7 +8,6 @@ How its cells are trained and measured, and when a preference becomes a mistake.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +90,7 @@ def point(run: Training, seen: measures.Seen | None = None) -> dict[str, float]:
 
 
 def run_cell(name: str, cell: Cell, seed: int) -> dict:
-    """Train and measure a run: a row of ``COLUMNS``, and the points of its trace."""
+    """Train and measure a run: a row of all columns that are published, and its trace's points."""
     config, trace, seen = replace(cell.config, seed=seed), [], SEEN.get(name)
     named = {"cell": name, "seed": seed}
     run = train_in_laboratory(
@@ -100,34 +99,22 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
     network, curve = run.agent.network, run.curve.table()
     row = named | {"mean": curve["success_rate"].mean(), "end": end_msr(curve)}
     row |= measures.judged_blanked(network, config, seen)
+    positions = replace(config, equalize=False)  # they are ranked after the environment
+    row["judged_averaged_x"] = measures.judged(network, positions, seen=SEEN["averaged_x"])
     points = pd.DataFrame(trace)
     row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
     return {"row": row, "trace": trace if name in TRACED else []}
 
 
-def run_fresh(name: str, cell: Cell, seed: int) -> dict:
-    """Train and measure a run: a row of ``FRESH_COLUMNS``."""
-    config, points = replace(cell.config, seed=seed), []
-    run = train_in_laboratory(config, cell.change, lambda run: points.append(point(run)))
-    network = run.agent.network
-    row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
-    row |= measures.judged_blanked(network, config)
-    positions = replace(config, equalize=False)  # they are ranked after the environment
-    row["judged_averaged_x"] = measures.judged(network, positions, seen=SEEN["averaged_x"])
-    return row | {name: points[-1][name] for name in SLOPES}
-
-
-def keep_cells(
-    folder: Path, cells: Mapping[str, Cell], run: Callable[[str, Cell, int], dict], n_jobs: int
-) -> list[Result]:
-    """What ``run`` returns of each seed of some cells, see ``results.kept``."""
-    jobs, same = [], {"measured": identity(run), "fingerprint": training_fingerprint()}
+def keep_cells(folder: Path, cells: Mapping[str, Cell], n_jobs: int) -> list[Result]:
+    """What ``run_cell`` returns of each seed of some cells, see ``results.kept``."""
+    asked, fingerprint = [], training_fingerprint()
     for name, cell in cells.items():
-        question = {"cell": name, "change": identity(cell.change), **same}
+        question = {"cell": name, "change": identity(cell.change), "fingerprint": fingerprint}
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
-            jobs.append((question | config, partial(run, name, cell, seed)))
-    return keep_all(folder, jobs, n_jobs)
+            asked.append((question | config, (name, cell, seed)))
+    return keep_all(folder, run_cell, asked, n_jobs)
 
 
 def laboratory_data(
@@ -149,7 +136,7 @@ def laboratory_data(
     A part of the ``cells``, or fewer ``seeds`` of each, goes to the folder ``reduced``.
     """
     chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
-    results = keep_cells(Path(runs_dir) / "laboratory", chosen, run_cell, n_jobs)
+    results = keep_cells(Path(runs_dir) / "laboratory", chosen, n_jobs)
     rows = [result.value["row"] for result in results]
     tables = {"laboratory": pd.DataFrame(rows)[COLUMNS]}
     if trace := [point for result in results for point in result.value["trace"]]:
@@ -167,8 +154,8 @@ def fresh_data(n_jobs: int = -1) -> None:
     Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
     containers if equal x share one rank when the trained network chooses.
     """
-    results = keep_cells(paths.RUNS / "fresh", FRESH, run_fresh, n_jobs)
-    table = pd.DataFrame([result.value for result in results])[FRESH_COLUMNS]
+    results = keep_cells(paths.RUNS / "fresh", FRESH, n_jobs)
+    table = pd.DataFrame([result.value["row"] for result in results])[FRESH_COLUMNS]
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
     place, command = paths.DATA / "falls", f"{COMMAND} fresh"
     publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")

@@ -22,7 +22,6 @@ from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
 from studies.results import COMMAND, JOBS, digest, keep_all, packed, publish, read_table
 from unload.agent.config import TrainConfig
-from unload.agent.identity import identity
 from unload.network.peq import PEQNetwork
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
@@ -68,10 +67,10 @@ def trace_data(
 ) -> None:
     """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``."""
     fingerprint = training_fingerprint()
-    question = {"every": TRACE_EVERY, "fingerprint": fingerprint, "measured": identity(_trace)}
+    question = {"every": TRACE_EVERY, "fingerprint": fingerprint}
     configs = [replace(CONFIG, seed=seed) for seed in TRACED_SEEDS]
-    jobs = [(question | config.plain(), partial(_trace, config)) for config in configs]
-    results = keep_all(Path(runs_dir) / "falls/trace", jobs, n_jobs)
+    asked = [(question | config.plain(), (config,)) for config in configs]
+    results = keep_all(Path(runs_dir) / "falls/trace", _trace, asked, n_jobs)
     traces = [
         pd.DataFrame(result.value).assign(seed=seed) for seed, result in zip(TRACED_SEEDS, results)
     ]
@@ -114,13 +113,13 @@ def published_data(
         judged[f"untrained/seed_{seed}"] = PAPER.cells["paper_mask"].config, network
 
     # The weights are part of the question: a policy that was trained again is judged again.
-    measured, jobs = identity(_judge), []
+    asked = []
     for name, (config, network) in judged.items():
         weights = {part: each.numpy() for part, each in network.state_dict().items()}
-        question = {"name": name, "weights": digest(packed(weights)), "measured": measured}
-        question |= {"fingerprint": fingerprint, **config.plain(), **LOADS}
-        jobs.append((question, partial(_judge, name, config, network)))
-    results = keep_all(Path(runs_dir) / "published", jobs, n_jobs)
+        question = {"name": name, "weights": digest(packed(weights)), **config.plain(), **LOADS}
+        question["fingerprint"] = fingerprint
+        asked.append((question, (name, config, network)))
+    results = keep_all(Path(runs_dir) / "published", _judge, asked, n_jobs)
     tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
     place, command = Path(folder) / "falls", f"{COMMAND} falls"
     publish(place, "published", tables, command, LOADS, results, fingerprint)

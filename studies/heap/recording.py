@@ -5,7 +5,6 @@ around the networks that were learned from the first.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,13 +37,10 @@ def make_heaps(
 
     Heap i of a split is the same however many there are.
     """
-    code = identity(_new_heap)
     names = [(split, number) for split, count in HEAPS.items() for number in range(count)]
-    jobs = []
-    for split, number in names:
-        question = {"heap": [SEEDS[split], number], "code": code}
-        jobs.append((question, partial(_new_heap, SEEDS[split], number)))
-    answers = keep_all(Path(runs_dir) / NAME / "heaps", jobs, n_jobs)
+    seeds = [(SEEDS[split], number) for split, number in names]
+    asked = [({"heap": seed}, seed) for seed in seeds]
+    answers = keep_all(Path(runs_dir) / NAME / "heaps", _new_heap, asked, n_jobs)
     heaps: dict[str, list[Heap]] = {split: [] for split in HEAPS}
     for (split, _), answer in zip(names, answers):
         arrays = unpacked(answer.value)
@@ -71,22 +67,19 @@ def make_networks(
     answers: list[Result] = []
     for round_number in range(ROUNDS):
         # Each episode explores around one of the networks that were learned in the round before.
-        question = {"round": round_number, "explorers": digest(learned), "code": identity(_record)}
-        jobs = []
+        question, asked = {"round": round_number, "explorers": digest(learned)}, []
         for number in range(episodes):
             one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
-            jobs.append((one, partial(_record, round_number, number, explorer)))
-        found = keep_all(place / "picks", jobs, n_jobs)
+            asked.append((one, (round_number, number, explorer)))
+        found = keep_all(place / "picks", _record, asked, n_jobs)
         answers += found
         recorded += [answer.value for answer in found]
 
         # All networks learn from the picks of all rounds so far.
-        question = {"picks": digest(recorded), "steps": STEPS, "code": identity(_learn)}
-        jobs = [
-            (question | {"seed": seed}, partial(_learn, recorded, seed)) for seed in range(NETWORKS)
-        ]
-        found = keep_all(place / "networks", jobs, n_jobs)
+        question = {"picks": digest(recorded), "steps": STEPS}
+        asked = [(question | {"seed": seed}, (recorded, seed)) for seed in range(NETWORKS)]
+        found = keep_all(place / "networks", _learn, asked, n_jobs)
         answers += found
         learned = [answer.value for answer in found]
     save_networks(list(map(_network, learned)), Path(folder) / NAME / "networks.safetensors")

@@ -8,7 +8,6 @@ the whole physics takes 0.55 s of CPU, and the whole experiment about a day.
 """
 
 from collections.abc import Callable, Hashable, Mapping
-from functools import partial
 from itertools import islice, product
 from pathlib import Path
 
@@ -115,16 +114,16 @@ def _played(
 
     Networks are known by what is in their file, wherever it is.
     """
-    code, jobs = identity(_play), []
+    asked = []
     for player, heaps in players.values():
         known = dict(player)
         if "networks" in player:
             known["networks"] = files.digest(player["networks"])
         for number, heap in enumerate(stored_heaps(split)[:heaps]):
-            question = {"player": known, "heap": identity(heap), "number": number, "code": code}
+            question = {"player": known, "heap": identity(heap), "number": number}
             question |= {"physics": physics, "picks": MAX_PICKS}
-            jobs.append((question, partial(_play, player, split, number, physics)))
-    answers = iter(keep_all(Path(runs_dir) / NAME / "episodes", jobs, n_jobs))
+            asked.append((question, (player, split, number, physics)))
+    answers = iter(keep_all(Path(runs_dir) / NAME / "episodes", _play, asked, n_jobs))
     return {name: list(islice(answers, heaps)) for name, (_, heaps) in players.items()}
 
 

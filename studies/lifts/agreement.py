@@ -11,7 +11,7 @@ boxes on top, which ``table`` answers without a simulation; and all that are clo
 of a policy, ``studies.policies.robustness`` tells.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
@@ -72,8 +72,8 @@ def agreement_data(
     # Full takes seconds for each lift, so that answers are kept one by one.
     asked = frame.index[frame["asked_full"] != ""]
     columns = (frame.loc[asked, name] for name in ("state", "item", "walls"))
-    jobs = [fresh_job(*states[state], item, walls) for state, item, walls in zip(*columns)]
-    answers = keep_all(Path(runs_dir) / "agreement", jobs, n_jobs)
+    lifts = [fresh_lift(*states[state], item, walls) for state, item, walls in zip(*columns)]
+    answers = keep_all(Path(runs_dir) / "agreement", fresh_distance, lifts, n_jobs)
     frame["full"] = pd.Series([answer.value for answer in answers], asked, "float64")
     settings = {
         "lifts": len(frame),
@@ -218,10 +218,10 @@ def choose_for_full(
     return why, walls
 
 
-def fresh_job(
+def fresh_lift(
     load: Load, present: np.ndarray, item: int, walls: int
-) -> tuple[dict, Callable[[], float]]:
-    """Question and computation of one lift in a fresh world of some walls, for ``keep_all``.
+) -> tuple[dict, tuple[Load, int]]:
+    """Question and arguments of one lift in a fresh world of some walls, for ``keep_all``.
 
     In a world that has seen other lifts, the answer depends on them (by a millimetre or so),
     and so on the order in which the items are lifted.
@@ -231,8 +231,7 @@ def fresh_job(
     fields = load.positions, load.sizes, load.packages, load.walls
     left, box = Load(*(field[items] for field in fields)), int(np.searchsorted(items, item))
     boxes = blake2b(left.positions.tobytes() + left.sizes.tobytes(), digest_size=16).hexdigest()
-    question = {"settings": SETTINGS, "boxes": boxes, "item": box}
-    return question, partial(fresh_distance, left, box)
+    return {"settings": SETTINGS, "boxes": boxes, "item": box}, (left, box)
 
 
 def fresh_distance(load: Load, item: int) -> float:

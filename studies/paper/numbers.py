@@ -12,10 +12,12 @@ from itertools import pairwise
 import gymnasium
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from studies import statistics
+from studies.grid import read_grid
 from studies.paper import tuning as search
-from studies.paper.training import PAPER_CELLS, paper_runs
+from studies.paper.training import PAPER, PAPER_CELLS
 from studies.paper.visible_items import BINS
 from unload import task
 from unload.agent import policies
@@ -211,7 +213,7 @@ def tuning() -> pd.DataFrame:
     shorter = f"from step {_steps(steps[with_fe])} on; without, {_steps(steps[without_fe])}"
     significantly = steps[with_fe]["high"] < steps[without_fe]["low"]
     of_fe, of_none = noise["loss"][with_fe], noise["loss"][without_fe]
-    low, high = statistics.welch_interval(of_fe, of_none)
+    low, high = stats.ttest_ind(of_fe, of_none, equal_var=False).confidence_interval()
     stabler = f"noise {of_fe.mean():.4f} with FE, {of_none.mean():.4f} without "
     stabler += f"(difference {low:+.4f} to {high:+.4f})"
     shown = "not shown" if low <= 0 <= high else high < 0
@@ -238,7 +240,8 @@ def training() -> pd.DataFrame:
         ``where`` and ``paper``, and a column for each of ``PAPER_CELLS``: ours, and whether it
         agrees.
     """
-    runs = paper_runs()
+    paper = read_grid(PAPER, cells=PAPER_CELLS)
+    runs = statistics.by_run(paper, statistics.first_plan)
     picks = task.NUM_ENVS * np.arange(1, search.STEPS + 1)
     losses = search.read_curves("loss", 2048, 1e-3).values()
     tuned = [pd.Series(search.running_mean(loss), picks).dropna() for loss in losses]
@@ -254,13 +257,13 @@ def training() -> pd.DataFrame:
     ]
     frame = pd.DataFrame(given, columns=["number", "where", "paper"]).set_index("number")
 
-    for cell in statistics.cell_table(runs).itertuples():
-        curves = [curve for name, _, curve in runs if name == cell.cell]
+    for cell in statistics.by_cell(runs).itertuples():
+        curves = [curve for _, curve in paper[paper["cell"] == cell.Index].groupby("seed")]
         start = np.mean([curve["success_rate"].iloc[0] for curve in curves])
         holds, half = bool(cell.low <= statistics.PAPER_MSR <= cell.high), cell.runs / 2
         reproduced = holds if cell.both >= half or not holds else "in part"  # the plan's rule
-        end = f"{cell.mean:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
-        end += f"({2 * cell.mean - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's"
+        end = f"{cell.end:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
+        end += f"({2 * cell.end - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's"
         joint = sum(all(statistics.after_loss_peak(curve)) for curve in curves)
         later = f"slower in {cell.slower}, noisier in {cell.noisier}, both in {joint} "
         later += f"of {cell.runs} runs"
@@ -276,7 +279,7 @@ def training() -> pd.DataFrame:
             (f"{cell.fig11} of {cell.runs} runs", cell.fig11 >= half),
             (slower, max(slopes) < tuned),
         ]
-        config = PAPER_CELLS[cell.cell].config
+        config = PAPER_CELLS[cell.Index].config
         reading = f"{'with' if config.mask else 'without'} the mask, b = {config.batch_size}"
         frame[reading] = [f"{text}: {word(agrees)}" for text, agrees in here]
     return frame

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter
 
 from studies import paths
-from studies.grid import Cell, Grid, read_grid, read_policies, train_grid
+from studies.grid import Cell, Grid, read_policies, train_grid
 from studies.results import COMMAND, JOBS
 from studies.style import COLOURS
 from unload import task
@@ -79,42 +79,10 @@ def training_data(
             save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
 
 
-def paper_runs() -> list[tuple[str, int, pd.DataFrame]]:
-    """Cell, seed and curve of each published run of the paper's four cells."""
-    curves = read_grid(PAPER, cells=PAPER_CELLS)
-    groups = curves.groupby(["cell", "seed"], sort=False)
-    return [(cell, seed, curve) for (cell, seed), curve in groups]
-
-
 def default_policies(folder: str | Path = paths.DATA) -> dict[int, Greedy]:
     """The policies that ``DEFAULT_SEEDS`` of the paper's configuration have learned."""
     policies = read_policies(Path(folder) / f"{PAPER.name}.safetensors")
     return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
-
-
-def episode_means(curve: pd.DataFrame) -> pd.DataFrame:
-    """Means of a learning curve over each complete episode of the 64 containers.
-
-    All containers are reset together, every 32,000 picks, and full ones, in which there is no
-    deadlock yet, are easier. Means over less than an episode therefore rise at every reset.
-
-    Args:
-        curve: of ``unload.train`` in 64 containers, with a ``log_interval`` that divides 500.
-
-    Returns:
-        One row per episode with the columns of ``curve``; ``picks``, ``wall_time`` and
-        ``epsilon`` are those at its end.
-    """
-    length = task.NUM_ENVS * task.MAX_PICKS
-    episode = ((curve["picks"] - 1) // length).rename("episode")
-    groups = curve[curve["picks"] <= curve["picks"].max() // length * length].groupby(episode)
-    ends = groups[["picks", "wall_time", "epsilon"]].last()
-    if (ends["picks"] % length).any():
-        raise ValueError(
-            f"curve has points after {curve['picks'].iloc[0]:,} picks each; "
-            f"expected a divisor of the {length:,} picks of an episode"
-        )
-    return groups.mean().assign(**ends)
 
 
 def draw_learning_curve(
@@ -122,15 +90,20 @@ def draw_learning_curve(
 ) -> None:
     """Draw the MSR while training: pale at each point of the curve, strong over whole episodes.
 
+    All containers are reset together, every 32,000 picks, and full ones, in which there is no
+    deadlock yet, are easier. Means over less than an episode therefore rise at every reset.
+
     Args:
         axes: where.
-        curve: of ``unload.train``, see ``episode_means``.
+        curve: of ``unload.train`` in 64 containers, with a ``log_interval`` that divides 500.
         name: in the legend.
         color: of both lines.
     """
     axes.plot(curve["picks"], curve["success_rate"], color=color, linewidth=0.7, alpha=0.45)
-    episodes = episode_means(curve)
-    middle = episodes["picks"] - task.NUM_ENVS * task.MAX_PICKS / 2
-    axes.plot(middle, episodes["success_rate"], "o-", color=color, markersize=3.5, label=name)
+    length = task.NUM_ENVS * task.MAX_PICKS
+    whole = curve[curve["picks"] <= curve["picks"].max() // length * length]
+    means = whole.groupby((whole["picks"] - 1) // length)["success_rate"].mean()
+    middle = (means.index + 0.5) * length
+    axes.plot(middle, means, "o-", color=color, markersize=3.5, label=name)
     axes.set(xlabel="picks", ylabel="MSR while training", ylim=(0, 1.02), xlim=(0, None))
     axes.xaxis.set_major_formatter(EngFormatter(sep=" "))

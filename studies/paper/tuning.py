@@ -4,6 +4,7 @@ python -m studies tuning
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -25,6 +26,10 @@ LEARNING_RATES = (1e-1, 1e-2, 1e-3)
 BATCH_SIZES = (64, 256, 1024, 2048)
 RUN_COUNT = 10  # of each configuration
 STEPS = 3000  # K, one pick in each of 64 environments and one update per step
+# Of all runs; they differ in batch size b, learning rate μ, seed, and with or without FE.
+CONFIG = TrainConfig(
+    env="unload/HighestItem-v0", picks=STEPS * task.NUM_ENVS, equalize=True, log_interval=1
+)
 # What the paper's plots read of the search: its folder, the column, batch size, learning rate, run.
 SHOWN = (
     ("with", "hitrate", 1024, 1e-1, 6),
@@ -48,32 +53,6 @@ Curves = dict[int, np.ndarray]  # one value per training step, by the number of 
 FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
 
 
-def tuning_config(
-    batch_size: int, learning_rate: float, run: int = 0, equalize: bool = True, steps: int = STEPS,
-    **changes,
-) -> TrainConfig:  # fmt: skip
-    """Run number ``run`` in the hyperparameter-tuning environment (Sec. IV-A).
-
-    Args:
-        batch_size: b.
-        learning_rate: μ.
-        run: its seed.
-        equalize: with the paper's feature engineering (FE) or without.
-        steps: K.
-        **changes: further fields of ``TrainConfig``.
-    """
-    return TrainConfig(
-        env="unload/HighestItem-v0",
-        picks=steps * task.NUM_ENVS,
-        batch_size=batch_size,
-        learning_rate=learning_rate,
-        seed=run,
-        equalize=equalize,
-        log_interval=1,
-        **changes,
-    )
-
-
 def tuning_cell(batch_size: int, learning_rate: float, equalize: bool) -> str:
     """The name of a cell of the search, such as ``b64/with_fe_lr_0.1``."""
     return f"b{batch_size}/{'with' if equalize else 'without'}_fe_lr_{learning_rate:g}"
@@ -91,15 +70,14 @@ def tuning_grid(
     The slow runs, of large batches, come first, so that no process is left with one of them at
     the end.
     """
-    cells = {
-        tuning_cell(batch_size, learning_rate, equalized): Cell(
-            tuning_config(batch_size, learning_rate, equalize=equalized, steps=steps),
-            range(runs),
-        )
-        for batch_size in sorted(batch_sizes, reverse=True)
-        for equalized in equalize
-        for learning_rate in learning_rates
-    }
+    cells = {}
+    for batch_size in sorted(batch_sizes, reverse=True):
+        for equalized in equalize:
+            for learning_rate in learning_rates:
+                fields = {"batch_size": batch_size, "learning_rate": learning_rate}
+                config = replace(CONFIG, picks=steps * task.NUM_ENVS, equalize=equalized, **fields)
+                name = tuning_cell(batch_size, learning_rate, equalized)
+                cells[name] = Cell(config, range(runs))
     return Grid("tuning/tuning", f"{COMMAND} tuning", cells, policies=False)
 
 
@@ -144,7 +122,7 @@ def read_curves(
 
     Args:
         column: ``"success_rate"`` or ``"loss"``.
-        batch_size, learning_rate, equalize: the configuration, see ``tuning_config``.
+        batch_size, learning_rate, equalize: the configuration.
 
     Returns:
         A value per training step, (steps,) float64, NaN where there is none yet.
@@ -176,14 +154,13 @@ def greedy_msr(success_rate: np.ndarray) -> np.ndarray:
     steps. The fewer picks are greedy, the noisier it is: it may leave [0, 1].
 
     Args:
-        success_rate: (..., steps) MSR while training at each step of a whole run of
-            ``tuning_config``.
+        success_rate: (..., steps) MSR while training at each step of a whole run.
 
     Returns:
         (..., steps), NaN where fewer than one pick in twenty is greedy.
     """
     steps = success_rate.shape[-1]
-    config = tuning_config(1, 1, 0, steps=steps)
+    config = replace(CONFIG, picks=steps * task.NUM_ENVS, batch_size=1)
     epsilon = np.array([config.epsilon(step * task.NUM_ENVS) for step in range(steps)])
     greedy = running_mean(1 - epsilon)
     by_greedy = np.apply_along_axis(running_mean, -1, success_rate - epsilon * chance())

@@ -1,11 +1,13 @@
 """A figure under sliders and switches, as a Jupyter widget."""
 
 import base64
+import io
 from collections.abc import Callable
 
 import ipywidgets as widgets
+import matplotlib.pyplot as plt
 
-from studies.style import as_png, styled
+from studies.style import STYLE, styled
 
 
 class Explore(widgets.VBox):
@@ -36,7 +38,11 @@ class Explore(widgets.VBox):
 
     def _show(self) -> None:
         values = {name: control.value for name, control in self._controls.items()}
-        self.picture.value = as_png(self._draw(**values))
+        figure, content = self._draw(**values), io.BytesIO()
+        with plt.style.context(STYLE):
+            figure.savefig(content, dpi="figure", format="png", metadata={"Software": None})
+        plt.close(figure)  # so that no notebook shows it once more
+        self.picture.value = content.getvalue()
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
         """The widget, and what is shown of it where no kernel runs."""

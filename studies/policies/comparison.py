@@ -24,7 +24,7 @@ from studies import paths
 from studies.paper import training
 from studies.policies.variants import GRIDS, RECOMMENDED
 from studies.results import COMMAND, measured, publish, read_provenance, read_table
-from studies.statistics import bootstrap_interval
+from studies.statistics import t_interval
 from studies.style import COLOURS, styled
 from unload import task
 from unload.agent import policies
@@ -209,6 +209,6 @@ def _panel(axes: Axes, table: pd.DataFrame) -> None:
             continue
         rate = rates[policy, mask]
         colour = COLOURS[SEEN.get(policy, policy)]
-        axes.plot(bootstrap_interval(rate), [row, row], color=colour)
+        axes.plot(t_interval(rate), [row, row], color=colour)
         axes.plot(rate.mean(), row, "o", color=colour, markerfacecolor=colour if mask else "white",
                   markersize=5, clip_on=False, zorder=3)  # fmt: skip

@@ -8,7 +8,6 @@ and a box on which nothing lies may be jammed between its neighbours.
 """
 
 from collections.abc import Callable
-from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -19,7 +18,6 @@ from studies import paths
 from studies.policies.comparison import LEARNED, SIMPLE, digests, find_policy
 from studies.results import COMMAND, keep_all, publish
 from unload.agent.evaluation import Policy, success_rate
-from unload.agent.identity import identity
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
@@ -45,15 +43,15 @@ def robustness_data(
     episode takes minutes. Each one that is finished is kept, so that a run that was stopped
     goes on.
     """
-    weights, code = digests(), identity(play)
+    weights = digests()
     seeds = np.random.SeedSequence(SEED).generate_state(EPISODES).tolist()
-    containers, jobs = [], []
+    containers, asked = [], []
     for (name, after_pick), (episode, seed) in product(PLAYED, enumerate(seeds)):
         containers.append({"policy": name, "after_pick": after_pick, "episode": episode})
         size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS, "settings": SETTINGS}
-        question = containers[-1] | size | {"weights": weights.get(name), "code": code}
-        jobs.append((question, partial(play, find_policy(name), after_pick, seed, PICKS)))
-    answers = keep_all(Path(runs_dir) / "robustness", jobs, n_jobs)
+        question = containers[-1] | size | {"weights": weights.get(name)}
+        asked.append((question, (find_policy(name), after_pick, seed, PICKS)))
+    answers = keep_all(Path(runs_dir) / "robustness", play, asked, n_jobs)
     rows = [one | answer.value for one, answer in zip(containers, answers)]
     tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
     settings = {"policies": weights, "episodes": EPISODES, "picks": PICKS, "seed": SEED}

@@ -23,7 +23,7 @@ from studies.changes import height_reward
 from studies.falls import measures
 from studies.grid import Cell, Grid, read_measures, train_grid
 from studies.results import COMMAND, JOBS
-from studies.statistics import bootstrap_interval
+from studies.statistics import t_interval
 from studies.style import styled
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
@@ -113,8 +113,7 @@ def variants_msr(part: str, folder: str | Path = paths.DATA) -> Figure:
             y = row + (0.15 if place else -0.15)
             style = {"color": colour, "marker": marker, "linestyle": "none"}
             axes.plot(cell[name], np.full(len(cell), y), **style, alpha=0.3, markersize=3)
-            low, high = bootstrap_interval(cell[name].to_numpy())
-            axes.plot([low, high], [y, y], color=colour, linewidth=1.2)
+            axes.plot(t_interval(cell[name]), [y, y], color=colour, linewidth=1.2)
             label = None if row else label
             axes.plot(cell[name].mean(), y, **style, markersize=6, label=label)
     axes.set_yticks(range(len(cells)), [name.replace("_", " ") for name in cells])

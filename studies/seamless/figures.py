@@ -16,43 +16,32 @@ CHANCE = 0.26  # MSR of random picks with a gap of 1 mm
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
 SMOOTH = 16  # episodes of all containers, about half a million picks
 
-# Curves of the runs of a panel, by whether the mask is on.
-Panel = Mapping[str, list[pd.DataFrame]]
-
-
-def runs_of(curves: pd.DataFrame, cells: Mapping[str, str]) -> Panel:
-    """The runs of some cells.
-
-    Args:
-        curves: of ``read_grid``.
-        cells: by a key of ``MASK_LINES``.
-    """
-    return {
-        name: [run for _, run in curves[curves["cell"] == cell].groupby("seed")]
-        for name, cell in cells.items()
-    }
+Panels = Mapping[str, Mapping[str, str]]
 
 
 @styled
-def fig11_loss(panels: Mapping[str, Panel]) -> Figure:
+def fig11_loss(curves: pd.DataFrame, panels: Panels) -> Figure:
     """Training loss over picks (Fig. 11), a panel for each setting.
 
+    Thin lines are means over episodes of all containers, strong ones running means of the first
+    seed over half a million picks.
+
     Args:
-        panels: by their titles. Thin lines are means over episodes of all containers, strong
-            ones running means of the first seed over half a million picks.
+        curves: of ``read_grid``.
+        panels: the cells of each by a key of ``MASK_LINES``, by its title.
     """
-    figure, all_axes = _panels(panels, lambda run: run["loss"])
+    figure, all_axes = _panels(curves.assign(value=curves["loss"]), panels)
     all_axes[0].set(ylabel=r"loss $\ell$", ylim=(0, 0.6))
     return figure
 
 
 @styled
-def fig12_reward(panels: Mapping[str, Panel]) -> Figure:
+def fig12_reward(curves: pd.DataFrame, panels: Panels) -> Figure:
     """Mean reward of the 64 environments over picks (Fig. 12), a panel for each setting.
 
     The marks are the paper's: −0.7 at the start, 0.2 at the end. Arguments as of ``fig11_loss``.
     """
-    figure, all_axes = _panels(panels, lambda run: 2 * run["success_rate"] - 1)
+    figure, all_axes = _panels(curves.assign(value=2 * curves["success_rate"] - 1), panels)
     for axes in all_axes:
         for place, reward in ((0.0, 2 * PAPER_START - 1), (2e7, 2 * PAPER_MSR - 1)):
             axes.axhline(reward, color="0.4", linestyle=":", linewidth=1)
@@ -65,19 +54,18 @@ def fig12_reward(panels: Mapping[str, Panel]) -> Figure:
     return figure
 
 
-def _panels(panels: Mapping[str, Panel], value) -> tuple[Figure, np.ndarray]:
-    """A panel for each setting, with ``value`` of every run's curve."""
+def _panels(curves: pd.DataFrame, panels: Panels) -> tuple[Figure, np.ndarray]:
+    """A panel for each setting, with the ``value`` of every run's curve."""
     figure, (all_axes,) = plt.subplots(
         1, len(panels), figsize=(3 + 2.6 * len(panels), 3.6), sharex=True, sharey=True,
         squeeze=False,
     )  # fmt: skip
-    for axes, (title, panel) in zip(all_axes, panels.items()):
-        for name, colour in zip(panel, ("C1", "C0")):
-            for number, run in enumerate(panel[name]):
-                values = value(run)
-                axes.plot(run["picks"], values, colour, linewidth=0.4, alpha=0.35)
+    for axes, (title, cells) in zip(all_axes, panels.items()):
+        for (name, cell), colour in zip(cells.items(), ("C1", "C0")):
+            for number, (_, run) in enumerate(curves[curves["cell"] == cell].groupby("seed")):
+                axes.plot(run["picks"], run["value"], colour, linewidth=0.4, alpha=0.35)
                 if number == 0:
-                    smooth = values.rolling(SMOOTH, min_periods=1).mean()
+                    smooth = run["value"].rolling(SMOOTH, min_periods=1).mean()
                     look = {"linestyle": MASK_LINES[name], "linewidth": 1.8, "zorder": 3}
                     axes.plot(run["picks"], smooth, colour, label=name, **look)
         axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7), xticks=np.arange(5) * 5e6)
@@ -93,7 +81,7 @@ def draw_start_and_end(groups: Mapping[str, tuple[pd.DataFrame, dict]]) -> Figur
     """Where runs start and end, the paper's point, and what a share of jammed boxes allows.
 
     Args:
-        groups: rows of ``verdicts.by_run`` and the look of their dots, by their names.
+        groups: rows of ``statistics.by_run`` and the look of their dots, by their names.
     """
     figure, axes = plt.subplots(figsize=(5.6, 4.2))
     shares = np.linspace(0, 0.8, 81)

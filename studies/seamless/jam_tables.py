@@ -1,7 +1,6 @@
 """What is published of the jams: counts by case, by place, and how long a jam lasts."""
 
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from studies.results import COMMAND, keep_all, publish, read_table
 from studies.seamless import episodes, jams
 from studies.seamless.jams import Case
 from unload import task
-from unload.agent.identity import identity
 
 MADE_BY = f"{COMMAND} jams"
 OUT_STEP = 25  # boxes taken out, between two rows of an episode
@@ -32,8 +30,8 @@ def jams_data(
     the others ``newly_jammed``.
     """
     cases = list(jams.cases())
-    jobs = [(jams.question(kind, case), partial(jams.asker(kind), case)) for kind, case in cases]
-    results = keep_all(Path(runs_dir) / "seamless/jams", jobs, n_jobs)
+    asked = [({"kind": kind, **asdict(case)}, (kind, case)) for kind, case in cases]
+    results = keep_all(Path(runs_dir) / "seamless/jams", jams.answer, asked, n_jobs)
     counts, lasting = [], []
     for (kind, case), result in zip(cases, results):
         if kind == "lasting":
@@ -85,12 +83,11 @@ def episodes_data(
     attempts of the random policy at boxes that have jammed, by ``friction`` and the successes
     ``between``; ``neighbours`` is how many would jam by the table of first attempts alone.
     """
-    cases, code = list(episodes.cases()), identity(episodes.episode)
-    jobs = []
+    cases, asked = list(episodes.cases()), []
     for case, policy, after_pick in cases:
-        question = {"case": asdict(case), "policy": policy, "after_pick": after_pick, "code": code}
-        jobs.append((question, partial(episodes.episode, case, policy, after_pick)))
-    results = keep_all(Path(runs_dir) / "seamless/episodes", jobs, n_jobs)
+        question = {"case": asdict(case), "policy": policy, "after_pick": after_pick}
+        asked.append((question, (case, policy, after_pick)))
+    results = keep_all(Path(runs_dir) / "seamless/episodes", episodes.episode, asked, n_jobs)
     rows, attempts = [], []
     for (case, policy, after_pick), result in zip(cases, results):
         rows += episode_rows(case, policy, after_pick, result.value)

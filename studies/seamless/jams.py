@@ -6,14 +6,12 @@ A box is free if nothing rests on it; it jams if it is lifted by less than 0.2 m
 a case varies stands in ``Case``, the cases in ``cases``.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, replace
-from functools import cache
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from unload import task
-from unload.agent.identity import identity
 from unload.env.observation import nearest
 from unload.load.boxes import ABOVE, CONTACT_TOLERANCE, Load
 from unload.load.substacks import stack_load
@@ -218,17 +216,6 @@ def cases() -> Iterator[tuple[str, Case]]:
         yield "container", Case(load, walls=12, friction=0.49, picks=200)
 
 
-def question(kind: str, case: Case) -> dict:
-    """What an answer depends on, see ``results.kept``."""
-    return {"kind": kind, **asdict(case), "code": code_of(kind)}
-
-
-@cache  # it reads files
-def code_of(kind: str) -> str:
-    """The identity of what computes the rows of a case."""
-    return identity(asker(kind))
-
-
-def asker(kind: str) -> Callable[[Case], list[dict]]:
-    """What computes the rows of a case."""
-    return persistence if kind == "lasting" else lifts
+def answer(kind: str, case: Case) -> list[dict]:
+    """The rows of a case: of ``persistence`` for the question "lasting", else of ``lifts``."""
+    return persistence(case) if kind == "lasting" else lifts(case)

@@ -7,7 +7,6 @@ MuJoCo's contacts are soft, and the friction of a contact is the larger one of b
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from studies import paths
 from studies.results import COMMAND, keep_all, publish, read_table
 from studies.seamless.jams import Case, load_of, visible_free
 from unload import task
-from unload.agent.identity import identity
 from unload.physics.bullet import TIME_STEP
 
 NAME = "mujoco_jams"
@@ -92,9 +90,8 @@ def mujoco_data(
     folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
 ) -> None:
     """Lift the boxes of all cases; write ``seamless/mujoco_jams.csv``, with ``COLUMNS``."""
-    code = identity(distances)
-    jobs = [({**asdict(case), "code": code}, partial(distances, case)) for case in cases()]
-    results = keep_all(Path(runs_dir) / "seamless" / NAME, jobs, n_jobs)
+    asked = [(asdict(case), (case,)) for case in cases()]
+    results = keep_all(Path(runs_dir) / "seamless" / NAME, distances, asked, n_jobs)
     rows = []
     for case, result in zip(cases(), results):
         lifted = np.array(result.value)

@@ -123,6 +123,10 @@ def make_batch(rng: np.random.Generator, size: int = 150, items: int = 20) -> di
     }
 
 
+def without_next(batch: dict) -> dict:
+    return {name: batch[name] for name in ("observations", "actions", "rewards")}
+
+
 class HeightNetwork(torch.nn.Module):
     """Values each item by its z, times a weight."""
 
@@ -134,7 +138,7 @@ class HeightNetwork(torch.nn.Module):
         return observations[..., 2] * self.weight
 
 
-def peq(seed: int = 0, n_features: int = 8) -> PEQNetwork:
+def peq(n_features: int = 8, seed: int = 0) -> PEQNetwork:
     return PEQNetwork(n_features, torch.Generator().manual_seed(seed))
 
 

@@ -4,6 +4,7 @@ import errno
 import os
 import shutil
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -106,12 +107,9 @@ def finished(tmp_path_factory) -> Path:
 
 def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypatch):
     """Not even a lock, or the checkpoint that a killed process has left."""
-
-    def refuse(path: Path) -> None:
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
-
+    refused = OSError(errno.EROFS, os.strerror(errno.EROFS))
     with files.locked(finished):
-        monkeypatch.setattr(Path, "unlink", refuse)
+        monkeypatch.setattr(Path, "unlink", Mock(side_effect=refused))
         assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
 
 

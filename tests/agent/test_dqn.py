@@ -5,12 +5,8 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import HeightNetwork, make_batch, peq, weights
+from tests.agent.runs import HeightNetwork, make_batch, peq, weights, without_next
 from unload import DQN, Greedy
-
-
-def without_next(batch: dict) -> dict:
-    return {name: batch[name] for name in ("observations", "actions", "rewards")}
 
 
 def test_epsilon_is_the_share_of_random_actions(rng):

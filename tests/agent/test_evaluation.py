@@ -3,6 +3,7 @@ import pandas as pd
 import pytest
 
 from tests.agent.runs import lowest
+from tests.env.comparing import few_items
 from unload import evaluate, policies, success_rate
 from unload.env.vector import ContainerVectorEnv
 
@@ -54,7 +55,7 @@ def test_whole_containers_are_unloaded_by_picking_the_highest_item():
 
 @pytest.mark.parametrize("policy", [policies.random, policies.nearest])
 @pytest.mark.parametrize("mask", [False, True])
-def test_each_episode_counts_to_its_own_end(few_items, policy, mask):
+def test_each_episode_counts_to_its_own_end(policy, mask):
     counts = iter([3, 60, 20] + [5] * 99)  # the first three loads, and those that follow
 
     frame = evaluate(
@@ -67,7 +68,7 @@ def test_each_episode_counts_to_its_own_end(few_items, policy, mask):
     assert not mask or (frame[["deadlocked", "longest_deadlock"]] == 0).all(axis=None)
 
 
-def test_local_and_table_agree_to_the_last_item(few_items):
+def test_local_and_table_agree_to_the_last_item():
     frames = [
         evaluate(policies.random, 1, physics=p, max_picks=None, stack=lambda rng: few_items(rng, 9))
         for p in ("local", "table")
@@ -76,7 +77,7 @@ def test_local_and_table_agree_to_the_last_item(few_items):
     assert frames[0]["emptied"].all()
 
 
-def test_an_episode_that_is_stuck_is_given_up(few_items):
+def test_an_episode_that_is_stuck_is_given_up():
     frame = evaluate(lowest, 2, mask=False, max_picks=None, stack=lambda rng: few_items(rng, 40))
     assert not frame["emptied"].any() and (frame["unloaded"] < 40).all()
     assert (frame["longest_deadlock"] == 1279).all()
@@ -86,15 +87,13 @@ def test_an_episode_that_is_stuck_is_given_up(few_items):
 
 
 @pytest.mark.parametrize("max_picks", [200, None])
-def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(
-    few_items, monkeypatch, max_picks
-):
+def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, max_picks):
     monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, *given: fail(envs, given[0]))
 
     def fail(envs, actions):
         envs._containers.masks[np.arange(len(actions)), actions] = 0
-        envs._items = envs._distances = np.zeros(len(actions))
-        return np.full(len(actions), -1.0)
+        infos = {"item": np.zeros(len(actions)), "distance": np.zeros(len(actions))}
+        return np.full(len(actions), -1.0), infos
 
     frame = evaluate(policies.random, 2, max_picks=max_picks, stack=lambda rng: few_items(rng, 40))
     assert (frame["unloaded"] == 0).all() and (frame["deadlocked"] == 0).all()

@@ -1,43 +1,19 @@
 """The identity of functions that are handed to a run."""
 
-import itertools
+import runpy
 import subprocess
 import sys
 import textwrap
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.agent.runs import CONTAINER, interrupt_run
+from tests.agent.runs import CONTAINER, ROOT, interrupt_run
 from unload import PEQNetwork, TrainConfig, stack_load, train
 from unload.agent.identity import identity
-from unload.agent.training import train_changed
 from unload.load.boxes import Load
 from unload.support import files
-
-ROOT = Path(__file__).resolve().parents[2]
-
-NUMBERS = itertools.count()
-
-
-@pytest.fixture
-def make(tmp_path, monkeypatch):
-    """``make(source, name)``: what a fresh module of a caller's own calls ``name``."""
-    monkeypatch.syspath_prepend(tmp_path)
-
-    def written(source: str, name: str = "change", **replaced):
-        monkeypatch.delitem(sys.modules, "own", raising=False)
-        # Another file each time, because Python keeps the lines of one that it has read.
-        path = tmp_path / f"{next(NUMBERS)}.py"
-        path.write_text(textwrap.dedent(source))
-        space = {"__name__": "own.module", "__file__": str(path)}
-        exec(compile(path.read_text(), str(path), "exec"), space)
-        return space[name]
-
-    return written
-
 
 CODE = """
     import functools
@@ -81,11 +57,17 @@ CODE = """
         ("[1, 2]", "[1, 5]", False),
     ],
 )
-def test_other_code_is_another_function_and_another_comment_is_not(make, old, new, same):
+def test_other_code_is_another_function_and_another_comment_is_not(tmp_path, old, new, same):
+    """Of a caller's own module, in another file each time: Python keeps the lines of one."""
     assert CODE.count(old) == 1
-    one, other = identity(make(CODE)), identity(make(CODE.replace(old, new)))
+    found = []
+    for number, source in enumerate([CODE, CODE.replace(old, new), CODE]):
+        path = tmp_path / f"{number}.py"
+        path.write_text(textwrap.dedent(source))
+        found.append(identity(runpy.run_path(path, run_name="own.module")["change"]))
+    one, other, again = found
     assert one.startswith("own.module.change ") and (one == other) == same
-    assert one == identity(make(CODE))
+    assert one == again
 
 
 def enclosing(walls: int):
@@ -109,11 +91,6 @@ class Maker:
         return stack_load(rng, walls=self.walls)
 
 
-def load_of(x: float) -> Load:
-    one = np.zeros(1, int)
-    return Load(np.array([[x, 1.0, 0.5]]), np.ones((1, 3)), one, one)
-
-
 @pytest.mark.parametrize(
     "made",
     [
@@ -123,7 +100,7 @@ def load_of(x: float) -> Load:
         lambda walls: Maker(walls).stack,
         lambda walls: partial(stack_load, walls=walls),
         lambda walls: partial(partial(stack_load, walls=walls), rows=3),
-        lambda walls: partial(print, [{"load": load_of(walls / 10)}]),
+        lambda walls: partial(print, [{"load": Load([[walls / 10, 1, 0.5]], np.ones((1, 3)))}]),
         lambda walls: partial(print, np.arange(walls)),
     ],
 )
@@ -163,13 +140,13 @@ def halved(run) -> None:
 
 def test_a_changed_run_is_not_taken_for_the_plain_one(tmp_path):
     config = TrainConfig(**CONTAINER)
-    result = train_changed(config, tmp_path / "changed", doubled, progress=False)
+    result = train(config, tmp_path / "changed", progress=False, change=doubled)
     assert result.policy.card["change"] == identity(doubled)
     assert files.read_json(tmp_path / "changed" / "config.json")["change"] == identity(doubled)
     with pytest.raises(ValueError, match=r"change \('tests.*doubled \w+', not None\)"):
         train(config, tmp_path / "changed", progress=False)
     with pytest.raises(ValueError, match=r"change \('tests.*doubled \w+', not 'tests.*halved"):
-        train_changed(config, tmp_path / "changed", halved, progress=False)
+        train(config, tmp_path / "changed", progress=False, change=halved)
     interrupt_run(config, tmp_path / "plain", 20)
     with pytest.raises(ValueError, match=r"change \(None, not 'tests.*halved \w+'\)"):
-        train_changed(config, tmp_path / "plain", halved, progress=False)
+        train(config, tmp_path / "plain", progress=False, change=halved)

@@ -3,12 +3,12 @@
 import io
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from tests.agent.runs import ROOT
 from tests.load.walls import KINDS, own_load
 from unload import Load, picking_order, policies, read_load
 from unload import __main__ as command
@@ -17,7 +17,6 @@ from unload.load.packing_list import EXAMPLE
 from unload.physics.local import LocalPhysics
 from unload.task import LIFT_THRESHOLD
 
-ROOT = Path(__file__).resolve().parents[2]
 # Allowed at first, until it fails or holds no box; it ends in case nothing stops the policy.
 STUBBORN = iter([127] * 999)
 

@@ -3,8 +3,6 @@ import pytest
 
 from unload import policies
 
-POLICIES = [policies.random, policies.nearest, policies.highest]
-
 
 def test_random_is_uniform_over_the_allowed(rng):
     masks = np.tile([1, 0, 1, 1], (30_000, 1))
@@ -22,7 +20,7 @@ def test_nearest_takes_the_first_allowed_row_and_highest_the_highest(rng):
     assert actions.tolist() == [2, 1, 3] and actions.dtype == np.int64
 
 
-@pytest.mark.parametrize("policy", POLICIES)
+@pytest.mark.parametrize("policy", [policies.random, policies.nearest, policies.highest])
 @pytest.mark.parametrize(
     ("observations", "masks", "error", "message"),
     [

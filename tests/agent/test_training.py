@@ -261,7 +261,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     ("given", "error", "message"),
     [
         ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
-        (of(None), TypeError, "network returned None; expected a torch.nn.Module"),
+        (of(None), TypeError, "what network returned is None; expected a torch.nn.Module"),
         (of(HeightNetwork().double()), TypeError, "weight of dtype torch.float64; expected"),
         (of(HeightNetwork(torch.ones(2, 1, 1))), ValueError, r"\(2, 2, 3\); expected \(2, 3\)"),
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),

@@ -1,25 +1,35 @@
-"""Comparison of environments, and stacks that fail."""
+"""Environments and loads of few items, and comparison to the bit."""
+
+from functools import partial
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from unload import Load, stack_load
+from unload.env import observation
 
 CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
 
 
+def few_items(rng: np.random.Generator, count: int) -> Load:
+    """The items of a random load that are farthest from the entrance."""
+    load = stack_load(rng)
+    last = np.sort(observation.nearest(load.positions, len(load))[-count:])
+    return Load(load.positions[last], load.sizes[last], load.packages[last], load.walls[last])
+
+
+def make_env(env_id: str = CONTAINER, **kwargs) -> gymnasium.Env:
+    """``gymnasium.make``, with a table of lifts if no physics is named."""
+    physics = {"physics": "table"} if env_id == CONTAINER else {}
+    return gymnasium.make(env_id, **physics | kwargs)
+
+
 def make_pair(env_id: str, num_envs: int, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs):
     """The array environment, and single ones side by side."""
-    single = {"physics": "table"} if env_id == CONTAINER else {}
-    side_by_side = gymnasium.make_vec(
-        env_id,
-        num_envs,
-        vectorization_mode="sync",
-        vector_kwargs={"autoreset_mode": autoreset_mode},
-        **single,
-        **kwargs,
-    )
+    single = [partial(make_env, env_id, **kwargs)] * num_envs
     array = gymnasium.make_vec(env_id, num_envs, autoreset_mode=autoreset_mode, **kwargs)
-    return array, side_by_side
+    return array, SyncVectorEnv(single, autoreset_mode=autoreset_mode)
 
 
 def assert_same(one, other) -> None:

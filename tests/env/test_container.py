@@ -1,5 +1,4 @@
 from functools import partial
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -7,8 +6,8 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from tests.env.comparing import CONTAINER, HIGHEST, assert_same
-from unload import ContainerEnv, Load, equalize, task
+from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_env
+from unload import ContainerEnv, equalize, task
 from unload.env import observation
 from unload.env.highest_item import GRID
 from unload.env.vector import ContainerVectorEnv
@@ -16,23 +15,15 @@ from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.picture import snapshot
 from unload.load.substacks import build_load
 
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def tall_load() -> Load:
-    """Few enough items to be quick, also where each of them is simulated."""
-    return build_load(np.zeros((2, 3, 4), dtype=int))
-
 
 @pytest.mark.parametrize("equalize", [False, True])
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
-@pytest.mark.filterwarnings("error")
 def test_check_env(env_id, equalize):
     env = gymnasium.make(env_id, equalize=equalize)
     check_env(env.unwrapped, skip_render_check=True)
 
 
-def test_reset_shows_the_nearest_items_scaled_blurred_and_sunk_once_per_load(make_env, full_load):
+def test_reset_shows_the_nearest_items_scaled_blurred_and_sunk_once_per_load(full_load):
     sharp, blurred, given = make_env(position_noise=0.0), make_env(), {"load": full_load}
     seen, info = sharp.reset(seed=0, options=given)
     rows = observation.nearest(full_load.positions)
@@ -47,7 +38,7 @@ def test_reset_shows_the_nearest_items_scaled_blurred_and_sunk_once_per_load(mak
     assert (blurred.unwrapped.observed_positions() - full_load.positions == blur).all()
 
 
-def test_a_success_removes_the_item_and_shows_the_next(make_env):
+def test_a_success_removes_the_item_and_shows_the_next():
     env = make_env()
     seen, _ = env.reset(seed=0)
     container = env.unwrapped
@@ -63,7 +54,7 @@ def test_a_success_removes_the_item_and_shows_the_next(make_env):
     assert not (after == seen).all()
 
 
-def test_a_failure_changes_nothing_but_the_mask(make_env):
+def test_a_failure_changes_nothing_but_the_mask():
     env = make_env()
     seen, info = env.reset(seed=0)
     row = int(np.argmin(seen[:, 2]))
@@ -79,7 +70,7 @@ def test_a_failure_changes_nothing_but_the_mask(make_env):
     assert masks.dtype == bool and (masks == expected).all()
 
 
-def test_failures_add_up_and_a_success_forgives_them(make_env, boxes):
+def test_failures_add_up_and_a_success_forgives_them(boxes):
     env = make_env()
     seen, _ = env.reset(seed=0)
     for row in np.argsort(seen[:, 2])[:3]:
@@ -92,7 +83,7 @@ def test_failures_add_up_and_a_success_forgives_them(make_env, boxes):
     assert env.step(row)[4]["action_mask"][row] == 0, "also the first box of a load"
 
 
-def test_liftable_says_what_would_succeed(make_env):
+def test_liftable_says_what_would_succeed():
     env = make_env()
     env.reset(seed=0)
     liftable = env.unwrapped.liftable()
@@ -102,7 +93,7 @@ def test_liftable_says_what_would_succeed(make_env):
         assert (env.step(row)[1] == 1) == liftable[row]
 
 
-def test_the_reward_needs_the_threshold(make_env, monkeypatch):
+def test_the_reward_needs_the_threshold(monkeypatch):
     env = make_env()
     env.reset(seed=0)
     for distance, reward in ((0.2, 1), (0.1999, -1), (0.46, 1), (0.0, -1)):
@@ -110,7 +101,7 @@ def test_the_reward_needs_the_threshold(make_env, monkeypatch):
         assert env.step(0)[1] == reward
 
 
-def test_truncation_after_max_picks(make_env, few_items):
+def test_truncation_after_max_picks():
     env = make_env(max_picks=3)
     env.reset(seed=0)
     assert [env.step(0)[2:4] for _ in range(3)] == [(False, False), (False, False), (False, True)]
@@ -120,9 +111,10 @@ def test_truncation_after_max_picks(make_env, few_items):
     assert [env.step(0)[2:4] for _ in range(3)][-1] == (True, True), "the last item, too"
 
 
-def test_drifting_boxes_are_seen_where_they_are(make_env):
+def test_drifting_boxes_are_seen_where_they_are():
+    """Few enough to be quick, because each of them is simulated."""
     settings = {"physics": "full", "after_pick": "keep", "render_mode": "rgb_array"}
-    env = make_env(**settings, stack=lambda rng: tall_load(), max_picks=3)
+    env = make_env(**settings, stack=lambda rng: build_load(np.zeros((2, 3, 4), int)), max_picks=3)
     env.reset(seed=0)
     container = env.unwrapped
     neat = container.physics.load.positions
@@ -141,18 +133,13 @@ def test_drifting_boxes_are_seen_where_they_are(make_env):
         container.liftable()
 
 
-@pytest.fixture
-def small_env(make_env, few_items):
-    """``small_env(count, **kwargs)``: an environment whose loads hold so many items."""
-
-    def make(count: int, **kwargs) -> gymnasium.Env:
-        return make_env(stack=lambda rng: few_items(rng, count), **kwargs)
-
-    return make
+def small_env(count: int, **kwargs) -> gymnasium.Env:
+    """An environment whose loads hold so many items."""
+    return make_env(stack=lambda rng: few_items(rng, count), **kwargs)
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"equalize": True}, {"equalize": True, "ties": "average"}])
-def test_a_container_is_unloaded_to_the_last_item(small_env, kwargs):
+def test_a_container_is_unloaded_to_the_last_item(kwargs):
     env, raw = small_env(135, **kwargs), small_env(135)
     _, info = env.reset(seed=0)
     seen, _ = raw.reset(seed=0)
@@ -178,7 +165,7 @@ def test_a_container_is_unloaded_to_the_last_item(small_env, kwargs):
     assert not container.liftable().any()
 
 
-def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing(small_env):
+def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing():
     env, untouched = small_env(5), small_env(5)
     seen, info = env.reset(seed=0)
     untouched.reset(seed=0)
@@ -196,7 +183,7 @@ def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing(small_env):
     [{"physics": "local"}, {"physics": "full"}, {"physics": "full", "after_pick": "keep"}],
     ids=str,
 )
-def test_every_physics_goes_to_the_last_item(small_env, kwargs):
+def test_every_physics_goes_to_the_last_item(kwargs):
     env = small_env(3, render_mode="rgb_array", **kwargs)
     seen, _ = env.reset(seed=0)
     before = env.render()
@@ -234,7 +221,7 @@ def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
         make().reset(options={"load": tower})
 
 
-def test_only_items_at_the_greatest_height_are_rewarded(make_env):
+def test_only_items_at_the_greatest_height_are_rewarded():
     sharp, blurred = make_env(HIGHEST, position_noise=0.0), make_env(HIGHEST)
     for env in (sharp, blurred):
         seen, info = env.reset(seed=0)
@@ -246,7 +233,7 @@ def test_only_items_at_the_greatest_height_are_rewarded(make_env):
             assert reward == (1.0 if highest[row] else -1.0) and not terminated
 
 
-def test_items_are_at_places_of_a_load(make_env, full_load):
+def test_items_are_at_places_of_a_load(full_load):
     places = {tuple(place) for place in np.rint(GRID / 1e-6).astype(int).tolist()}
     items = np.rint(full_load.positions / 1e-6).astype(int).tolist()
     assert all(tuple(item) in places for item in items)
@@ -256,7 +243,7 @@ def test_items_are_at_places_of_a_load(make_env, full_load):
     assert seen.shape == (128, 3) and nearest.max() == 0
 
 
-def test_items_are_blurred_and_nearest_first(make_env):
+def test_items_are_blurred_and_nearest_first():
     sharp, _ = make_env(HIGHEST, position_noise=0.0).reset(seed=0)
     blurred, _ = make_env(HIGHEST).reset(seed=0)
     assert len(np.unique(blurred[:, 2])) > 120 > len(np.unique(sharp[:, 2]))

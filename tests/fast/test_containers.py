@@ -41,7 +41,7 @@ def assert_digests_agree(load: Load, present: np.ndarray) -> int:
     return held_down
 
 
-@settings(derandomize=True, deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(load=loads(), data=st.data())
 def test_digests_of_situations_in_random_loads(load, data):
     some = data.draw(st.lists(st.booleans(), min_size=len(load), max_size=len(load)))

@@ -9,10 +9,8 @@ from unload.load.boxes import BoxError, check_stacked
 from unload.load.settling import settle as moves
 from unload.load.settling import uncarried
 
-TOLERANCE = 0.005
 
-
-def settle(low, sizes, tolerance=TOLERANCE):
+def settle(low, sizes, tolerance=0.005):
     """The corners of boxes that have settled."""
     low = np.array(low, float)
     return low + moves(low, np.array(sizes, float), task.CONTAINER, tolerance)

@@ -99,11 +99,5 @@ def corners(draw) -> tuple[np.ndarray, np.ndarray]:
     return np.array(low), np.array(high)
 
 
-def load_of(low: np.ndarray, high: np.ndarray) -> Load:
-    """The load with boxes of these corners."""
-    labels = np.zeros(len(low), dtype=int)
-    return Load((low + high) / 2, high - low, labels, labels)
-
-
 def loads() -> st.SearchStrategy[Load]:
-    return corners().map(lambda pair: load_of(*pair))
+    return corners().map(lambda pair: Load.from_corners(pair[0], pair[1] - pair[0]))

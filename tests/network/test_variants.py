@@ -8,7 +8,6 @@ from unload import AttentionNetwork, EquivariantStack, PEQNetwork, TwoLayerScore
 from unload.network.variants import NETWORKS
 
 ITEMS = torch.zeros(2, 4, 3)
-VARIANTS = (TwoLayerScorer, EquivariantStack, AttentionNetwork)
 
 
 @pytest.fixture(params=NETWORKS.values())
@@ -70,16 +69,15 @@ def test_permuting_the_items_permutes_the_values(kind, items, rng):
     torch.testing.assert_close(network(batch[:, order]), values[:, order], atol=1e-6, rtol=0)
 
 
-@pytest.mark.parametrize("other_kind", [PEQNetwork, *VARIANTS])
-def test_other_items_change_the_choice_but_for_the_papers_network(items, other_kind):
+def test_other_items_change_the_choice_but_for_the_papers_network(kind, items):
     """The better one of the same two items, in the company of six others."""
     batch = 3 * items(500, 8)
     batch[:, :2] = torch.tensor([[0.2, 0.1, 0.5], [0.1, 0.3, 0.4]])
     orders = []
     for seed in range(10):
-        values = make(other_kind, seed=seed)(batch)
+        values = make(kind, seed=seed)(batch)
         orders.append(len((values[:, 0] > values[:, 1]).unique()))
-    assert max(orders) == (1 if other_kind is PEQNetwork else 2)
+    assert max(orders) == (1 if kind is PEQNetwork else 2)
 
 
 def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):
@@ -173,13 +171,18 @@ def test_values_and_gradients_are_finite_where_there_is_no_item(kind, items, tra
 @pytest.mark.parametrize(
     ("observations", "present", "error", "message"),
     [
-        (torch.zeros(4, 3), None, ValueError, r"observations has shape .*expected \(batch, "),
+        (torch.zeros(4, 3), None, ValueError, r"has shape \(4, 3\); expected \(any, any, 3\)"),
         (torch.zeros(2, 4, 2), None, ValueError, r"observations has shape \(2, 4, 2\)"),
-        (torch.zeros(2, 0, 3), None, ValueError, r"observations has shape \(2, 0, 3\)"),
-        (np.zeros((1, 4, 3)), None, TypeError, "observations is a ndarray; expected a tensor"),
+        (torch.zeros(2, 0, 3), None, ValueError, "observations has no rows; expected at least one"),
+        (np.zeros((1, 4, 3)), None, TypeError, "observations is a ndarray of dtype float64; exp"),
         (torch.zeros((1, 4, 3), dtype=int), None, TypeError, "dtype torch.int64; expected torch."),
-        (ITEMS, np.ones((2, 4), bool), TypeError, "present is a ndarray; expected a tensor"),
-        (ITEMS, torch.ones(2, 4), TypeError, "present has dtype torch.float32; expected torch.b"),
+        (
+            ITEMS,
+            np.ones((2, 4), bool),
+            TypeError,
+            "present is a ndarray of dtype bool; expected torch",
+        ),
+        (ITEMS, torch.ones(2, 4), TypeError, "present is a Tensor of dtype torch.float32; expec"),
         (ITEMS, torch.ones(2, 5, dtype=bool), ValueError, r"shape \(2, 5\); expected \(2, 4\)"),
     ],
 )

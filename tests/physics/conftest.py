@@ -1,24 +1,7 @@
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
-from tests.physics.kinds import KINDS
-from unload.load.boxes import Load
-from unload.physics.base import Physics
 from unload.physics.situation import Situation, Surroundings
-
-
-@pytest.fixture(scope="package")
-def make() -> Callable[..., Physics]:
-    """``make(kind, load)``: a physics that holds ``load``."""
-
-    def build(kind: str, load: Load, **kwargs) -> Physics:
-        physics = KINDS[kind](**kwargs)
-        physics.reset(load)
-        return physics
-
-    return build
 
 
 @pytest.fixture(scope="package")

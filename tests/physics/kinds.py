@@ -1,5 +1,6 @@
 """The three physics, the appendix's distances, and lifts one after the other."""
 
+from unload.load.boxes import Load
 from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
@@ -7,6 +8,13 @@ from unload.physics.table import TablePhysics
 
 KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
 ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg
+
+
+def make(kind: str, load: Load, **kwargs) -> Physics:
+    """A physics that holds ``load``."""
+    physics = KINDS[kind](**kwargs)
+    physics.reset(load)
+    return physics
 
 
 def lifts(physics: Physics, items) -> list[float]:

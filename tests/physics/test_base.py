@@ -3,11 +3,12 @@
 import os
 from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES, lifts
+from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES, lifts, make
 from unload.load.boxes import SMALLEST_EDGE, Load
 from unload.physics.base import Physics
 from unload.physics.bullet import World
@@ -17,13 +18,13 @@ from unload.physics.situation import Situation, Surroundings
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_free_box_is_lifted_as_far_as_the_appendix_says(make, boxes, kind):
+def test_a_free_box_is_lifted_as_far_as_the_appendix_says(boxes, kind):
     physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
     assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_two_stacked_boxes_move_as_far_as_the_appendix_says(make, boxes, kind):
+def test_two_stacked_boxes_move_as_far_as_the_appendix_says(boxes, kind):
     physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
     assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.002)
     assert make(kind, boxes((1.2, 0.2), (1.2, 0.6), (1.2, 1.0))).lift(0) < 0.001
@@ -34,7 +35,7 @@ def test_two_stacked_boxes_move_as_far_as_the_appendix_says(make, boxes, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_free_boxes_of_a_neat_wall_do_not_jam(make, small_load, kind):
+def test_free_boxes_of_a_neat_wall_do_not_jam(small_load, kind):
     """They would, mostly, if the boxes had no gap between them."""
     physics = make(kind, small_load)
     around = Surroundings(small_load, physics.present)
@@ -44,12 +45,11 @@ def test_free_boxes_of_a_neat_wall_do_not_jam(make, small_load, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_smallest_boxes_of_a_load_are_simulated(make, kind):
+def test_the_smallest_boxes_of_a_load_are_simulated(kind):
     """Physics takes the gap off their edges, of which something must be left."""
     edge = SMALLEST_EDGE
     positions = [[3.5, 1.2 + edge * column, edge * (row + 0.5)] for column, row in np.ndindex(2, 2)]
-    load = Load(positions, np.full((4, 3), edge), [0] * 4, [0] * 4)
-    physics = make(kind, load)
+    physics = make(kind, Load(positions, np.full((4, 3), edge)))
     assert (np.array(lifts(physics, range(4))) >= 0).all()
 
 
@@ -64,7 +64,7 @@ def test_the_smallest_boxes_of_a_load_are_simulated(make, kind):
         (0.0, TypeError, "item is 0.0"),
     ],
 )
-def test_bad_items_are_refused(make, boxes, kind, call, item, error, message):
+def test_bad_items_are_refused(boxes, kind, call, item, error, message):
     physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
     physics.remove(1)
     with pytest.raises(error, match=message):
@@ -99,12 +99,9 @@ def test_calls_out_of_order_are_refused(boxes, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_interrupted_reset_needs_another_one(make, boxes, kind, monkeypatch):
+def test_an_interrupted_reset_needs_another_one(boxes, kind, monkeypatch):
     physics, load = make(kind, boxes((1.2, 0.2))), boxes((1.2, 0.2), (1.2, 0.6))
-
-    def interrupted(*arguments):
-        raise KeyboardInterrupt
-
+    interrupted = Mock(side_effect=KeyboardInterrupt)
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr("unload.physics.bullet.World.add_box", interrupted)
         patch.setattr("unload.physics.local.Surroundings", interrupted)
@@ -118,7 +115,7 @@ def test_an_interrupted_reset_needs_another_one(make, boxes, kind, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["local", "table"])
-def test_a_lift_has_no_effect(make, small_load, kind):
+def test_a_lift_has_no_effect(small_load, kind):
     physics = make(kind, small_load)
     items = range(20, len(small_load))
     forwards = [physics.lift(item) for item in items]
@@ -128,12 +125,8 @@ def test_a_lift_has_no_effect(make, small_load, kind):
 
 def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
     interrupted, fresh = LocalPhysics(), LocalPhysics()
-
-    def interrupt(world, body):
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(World, "pull", interrupt)
+        patch.setattr(World, "pull", Mock(side_effect=KeyboardInterrupt))
         interrupted.simulate(situations[0])
     for situation in situations[:10]:
         assert interrupted.simulate(situation) == fresh.simulate(situation)

@@ -10,16 +10,11 @@ from unload.physics.bullet import TIME_STEP, World
 
 
 @pytest.fixture(params=[True, False], ids=["maximal", "multibody"])
-def maximal(request) -> bool:
-    return request.param
-
-
-@pytest.fixture
-def make_world(maximal):
+def make_world(request):
     """``make_world(boxes, ...)``: a world with a floor and a tower of cubes of 0.3 m."""
 
     def make(boxes: int = 1, mass: float = task.MASS) -> tuple[World, list[int]]:
-        world = World(maximal_coordinates=maximal)
+        world = World(maximal_coordinates=request.param)
         world.add_box((0, 0, -0.5), (9, 9, 1), 0)
         centres = [(0, 0, 0.15 + 0.3 * level) for level in range(boxes)]
         return world, [world.add_box(centre, (0.3, 0.3, 0.3), mass) for centre in centres]

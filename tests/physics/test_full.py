@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.physics.kinds import lifts
+from tests.physics.kinds import lifts, make
 from unload import Load, task
 from unload.load.substacks import stack_load
 from unload.physics.bullet import World
@@ -15,7 +15,7 @@ BRIDGE = ((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))
 
 @pytest.mark.parametrize(("after_pick", "restored"), [("restore", True), ("keep", False)], ids=str)
 @pytest.mark.parametrize("item", [0, 2])
-def test_what_a_full_lift_leaves_behind(make, boxes, after_pick, item, restored):
+def test_what_a_full_lift_leaves_behind(boxes, after_pick, item, restored):
     load = boxes(*BRIDGE)
     physics = make("full", load, after_pick=after_pick)
     assert (physics.lift(item) >= task.LIFT_THRESHOLD) == (item == 2)
@@ -24,14 +24,14 @@ def test_what_a_full_lift_leaves_behind(make, boxes, after_pick, item, restored)
     assert physics.exact == (after_pick == "restore")
 
 
-def test_a_restored_full_world_repeats_its_answers(make, small_load):
+def test_a_restored_full_world_repeats_its_answers(small_load):
     physics = make("full", small_load)
     items = range(0, len(small_load), 15)
     first = lifts(physics, items)
     assert lifts(physics, items) == pytest.approx(first, abs=0.002)
 
 
-def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(make, small_load):
+def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(small_load):
     physics = make("full", small_load)
     physics.settle(0.5)
     settled = physics.positions()
@@ -45,7 +45,7 @@ def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(make, small_load)
 
 
 @pytest.mark.parametrize("after_pick", ["restore", "keep"])
-def test_an_interrupted_lift_moves_no_box(make, boxes, after_pick, monkeypatch):
+def test_an_interrupted_lift_moves_no_box(boxes, after_pick, monkeypatch):
     load = boxes(*BRIDGE)
     physics, pull = make("full", load, after_pick=after_pick), World.pull
 
@@ -60,7 +60,7 @@ def test_an_interrupted_lift_moves_no_box(make, boxes, after_pick, monkeypatch):
 
 
 @pytest.mark.parametrize("container", [task.CONTAINER, (6.0, 2.2, 2.7)])
-def test_the_container_has_a_floor_and_three_walls(make, boxes, container):
+def test_the_container_has_a_floor_and_three_walls(boxes, container):
     """Rays from its inside, also close to its corners, meet them where the container ends."""
     load = boxes((0.4, 0.2))
     client = make("full", Load(load.positions, load.sizes, container=container))._world.client
@@ -74,7 +74,7 @@ def test_the_container_has_a_floor_and_three_walls(make, boxes, container):
         assert client.rayTest(start, (9, *start[1:]))[0][0] == -1
 
 
-def test_a_removed_box_comes_to_lie_far_below(make, boxes):
+def test_a_removed_box_comes_to_lie_far_below(boxes):
     physics = make("full", boxes((1.2, 0.2)))
     physics.remove(0)
     physics.settle(1.0)
@@ -82,7 +82,7 @@ def test_a_removed_box_comes_to_lie_far_below(make, boxes):
 
 
 @pytest.mark.parametrize("after_pick", ["restore", "keep"])
-def test_a_world_that_is_filled_again_is_a_new_one(make, rng, after_pick):
+def test_a_world_that_is_filled_again_is_a_new_one(rng, after_pick):
     first, second = (stack_load(rng, walls=1) for _ in range(2))
     again = make("full", first, after_pick=after_pick)
     lifts(again, range(0, len(first), 12))

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -22,17 +23,13 @@ def three_cores(monkeypatch):
 
 
 @pytest.fixture
-def local():
-    physics = LocalPhysics()
-    yield physics
-    physics.close()
+def local() -> LocalPhysics:
+    return LocalPhysics()
 
 
 @pytest.fixture
-def pool():
-    pool = Pool()
-    yield pool
-    pool.close()
+def pool() -> Pool:
+    return Pool()
 
 
 @pytest.fixture
@@ -59,11 +56,8 @@ def test_each_process_has_its_share(pool, hard):
 
 
 def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
-    def interrupt(situation):
-        raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        pool.simulate(hard, interrupt)
+        pool.simulate(hard, Mock(side_effect=KeyboardInterrupt))
     assert pool.simulate(hard[5:], local.simulate) == [local.simulate(each) for each in hard[5:]]
 
 
@@ -79,7 +73,7 @@ def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
     assert pool.simulate(hard, local.simulate) == alone
 
 
-def test_they_end_with_the_pool_or_its_physics(hard):
+def test_they_end_with_the_pool_or_its_physics():
     pool, physics = Pool(), TablePhysics(LiftTable())
     for each in (pool, physics._pool):
         each.simulate([], None)

@@ -7,12 +7,14 @@ from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 import unload.physics.table
 from tests.load.walls import KINDS, own_load
+from tests.physics.kinds import make
 from unload import task
 from unload.load.boxes import OVERLAP
 from unload.load.substacks import stack_load
@@ -39,7 +41,7 @@ def known(situations):
     return [(situation, local.simulate(situation)) for situation in light]
 
 
-def test_table_equals_local_exactly(make, rng):
+def test_table_equals_local_exactly(rng):
     load = stack_load(rng, walls=2)
     local, table = make("local", load), make("table", load)
     for item in rng.permutation(len(load)):
@@ -115,9 +117,9 @@ def test_shipped_table_fits_this_physics(known):
     assert all(distance in (None, answer) for distance, answer in found)
 
 
-def situation(number: int) -> Situation:
-    """One of many different situations."""
-    return Situation(np.array([[0, 0, 0, number, 2, 3]], np.int32), 1, None, ())
+def free_box(number: int) -> Situation:
+    """One of many different boxes that nothing touches."""
+    return Situation(np.array([[0, 0, 0, 400_000, 400_000, number]], np.int32), 1, None, ())
 
 
 def entries_of(table: LiftTable) -> list[list[int]]:
@@ -126,31 +128,31 @@ def entries_of(table: LiftTable) -> list[list[int]]:
 
 @pytest.fixture
 def table() -> LiftTable:
-    """A table of 50 lifts, the one of situation k over k mm."""
+    """A table of 50 lifts, that of box k over k mm."""
     table = LiftTable()
     for number in range(50):
-        table.add(situation(number), number / 1000)
+        table.add(free_box(number), number / 1000)
     return table
 
 
 def test_a_table_grows_and_forgets_nothing(table):
     old = table.slots
     for number in range(50, 2000):
-        table.add(situation(number), number / 1000)
+        table.add(free_box(number), number / 1000)
     digests, micrometres = table.slots
     assert len(digests) == len(micrometres) == 4096 and len(table) == 2000
-    assert all(table.find(situation(number)) == number / 1000 for number in range(2000))
+    assert all(table.find(free_box(number)) == number / 1000 for number in range(2000))
     # Whoever still reads the first arrays finds in them what they held when they were full.
     assert len(old[0]) == FEWEST_SLOTS and (old[0] != 0).sum() == FEWEST_SLOTS // 2 + 1
-    assert table.find(situation(2000)) is None
-    table.add(situation(7), 0.5)  # it is known
-    assert len(table) == 2000 and table.find(situation(7)) == 0.007
+    assert table.find(free_box(2000)) is None
+    table.add(free_box(7), 0.5)  # it is known
+    assert len(table) == 2000 and table.find(free_box(7)) == 0.007
 
 
 def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng, tmp_path):
     other = LiftTable()
     for number in rng.permutation(50).tolist():
-        other.add(situation(number), number / 1000)
+        other.add(free_box(number), number / 1000)
     digests, micrometres = table.entries()
     assert digests.dtype == np.uint64 and micrometres.dtype == np.int32
     assert (digests[1:] > digests[:-1]).all() and set(micrometres) == set(range(0, 50_000, 1000))
@@ -159,27 +161,27 @@ def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng, tm
     other.save(tmp_path / "other.npz")
     assert (tmp_path / "lifts.npz").read_bytes() == (tmp_path / "other.npz").read_bytes()
     read = LiftTable.load(tmp_path / "lifts.npz")
-    read.add(situation(50), 0.05)
-    assert len(read) == 51 and all(read.find(situation(k)) == k / 1000 for k in range(51))
+    read.add(free_box(50), 0.05)
+    assert len(read) == 51 and all(read.find(free_box(k)) == k / 1000 for k in range(51))
 
 
-def test_threads_find_and_add_at_the_same_time(monkeypatch):
+def test_threads_find_and_add_at_the_same_time():
     """While the arrays grow several times: nobody meets a wrong distance, and none is lost."""
     table = LiftTable()
 
     def work(first: int) -> list:
         wrong = []
         for number in range(first, 6000, 4):
-            table.add(situation(number), number / 1000)
+            table.add(free_box(number), number / 1000)
             for known in range(first, number, 997):
-                if table.find(situation(known)) not in (None, known / 1000):
+                if table.find(free_box(known)) not in (None, known / 1000):
                     wrong.append(known)
         return wrong
 
     with ThreadPoolExecutor(4) as pool:
         assert list(pool.map(work, range(4))) == [[]] * 4
     assert len(table) == 6000
-    assert all(table.find(situation(number)) == number / 1000 for number in range(6000))
+    assert all(table.find(free_box(number)) == number / 1000 for number in range(6000))
 
 
 def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(monkeypatch):
@@ -192,12 +194,7 @@ def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(mon
         return slot
 
     monkeypatch.setattr(unload.physics.table, "slot_of", then_filled)
-    assert table.find(situation(0)) is None
-
-
-def free_box(number: int) -> Situation:
-    """One of many different boxes that nothing touches."""
-    return Situation(np.array([[0, 0, 0, 400_000, 400_000, number]], np.int32), 1, None, ())
+    assert table.find(free_box(0)) is None
 
 
 def true_table(numbers: Iterable[int]) -> LiftTable:
@@ -244,12 +241,10 @@ def test_a_link_to_a_shared_file_stays_one(tmp_path):
 
 
 def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatch, caplog):
-    def full(path, arrays):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-
     table, path = true_table([1]), tmp_path / "lifts.npz"
     true_table([2]).exchange(path)
-    monkeypatch.setattr(files, "write_arrays", full)
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    monkeypatch.setattr(files, "write_arrays", Mock(side_effect=full))
     table.exchange(path)
     assert len(table) == 2 and len(LiftTable.load(path)) == 1
     assert "lifts are kept in memory only" in caplog.text and str(path) in caplog.text
@@ -317,11 +312,8 @@ def test_a_table_of_lies_is_refused(tmp_path, known):
 
 
 def test_without_pybullet_a_table_is_taken_as_it_is(tmp_path, monkeypatch, table):
-    def missing(world):
-        raise ModuleNotFoundError("pybullet")
-
     table.save(tmp_path / "lifts.npz")
-    monkeypatch.setattr(World, "__init__", missing)
+    monkeypatch.setattr(World, "__init__", Mock(side_effect=ModuleNotFoundError("pybullet")))
     other = LiftTable()
     other.exchange(tmp_path / "lifts.npz")
     assert entries_of(other) == entries_of(table)

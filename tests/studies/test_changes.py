@@ -10,7 +10,7 @@ from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
 from unload.agent.config import TrainConfig
-from unload.agent.training import Training, train_changed
+from unload.agent.training import Training, train
 
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
@@ -148,14 +148,14 @@ def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
 def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, change):
     """Otherwise the long runs would depend on where they were stopped."""
     config = replace(SMALL, max_picks=25)
-    whole = train_changed(config, tmp_path / "whole", change, progress=False)
+    whole = train(config, tmp_path / "whole", progress=False, change=change)
 
     def stop(point):
         if point["picks"] == 3840:
             raise SystemExit
 
     with pytest.raises(SystemExit):
-        train_changed(config, tmp_path / "stopped", change, progress=False, callback=stop)
-    resumed = train_changed(config, tmp_path / "stopped", change, progress=False)
+        train(config, tmp_path / "stopped", progress=False, callback=stop, change=change)
+    resumed = train(config, tmp_path / "stopped", progress=False, change=change)
     columns = ["picks", "success_rate", "loss"]
     assert resumed.curve[columns].equals(whole.curve[columns])

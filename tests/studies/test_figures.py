@@ -4,9 +4,7 @@ import json
 import re
 from functools import partial
 
-import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies import paths, style
@@ -14,7 +12,7 @@ from studies.falls import figures as falls
 from studies.falls.laboratory import read_laboratory, read_trace
 from studies.falls.long import read_long_trace
 from studies.grid import read_grid
-from studies.paper import diagrams, training, tuning
+from studies.paper import diagrams, tuning
 from studies.paper.training import PAPER
 from studies.paper.visible_items import scaled_side_view
 from studies.policies.comparison import comparison_msr
@@ -74,17 +72,6 @@ def test_curves_are_running_means_and_the_papers_run_is_strong():
         assert np.array_equal(line.get_ydata(), tuning.running_mean(run))
     labels = [text.get_text() for text in figure.axes[0].get_legend().texts]
     assert labels == ["a, run 3", "with FE"]
-
-
-def test_a_learning_curve_is_drawn_over_whole_episodes():
-    picks = np.arange(1, 101) * 640
-    curve = pd.DataFrame({"picks": picks, "success_rate": np.tile([0.2, 0.6], 50)})
-    _, axes = plt.subplots()
-    training.draw_learning_curve(axes, curve.assign(wall_time=0, epsilon=0), "run")
-    points, episodes = axes.lines
-    assert len(points.get_ydata()) == 100
-    assert episodes.get_xdata().tolist() == [16_000, 48_000]
-    assert episodes.get_ydata() == pytest.approx([0.4, 0.4])
 
 
 def test_the_published_figures_are_those_that_notebooks_save():

@@ -17,40 +17,20 @@ NOT_TRAINED = {
 }  # fmt: skip
 
 
-def networks_of(name: str) -> set[str]:
-    """The networks that a result rests on."""
-    grid = GRIDS.get(name.removeprefix("variants/"))
-    return {cell.config.network for cell in grid.cells.values()} if grid else {"peq"}
-
-
 def test_data_is_of_todays_training():
+    """Of the networks that a result rests on."""
     suffix = ".provenance.json"
     of_today = {}
     for path in paths.DATA.rglob(f"*{suffix}"):
         name = path.relative_to(paths.DATA).as_posix().removesuffix(suffix)
         if not NOT_TRAINED & {name, name.split("/")[0]}:
-            wanted = training_fingerprint(networks_of(name))
+            grid = GRIDS.get(name.removeprefix("variants/"))
+            networks = {cell.config.network for cell in grid.cells.values()} if grid else {"peq"}
+            wanted = training_fingerprint(networks)
             of_today[name] = files.read_json(path).get("fingerprint") == wanted
     differing = {name for name, same in of_today.items() if not same}
     assert of_today
     assert not differing, "made by code that trained otherwise: make it again"
-
-
-@pytest.fixture
-def changed(monkeypatch):
-    """``changed(owner, name, value)``: the fingerprint of one short run with this change."""
-    run = short_runs("peq")[1]
-    monkeypatch.setattr(fingerprint, "short_runs", lambda network: [run])
-
-    def compute(owner=None, name="", value=None):
-        fingerprint._curves.cache_clear()
-        with monkeypatch.context() as patch:
-            if owner is not None:
-                patch.setattr(owner, name, value)
-            return training_fingerprint()
-
-    yield compute
-    fingerprint._curves.cache_clear()
 
 
 def scaled_weights(factor: float):
@@ -66,9 +46,19 @@ def scaled_weights(factor: float):
     return reset
 
 
-def test_only_what_changes_training_changes_the_fingerprint(changed):
-    today = changed()
-    assert today == changed()
+def test_only_what_changes_training_changes_the_fingerprint(monkeypatch):
+    """Of one short run, whose curve is not kept."""
+    run = short_runs("peq")[1]
+    monkeypatch.setattr(fingerprint, "short_runs", lambda network: [run])
+    monkeypatch.setattr(fingerprint, "_curves", fingerprint._curves.__wrapped__)
+
+    def changed(owner, name: str, value) -> str:
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, name, value)
+            return training_fingerprint()
+
+    today = training_fingerprint()
+    assert today == training_fingerprint()
     assert today == changed(PEQNetwork, "reset_parameters", scaled_weights(1 + 1e-7))
     assert today != changed(PEQNetwork, "reset_parameters", scaled_weights(1.01))
     epsilon = TrainConfig.epsilon

@@ -12,7 +12,7 @@ from joblib import parallel_config
 
 from studies import grid, sweep
 from studies.changes import shuffled
-from studies.paper.tuning import tuning_config
+from studies.paper import tuning
 from studies.results import read_provenance
 from tests.agent.runs import assert_same
 from unload.agent.config import TrainConfig
@@ -23,52 +23,48 @@ from unload.support import files
 CONFIG = TrainConfig(
     picks=640, num_envs=8, batch_size=64, n_features=4, log_interval=20, replay_size=512
 )
+CELLS = {
+    "plain": grid.Cell(CONFIG, (0, 1)),
+    "averaged_mask": grid.Cell(replace(CONFIG, mask=True, ties="average"), (3,)),
+    "shuffled": grid.Cell(CONFIG, (0,), shuffled),
+}
+SMALL = grid.Grid("some/small", "make small", CELLS)
 
 
 @pytest.fixture
-def small():
-    cells = {
-        "plain": grid.Cell(CONFIG, (0, 1)),
-        "averaged_mask": grid.Cell(replace(CONFIG, mask=True, ties="average"), (3,)),
-        "shuffled": grid.Cell(CONFIG, (0,), shuffled),
-    }
-    return grid.Grid("some/small", "make small", cells)
-
-
-@pytest.fixture
-def trained(small, tmp_path, monkeypatch):
+def trained(tmp_path, monkeypatch):
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
-    grid.train_grid(small, None, None, tmp_path, tmp_path / "runs", n_jobs=1)
+    grid.train_grid(SMALL, None, None, tmp_path, tmp_path / "runs", n_jobs=1)
     return tmp_path
 
 
-def test_a_grid_is_read_as_it_was_trained(small, trained):
-    curves = grid.read_grid(small, trained)
+def test_a_grid_is_read_as_it_was_trained(trained):
+    curves = grid.read_grid(SMALL, trained)
     names = curves[["cell", "seed"]].drop_duplicates().itertuples(index=False)
     assert [tuple(name) for name in names] == [
         ("plain", 0), ("plain", 1), ("averaged_mask", 3), ("shuffled", 0)
     ]  # fmt: skip
     assert (curves.groupby(["cell", "seed"])["picks"].max() == 640).all()
-    plain, changed = (curves[(curves["cell"] == c) & (curves["seed"] == 0)] for c in small.cells
+    plain, changed = (curves[(curves["cell"] == c) & (curves["seed"] == 0)] for c in CELLS
                       if c != "averaged_mask")  # fmt: skip
     assert not np.array_equal(plain["loss"], changed["loss"])
 
 
-def test_policies_of_a_grid_have_the_names_of_their_runs(small, trained):
+def test_policies_of_a_grid_have_the_names_of_their_runs(trained):
     policies = grid.read_policies(trained / "some/small.safetensors")
-    assert list(policies) == list(small.configs())
+    assert list(policies) == list(SMALL.configs())
     assert policies["averaged_mask/seed_3"].ties == "average"
     first, second = (policies[f"plain/seed_{seed}"].network.state_dict() for seed in (0, 1))
     assert all(not np.array_equal(first[name], second[name]) for name in first)
 
 
-def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(small, trained):
+def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained):
     before = (trained / "some/small_loss.csv").read_bytes()
     message = "would hold 2 finished runs; expected at least as many as the 4"
     with pytest.raises(ValueError, match=message):
-        grid.train_grid(small, ["plain"], None, trained, trained / "other", 1)
+        grid.train_grid(SMALL, ["plain"], None, trained, trained / "other", 1)
     assert not (trained / "other").exists()  # refused before hours of training
-    grid.train_grid(small, ["plain"], 320, trained, trained / "runs", 1)
+    grid.train_grid(SMALL, ["plain"], 320, trained, trained / "runs", 1)
     assert (trained / "some/small_loss.csv").read_bytes() == before
     provenance = read_provenance(trained / "some", "small")
     assert (provenance["runs"], provenance["planned"], provenance["reduced"]) == (4, 4, False)
@@ -79,7 +75,8 @@ def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(small, trained
 @pytest.fixture
 def configs():
     """Two tiny runs."""
-    return {f"set/run_{run}": tuning_config(8, 1e-3, run, steps=4, n_features=4) for run in (0, 1)}
+    tiny = replace(tuning.CONFIG, picks=4 * 64, batch_size=8, n_features=4)
+    return {f"set/run_{run}": replace(tiny, seed=run) for run in (0, 1)}
 
 
 def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
@@ -145,11 +142,10 @@ def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp
 
 
 @pytest.mark.slow
-def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
+def test_dask_cluster_of_two_processes_equals_loky(tmp_path, capfd):
     distributed = pytest.importorskip("distributed")
-    configs = {
-        f"run_{run}": tuning_config(8, 1e-3, run, steps=200, n_features=4) for run in range(4)
-    }
+    tiny = replace(tuning.CONFIG, picks=200 * 64, batch_size=8, n_features=4)
+    configs = {f"run_{run}": replace(tiny, seed=run) for run in range(4)}
     cluster = distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     )
@@ -169,7 +165,7 @@ def test_dask_cluster_of_two_processes_equals_loky(configs, tmp_path, capfd):
     assert len(used) == 2
 
 
-def test_runs_that_do_not_fit_the_memory_are_warned_of(configs, tmp_path, monkeypatch):
+def test_runs_that_do_not_fit_the_memory_are_warned_of(monkeypatch):
     config = TrainConfig()  # 1.6 GB each
     pages = {"SC_PHYS_PAGES": 4 * 2**20, "SC_PAGE_SIZE": 1000}
     monkeypatch.setattr(os, "sysconf", pages.get)

@@ -5,6 +5,7 @@ import resource
 import subprocess
 from dataclasses import replace
 from functools import partial
+from unittest.mock import Mock
 
 import pandas as pd
 import pytest
@@ -22,15 +23,9 @@ PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
 
 
 @pytest.fixture
-def asked():
-    """``asked(value)``: computes the value; ``asked.times`` counts how often."""
-
-    def compute(value):
-        compute.times += 1
-        return value
-
-    compute.times = 0
-    return compute
+def asked() -> Mock:
+    """``asked(value)``: computes the value; ``asked.call_count`` says how often."""
+    return Mock(side_effect=lambda value: value)
 
 
 def test_a_result_is_computed_once_per_question(tmp_path, asked):
@@ -39,17 +34,17 @@ def test_a_result_is_computed_once_per_question(tmp_path, asked):
     assert first.value == {"msr": 0.1 + 0.2, "counts": [1, 2]}
     assert first.record["revision"] == revision() and first.record["wall_time_s"] >= 0
     same = kept(tmp_path, {"sizes": [2, 3], "seed": 1}, partial(asked, "not computed"))
-    assert same == first and asked.times == 1
+    assert same == first and asked.call_count == 1
 
 
 def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
     for seed in (1, 2, 1):
         assert kept(tmp_path, {"seed": seed}, partial(asked, seed)).value == seed
-    assert asked.times == 2  # neither replaces the other
+    assert asked.call_count == 2  # neither replaces the other
     one, other = tmp_path.iterdir()
     one.write_text(other.read_text())
     values = [kept(tmp_path, {"seed": seed}, partial(asked, seed)).value for seed in (1, 2)]
-    assert values == [1, 2] and asked.times == 3
+    assert values == [1, 2] and asked.call_count == 3
 
 
 def test_a_damaged_answer_is_named(tmp_path):

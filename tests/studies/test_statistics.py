@@ -4,25 +4,8 @@ import pytest
 from scipy import stats
 
 from studies import statistics
-
-PICKS = 20_000_000
-STEP = 32_000  # picks of an episode of all environments
-
-
-def curve(msr, loss=(0.5, 0.3, 0.5, 0.3)) -> pd.DataFrame:
-    """A run whose MSR and loss run straight from one of the given values to the next."""
-    picks = np.arange(STEP, PICKS + 1, STEP)
-
-    def along(values):
-        return np.interp(picks, np.linspace(0, PICKS, len(values)), values)
-
-    return pd.DataFrame({"picks": picks, "success_rate": along(msr), "loss": along(loss)})
-
-
-def course(msr, loss) -> pd.DataFrame:
-    """A run whose windows have these means."""
-    picks = statistics.WINDOW_PICKS * np.arange(1, len(msr) + 1)
-    return pd.DataFrame({"picks": picks, "success_rate": msr, "loss": loss})
+from studies.statistics import fell, resembles_fig11, resembles_fig12
+from tests.studies.curves import course, curve
 
 
 def test_a_window_ends_with_its_last_pick():
@@ -38,66 +21,45 @@ def test_the_end_is_the_last_tenth():
 
 
 @pytest.mark.parametrize(
-    ("msr", "found"),
+    ("judge", "run", "found"),
     [
-        ([0.3, 0.9, 0.5], False),  # never high
-        ([0.3, 0.96, 0.81], False),  # never low again
-        ([0.3, 0.94, 0.95, 0.8, 0.3], True),
-        ([0.3, 0.95, 0.9, 0.81, 0.8], True),
-        ([0.3, 0.8, 0.95, 0.96, 0.98], False),  # low before
+        (fell, course([0.3, 0.9, 0.5], 0.1), False),  # never high
+        (fell, course([0.3, 0.96, 0.81], 0.1), False),  # never low again
+        (fell, course([0.3, 0.94, 0.95, 0.8, 0.3], 0.1), True),
+        (fell, course([0.3, 0.95, 0.9, 0.81, 0.8], 0.1), True),
+        (fell, course([0.3, 0.8, 0.95, 0.96, 0.98], 0.1), False),  # low before
+        (resembles_fig12, curve([0.25, 0.5, 0.6]), True),
+        (resembles_fig12, curve([0.25, 0.5, 0.9]), False),  # too good
+        (resembles_fig12, curve([0.25, 0.3, 0.35]), False),  # too bad
+        (resembles_fig12, curve([0.25, 0.9, 0.6]), False),  # no steady rise
+        (resembles_fig12, curve([0.5, 0.55, 0.6]), False),  # hardly a rise
+        (resembles_fig11, curve([0.3, 0.6], loss=[0.5, 0.3, 0.5, 0.3]), True),
+        (resembles_fig11, curve([0.3, 0.6], loss=[0.5, 0.3, 0.3]), False),  # never rises
+        (resembles_fig11, curve([0.3, 0.6], loss=[0.5, 0.3, 0.5]), False),  # never falls again
+        (resembles_fig11, curve([0.3, 0.6], loss=[0.5, 0.49, 0.5, 0.3]), False),  # by too little
     ],
 )
-def test_a_fall_leads_from_high_to_low(msr, found):
-    assert statistics.fell(course(msr, 0.1)) is found
-
-
-@pytest.mark.parametrize(
-    ("msr", "like"),
-    [
-        ([0.25, 0.5, 0.6], True),
-        ([0.25, 0.5, 0.9], False),  # too good
-        ([0.25, 0.3, 0.35], False),  # too bad
-        ([0.25, 0.9, 0.6], False),  # no steady rise
-        ([0.5, 0.55, 0.6], False),  # hardly a rise
-    ],
-)
-def test_what_is_like_fig_12(msr, like):
-    assert statistics.resembles_fig12(curve(msr)) is like
-
-
-@pytest.mark.parametrize(
-    ("loss", "like"),
-    [
-        ([0.5, 0.3, 0.5, 0.3], True),
-        ([0.5, 0.3, 0.3], False),  # never rises
-        ([0.5, 0.3, 0.5], False),  # never falls again
-        ([0.5, 0.49, 0.5, 0.3], False),  # rises by too little
-    ],
-)
-def test_what_is_like_fig_11(loss, like):
-    assert statistics.resembles_fig11(curve([0.3, 0.6], loss)) is like
+def test_what_falls_and_what_is_like_the_papers_figures(judge, run, found):
+    """A fall leads from high to low."""
+    assert judge(run) is found
 
 
 def test_a_cell_is_summed_up():
     runs = [
-        ("a", 0, curve([0.25, 0.5, 0.6])),
-        ("a", 1, curve([0.25, 0.97, 0.6])),
-        ("b", 0, curve([0.2, 0.3])),
+        curve([0.25, 0.5, 0.6]).assign(cell="a", seed=0),
+        curve([0.25, 0.97, 0.6]).assign(cell="a", seed=1),
+        curve([0.2, 0.3]).assign(cell="b", seed=0),
     ]
-    table = statistics.cell_table(runs).set_index("cell")
-    ends = [statistics.end_msr(run) for _, _, run in runs]
+    measures = statistics.by_run(pd.concat(runs), statistics.first_plan)
+    table = statistics.by_cell(measures)
+    ends = [statistics.end_msr(run) for run in runs]
+    assert measures["end"].tolist() == ends and list(table.index) == ["a", "b"]
     assert table["runs"].tolist() == [2, 1]
-    assert table["mean"].tolist() == pytest.approx([np.mean(ends[:2]), ends[2]])
+    assert table["end"].tolist() == pytest.approx([np.mean(ends[:2]), ends[2]])
+    assert table.loc["a", ["lowest", "highest"]].tolist() == sorted(ends[:2])
     assert table.loc["a", ["fell", "fig11", "fig12", "both"]].tolist() == [1, 2, 1, 1]
     low, high = table.loc["a", ["low", "high"]]
     assert (low, high) == pytest.approx(statistics.t_interval(ends[:2]))
-
-
-def test_the_interval_of_a_difference_is_welchs():
-    first, second = [0.6, 0.7, 0.8, 0.5, 0.65], [0.3, 0.42, 0.35]
-    found = statistics.welch_interval(first, second)
-    assert found == pytest.approx((0.14426, 0.44240), abs=1e-5)  # 6.0 degrees of freedom
-    assert np.isnan(statistics.welch_interval(first, [0.3])).all()
 
 
 def test_the_rise_after_the_peak_of_the_loss():
@@ -123,10 +85,7 @@ def test_share_intervals_are_those_of_the_binomial_distribution():
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [
-        (statistics.bootstrap_interval, ([],), "values is empty"),
-        (statistics.bootstrap_interval, ([np.nan],), "values"),
         (statistics.t_interval, ([np.inf, 1],), "values"),
-        (statistics.welch_interval, ([1, 2], [np.nan, 1]), "second"),
         (statistics.share_interval, (3, 2), "count is 3"),
         (statistics.share_interval, (0, 0), "total is 0"),
     ],

@@ -126,7 +126,7 @@ class RunFolder:
     def result(
         self, config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
     ) -> TrainResult:
-        """Read back what a finished run of ``training.train_changed`` has left."""
+        """Read back what a finished run of ``training.train`` has left."""
         stored = files.read_json(self._config, checked=True)
         marks = stored.pop("marks", {})
         self._check_same(stored, settings_of(config, stack, change))

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import torch
 
-from unload.agent.greedy import check_network
 from unload.agent.learner import PlainLearner, flat, grouped
 from unload.agent.policies import any_allowed
 from unload.fast import fused
@@ -42,7 +41,7 @@ class DQN:
         beta: float = 1.0,
         fused_update: bool | None = None,
     ) -> None:
-        self.network = check_network(network)
+        self.network = checks.instance("network", network, torch.nn.Module, "a torch.nn.Module")
         applies = fused.applies(network)
         if fused_update is None:
             fused_update = applies

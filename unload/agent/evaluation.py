@@ -129,7 +129,7 @@ def _play(
         # is checked before anything is picked, because it may be anybody's.
         allowed = choosable(allowed, infos["item_mask"])
         chosen, last = policy(observations, allowed, rng), task.N_VISIBLE - 1
-        actions = checks.integer_array("what policy returned", chosen, rows.shape, 0, last)
+        actions = checks.integer_array("what policy returned", chosen, rows.shape, last)
 
         # The masks of before the pick say whether its item had failed already.
         deadlocked.append(infos["action_mask"][rows, actions] == 0)

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from unload import task
-from unload.agent.learner import action_values, highest_values
+from unload.agent.learner import highest_values
 from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
@@ -19,13 +19,6 @@ from unload.support import checks, files
 
 # The policies that come with the package, by name.
 SHIPPED = {file.stem: file for file in sorted(files.SHIPPED.glob("policies/*.safetensors"))}
-
-
-def check_network(network: object) -> torch.nn.Module:
-    """Return ``network``; raise TypeError unless it is a ``torch.nn.Module``."""
-    if not isinstance(network, torch.nn.Module):
-        raise TypeError(f"network is {network!r}; expected a torch.nn.Module")
-    return network
 
 
 def greedy_actions(
@@ -63,7 +56,8 @@ class Greedy:
         ties: str = "noise",
         card: dict | None = None,
     ) -> None:
-        self.network = check_network(network).eval()
+        checks.instance("network", network, torch.nn.Module, "a torch.nn.Module")
+        self.network = network.eval()
         self.equalize = checks.boolean("equalize", equalize)
         checks.one_of("ties", ties, TIES)
         self.ties = ties
@@ -81,25 +75,10 @@ class Greedy:
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
     ) -> np.ndarray:
-        observations, present = self._seen(observations)
-        return greedy_actions(self.network, observations, masks, present)
-
-    def values(self, observations: np.ndarray) -> np.ndarray:
-        """Return the network's action values of all items, (batch, items) float32.
-
-        Args:
-            observations: (batch, items, 3) float, not equalized.
-        """
-        observations = checks.finite_array("observations", observations, (None, None, 3))
-        observations, present = self._seen(observations)
-        return action_values(self.network, observations.astype(np.float32), present).numpy()
-
-    def _seen(self, observations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What the network sees of observations, and which of their rows hold an item."""
         present = holds_item(observations)
         if self.equalize:
             observations = equalize(observations, self.ties, present=present)
-        return observations, present
+        return greedy_actions(self.network, observations, masks, present)
 
 
 def save_policy(policy: Greedy, path: str | Path) -> None:
@@ -114,8 +93,7 @@ def save_policy(policy: Greedy, path: str | Path) -> None:
         ValueError: ``path`` is empty or a folder.
         OSError: the file cannot be written.
     """
-    if not isinstance(policy, Greedy):
-        raise TypeError(f"policy is {policy!r}; expected an unload.Greedy")
+    checks.instance("policy", policy, Greedy, "an unload.Greedy")
     card = {"version": task.VERSION} | (policy.card or {})
     try:
         held = json.loads(json.dumps(card)) == card

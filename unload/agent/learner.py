@@ -96,17 +96,6 @@ def grouped(arrays: Mapping[str, Each]) -> dict[str, dict[str, Each]]:
 
 
 @torch.no_grad()
-def action_values(
-    network: torch.nn.Module, observations: np.ndarray, present: np.ndarray | None = None
-) -> torch.Tensor:
-    """Return a network's action values, (batch, items); for the arguments see below."""
-    arguments = [torch.from_numpy(observations)]
-    if present is not None and not present.all():  # other modules need not know of padding
-        arguments.append(torch.from_numpy(present))
-    return network(*arguments)
-
-
-@torch.no_grad()
 def highest_values(
     network: torch.nn.Module,
     observations: np.ndarray,
@@ -124,8 +113,10 @@ def highest_values(
     Returns:
         (batch,) int64.
     """
-    values = action_values(network, observations, present)
-    values = values.masked_fill(torch.from_numpy(~allowed), -torch.inf)
+    arguments = [torch.from_numpy(observations)]
+    if present is not None and not present.all():  # other modules need not know of padding
+        arguments.append(torch.from_numpy(present))
+    values = network(*arguments).masked_fill(torch.from_numpy(~allowed), -torch.inf)
     actions = values.argmax(dim=1)  # NaN counts as the highest
     finite = values.gather(1, actions[:, None]).isfinite()
     if not finite.all():

@@ -4,6 +4,7 @@ import numpy as np
 
 from unload import task
 from unload.agent.config import TrainConfig
+from unload.support import checks
 
 
 def shuffle_places(
@@ -76,9 +77,7 @@ class ReplayBuffer:
             raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
         count = len(batch["actions"])
         for name, array in self.arrays.items():
-            wanted = (count, *array.shape[1:])
-            if np.shape(batch[name]) != wanted:
-                raise ValueError(f"{name} has shape {np.shape(batch[name])}; expected {wanted}")
+            checks.shaped(name, batch[name], (count, *array.shape[1:]))
         slots = np.arange(self.total, self.total + count) % self.size
         for name, array in self.arrays.items():
             array[slots] = batch[name]

@@ -103,7 +103,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
-        change: is made at the end, see ``train_changed``.
+        change: is made at the end, see ``train``.
 
     Attributes:
         settings: what the run is, as JSON can hold it.
@@ -220,6 +220,7 @@ def train(
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
     callback: Callable[[dict[str, float]], bool | None] | None = None,
+    change: Callable[[Training], None] = unchanged,
 ) -> TrainResult:
     """Train an agent; go on where ``run_dir`` holds a checkpoint of the same configuration.
 
@@ -235,6 +236,14 @@ def train(
     again stops at once, and after an error in ``callback``. It holds all that the run is, also
     its replay memory, 1.6 GB with the paper's configuration and twice that with gamma > 0, and
     needs twice that room on the disk while a new one replaces it. The end of the run removes it.
+
+    What no ``TrainConfig`` offers is changed by ``change``. This agent learns that a pick is worth
+    the metres by which it lifts::
+
+        def metres(run):
+            run.reward = lambda picks, distances: distances
+
+        train(TrainConfig(), "runs/metres", change=metres)
 
     Args:
         config: what to train.
@@ -254,13 +263,17 @@ def train(
             ``TrainResult.curve``: ``picks``, ``success_rate``, ``loss`` and so on. A run that is
             resumed calls it for new points only; an error in it ends the run. So does False, with
             a policy and a curve: what has been learned until then is the run's result.
+        change: is called with the ``Training`` before its first pick, also where a run is
+            resumed, and may replace methods of its parts, such as ``run.replay.add``. What it
+            does to a pick may depend on the configuration and on how many picks were made before
+            (``run.replay.total``), but on nothing else; otherwise a resumed run would differ.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
 
     Raises:
         TypeError: an argument is not of the kind described.
-        ValueError: ``run_dir`` is empty, or holds another configuration, another stack or a
+        ValueError: ``run_dir`` is empty, or holds another configuration, stack or change or a
             damaged file; ``stack`` or ``lifts`` is given for an environment without loads;
             ``lifts`` is empty or a folder, or its file is damaged, or of another physics.
         OSError: ``run_dir`` is a file, cannot be written, has no room for checkpoints, or holds a
@@ -272,39 +285,7 @@ def train(
         BaseException: what ``callback`` raises, after a checkpoint, or ``stack``, where the run
             goes on from the last checkpoint.
     """
-    return train_changed(config, run_dir, unchanged, progress, stack, lifts, callback)
-
-
-def train_changed(
-    config: TrainConfig,
-    run_dir: str | Path,
-    change: Callable[[Training], None],
-    progress: bool | TextIO = True,
-    stack: Callable[[np.random.Generator], Load] | None = None,
-    lifts: str | Path | None = None,
-    callback: Callable[[dict[str, float]], bool | None] | None = None,
-) -> TrainResult:
-    """``train`` with something changed that no ``TrainConfig`` offers, such as the reward.
-
-    This one learns that a pick is worth the metres by which it lifts::
-
-        def metres(run):
-            run.reward = lambda picks, distances: distances
-
-        train_changed(TrainConfig(), "runs/metres", metres)
-
-    Args:
-        config, run_dir, progress, stack, lifts, callback: see ``train``.
-        change: is called with the ``Training`` before its first pick, also where a run is
-            resumed, and may replace methods of its parts, such as ``run.replay.add``. What it
-            does to a pick may depend on the configuration and on how many picks were made before
-            (``run.replay.total``), but on nothing else; otherwise a resumed run would differ.
-
-    Raises:
-        As ``train``; also where ``run_dir`` holds a run with another change.
-    """
-    if not isinstance(config, TrainConfig):
-        raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
+    checks.instance("config", config, TrainConfig, "an unload.TrainConfig")
     if not isinstance(progress, bool) and not hasattr(progress, "write"):
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
     if callback is not None and not callable(callback):

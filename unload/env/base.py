@@ -237,14 +237,15 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         ``SAME_STEP``, ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones then.
         """
         self._check_started()
-        began = self._over()  # in the mode NEXT_STEP; SAME_STEP leaves no episode that is over
+        # An episode has ended and the next one has not begun; SAME_STEP leaves none so.
+        began = self._emptied() | (self._picks == self.max_picks)
         if began.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
         highest = task.N_VISIBLE - 1
-        actions = checks.integer_array("actions", actions, (self.num_envs,), 0, highest)
+        actions = checks.integer_array("actions", actions, (self.num_envs,), highest)
 
         with AllOrReset(self):
-            rewards, picked = self._pick(actions, ~began), self._pick_infos()
+            rewards, picked = self._pick(actions, ~began)
             self._picks += 1
             if began.any():
                 rewards[began] = 0
@@ -269,10 +270,6 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             if not began.all():  # a reset has no infos about a pick
                 infos |= _flagged(picked, ~began)
         return self._look(), rewards, terminations, truncations, infos | final
-
-    def _over(self) -> np.ndarray:
-        """(num_envs,) bool, True where an episode has ended and the next one has not begun."""
-        return self._emptied() | (self._picks == self.max_picks)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of the arrays that ``load_state`` needs to go on from here."""
@@ -317,10 +314,15 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         """Put fresh items into some environments, (k,) int64, drawn from the generator of each."""
 
     @abstractmethod
-    def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
-        """Carry out checked actions; return the rewards, (num_envs,) float64.
+    def _pick(
+        self, actions: np.ndarray, playing: np.ndarray
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Carry out checked actions where an environment is ``playing``, (num_envs,) bool.
 
-        Where an environment is not ``playing``, (num_envs,) bool, it is filled next.
+        The others are filled next.
+
+        Returns:
+            The rewards, (num_envs,) float64, and the infos of ``step`` only.
         """
 
     @abstractmethod
@@ -334,10 +336,6 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
     @abstractmethod
     def _infos(self) -> dict[str, np.ndarray]:
         """The infos of ``reset`` and ``step``, without Gymnasium's flags."""
-
-    def _pick_infos(self) -> dict[str, np.ndarray]:
-        """The infos of ``step`` only."""
-        return {}
 
     @abstractmethod
     def _arrays(self) -> dict[str, np.ndarray]:

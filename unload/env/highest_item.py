@@ -52,8 +52,6 @@ class HighestItemEnv(PickingEnv):
     Arguments and errors are as for ``ContainerEnv``, but there is nothing to draw.
     """
 
-    metadata = {"render_modes": []}
-
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Draw the first items. There are no options."""
         self._check_open()

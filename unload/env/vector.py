@@ -24,9 +24,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        num_envs: number of containers.
         physics: ``"table"``; there is no other one for arrays.
-        stack: makes a ``Load`` from a ``numpy.random.Generator``.
 
     Attributes:
         table: the lifts that are known, filled by unknown ones; it may be replaced.
@@ -114,9 +112,12 @@ class ContainerVectorEnv(PickingVectorEnv):
         for before, after in zip(old, self._containers):
             after[tuple(slice(length) for length in before.shape)] = before
 
-    def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
-        self._items, self._distances = self._look_up(actions)
-        return containers.pick(self._containers, actions, self._distances, *self._features)
+    def _pick(
+        self, actions: np.ndarray, playing: np.ndarray
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        items, distances = self._look_up(actions)
+        rewards = containers.pick(self._containers, actions, distances, *self._features)
+        return rewards, {"item": items, "distance": distances}
 
     def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
@@ -160,9 +161,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._containers = containers.Containers(**arrays)
         self._around.clear()
 
-    def _pick_infos(self) -> dict[str, np.ndarray]:
-        return {"item": self._items, "distance": self._distances}
-
 
 class HighestItemVectorEnv(PickingVectorEnv):
     """``unload/HighestItem-v0``, many at once. See ``HighestItemEnv``."""
@@ -188,12 +186,13 @@ class HighestItemVectorEnv(PickingVectorEnv):
         self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
         self._highest[envs] = np.take_along_axis(highest_places(places), order, axis=1)
 
-    def _pick(self, actions: np.ndarray, playing: np.ndarray) -> np.ndarray:
-        envs = np.arange(self.num_envs)
-        rewards = np.where(self._highest[envs, actions], 1.0, -1.0)
+    def _pick(
+        self, actions: np.ndarray, playing: np.ndarray
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        rewards = np.where(self._highest[np.arange(self.num_envs), actions], 1.0, -1.0)
         envs = np.flatnonzero(playing)
         self._fill(envs, [self._rngs[env] for env in envs])
-        return rewards
+        return rewards, {}
 
     def _emptied(self) -> np.ndarray:
         return np.zeros(self.num_envs, bool)  # there are always 128 items

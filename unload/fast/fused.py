@@ -88,25 +88,19 @@ def start_gradients(
         stay as they are. It raises FloatingPointError unless all are finite.
 
     Raises:
-        ValueError: an array's shape or dtype is another, or an action or row is out of range.
+        TypeError: an array's dtype is another.
+        ValueError: its shape is another, or an action or row is out of range.
     """
-    count, items = _check(observations)
-    if rows is None:
-        rows = np.arange(count)
-    for name, array, shape, dtype in (
-        ("rows", rows, (rows.size,), np.int64),
-        ("actions", actions, (count,), np.int64),
-        ("targets", targets, (count,), np.float32),
-    ):
-        if array.shape != shape or array.dtype != dtype or not array.size:
-            raise ValueError(
-                f"{name} has shape {array.shape} and dtype {array.dtype}; "
-                f"expected {shape if array.size else '(batch,)'} {np.dtype(dtype)}"
-            )
-
     # Compiled code reads and writes wherever it is told to, therefore all is checked before.
-    checks.integer_array("rows", rows, (None,), 0, count - 1)
-    checks.integer_array("actions", actions[rows], (None,), 0, items - 1)
+    count, items = _check(observations)
+    rows = np.arange(count) if rows is None else rows
+    checks.shaped("rows", rows, (None,), np.dtype(np.int64))
+    checks.shaped("actions", actions, (count,), np.dtype(np.int64))
+    checks.shaped("targets", targets, (count,), np.dtype(np.float32))
+    if not rows.size:
+        raise ValueError("rows is empty; expected at least one")
+    checks.integer_array("rows", rows, (None,), count - 1)
+    checks.integer_array("actions", actions[rows], (None,), items - 1)
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
@@ -155,11 +149,7 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
         FloatingPointError: a row has no allowed action of a finite value.
     """
     size, items = _check(observations)
-    if allowed.shape != (size, items) or allowed.dtype != bool:
-        raise ValueError(
-            f"allowed has shape {allowed.shape} and dtype {allowed.dtype}; "
-            f"expected ({size}, {items}) bool"
-        )
+    checks.shaped("allowed", allowed, (size, items), np.dtype(bool))
     actions = np.full(size, -1)
     best_items(observations, allowed, weights.weight, weights.bias, weights.score[0], actions)
     if (actions < 0).any():
@@ -172,13 +162,10 @@ def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray
 
 def _check(observations: np.ndarray) -> tuple[int, int]:
     """Batch size and number of items of (batch, items, 3) float32 observations."""
-    shape, dtype = observations.shape, observations.dtype
-    if len(shape) != 3 or 0 in shape or shape[2] != 3 or dtype != np.float32:
-        raise ValueError(
-            f"observations has shape {shape} and dtype {dtype}; "
-            "expected (batch, items, 3) float32, not empty"
-        )
-    return shape[:2]
+    checks.shaped("observations", observations, (None, None, 3), np.dtype(np.float32))
+    if not observations.size:
+        raise ValueError(f"observations is empty, {observations.shape}; expected at least one item")
+    return observations.shape[:2]
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.Tensor, ...]:

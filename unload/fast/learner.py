@@ -1,6 +1,6 @@
-"""The fused twin of ``unload.agent.learner.PlainLearner``, and its Adam."""
+"""The fused twin of ``unload.agent.learner.PlainLearner``."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -18,12 +18,15 @@ class FusedLearner:
     Its update reads the rows where they are, which saves copying them, and goes on in other
     threads while the caller does something else. It takes tanh in double precision, where its
     slope does not become 0 so soon, and the choice compares what stands before it, which never
-    ties.
+    ties. ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights
+    of the paper's network; its rule is one compiled pass here.
     """
 
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
         self.weights, self.beta = fused.weights_of(network), beta
-        self.optimizer = Adam([array.reshape(-1) for array in self.weights], learning_rate)
+        self.learning_rate, self.steps = learning_rate, 0
+        # Running means of the gradients and of their squares.
+        self.moments = np.zeros((2, sum(array.size for array in self.weights)))
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         return fused.best_actions(self.weights, observations, allowed)
@@ -37,52 +40,29 @@ class FusedLearner:
 
         def finish() -> float:
             total = gradients()
-            self.optimizer.step(total[:-1])
+            self.step(total[:-1])
             return float(total[-1])
 
         return finish
-
-    def state(self) -> dict[str, np.ndarray]:
-        return self.optimizer.state()
-
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        self.optimizer.load_state(arrays)
-
-
-class Adam:
-    """The optimizer of some weights, which it changes where they are.
-
-    ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights of the
-    paper's network. This is its rule in one compiled pass; readers learn from the other one.
-
-    Args:
-        weights: (k,) float32 each.
-        learning_rate: the step size.
-    """
-
-    def __init__(self, weights: Sequence[np.ndarray], learning_rate: float) -> None:
-        self.weights, self.learning_rate, self.steps = tuple(weights), learning_rate, 0
-        # Running means of the gradients and of their squares.
-        self.moments = np.zeros((2, sum(map(len, self.weights))))
 
     def step(self, gradients: np.ndarray) -> None:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - beta**self.steps for beta in BETAS]
-        _step(self.weights, gradients, self.moments, self.learning_rate, *corrections)
+        weights = tuple(array.reshape(-1) for array in self.weights)
+        _step(weights, gradients, self.moments, self.learning_rate, *corrections)
 
     def state(self) -> dict[str, np.ndarray]:
-        """What ``load_state`` needs to go on from here."""
         return {"steps": np.array(self.steps), "moments": self.moments.copy()}
 
     def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned."""
         self.steps = int(arrays["steps"])
         self.moments[:] = arrays["moments"]
 
 
 @compiled
 def _step(weights, gradients, moments, learning_rate, correction, correction2):
+    """Adam's rule; changes the weights where they are."""
     mean, square = moments
     i = 0
     for part in weights:

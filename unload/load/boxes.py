@@ -106,12 +106,10 @@ class Load:
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
         extras = {name: np.array(values) for name, values in dict(self.extras or {}).items()}
         for name, values in extras.items():
-            if values.shape != (count,):
-                raise ValueError(f"extras[{name!r}] has shape {values.shape}; expected ({count},)")
+            checks.shaped(f"extras[{name!r}]", values, (count,))
         if self.ids is not None:
             labels["ids"] = np.array(self.ids, dtype=str)
-            if labels["ids"].shape != (count,):
-                raise ValueError(f"ids has shape {labels['ids'].shape}; expected ({count},)")
+            checks.shaped("ids", labels["ids"], (count,))
             _, which, times = np.unique(labels["ids"], return_inverse=True, return_counts=True)
             if (repeated := np.flatnonzero(times[which] > 1)).size:
                 raise BoxError(repeated, "the same id; expected one for each box")
@@ -183,8 +181,7 @@ class Load:
 
 def check_load(load: object, name: str = "load") -> None:
     """Raise TypeError unless ``load`` is a ``Load``, which holds at least one item."""
-    if not isinstance(load, Load):
-        raise TypeError(f"{name} is {load!r}; expected an unload.Load")
+    checks.instance(name, load, Load, "an unload.Load")
 
 
 def check_stacked(load: Load, name: str = "load") -> None:

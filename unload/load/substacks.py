@@ -96,7 +96,7 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
         TypeError, ValueError: an argument is not as described.
     """
     columns = substacks_that_fit(scale)[2]
-    variants = checks.integer_array("variants", variants, (None, None, columns), 0, 2)
+    variants = checks.integer_array("variants", variants, (None, None, columns), 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
     counts, cells = (each[np.arange(columns), variants] for each in _row(columns))

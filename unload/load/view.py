@@ -89,7 +89,7 @@ def view(
     if order is not None:
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
-        first = checks.integer_array("order", order, (None,), 0, count - 1)[:FIRST_PICKS]
+        first = checks.integer_array("order", order, (None,), count - 1)[:FIRST_PICKS]
         groups = {f"pick {k + 1}": first[k : k + 1] for k in range(len(first))}
         colours, rest = PICK_COLOURS, "picked later"
     elif groups is None:
@@ -106,7 +106,7 @@ def view(
     # Of two groups that share an item the later one wins; a last group holds the rest.
     of_item, names = np.full(count, -1), list(groups)
     for number, (name, items) in enumerate(groups.items()):
-        items = checks.integer_array(f"groups[{name!r}]", items, (None,), 0, count - 1)
+        items = checks.integer_array(f"groups[{name!r}]", items, (None,), count - 1)
         of_item[items] = number
     if (present & (of_item < 0)).any():
         names += [rest] if rest not in names else []

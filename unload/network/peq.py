@@ -49,17 +49,12 @@ class ScoringNetwork(nn.Module):
         Raises:
             TypeError, ValueError: no tensor, another dtype or shape, or no rows.
         """
-        _check("observations", observations, next(self.parameters()).dtype)
-        if observations.ndim != 3 or observations.shape[1] == 0 or observations.shape[2] != 3:
-            raise ValueError(
-                f"observations has shape {tuple(observations.shape)}; "
-                "expected (batch, items, 3) with at least one item"
-            )
+        dtype = next(self.parameters()).dtype
+        checks.shaped("observations", observations, (None, None, 3), dtype)
+        if not observations.shape[1]:
+            raise ValueError("observations has no rows; expected at least one item")
         if present is not None:
-            _check("present", present, torch.bool)
-            shape, expected = tuple(present.shape), tuple(observations.shape[:2])
-            if shape != expected:
-                raise ValueError(f"present has shape {shape}; expected {expected}")
+            checks.shaped("present", present, tuple(observations.shape[:2]), torch.bool)
             present = present | ~present.any(dim=1, keepdim=True)  # the maximum of none is infinite
         return torch.tanh(self.scorer(self.features(observations, present))).squeeze(2)
 
@@ -96,14 +91,6 @@ class PEQNetwork(ScoringNetwork):
         own = torch.relu(self.extractor(observations))  # (batch, items, n)
         context = torch.cat(pooled(own, present), dim=1).unsqueeze(1)  # (batch, 1, 3 n)
         return torch.cat([own, context.expand(-1, own.shape[1], -1)], dim=2)
-
-
-def _check(name: str, value: object, dtype: torch.dtype) -> None:
-    """Raise TypeError unless ``value`` is a tensor of this dtype."""
-    if not isinstance(value, torch.Tensor):
-        raise TypeError(f"{name} is a {type(value).__name__}; expected a tensor")
-    if value.dtype != dtype:
-        raise TypeError(f"{name} has dtype {value.dtype}; expected {dtype}")
 
 
 def pooled(features: torch.Tensor, present: torch.Tensor | None) -> list[torch.Tensor]:

@@ -12,6 +12,7 @@ from torch import nn
 from torch.nn.functional import linear
 
 from unload.network.peq import PEQNetwork, ScoringNetwork, pooled
+from unload.support import checks
 
 HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 features
 
@@ -126,15 +127,13 @@ def make_network(
 @torch.no_grad()
 def _check(network: object) -> None:
     """Raise unless this is a network that can be trained and saved, before hours are spent."""
-    if not isinstance(network, nn.Module):
-        raise TypeError(f"network returned {network!r}; expected a torch.nn.Module")
-    for name, value in network.state_dict().items():
+    made = checks.instance("what network returned", network, nn.Module, "a torch.nn.Module")
+    for name, value in made.state_dict().items():
         if value.dtype != torch.float32:
             raise TypeError(f"network has {name} of dtype {value.dtype}; expected torch.float32")
     # A copy, because a module may count its calls.
-    values = deepcopy(network).eval()(torch.zeros(2, 3, 3), torch.ones(2, 3, dtype=torch.bool))
-    if values.shape != (2, 3):
-        raise ValueError(f"network returned values of shape {tuple(values.shape)}; expected (2, 3)")
+    values = deepcopy(made).eval()(torch.zeros(2, 3, 3), torch.ones(2, 3, dtype=torch.bool))
+    checks.shaped("what network returned", values, (2, 3), torch.float32)
 
 
 def linear_with_context(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) -> torch.Tensor:

@@ -21,38 +21,34 @@ class LocalPhysics(Physics):
     """
 
     def simulate(self, situation: Situation) -> float:
-        """Lift the chosen box of a situation; return how far it moved, in m."""
+        """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
+
+        What was lifted before makes no difference, not in one bit.
+        """
         self._check_open()
         if self._world is None:
             self._world = World()
         elif self._world.bodies > MOST_BODIES:
             self._world.clear()
-        return lift(self._world, situation)
+
+        world, bodies = self._world, list[int]()
+        try:
+            for row, box in enumerate(situation.boxes * RESOLUTION):
+                mass = task.MASS if row < situation.dynamic else 0.0
+                bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
+            if situation.floor is not None:
+                height = situation.floor * RESOLUTION
+                bodies.append(world.add_box((0, 0, height - 0.5), (9, 9, 1), 0))
+            for side in situation.sides:
+                outwards = np.sign(side) * 0.5
+                bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
+            return round(world.pull(bodies[0]), 6)
+        finally:  # also when interrupted: what stays behind would be in the way of the next lift
+            for body in reversed(bodies):
+                world.remove(body)
 
     def _reset(self, load: Load) -> None:
         self.surroundings = Surroundings(load, self.present)
 
     def _lift(self, item: int) -> float:
         return self.simulate(self.surroundings.situation(item))
-
-
-def lift(world: World, situation: Situation) -> float:
-    """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
-
-    The chosen box and all that rests on it are free to move, the rest is fixed. The world is
-    empty before and after, and what was lifted in it before makes no difference, not in one bit.
-    """
-    bodies: list[int] = []
-    try:
-        for row, box in enumerate(situation.boxes * RESOLUTION):
-            mass = task.MASS if row < situation.dynamic else 0.0
-            bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
-        if situation.floor is not None:
-            bodies.append(world.add_box((0, 0, situation.floor * RESOLUTION - 0.5), (9, 9, 1), 0))
-        for side in situation.sides:
-            outwards = np.sign(side) * 0.5
-            bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-        return round(world.pull(bodies[0]), 6)
-    finally:  # also when interrupted: what stays behind would be in the way of the next lift
-        for body in reversed(bodies):
-            world.remove(body)

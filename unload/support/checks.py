@@ -6,7 +6,7 @@ What is of another type is a TypeError, what has another value a ValueError.
 from collections.abc import Hashable, Iterable, Mapping
 from numbers import Integral
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,13 @@ import numpy as np
 Shape = tuple[int | None, ...] | None
 Option = TypeVar("Option")
 LARGEST = np.iinfo(np.int64).max
+
+
+def instance(name: str, value: object, kind: Any, expected: str) -> Any:
+    """Return ``value``; raise TypeError unless it is of ``kind``, see ``isinstance``."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} is {value!r}; expected {expected}")
+    return value
 
 
 def one_of(name: str, value: object, options: Iterable[Option]) -> Option:
@@ -28,9 +35,7 @@ def one_of(name: str, value: object, options: Iterable[Option]) -> Option:
 
 def boolean(name: str, value: object) -> bool:
     """Return ``value`` as bool; raise TypeError unless it is True or False."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"{name} is {value!r}; expected True or False")
-    return bool(value)
+    return bool(instance(name, value, (bool, np.bool_), "True or False"))
 
 
 def integer(name: str, value: object, low: int, high: int | None = None) -> int:
@@ -48,9 +53,7 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
 
 def path(name: str, value: object) -> Path:
     """Return ``value`` as a Path; raise TypeError unless it is one, or a str."""
-    if not isinstance(value, (str, Path)):
-        raise TypeError(f"{name} is {value!r}; expected a path")
-    return Path(value)
+    return Path(instance(name, value, (str, Path), "a path"))
 
 
 def file(name: str, value: object) -> Path:
@@ -81,21 +84,31 @@ def real(name: str, value: object, low: float, high: float = np.inf) -> float:
 
 def generator(name: str, value: object) -> np.random.Generator:
     """Return ``value``; raise TypeError unless it is a ``numpy.random.Generator``."""
-    if not isinstance(value, np.random.Generator):
-        raise TypeError(
-            f"{name} is {value!r}; expected a numpy.random.Generator, "
-            "for example numpy.random.default_rng(0)"
-        )
-    return value
+    expected = "a numpy.random.Generator, for example numpy.random.default_rng(0)"
+    return instance(name, value, np.random.Generator, expected)
 
 
 def entries(name: str, value: object, required: Iterable[str]) -> None:
     """Raise unless ``value`` is a mapping that holds all ``required`` names."""
-    if not isinstance(value, Mapping):
-        raise TypeError(f"{name} is {value!r}; expected a dict")
-    missing = sorted(set(required) - set(value))
+    held = instance(name, value, Mapping, "a dict")
+    missing = sorted(set(required) - set(held))
     if missing:
         raise ValueError(f"{name} has no {', '.join(missing)}; expected {', '.join(required)}")
+
+
+def shaped(name: str, value: Any, shape: Shape, dtype: Any = None) -> None:
+    """Check an array or tensor: raise TypeError for another dtype, ValueError for another shape."""
+    if dtype is not None and getattr(value, "dtype", None) != dtype:
+        found = f"a {type(value).__name__} of dtype {getattr(value, 'dtype', None)}"
+        raise TypeError(f"{name} is {found}; expected {dtype}")
+    has = tuple(np.shape(value))
+    fits = shape is None or (
+        len(has) == len(shape)
+        and all(want is None or length == want for length, want in zip(has, shape))
+    )
+    if not fits:
+        wanted = str(shape).replace("None", "any")
+        raise ValueError(f"{name} has shape {has}; expected {wanted}")
 
 
 def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
@@ -108,16 +121,14 @@ def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
     return array
 
 
-def integer_array(
-    name: str, value: object, shape: Shape, low: int = 0, high: int | None = None
-) -> np.ndarray:
+def integer_array(name: str, value: object, shape: Shape, high: int | None = None) -> np.ndarray:
     """Return ``value`` as an int64 array; raise unless it holds integers and has ``shape``.
 
-    If ``high`` is given, they must lie in [low, high].
+    If ``high`` is given, they must lie in [0, high].
     """
     array = _array(name, value, shape, "iu", "integers").astype(np.int64)
-    if high is not None and array.size and not (low <= array.min() and array.max() <= high):
-        raise ValueError(f"{name} holds {array.min()} to {array.max()}; expected {low} to {high}")
+    if high is not None and array.size and not (array.min() >= 0 and array.max() <= high):
+        raise ValueError(f"{name} holds {array.min()} to {array.max()}; expected 0 to {high}")
     return array
 
 
@@ -138,11 +149,5 @@ def _array(name: str, value: object, shape: Shape, kinds: str, expected: str) ->
         raise TypeError(f"{name} cannot be read as an array ({error}); expected one") from error
     if array.size and array.dtype.kind not in kinds:
         raise TypeError(f"{name} has dtype {array.dtype}; expected {expected}")
-    fits = shape is None or (
-        array.ndim == len(shape)
-        and all(want is None or have == want for have, want in zip(array.shape, shape))
-    )
-    if not fits:
-        wanted = str(shape).replace("None", "any")
-        raise ValueError(f"{name} has shape {array.shape}; expected {wanted}")
+    shaped(name, array, shape)
     return array

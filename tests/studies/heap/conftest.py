@@ -8,7 +8,6 @@ import pytest
 from studies.heap.boxes import Heap
 from studies.heap.env import HeapEnv
 from studies.heap.generate import settled_heap
-from studies.heap.rake import Rake
 from unload.physics.bullet import World
 
 EDGE = 0.4  # m
@@ -43,11 +42,6 @@ def pile(cubes) -> Heap:
 def real_heap() -> Heap:
     """A heap of the generator, about 4 s."""
     return settled_heap(np.random.default_rng(0))
-
-
-@pytest.fixture
-def make_rake() -> Callable[..., Rake]:
-    return lambda physics="coarse": Rake(physics)
 
 
 @pytest.fixture

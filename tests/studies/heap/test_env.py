@@ -1,5 +1,3 @@
-from types import SimpleNamespace
-
 import gymnasium
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from studies.heap.learning import Learned, fit
 from studies.heap.network import FateNetwork
 from studies.heap.observation import ROWS
 from studies.heap.policies import Oracle, Picks, linear
+from studies.heap.rake import Rake
 from unload import task
 
 
@@ -41,8 +40,6 @@ def test_the_stored_heaps_can_be_played():
     observation, info = envs[1].reset(seed=0)
     assert observation in envs[1].observation_space and 30 < info["item_mask"].sum() < 90
     assert any(envs[1].unwrapped.heap is heap for heap in envs[1].unwrapped.heaps)
-    for env in envs:
-        env.close()
 
 
 def test_reward_and_fates_say_what_happened(make_heap_env, cubes, set_friction):
@@ -122,38 +119,27 @@ def test_bad_actions_and_rows_without_a_box_change_nothing(make_heap_env):
         env.reset()
 
 
-@pytest.fixture
-def room(cubes, pile, make_rake, make_heap_env) -> SimpleNamespace:
-    """What the cases below need."""
-    picks = Picks(*(np.zeros((1, *shape), np.float32) for shape in ((96, 13), (), (), (), (96,))))
-    none = Picks(*(getattr(picks, name)[:0] for name in Picks.__dataclass_fields__))
-    return SimpleNamespace(
-        cube=cubes((5, 1, 0)), pile=pile, rake=make_rake, env=make_heap_env, picks=picks,
-        none=none,
-    )  # fmt: skip
-
-
 BAD_INPUT = {
-    "physics is 'full'; expected one of 'whole'": lambda r: r.rake("full"),
-    "box is 1; expected an integer >= 0 and <= 0": lambda r: r.rake().pick(r.cube, 1),
-    "rng is 0; expected a numpy.random.Generator": lambda r: settled_heap(0),
-    "split is 'all'; expected one of 'train'": lambda r: stored_heaps("all"),
-    "max_picks is 0": lambda r: r.env(max_picks=0),
-    "render_mode is 'human'": lambda r: r.env(render_mode="human"),
-    "expected a Heap that holds a box": lambda r: r.env().reset(
-        options={"heap": r.pile.only(np.array([], int))}
+    "physics is 'full'; expected one of 'whole'": lambda make, pile: Rake("full"),
+    "box is 9; expected an integer >= 0 and <= 8": lambda make, pile: Rake("coarse").pick(pile, 9),
+    "rng is 0; expected a numpy.random.Generator": lambda make, pile: settled_heap(0),
+    "split is 'all'; expected one of 'train'": lambda make, pile: stored_heaps("all"),
+    "max_picks is 0": lambda make, pile: make(max_picks=0),
+    "render_mode is 'human'": lambda make, pile: make(render_mode="human"),
+    "expected a Heap that holds a box": lambda make, pile: make().reset(
+        options={"heap": pile.only(np.array([], int))}
     ),
-    "a column is 'colour'; expected one of 'behind'": lambda r: linear({"colour": 1}),
-    "falls_weight is -2": lambda r: Oracle(r.env(), -2),
-    "n_features is 0": lambda r: FateNetwork(0),
-    "steps is 0": lambda r: fit(r.picks, 0, 0),
-    "picks is empty": lambda r: fit(r.none, 0),
-    "networks is empty": lambda r: Learned([]),
+    "a column is 'colour'; expected one of 'behind'": lambda make, pile: linear({"colour": 1}),
+    "falls_weight is -2": lambda make, pile: Oracle(make(), -2),
+    "n_features is 0": lambda make, pile: FateNetwork(0),
+    "steps is 0": lambda make, pile: fit(Picks(*np.zeros((5, 1))), 0, steps=0),
+    "picks is empty": lambda make, pile: fit(Picks(*np.zeros((5, 0))), 0),
+    "networks is empty": lambda make, pile: Learned([]),
 }
 
 
 @pytest.mark.parametrize("message", BAD_INPUT)
-def test_bad_input_is_refused(room, message):
+def test_bad_input_is_refused(make_heap_env, pile, message):
     """In all modules of this room; the message names the argument and its value."""
     with pytest.raises((TypeError, ValueError), match=message):
-        BAD_INPUT[message](room)
+        BAD_INPUT[message](make_heap_env, pile)

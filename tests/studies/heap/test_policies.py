@@ -8,9 +8,8 @@ from studies.heap.observation import COLUMN, COLUMNS, ROWS, SEEN, Camera, featur
 from studies.heap.policies import RULES, Oracle, best, linear, play
 
 
-@pytest.fixture
-def three_boxes() -> tuple[np.ndarray, np.ndarray]:
-    """One observation: row 0 foremost and covered, row 1 highest, row 2 lowest and far behind."""
+def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(rng):
+    """Row 0 is foremost and covered, row 1 highest, row 2 lowest and far behind."""
     observations = np.zeros((1, ROWS, len(COLUMNS)), np.float32)
     for name, values in {
         "behind": (0.2, 0.5, 2.0),
@@ -21,11 +20,6 @@ def three_boxes() -> tuple[np.ndarray, np.ndarray]:
         observations[0, :3, COLUMN[name]] = values
     masks = np.zeros((1, ROWS), np.int8)
     masks[0, :3] = 1
-    return observations, masks
-
-
-def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(three_boxes, rng):
-    observations, masks = three_boxes
     expected = {"highest": 1, "lowest": 2, "foremost": 0, "clear above": 1, "nearest": 1}
     assert set(expected) == set(RULES) - {"random"}
     for name, row in expected.items():

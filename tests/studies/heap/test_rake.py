@@ -5,7 +5,7 @@ import pytest
 
 from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_sizes
 from studies.heap.generate import FEWEST, HIGHEST, stored_heaps, write_heaps
-from studies.heap.rake import PHYSICS
+from studies.heap.rake import PHYSICS, Rake
 from unload import task
 from unload.agent.identity import identity
 
@@ -19,9 +19,9 @@ from unload.agent.identity import identity
         (((6.0, 1, 0), (6.5, 1, 0), (7.19, 2, 0)), [True, True, False]),
     ],
 )
-def test_boxes_before_the_dragged_one_are_pushed_over_the_edge(cubes, make_rake, places, unloaded):
+def test_boxes_before_the_dragged_one_are_pushed_over_the_edge(cubes, places, unloaded):
     heap = cubes(*places)
-    outcome = make_rake().pick(heap, 0)
+    outcome = Rake("coarse").pick(heap, 0)
     assert outcome.unloaded.tolist() == unloaded
     assert len(outcome.heap) == unloaded.count(False)
     assert outcome.heap.positions[-1] == pytest.approx(heap.positions[-1], abs=0.005)
@@ -29,27 +29,27 @@ def test_boxes_before_the_dragged_one_are_pushed_over_the_edge(cubes, make_rake,
 
 @pytest.mark.parametrize(("mass", "moved", "came"), [(12.0, 0.7, True), (18.0, 0.44, False)])
 def test_a_box_comes_if_it_has_moved_by_nine_tenths_of_the_reach(
-    cubes, make_rake, monkeypatch, mass, moved, came
+    cubes, monkeypatch, mass, moved, came
 ):
     """The heavier, the less far within a second; it is not past the edge in either case."""
     monkeypatch.setattr(task, "MASS", mass)
-    outcome = make_rake().pick(cubes((4.5, 1, 0), (6, 2, 0)), 0)
+    outcome = Rake("coarse").pick(cubes((4.5, 1, 0), (6, 2, 0)), 0)
     assert outcome.moved == pytest.approx(moved, abs=0.03)
     assert outcome.came == came and outcome.unloaded.tolist() == [came, False]
 
 
-def test_a_box_that_loses_its_support_falls_but_not_the_dragged_one(cubes, make_rake, set_friction):
+def test_a_box_that_loses_its_support_falls_but_not_the_dragged_one(cubes, set_friction):
     tower = cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (4.55, 1, 0))
-    high = make_rake().pick(tower, 2)
+    high = Rake("coarse").pick(tower, 2)
     assert high.came and not high.fallen.any(), "the dragged box dropped by 0.8 m"
     set_friction(0.05)
     tower = cubes((5, 1, 0), (5, 1, 1), (5, 1, 2), (5, 1, 3))
-    assert make_rake().pick(tower, 0).fallen.tolist() == [False, False, True, True]
+    assert Rake("coarse").pick(tower, 0).fallen.tolist() == [False, False, True, True]
 
 
 @pytest.mark.parametrize("physics", PHYSICS)
-def test_a_pick_depends_on_nothing_but_the_heap(pile, make_rake, physics):
-    used, fresh = make_rake(physics), make_rake(physics)
+def test_a_pick_depends_on_nothing_but_the_heap(pile, physics):
+    used, fresh = Rake(physics), Rake(physics)
     first = used.pick(pile, 3)
     used.pick(pile.only(np.arange(5)), 1)
     for other in (used.pick(pile, 3), fresh.pick(pile, 3)):

@@ -20,19 +20,14 @@ from unload.agent.identity import identity
 from unload.load.picture import COLOURS
 
 
-@pytest.fixture
-def episodes() -> pd.DataFrame:
+def test_compared_gives_means_and_ratios_over_pairs():
     """Two policies on four heaps; the learned one brings half a box more on each."""
     rows = []
     for number, boxes in enumerate((1.0, 2.0, 3.0, 2.0)):
         for policy, more in (("best rule", 0.0), ("learned", 0.5)):
             row = {"falls_weight": 1.0, "policy": policy, "heap": number}
             rows.append(row | {"boxes": boxes + more, "falls": 0.5, "net": boxes + more - 0.5})
-    return pd.DataFrame(rows)
-
-
-def test_compared_gives_means_and_ratios_over_pairs(episodes):
-    table = compared(episodes).set_index("policy")
+    table = compared(pd.DataFrame(rows)).set_index("policy")
     assert table.loc["best rule", "boxes"] == 2.0 and table.loc["learned", "boxes"] == 2.5
     assert table.loc["best rule", ["boxes_ratio", "boxes_ratio_low"]].tolist() == [1.0, 1.0]
     learned = table.loc["learned"]

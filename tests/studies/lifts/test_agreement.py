@@ -52,7 +52,7 @@ def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
     provenance = read_provenance(tmp_path / "data", agreement.NAME)
     assert provenance["settings"]["lifts"] == 3
     written = (tmp_path / "data" / "lift_agreement.csv").read_bytes()
-    monkeypatch.setattr(agreement, "FullPhysics", None)
+    monkeypatch.setattr(agreement.FullPhysics, "reset", None)
     agreement.agreement_data(*folders)
     assert (tmp_path / "data" / "lift_agreement.csv").read_bytes() == written
     monkeypatch.setattr(agreement, "FIRST_SEED", 6)

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from studies.paper import numbers
+from tests.studies.curves import course
 from unload import policies
 from unload.agent.evaluation import evaluate
 
@@ -35,12 +36,8 @@ def test_what_is_measured_agrees_where_it_should(monkeypatch):
     assert numbers.measured(1, 1, 5).loc["Tab. I", "agrees"] == "no"
 
 
-def run_of(msr):
-    """A curve of ten million picks, whose loss falls, rises and falls."""
-    loss = np.r_[np.linspace(1, 0.1, 7), np.linspace(0.1, 0.8, 7), np.linspace(0.8, 0.2, 6)]
-    return pd.DataFrame({"picks": 500_000 * np.arange(1, 21), "success_rate": msr, "loss": loss})
-
-
+# Of ten million picks: it falls, rises and falls.
+LOSS = np.r_[np.linspace(1, 0.1, 7), np.linspace(0.1, 0.8, 7), np.linspace(0.8, 0.2, 6)]
 RISE, WAVES = np.linspace(0.15, 0.5, 14), 0.02 * np.resize([1, -1], 6)
 COURSES = {  # of two or three runs, and what agrees
     "like the paper's": (
@@ -60,8 +57,8 @@ COURSES = {  # of two or three runs, and what agrees
 
 @pytest.mark.parametrize("name", COURSES)
 def test_runs_agree_with_the_paper_by_the_plan(name, monkeypatch):
-    courses, agree = COURSES[name]
-    runs = [("paper_mask", seed, run_of(course)) for seed, course in enumerate(courses)]
-    monkeypatch.setattr(numbers, "paper_runs", lambda: runs)
+    rates, agree = COURSES[name]
+    runs = [course(msr, LOSS).assign(cell="paper_mask", seed=i) for i, msr in enumerate(rates)]
+    monkeypatch.setattr(numbers, "read_grid", lambda *_, **__: pd.concat(runs))
     found = numbers.training()["with the mask, b = 256"]
     assert [text.rpartition(": ")[2] for text in found] == agree

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-import pytest
 
 from studies import grid
 from studies.grid import Cell, Grid, read_policies
@@ -13,18 +13,12 @@ from studies.paper.training import PAPER
 from unload import TrainConfig, load_policy
 
 
-@pytest.fixture
-def small(monkeypatch):
-    """A grid of four short runs that stands for the paper's."""
+def test_a_full_grid_leaves_the_policies_that_play_elsewhere(tmp_path, monkeypatch):
+    """A grid of four short runs stands for the paper's."""
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
     config = TrainConfig(picks=64 * 500, batch_size=64, n_features=4, log_interval=500)
     cells = {training.DEFAULTS: Cell(config, range(4))}
-    small = Grid("falls/paper", "make it", cells)
-    monkeypatch.setattr(training, "PAPER", small)
-    return small
-
-
-def test_a_full_grid_leaves_the_policies_that_play_elsewhere(small, tmp_path):
+    monkeypatch.setattr(training, "PAPER", Grid("falls/paper", "make it", cells))
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
     training.training_data(None, None, **folders, n_jobs=1)
     trained = read_policies(tmp_path / "falls/paper.safetensors")
@@ -45,14 +39,12 @@ def test_the_default_cell_has_the_defaults():
     assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
 
 
-def test_means_over_whole_episodes():
+def test_means_over_whole_episodes_are_drawn():
     """Points of 10 of 500 steps; the last, incomplete episode is left out."""
     picks = np.arange(1, 121) * 640
     curve = pd.DataFrame({"picks": picks, "success_rate": np.arange(120.0)})
-    curve = curve.assign(wall_time=picks / 1000, epsilon=1 - picks / 1e6)
-    means = training.episode_means(curve)
-    assert means["picks"].tolist() == [32_000, 64_000]
-    assert means["success_rate"].tolist() == [24.5, 74.5]
-    assert means["epsilon"].tolist() == pytest.approx([0.968, 0.936])
-    with pytest.raises(ValueError, match="points after 1,920 picks each; expected a divisor"):
-        training.episode_means(curve.assign(picks=3 * picks))
+    _, axes = plt.subplots()
+    training.draw_learning_curve(axes, curve, "run")
+    points, episodes = axes.lines
+    assert len(points.get_ydata()) == 120
+    assert episodes.get_xydata().tolist() == [[16_000, 24.5], [48_000, 74.5]]

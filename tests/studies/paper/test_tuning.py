@@ -11,17 +11,12 @@ from studies.paper.tuning import tuning_grid
 from unload.env.vector import HighestItemVectorEnv
 
 
-@pytest.fixture
-def small(monkeypatch):
-    """A search of two batch sizes, two runs each, that stands for the paper's."""
+def test_a_search_is_published_in_two_tables_a_batch_size(tmp_path, monkeypatch):
+    """Of two batch sizes and two learning rates, two runs each."""
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
     small = tuning_grid([1e-2, 1e-3], [8, 16], runs=2, equalize=[True], steps=20)
     monkeypatch.setattr(tuning, "TUNING", small)
     monkeypatch.setattr(tuning, "SHOWN", (("with", "loss", 8, 1e-3, 1),))
-    return small
-
-
-def test_a_search_is_published_in_two_tables_a_batch_size(small, tmp_path):
     tuning.tuning_data(tmp_path, tmp_path / "runs", n_jobs=1)
     names = {path.name for path in (tmp_path / "tuning").iterdir()}
     tables = {f"b{size}_{column}.csv" for size in (8, 16) for column in ("loss", "success_rate")}

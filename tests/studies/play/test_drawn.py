@@ -1,16 +1,16 @@
 """How a load is drawn: in the widget, by what an agent sees, and in the replay beside it."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import unload
-from studies.play.agent_view import LEVELS, AgentView, look
+from studies.play.agent_view import agent_view, look
 from studies.play.canvas import ABSENT, Canvas
 from studies.play.episode import Episode, Run, policy_of
 from studies.play.replay import PAUSE, STOPS, replay
+from unload.load.picture import COLOURS
 
 
 def test_the_canvas_holds_the_load_and_a_pick_is_one_small_message(full_load, monkeypatch):
@@ -72,44 +72,56 @@ def test_a_failed_pick_is_marked_in_the_container_of_the_load(boxes):
     assert figure.layout.scene.xaxis.range == (0, 6)
 
 
-@pytest.fixture
-def stuck():
+@pytest.fixture(scope="module")
+def stuck() -> Run:
     """The paper's agent where it gets stuck."""
-    return AgentView(seed=4, agent="the paper's agent", picks=95)
+    run = Run("the paper's agent", unload.stack_load(np.random.default_rng(4)), 4, mask=False)
+    run.play_to(95)
+    return run
 
 
-def ranks_and_item(view) -> tuple[int, int]:
-    """The number of different ranks, and the item of the greedy choice, as they are shown."""
-    ranks, item = re.findall(r"<b>(\d+)</b>", view.message.value)[:2]
-    return int(ranks), int(item)
+SETTINGS = {
+    "agent": "the paper's agent", "epsilon": 0, "noise": 0.5, "number": 0, "ties": "noise",
+}  # fmt: skip
 
 
-def test_the_controls_show_why_the_agent_is_stuck(stuck):
+@pytest.mark.parametrize(
+    ("changed", "can"),
+    [
+        ({}, False),
+        ({"number": 3}, True),
+        ({"agent": "the recommended agent"}, True),
+        ({"noise": 0}, True),
+        ({"ties": "average"}, True),
+    ],
+)
+def test_the_settings_show_why_the_agent_is_stuck(stuck, changed, can):
     """Draw 0 is the noise that it is stuck with; without noise or ties it is not."""
-    assert ranks_and_item(stuck) == (128, 637)
-    for control, value, can in (
-        (stuck.noise, 0.5, False), (stuck.draw, 3, True), (stuck.draw, 0, False),
-        (stuck.agent, "the recommended agent", True), (stuck.agent, "the paper's agent", False),
-        (stuck.noise, 0, True), (stuck.noise, 0.5, False), (stuck.ties, "average", True),
-    ):  # fmt: skip
-        control.value = value
-        assert f"<b>{'can' if can else 'cannot'}</b> be lifted" in stuck.message.value
-    assert ranks_and_item(stuck)[0] < 30
+    title = agent_view(stuck, **SETTINGS | changed).axes[0].get_title()
+    assert f" {'can' if can else 'cannot'} be lifted" in title
+    assert ("item 637 of" in title) is not can
+    ranks = int(title.split()[0])
+    assert ranks < 30 if changed == {"ties": "average"} else ranks == 128
 
 
-def test_colours_are_ranks_and_the_choice_is_outlined(stuck):
-    numbers = np.frombuffer(stuck.canvas.colours, np.uint8)
-    counts = np.bincount(numbers[numbers < LEVELS])
-    assert counts.tolist() == [128 // LEVELS] * LEVELS  # every rank once
-    assert (numbers == ABSENT).sum() == 94
-    assert stuck.canvas.outlined == [ranks_and_item(stuck)[1]]
+def test_colours_are_ranks_and_the_choice_is_in_front(stuck, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("studies.play.agent_view.draw", lambda *given: drawn.append(given))
+    agent_view(stuck, **SETTINGS)
+    ((_, low, high, colours),) = drawn
+    assert len(low) == len(stuck.load) - stuck.unloaded() + 1  # the choice is drawn once more
+    assert (low[-1] + high[-1]) / 2 == pytest.approx(stuck.load.positions[637])
+    assert tuple(colours[-1]) == COLOURS["failed"]
+    seen = (colours != COLOURS["unseen"]).any(axis=1) & (colours != COLOURS["failed"]).any(axis=1)
+    assert len(np.unique(colours[seen], axis=0)) == 127  # every rank once, but for the choice's
+    heights = (low + high)[seen, 2]
+    assert np.corrcoef(heights, colours[seen].sum(axis=1))[0, 1] < -0.9  # dark is high
 
 
 def test_chance_mixes_the_greedy_and_a_random_pick(full_load):
     env = unload.ContainerEnv(physics="table", position_noise=0)
     env.reset(seed=0, options={"load": full_load})
     seen = full_load.positions[env.visible], env.liftable()
-    env.close()
     share = seen[1].mean()
     for epsilon, expected in ((0, 1), (1, share), (0.5, (1 + share) / 2)):
         chance = look(*seen, policy_of("the recommended agent"), epsilon, "noise")[2]

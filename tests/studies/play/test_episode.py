@@ -3,6 +3,7 @@ import pytest
 
 import unload
 from studies.play.episode import PLAYERS, Episode, Pick, Run, explain, policy_of
+from tests.env.comparing import make_env
 
 
 @pytest.fixture
@@ -10,7 +11,7 @@ def episode(full_load):
     return Episode(full_load, seed=3)
 
 
-def test_picks_are_those_of_the_environment(full_load, episode, make_env):
+def test_picks_are_those_of_the_environment(full_load, episode):
     env = make_env().unwrapped
     observation, info = env.reset(seed=3, options={"load": full_load})
     for row in (0, 20, 20, 40, 60, 5):

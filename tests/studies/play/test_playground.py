@@ -10,7 +10,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from studies.play.agent_view import AgentView
 from studies.play.canvas import ABSENT
 from studies.play.episode import Episode, Run
 from studies.play.explore import Explore
@@ -19,12 +18,6 @@ from unload import policies, stack_load
 from unload.load.view import PLOTLY_MIMETYPE
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
-
-
-@pytest.fixture(scope="module")
-def stuck():
-    """The paper's agent without the mask, on a load where it gets stuck at pick 95."""
-    return Playground(seed=4, player="the paper's agent", mask=False, picks=120)
 
 
 @pytest.fixture
@@ -122,7 +115,9 @@ def test_a_player_is_watched_by_the_slider(game):
     assert score(game) == [0, 0]
 
 
-def test_a_deadlock_is_seen_and_the_mask_ends_it(stuck):
+def test_a_deadlock_is_seen_and_the_mask_ends_it():
+    """The paper's agent without the mask, on a load where it gets stuck at pick 95."""
+    stuck = Playground(seed=4, player="the paper's agent", mask=False, picks=120)
     stuck.slider.value = 100
     assert "this is a deadlock" in stuck.message.value
     unloaded = score(stuck)[0]
@@ -148,8 +143,6 @@ def test_where_no_kernel_runs_a_picture_or_a_replay_stands(game):
 
 
 BAD_INPUT = {
-    "agent is 'random'; expected one of": lambda load: AgentView(agent="random"),
-    "picks is -1": lambda load: AgentView(picks=-1),
     "load is 'load'; expected an unload.Load": lambda load: Episode("load"),
     "item is 0; expected one of the visible": lambda load: Episode(load).pick(0),
     "count is 1; expected an integer >= 0 and <= 0": lambda load: Episode(load).back_to(1),

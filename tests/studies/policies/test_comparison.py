@@ -82,8 +82,7 @@ def piles(rng: np.random.Generator) -> Load:
     """140 piles of two cubes each."""
     x, y, z = np.meshgrid(0.5 * np.arange(14) + 0.25, 0.25 * np.arange(10) + 0.125, (0.1, 0.3))
     positions = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    labels = np.zeros(len(positions), dtype=int)
-    return Load(positions, np.full((len(positions), 3), 0.2), labels, labels)
+    return Load(positions, np.full((len(positions), 3), 0.2))
 
 
 def test_play_agrees_with_evaluate():
@@ -160,8 +159,7 @@ def test_every_condition_has_its_panel_whose_dots_are_means_over_the_containers(
 
 
 def test_a_step_leads_to_the_side_and_up():
-    sizes, labels = np.array([(0.5, 1.0, 0.4), (0.5, 0.6, 0.2)]), np.zeros(2, int)
-    load = Load(np.array([(6.7, 1.0, 0.2), (6.7, 1.3, 0.5)]), sizes, labels, labels)
+    load = Load([(6.7, 1.0, 0.2), (6.7, 1.3, 0.5)], [(0.5, 1.0, 0.4), (0.5, 0.6, 0.2)])
     assert steps_of(load) == pytest.approx(np.array([(0.3, 0.3)]))
 
 

@@ -99,8 +99,6 @@ def test_each_question_has_its_cases():
     found = {(case.load, case.friction, case.gap) for case in fresh}
     wanted = len(jams.LOADS) * len(jams.FRICTIONS) * len(jams.GAPS)
     assert len(found) == len(fresh) == wanted
-    questions = [str(jams.question(*case)) for case in cases]
-    assert len(set(questions)) == len(cases)
     other = [(case.load, case.gap, case.friction) for case in mujoco_jams.cases()]
     assert len(set(other)) == len(other) == 21
 

@@ -11,13 +11,14 @@ import pytest
 from studies import grid, paths
 from studies.grid import Cell, Grid, read_grid
 from studies.paper.training import PAPER
-from studies.seamless import figures, jam_tables, training, verdicts
+from studies.seamless import figures, jam_tables, training
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
+from studies.statistics import by_cell, by_run, seamless_plan
+from tests.studies.curves import curve
 from unload import TrainConfig
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
 BY_MASK = {"with the mask": "paper_b2048_mask", "without the mask": "paper_b2048_no_mask"}
-PICKS = np.arange(1, 626) * 32_000
 
 
 def test_the_cells_are_those_of_the_plan():
@@ -46,7 +47,7 @@ def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
 
 def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path):
     curves = read_grid(training.SEAMLESS, cells=[EXPORTED[0]])
-    found = verdicts.measures(curves[curves["seed"] == EXPORTED[1]])
+    found = seamless_plan(curves[curves["seed"] == EXPORTED[1]])
     assert found["fig11"] and found["fig12"]
     (tmp_path / "seamless").mkdir()
     for name in ("seamless/runs_success_rate.csv", "seamless/runs_loss.csv"):
@@ -66,58 +67,42 @@ def test_measured_jams_are_those_of_the_published_table():
         assert found.to_numpy() == pytest.approx(shares, abs=0.1)
 
 
-def run(msr, loss=0.3) -> pd.DataFrame:
-    """A curve of 20 million picks, of numbers at equal distances."""
-    place = np.linspace(0, 1, len(PICKS))
-    values = {
-        name: np.interp(place, np.linspace(0, 1, np.size(each)), np.atleast_1d(each))
-        for name, each in (("success_rate", msr), ("loss", loss))
-    }
-    return pd.DataFrame({"picks": PICKS, **values})
-
-
 def test_a_run_starts_in_its_first_episode_and_ends_in_its_last_tenth():
-    found = verdicts.measures(run([0.2, *[0.5] * 8, 0.8, 0.8]))
+    found = seamless_plan(curve([0.2, *[0.5] * 8, 0.8, 0.8]))
     assert found["start"] == pytest.approx(0.2)
     assert found["end"] == pytest.approx(0.8, abs=1e-3)
-    assert found["best"] == pytest.approx(0.8) and found["drop"] == 0
+    assert found["best"] == pytest.approx(0.8) and found["steady"]
+
+
+RISE = np.linspace(0.2, 0.5, 20)
 
 
 @pytest.mark.parametrize(
-    ("msr", "like"),
+    ("figure", "run", "like"),
     [
-        ([0.15, 0.6, 0.6], True),
-        ([0.26, 0.6, 0.6], False),  # the start
-        ([0.15, 0.6, 0.75], False),  # the end
-        ([0.15, 0.6, 0.45], False),
-        ([0.15, 0.6, 0.56, 0.6], True),  # four points down
-        ([0.15, 0.6, 0.53, 0.6], False),
+        ("fig12", curve([0.15, 0.6, 0.6]), True),
+        ("fig12", curve([0.26, 0.6, 0.6]), False),  # the start
+        ("fig12", curve([0.15, 0.6, 0.75]), False),  # the end
+        ("fig12", curve([0.15, 0.6, 0.45]), False),
+        ("fig12", curve([0.15, 0.6, 0.56, 0.6]), True),  # four points down
+        ("fig12", curve([0.15, 0.6, 0.53, 0.6]), False),
+        ("fig11", curve([0.5], loss=[0.3, 0.2, *RISE, 0.45]), True),
+        ("fig11", curve([0.5], loss=[0.2, *RISE, 0.45]), False),  # does not fall first
+        ("fig11", curve([0.5], loss=[0.3, 0.2, *RISE, *[0.3] * 8]), False),  # sinks by over half
+        ("fig11", curve([0.5], loss=[0.3, 0.2, *RISE]), True),
+        ("fig11", curve([0.5], loss=[0.5, 0.4, 0.3, 0.2]), False),  # does not rise
     ],
 )
-def test_a_run_is_like_fig_12_by_start_end_and_rise(msr, like):
-    assert verdicts.measures(run(msr))["fig12"] is like
-
-
-@pytest.mark.parametrize(
-    ("loss", "like"),
-    [
-        ([0.3, 0.2, *np.linspace(0.2, 0.5, 20), 0.45], True),
-        ([0.2, *np.linspace(0.2, 0.5, 20), 0.45], False),  # does not fall first
-        ([0.3, 0.2, *np.linspace(0.2, 0.5, 20), *[0.3] * 8], False),  # sinks by more than half
-        ([0.3, 0.2, *np.linspace(0.2, 0.5, 20)], True),
-        ([0.5, 0.4, 0.3, 0.2], False),  # does not rise
-    ],
-)
-def test_a_run_is_like_fig_11_by_its_loss(loss, like):
-    assert verdicts.measures(run(0.5, loss))["fig11"] is like
+def test_a_run_is_like_fig_12_by_its_msr_and_like_fig_11_by_its_loss(figure, run, like):
+    assert seamless_plan(run)[figure] is like
 
 
 def test_runs_are_counted_by_cell():
     curves = pd.concat(
-        run([0.15, end, end]).assign(cell="mask_order", seed=seed)
+        curve([0.15, end, end]).assign(cell="mask_order", seed=seed)
         for seed, end in ((40, 0.5), (41, 0.6), (42, 0.9))
     )
-    row = verdicts.by_cell(verdicts.by_run(curves)).loc["mask_order"]
+    row = by_cell(by_run(curves, seamless_plan)).loc["mask_order"]
     assert (row["runs"], row["fig12"], row["steady"]) == (3, 2, 3)
     assert row["lowest"] == pytest.approx(0.5) and row["highest"] == pytest.approx(0.9)
     assert row["end"] == pytest.approx(2 / 3, abs=1e-3)
@@ -131,22 +116,23 @@ def curves() -> pd.DataFrame:
 
 @pytest.mark.parametrize("draw", [figures.fig11_loss, figures.fig12_reward])
 def test_dashed_lines_are_without_the_mask(curves, draw):
-    panel = figures.runs_of(curves, BY_MASK)
-    assert {name: len(runs) for name, runs in panel.items()} == dict.fromkeys(BY_MASK, 8)
-    assert {run["cell"].iloc[0] for run in panel["with the mask"]} == {"paper_b2048_mask"}
-    axes = draw({"a gap of 1 mm": panel, "seamless walls": panel}).axes
+    axes = draw(curves, {"a gap of 1 mm": BY_MASK, "seamless walls": BY_MASK}).axes
     assert [each.get_title() for each in axes] == ["a gap of 1 mm", "seamless walls"]
     strong = [line for line in axes[0].lines if line.get_linewidth() > 1.5]
     assert {line.get_label(): line.get_linestyle() for line in strong} == figures.MASK_LINES
     thin = [line for line in axes[0].lines if line.get_linewidth() < 0.5]
-    assert len(thin) == 16 and strong[0].get_ydata()[0] == thin[0].get_ydata()[0]  # the first run
+    assert len(thin) == 16
+    for line, cell in zip(strong, BY_MASK.values()):  # the first run of each
+        first = curves[(curves["cell"] == cell) & (curves["seed"] == 0)].iloc[0]
+        value = first["loss"] if draw == figures.fig11_loss else 2 * first["success_rate"] - 1
+        assert line.get_ydata()[0] == pytest.approx(value, nan_ok=True)
     stars = [line.get_xydata()[0] for line in axes[0].lines if line.get_marker() == "*"]
     if draw == figures.fig12_reward:  # the paper's start and end
         assert np.array(stars) == pytest.approx(np.array([(0, -0.7), (2e7, 0.2)]))
 
 
 def test_the_line_of_jams_passes_the_papers_point(curves):
-    runs, look = verdicts.by_run(curves), {"marker": "o"}
+    runs, look = by_run(curves, seamless_plan), {"marker": "o"}
     groups = {"ours": (runs, look), "none": (runs.head(0), look)}
     bound, ours, paper = figures.draw_start_and_end(groups).axes[0].lines
     at_start = np.interp(15, bound.get_xdata()[::-1], bound.get_ydata()[::-1])
