@@ -40,9 +40,12 @@ ROOMS = {room: f"tests/{room.removeprefix('unload/')}" for room in ROOMS} | {
     "studies": "tests/studies/test_*.py",
     "studies/speed": "tests/studies/test_speed.py",
 }
-# Tests that take long or start processes of their own.
-SLOW = "full or program_ends or processes or 16_containers or saved_as_the_same"
-OPTIONS = ["-q", "-x", "-m", "not slow", "-k", f"not ({SLOW})"]
+# What a study draws and tells is compared with what is published.
+PUBLISHED = " tests/studies/test_published.py"
+ROOMS |= {room: tests + PUBLISHED for room, tests in ROOMS.items() if room.startswith("studies/")}
+OPTIONS = ["-q", "-x", "-m", "not slow"]
+# Tests of the package that take long or start processes of their own.
+SLOW = "full or program_ends or processes or 16_containers"
 PAIRS = {
     ast.Lt: ast.LtE, ast.Gt: ast.GtE, ast.Eq: ast.NotEq, ast.Is: ast.IsNot, ast.In: ast.NotIn,
     ast.Add: ast.Sub, ast.Mult: ast.Div, ast.And: ast.Or, ast.BitAnd: ast.BitOr,
@@ -101,6 +104,7 @@ def killed_by(trees: SimpleQueue, room: str, path: Path, code: bytes | None, lim
     tests = [each for pattern in ROOMS[room].split() for each in sorted(tree.glob(pattern))]
     own = [each for folder in tests for each in folder.glob(f"test_{path.stem}.py")]
     command = ["timeout", "-s", "KILL", f"{limit:.0f}", sys.executable, "-m", "pytest", *OPTIONS]
+    command += ["-k", f"not ({SLOW})"] if room.startswith("unload") else []
     # Bytecode is known by the second and the size of its source, which a mutant may share.
     env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
     env["NUMBA_DISABLE_JIT"] = str(int(b"@compiled" in before and room != "unload/fast"))

@@ -31,7 +31,8 @@ class LocalPhysics(Physics):
         elif self._world.bodies > MOST_BODIES:
             self._world.clear()
 
-        world, bodies = self._world, list[int]()
+        world = self._world
+        bodies: list[int] = []
         try:
             for row, box in enumerate(situation.boxes * RESOLUTION):
                 mass = task.MASS if row < situation.dynamic else 0.0

@@ -1,0 +1,159 @@
+"""What is published follows from the data: figures, and the tables of the reports."""
+
+import ast
+import json
+import re
+from contextlib import redirect_stdout
+from functools import partial
+from io import BytesIO, StringIO
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import paths, style
+from studies.falls import figures as falls
+from studies.falls.laboratory import read_laboratory, read_trace
+from studies.falls.long import read_long_trace
+from studies.grid import read_grid
+from studies.paper import diagrams, tuning
+from studies.paper.training import PAPER
+from studies.policies.comparison import comparison_msr
+from studies.policies.variants import PARTS, variants_msr
+
+LINE = np.arange(3.0)
+RUNS = {"a": ({0: LINE, 3: 2 * LINE}, 3), "with FE": ({1: LINE}, 1)}
+SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
+# The cells, by their ids, that draw the other figures from data/; all cells of a report.
+PUBLISHED = {
+    "01_task": ("code-08", "code-04", "code-18"),
+    "02_equalization": ("code-16", "code-18"),
+    "03_network": ("code-04",),
+    "06_why_runs_fall": ("why-runs-fall-4", "why-runs-fall-10", "why-runs-fall-14"),
+    "10_lifting": ("lifting-jams",),
+    "11_hyperparameters": ("cell-17", "d7126e58", "cell-19", "cell-24", "cell-28"),
+    "12_training": ("cell-13", "cell-19", "cell-23", "training-start-end"),
+    "20_a_policy_without_a_miss": ("698c4502",),
+    "21_when_is_learning_worth_it": ("cell-23", "cell-28"),
+    "22_how_it_became_fast": ("592fcdbf",),
+    **dict.fromkeys(
+        ("report/01_paper_and_here", "report/02_verdicts", "report/03_outlook")
+        + ("report/04_evidence", "report/05_seamless_walls")
+    ),
+}
+# How Jupyter shows a table.
+JUPYTER = "display.max_columns", 20, "display.max_colwidth", 50, "display.max_rows", 60
+# Figures that are drawn from data/, and take its folder.
+FROM_DATA = {
+    **{f"variants_{part}": partial(variants_msr, part) for part in PARTS},
+    "comparison": comparison_msr,
+    "why_60": lambda folder=paths.DATA: falls.four_cells(read_grid(PAPER, folder)),
+    "why_runs_fall": lambda folder=paths.DATA: falls.loop(
+        read_trace(folder), read_laboratory(folder)
+    ),
+    "a_fall": lambda folder=paths.DATA: falls.fall(read_long_trace(folder).head(40)),
+}
+
+
+def cells_of(notebook: str) -> dict[str, dict]:
+    """The code cells of a notebook, by their ids."""
+    cells = json.loads((paths.ROOT / "notebooks" / f"{notebook}.ipynb").read_text())["cells"]
+    return {cell["id"]: cell for cell in cells if cell["cell_type"] == "code"}
+
+
+def code_of(cell: dict) -> str:
+    return "".join(cell["source"])
+
+
+def saved_by(notebook: str) -> set[str]:
+    """The names under which a notebook saves figures."""
+    code = "\n".join(map(code_of, cells_of(notebook).values()))
+    return set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", code))
+
+
+def run(code: str, namespace: dict) -> tuple[str, str]:
+    """Run a cell; return what it prints, and how its last value is shown."""
+    tree, value, printed = ast.parse(code), None, StringIO()
+    with redirect_stdout(printed):
+        if isinstance(tree.body[-1], ast.Expr):
+            last = ast.Expression(tree.body.pop().value)
+            exec(compile(tree, "cell", "exec"), namespace)
+            value = eval(compile(last, "cell", "eval"), namespace)
+        else:
+            exec(compile(tree, "cell", "exec"), namespace)
+    return printed.getvalue(), repr(value)
+
+
+@pytest.mark.parametrize("notebook", PUBLISHED)
+def test_figures_and_tables_are_those_that_the_data_give(notebook, monkeypatch):
+    drawn, cells = set(), cells_of(notebook)
+
+    def compare(figure, name):
+        content = BytesIO()
+        with plt.style.context(style.STYLE):
+            figure.savefig(content, format="png")
+        content.seek(0)
+        found, published = plt.imread(content), plt.imread(paths.FIGURES / f"{name}.png")
+        assert found.shape == published.shape, name
+        # A processor that rounds otherwise may shade a few pixels otherwise.
+        assert (np.abs(found - published) > 0.1).mean() < 1e-5, name
+        drawn.add(name)
+
+    monkeypatch.setattr(style, "save", compare)
+    monkeypatch.setattr(plt, "show", lambda: None)
+    imports, parameters = list(cells)[:2]
+    namespace: dict = {}
+    with pd.option_context(*JUPYTER):
+        for name in dict.fromkeys((imports, parameters, *(PUBLISHED[notebook] or cells))):
+            printed, shown = run(code_of(cells[name]), namespace)
+            outputs = {output["output_type"]: output for output in cells[name]["outputs"]}
+            assert printed == "".join(outputs.get("stream", {"text": ""})["text"]), name
+            if "execute_result" in outputs:
+                published = "".join(outputs["execute_result"]["data"]["text/plain"])
+                assert shown == published or " at 0x" in published, name
+    assert drawn == saved_by(notebook) - SIMULATED
+
+
+def test_each_published_figure_is_drawn_by_a_notebook():
+    notebooks = (paths.ROOT / "notebooks").rglob("*.ipynb")
+    names = [path.relative_to(paths.ROOT / "notebooks").with_suffix("") for path in notebooks]
+    saved = {name.as_posix(): saved_by(name.as_posix()) for name in names}
+    assert {name for name in saved if saved[name] or "report" in name} == set(PUBLISHED)
+    published = {path.stem for path in paths.FIGURES.glob("*.png")}
+    assert set().union(*saved.values()) == published >= SIMULATED
+    assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in published}
+
+
+@pytest.mark.parametrize("draw", [FROM_DATA["comparison"], diagrams.fig07_network])
+def test_a_figure_is_saved_as_the_same_bytes(draw, tmp_path):
+    for folder in ("a", "b"):
+        style.save(draw(), "figure", tmp_path / folder)
+    for suffix in ("png", "pdf"):
+        first, second = (tmp_path / folder / f"figure.{suffix}" for folder in "ab")
+        assert first.read_bytes() == second.read_bytes()
+
+
+@pytest.mark.parametrize("name", FROM_DATA)
+def test_missing_data_name_the_command_that_makes_them(name, tmp_path):
+    with pytest.raises(FileNotFoundError, match="python -m studies"):
+        FROM_DATA[name](tmp_path)
+
+
+def test_curves_are_running_means_and_the_papers_run_is_strong():
+    figure = tuning.over_steps(RUNS, "MSR")
+    lines = figure.axes[0].lines
+    assert [line.get_zorder() == 3 for line in lines] == [False, True, True]
+    for line, run in zip(lines, (LINE, 2 * LINE, LINE)):
+        assert np.array_equal(line.get_ydata(), tuning.running_mean(run))
+    labels = [text.get_text() for text in figure.axes[0].get_legend().texts]
+    assert labels == ["a, run 3", "with FE"]
+
+
+@pytest.mark.parametrize(("msr", "title"), [(0.6, "60.0%: it errs"), (0.95, "95.0%: it does not")])
+def test_a_dug_load_is_drawn_with_its_preference(msr, title):
+    surface = np.arange(6.0).reshape(3, 2) / 5
+    left, right = falls.dug(surface, (0.5, -0.2), False, msr).axes[:2]
+    assert np.array_equal(left.images[0].get_array(), surface.T)
+    (dot,) = (line for line in right.lines if line.get_xdata().size)
+    assert dot.get_xydata().tolist() == [[0.5, 0.2]] and title in right.get_title()
