@@ -37,11 +37,11 @@ def four_cells(curves: pd.DataFrame) -> Figure:
         for run in runs:
             axes.plot(run["picks"] / 1e6, 100 * run["success_rate"], "C1", lw=0.5, alpha=0.5)
         ends = 100 * np.array([end_msr(run) for run in runs])
-        axes.plot(np.full(len(ends), 21), ends, "k.", ms=4, clip_on=False)
+        axes.plot(np.full(len(ends), 21), ends, "k.", ms=4)
         low, high = t_interval(ends)
         axes.errorbar(
             22.3, ends.mean(), [[ends.mean() - low], [high - ends.mean()]],
-            fmt="k_", capsize=3, clip_on=False,
+            fmt="k_", capsize=3,
         )  # fmt: skip
         axes.axhline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
         kind = f"mask {'on' if cell.config.mask else 'off'}, b = {cell.config.batch_size}"

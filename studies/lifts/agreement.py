@@ -105,7 +105,7 @@ def read_agreement(folder: str | Path = paths.DATA) -> pd.DataFrame:
 
 def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
     """The lifts that succeed in one physics and not in the other; both must be known."""
-    known = frame[frame[one].notna() & frame[other].notna()]
+    known = frame.dropna(subset=[one, other])
     lifted = known[[one, other]] >= task.LIFT_THRESHOLD
     return known[lifted[one] != lifted[other]]
 

@@ -108,7 +108,7 @@ def fig03_substacks() -> Figure:
 
 
 @styled
-def fig07_network(n_features: int = 64) -> Figure:
+def fig07_network(n_features: int) -> Figure:
     """Fig. 7: observations → features → features beside their pooled values → action values.
 
     The cells are shaded by a forward pass of a small network of this kind, so that the

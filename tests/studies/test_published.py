@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from studies import paths, style
 from studies.falls import figures as falls
@@ -125,13 +126,29 @@ def test_each_published_figure_is_drawn_by_a_notebook():
     assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in published}
 
 
-@pytest.mark.parametrize("draw", [FROM_DATA["comparison"], diagrams.fig07_network])
+@pytest.mark.parametrize("draw", [FROM_DATA["comparison"], partial(diagrams.fig07_network, 4)])
 def test_a_figure_is_saved_as_the_same_bytes(draw, tmp_path):
     for folder in ("a", "b"):
         style.save(draw(), "figure", tmp_path / folder)
     for suffix in ("png", "pdf"):
         first, second = (tmp_path / folder / f"figure.{suffix}" for folder in "ab")
         assert first.read_bytes() == second.read_bytes()
+
+
+def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeypatch):
+    monkeypatch.setattr(paths, "FIGURES", tmp_path)
+    cells, namespace = cells_of("01_task"), {}
+    for name in (*list(cells)[:2], "code-25"):
+        run(code_of(cells[name]), namespace)
+    committed = paths.ROOT / "figures" / "unloading.gif"
+    with Image.open(tmp_path / "unloading.gif") as found, Image.open(committed) as published:
+        assert found.n_frames == published.n_frames
+        for number in (0, 1, 15, found.n_frames - 1):
+            found.seek(number)
+            published.seek(number)
+            assert found.info["duration"] == published.info["duration"]
+            both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
+            assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
 
 
 @pytest.mark.parametrize("name", FROM_DATA)

@@ -64,6 +64,14 @@ def test_cells_differ_from_the_first_in_what_they_are_named_for():
     assert {*cells.SEEN, *laboratory.TRACED} < set(laboratory.CELLS)
     for name, fields in cells.TAKEN_BACK.items():
         assert configs[f"ranks_{name}"] == replace(plain, **fields) != plain
+    assert configs["perfect"].epsilon(0) == 0 < plain.epsilon(0)
+
+
+def test_long_runs_store_successes_alone_when_they_no_longer_explore():
+    cell, last = long.LONG.cells["successes"], long.EXPLORED - long.CONFIG.num_envs
+    assert cell.change.keywords == {"start": long.EXPLORED}
+    least = long.CONFIG.epsilon(long.CONFIG.picks)
+    assert cell.config.epsilon(long.EXPLORED) == least < cell.config.epsilon(last)
 
 
 @pytest.mark.parametrize(("cell", "label"), cells.WATCHING.items())
@@ -215,6 +223,11 @@ def test_tilt_is_the_effect_of_place_at_equal_height(observations):
     dug = z + 0.5 * y > 0.3
     along_x, along_y = measures.tilt(observations, dug)
     assert abs(along_x) < 0.03 and along_y > 0.15
+    # The same by what is left of all three within the twelve heights.
+    table = pd.DataFrame({"x": x.ravel(), "y": y.ravel(), "liftable": dug.ravel()}, dtype=float)
+    within = table - table.groupby(pd.cut(z.ravel(), 12, labels=False)).transform("mean")
+    fit = np.linalg.lstsq(within[["x", "y"]], within["liftable"], rcond=None)[0]
+    assert (along_x, along_y) == pytest.approx(fit, abs=1e-4)
 
 
 def test_mistakes_with_and_without_place(network, observations):

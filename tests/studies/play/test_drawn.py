@@ -107,7 +107,8 @@ def test_the_settings_show_why_the_agent_is_stuck(stuck, changed, can):
 def test_colours_are_ranks_and_the_choice_is_in_front(stuck, monkeypatch):
     drawn = []
     monkeypatch.setattr("studies.play.agent_view.draw", lambda *given: drawn.append(given))
-    agent_view(stuck, **SETTINGS)
+    _, legend = agent_view(stuck, **SETTINGS).axes
+    assert legend.get_ylim() == (0, 127)
     ((_, low, high, colours),) = drawn
     assert len(low) == len(stuck.load) - stuck.unloaded() + 1  # the choice is drawn once more
     assert (low[-1] + high[-1]) / 2 == pytest.approx(stuck.load.positions[637])

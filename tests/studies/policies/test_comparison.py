@@ -57,7 +57,8 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
         comparison.loads_of(scale): comparison.measure(load_policy("paper"), scale)
         for scale in comparison.SCALES
     }
-    assert card["on the paper's loads"]["picks"] == 1000
+    known = card["on the paper's loads"]
+    assert known["picks"] == 1000 and known["misses"] == round(1000 * (1 - known["msr"]))
 
 
 @pytest.mark.parametrize("name", comparison.ORIGINS)

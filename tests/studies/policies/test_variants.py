@@ -31,6 +31,8 @@ def test_what_is_shown_together_stands_beside_its_control(part):
     rows = read_variants(part)
     assert rows["cell"].unique().tolist() == [*PARTS[part]]
     assert part == "networks" or rows["cell"].iloc[0] == "unchanged"
+    with pytest.raises(ValueError, match="part is 'loss'; expected one of 'networks', "):
+        read_variants("loss")
 
 
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
