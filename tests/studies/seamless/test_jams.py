@@ -1,7 +1,7 @@
 """Jams in seamless walls: what is lifted, and what is counted; and a second engine."""
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import replace
+from dataclasses import astuple, fields, replace
 
 import numpy as np
 import pandas as pd
@@ -164,11 +164,46 @@ def test_the_model_of_the_second_engine_holds_the_boxes_of_the_case():
     case = Case(0, walls=1, friction=0.49, gap=0.001)
     world = ElementTree.fromstring(mujoco_jams.model_of(case)).find("worldbody")
     load, bodies = jams.load_of(case), world.findall("body")
-    assert len(bodies) == len(load) and len(world.findall("geom")) == 4  # floor and walls
+    assert len(bodies) == len(load)
+    # Floor and walls leave the container free, and reach as far as it does.
+    low, high = np.zeros(3), task.CONTAINER
+    for geom, axis, side in zip(world.findall("geom"), (2, 1, 1, 0), (0, 0, 1, 0), strict=True):
+        at, half = (np.fromstring(geom.get(name), sep=" ") for name in ("pos", "size"))
+        face = (at - half)[axis] if side else (at + half)[axis]
+        assert face == pytest.approx((low, high)[side][axis])
+        others = np.arange(3) != axis
+        assert (at - half <= low)[others].all() and (at + half >= high)[others].all()
     for body, position, size in zip(bodies, load.positions, load.sizes):
         assert np.fromstring(body.get("pos"), sep=" ") == pytest.approx(position)
         halves = np.fromstring(body.find("geom").get("size"), sep=" ")
         assert 2 * halves == pytest.approx(size - [0.001, 0.001, 0])
+
+
+def test_what_is_published_are_the_planned_cases():
+    def rounded(rows) -> list[tuple]:
+        return [tuple(round(x, 6) if isinstance(x, float) else x for x in row) for row in rows]
+
+    names = [field.name for field in fields(Case)]
+    counted = jam_tables.read_jams().rename(columns={"moment": "picks"})[["question", *names]]
+    planned = [(kind, *astuple(case)) for kind, case in jams.cases() if kind != "lasting"]
+    assert rounded(counted.itertuples(index=False)) == rounded(planned)
+
+    keys = ["load", "friction", "again"]
+    lasting = jam_tables.read_jams("jam_lasting").drop_duplicates(keys)[keys]
+    planned = [case for kind, case in jams.cases() if kind == "lasting"]
+    planned = [(case.load, case.friction, case.again) for case in planned]
+    assert list(lasting.itertuples(index=False, name=None)) == planned
+
+    keys = ["load", "walls", "friction", "gap", "policy", "after_pick"]
+    played = jam_tables.read_jams("jam_episodes").drop_duplicates(keys)[keys]
+    assert list(played.itertuples(index=False, name=None)) == [
+        (case.load, case.walls, case.friction, case.gap, policy, after_pick)
+        for case, policy, after_pick in episodes.cases()
+    ]
+
+    other = mujoco_jams.read_mujoco()[["load", "friction", "gap", "settle"]]
+    planned = [(case.load, case.friction, case.gap, case.settle) for case in mujoco_jams.cases()]
+    assert list(other.itertuples(index=False, name=None)) == planned
 
 
 def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too():
