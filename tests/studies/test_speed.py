@@ -11,6 +11,7 @@ import unload
 from studies.speed import mutants, parts
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
 from studies.speed.run import PEQPolicy, show
+from unload.agent import learner
 
 
 def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
@@ -71,6 +72,28 @@ def test_rates_are_positive_and_printed_with_their_units(small_load, monkeypatch
     row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
     show(pd.DataFrame([row]))
     assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
+
+
+def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
+    seen = {}
+
+    def note(agent, batch):
+        rows = learner.ROWS_PER_PASS
+        return type(agent.learner).__name__, torch.get_num_threads(), rows, len(batch["rewards"])
+
+    def call(calls):
+        seen.update({name: update() for name, update in calls.items()})
+        return dict.fromkeys(calls, 1.0)
+
+    monkeypatch.setattr(unload.DQN, "update", note)
+    monkeypatch.setattr(parts, "best_times", call)
+    update_times()
+    assert seen == {
+        "PyTorch, whole batch": ("PlainLearner", 1, 2048, 2048),
+        "PyTorch, chunks of 64": ("PlainLearner", 1, 64, 2048),
+        "fused": ("FusedLearner", 1, 64, 2048),
+        "fused, 2 threads": ("FusedLearner", 2, 64, 2048),
+    }
 
 
 def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
