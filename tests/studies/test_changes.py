@@ -88,6 +88,16 @@ def test_failures_are_replaced_by_successes_of_the_same_step():
     assert run.replay.total == 256
 
 
+def test_where_all_of_a_step_failed_what_was_stored_last_is_stored_again():
+    run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
+    arrays = run.replay.arrays
+    failed = {name: array[:64].copy() for name, array in arrays.items()}
+    run.replay.add(**failed | {"rewards": np.full(64, -1.0)})
+    for array in arrays.values():
+        assert (array[256:320] == array[192:256]).all()
+    assert run.replay.total == 320
+
+
 def test_a_teacher_chooses_by_height_and_its_preference(asking):
     run, _ = asking
     changes.taught(run, preference=0.5)
