@@ -31,7 +31,7 @@ from studies import paths
 from unload.agent.identity import identity
 from unload.support import checks, files
 
-PACKAGES = ("gymnasium", "joblib", "numba", "numpy", "pandas", "pybullet", "torch")
+PACKAGES = ("gymnasium", "joblib", "mujoco", "numba", "numpy", "pandas", "pybullet", "torch")
 COMMAND = "python -m studies"
 # The command-line option of every experiment that uses several processes.
 JOBS = {
