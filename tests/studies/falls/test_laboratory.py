@@ -67,6 +67,13 @@ def test_cells_differ_from_the_first_in_what_they_are_named_for():
     assert configs["perfect"].epsilon(0) == 0 < plain.epsilon(0)
 
 
+@pytest.mark.parametrize("planned", [PAPER.cells, long.LONG.cells, cells.CELLS, cells.FRESH])
+def test_names_of_cells_tell_the_mask_and_the_batch(planned):
+    for name, cell in planned.items():
+        assert cell.config.mask is ("no_mask" not in name), name
+        assert (cell.config.batch_size == 2048) is ("b2048" in name), name
+
+
 def test_long_runs_store_successes_alone_when_they_no_longer_explore():
     cell, last = long.LONG.cells["successes"], long.EXPLORED - long.CONFIG.num_envs
     assert cell.change.keywords == {"start": long.EXPLORED}

@@ -88,3 +88,9 @@ def test_greedy_msr_is_found_again_in_that_of_the_exploring_agent():
     reached = tuning.greedy_reached([mixed, mixed])
     assert reached["step"] == pytest.approx(1750, abs=10)
     assert reached["low"] == reached["high"] == reached["step"]
+
+
+def test_a_rate_is_reached_where_it_stays_until_the_end():
+    never, late, always = [0.95, 0.95, 0.89], [0.95, 0.2, 0.9], [0.9, 0.91, 0.92]
+    found = tuning.reached_at(np.array([never, late, always, [np.nan, 0.95, 0.95]]))
+    assert np.isnan(found[0]) and found[1:].tolist() == [2, 0, 1]

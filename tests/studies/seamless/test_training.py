@@ -26,6 +26,9 @@ def test_the_cells_are_those_of_the_plan():
     patterns = re.findall(r"`([a-z_0-9.*]+)`", plan[plan.index("## Runs") :])
     assert not [name for name in CELLS if not any(fnmatch(name, each) for each in patterns)]
     assert min(seed for cell in CELLS.values() for seed in cell.seeds) == FIRST_SEED == 40
+    for name, cell in CELLS.items():
+        assert cell.config.mask is ("no_mask" not in name), name
+        assert (cell.config.batch_size == 2048) is ("b2048" in name), name
 
 
 def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
