@@ -23,6 +23,7 @@ BY_MASK = {"with the mask": "paper_b2048_mask", "without the mask": "paper_b2048
 
 def test_the_cells_are_those_of_the_plan():
     plan = (paths.DATA / "seamless" / "PLAN.md").read_text()
+    assert f"drawn again within {training.LASTS} successes" in " ".join(plan.split())
     patterns = re.findall(r"`([a-z_0-9.*]+)`", plan[plan.index("## Runs") :])
     assert not [name for name in CELLS if not any(fnmatch(name, each) for each in patterns)]
     assert min(seed for cell in CELLS.values() for seed in cell.seeds) == FIRST_SEED == 40
