@@ -157,6 +157,10 @@ def test_a_heap_is_drawn_from_the_rear_to_the_front(cubes):
     assert painted[3:].max() <= along.max() + 1e-9
 
 
+def test_there_are_as_many_heaps_as_are_made():
+    assert {split: len(stored_heaps(split)) for split in HEAPS} == HEAPS
+
+
 def test_the_shipped_heaps_are_what_the_generator_makes():
     """Of number 60, boxes were still leaving in the last round of settling."""
     made = unpacked(recording._new_heap(recording.SEEDS["train"], 60))
