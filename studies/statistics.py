@@ -118,15 +118,15 @@ def seamless_plan(curve: pd.DataFrame) -> dict:
         the picks; ``best``, of the best window; whether the run is ``steady`` and like ``fig12``
         and ``fig11``.
     """
-    start, end = curve["success_rate"].iloc[0], end_msr(curve)
+    start, end, rises = curve["success_rate"].iloc[0], end_msr(curve), steady(curve)
     starts_so = LIKE_THE_START[0] <= start <= LIKE_THE_START[1]
     ends_so = LIKE_THE_PAPER[0] <= end <= LIKE_THE_PAPER[1]
     return {
         "start": start,
         "end": end,
         "best": windows(curve)["success_rate"].max(),
-        "steady": steady(curve),
-        "fig12": bool(starts_so and ends_so and steady(curve)),
+        "steady": rises,
+        "fig12": bool(starts_so and ends_so and rises),
         "fig11": loss_rises_for_good(curve),
     }
 

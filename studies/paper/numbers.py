@@ -264,7 +264,8 @@ def training() -> pd.DataFrame:
         reproduced = holds if cell.both >= half or not holds else "in part"  # the plan's rule
         end = f"{cell.end:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
         end += f"({2 * cell.end - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's"
-        joint = sum(all(statistics.after_loss_peak(curve)) for curve in curves)
+        own = runs[runs["cell"] == cell.Index]
+        joint = (own["slower"] & own["noisier"]).sum()
         later = f"slower in {cell.slower}, noisier in {cell.noisier}, both in {joint} "
         later += f"of {cell.runs} runs"
         losses = [statistics.windows(curve)["loss"].dropna() for curve in curves]

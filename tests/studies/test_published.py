@@ -1,4 +1,4 @@
-"""What is published follows from the data: figures, and the tables of the reports."""
+"""What is published follows from the data: figures, and tables of the reports."""
 
 import ast
 import json
@@ -75,14 +75,12 @@ def saved_by(notebook: str) -> set[str]:
 
 def run(code: str, namespace: dict) -> tuple[str, str]:
     """Run a cell; return what it prints, and how its last value is shown."""
-    tree, value, printed = ast.parse(code), None, StringIO()
+    tree, printed = ast.parse(code), StringIO()
+    ends_in_value = isinstance(tree.body[-1], ast.Expr)
+    last = tree.body.pop().value if ends_in_value else ast.Constant(None, lineno=1, col_offset=0)
     with redirect_stdout(printed):
-        if isinstance(tree.body[-1], ast.Expr):
-            last = ast.Expression(tree.body.pop().value)
-            exec(compile(tree, "cell", "exec"), namespace)
-            value = eval(compile(last, "cell", "eval"), namespace)
-        else:
-            exec(compile(tree, "cell", "exec"), namespace)
+        exec(compile(tree, "cell", "exec"), namespace)
+        value = eval(compile(ast.Expression(last), "cell", "eval"), namespace)
     return printed.getvalue(), repr(value)
 
 

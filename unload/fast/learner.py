@@ -25,6 +25,7 @@ class FusedLearner:
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
         self.weights, self.beta = fused.weights_of(network), beta
         self.learning_rate, self.steps = learning_rate, 0
+        self._rows = tuple(array.reshape(-1) for array in self.weights)  # the same memory
         # Running means of the gradients and of their squares.
         self.moments = np.zeros((2, sum(array.size for array in self.weights)))
 
@@ -49,8 +50,7 @@ class FusedLearner:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - beta**self.steps for beta in BETAS]
-        weights = tuple(array.reshape(-1) for array in self.weights)
-        _step(weights, gradients, self.moments, self.learning_rate, *corrections)
+        _step(self._rows, gradients, self.moments, self.learning_rate, *corrections)
 
     def state(self) -> dict[str, np.ndarray]:
         return {"steps": np.array(self.steps), "moments": self.moments.copy()}
