@@ -1,5 +1,6 @@
 """``unload train``, and what every command says without any work."""
 
+import inspect
 import re
 import subprocess
 import sys
@@ -47,6 +48,17 @@ def test_every_field_is_an_option_that_is_explained_and_nothing_is_compiled(tmp_
         assert f"({field.default})" in line, field.name
     for text in ("--mask, --no-mask", "* whether failed items are masked", "μ, of Adam."):
         assert text in done.stdout
+
+
+def test_options_are_explained_whether_or_not_docstrings_are_indented(monkeypatch, capsys):
+    """Python 3.13 takes the indent off docstrings."""
+    told = []
+    for docstring in (TrainConfig.__doc__, inspect.cleandoc(TrainConfig.__doc__)):
+        monkeypatch.setattr(TrainConfig, "__doc__", docstring)
+        with pytest.raises(SystemExit):
+            main(["train", "--help"])
+        told.append(capsys.readouterr().out)
+    assert told[0] == told[1]
 
 
 @pytest.mark.parametrize("option", ["--help", "--version"])

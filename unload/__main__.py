@@ -1,6 +1,7 @@
 """The command line, ``unload``: the order of picks for a packing list, and training."""
 
 import argparse
+import inspect
 import re
 import signal
 import sys
@@ -139,11 +140,12 @@ def _named(text: str) -> Callable:
 
 def _explained(kind: type) -> dict[str, str]:
     """What the docstring of a dataclass says of each of its attributes."""
-    attributes = kind.__doc__.partition("Attributes:\n")[2].partition("\n\n")[0]
+    text = inspect.getdoc(kind) or ""  # from Python 3.13 on, docstrings have no indent
+    attributes = text.partition("Attributes:\n")[2].partition("\n\n")[0]
     found: dict[str, str] = {}
-    for entry in re.split(r"\n {8}(?=\w)", "\n" + attributes)[1:]:
-        names, _, text = " ".join(entry.replace("``", "").split()).partition(": ")
-        found |= dict.fromkeys(names.split(", "), text)
+    for entry in re.split(r"\n {4}(?=\w)", "\n" + attributes)[1:]:
+        names, _, meaning = " ".join(entry.replace("``", "").split()).partition(": ")
+        found |= dict.fromkeys(names.split(", "), meaning)
     return found
 
 
