@@ -1,5 +1,6 @@
 """The identity of functions that are handed to a run."""
 
+import linecache
 import runpy
 import subprocess
 import sys
@@ -128,6 +129,17 @@ def test_a_function_without_source_is_the_same_in_each_process():
     ]
     one, same, other = (each.stdout for each in found)
     assert one.startswith("__main__.f ") and one == same != other
+
+
+@pytest.mark.parametrize("text", ["", "def other(run): return 3\n", "f = 3\n"])
+def test_a_function_is_not_taken_for_a_text_of_the_same_name(text, monkeypatch):
+    """From Python 3.13 on, the text of ``python -c`` can be read, under the name of ``exec``'s."""
+    found = []
+    for source in ("def f(run): return 1", "def f(run): return 2"):
+        exec(compile(source, "<shared>", "exec"), names := {"__name__": "__main__"})
+        monkeypatch.setitem(linecache.cache, "<shared>", (1, None, [text or "\n"], "<shared>"))
+        found.append(identity(names["f"]))
+    assert found[0] != found[1]
 
 
 def doubled(run) -> None:

@@ -157,7 +157,9 @@ def _tree(function: FunctionType) -> ast.AST | None:
     for node in ast.walk(tree):
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and ast.get_docstring(node):
             node.body = node.body[1:] or [ast.Pass()]
-    return tree.body[0]
+    # What ``exec`` has made may share the name of its file with another text.
+    names = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
+    return tree.body[0] if names == [function.__code__.co_name] else None
 
 
 def _bytecode(code: CodeType) -> str:
