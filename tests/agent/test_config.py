@@ -14,6 +14,9 @@ def test_the_papers_configuration_is_the_default():
     assert (config.batch_size, config.replay_size) == (2048, 2**20)
     assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
     assert (config.network, config.n_features, config.max_picks, config.seed) == ("peq", 64, 500, 0)
+    assert (config.epsilon_init, config.epsilon_final, config.epsilon_fraction) == (1, 0, 0.5)
+    assert (config.mask, config.gradient_steps, config.target_update_interval) == (False, 1, 10_000)
+    assert config.checkpoint_interval == 600
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 
 

@@ -7,6 +7,8 @@ from torch.nn.functional import smooth_l1_loss
 
 from tests.agent.runs import HeightNetwork, make_batch, peq, weights, without_next
 from unload import DQN, Greedy
+from unload.agent.learner import PlainLearner
+from unload.fast.learner import FusedLearner
 
 
 def test_epsilon_is_the_share_of_random_actions(rng):
@@ -29,6 +31,7 @@ def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
     """
     batch = make_batch(rng)
     agent = DQN(peq(), learning_rate=0.01, gamma=gamma, beta=beta, fused_update=fused)
+    assert type(agent.learner) is (FusedLearner if fused else PlainLearner)
     reference, target = peq(), peq()
     optimizer = torch.optim.Adam(reference.parameters(), lr=0.01)
     for number in range(3):
@@ -94,6 +97,8 @@ def test_what_is_no_network_setting_or_batch_is_refused(rng):
     for name in ("gamma", "beta", "learning_rate", "fused_update"):
         with pytest.raises((TypeError, ValueError), match=f"{name} is -0.5; expected"):
             DQN(peq(), **{name: -0.5})
+    with pytest.raises(ValueError, match="gamma is 1.5; expected"):
+        DQN(peq(), gamma=1.5)
     with pytest.raises(ValueError, match="batch has no actions, observations, rewards"):
         DQN(peq()).update({})
     with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):

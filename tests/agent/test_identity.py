@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 from functools import partial
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from unload.agent.identity import identity
 from unload.load.boxes import Load
 from unload.support import files
 
+# A module of this package.
+SIBLING = ModuleType("tests.sibling")
 CODE = """
     import functools
     LIMIT = 3
@@ -67,8 +70,8 @@ def test_other_code_is_another_function_and_another_comment_is_not(tmp_path, old
         path.write_text(textwrap.dedent(source))
         found.append(identity(runpy.run_path(path, run_name="own.module")["change"]))
     one, other, again = found
-    assert one.startswith("own.module.change ") and (one == other) == same
-    assert one == again
+    assert one == again == "own.module.change 2bf649a0f09f9449", "kept runs are known by it"
+    assert (one == other) == same
 
 
 def enclosing(walls: int):
@@ -77,6 +80,11 @@ def enclosing(walls: int):
 
 def with_default(walls: int):
     return lambda rng, number=walls: stack_load(rng, walls=number)
+
+
+def with_module(walls: int):
+    SIBLING.walls = walls
+    return lambda rng: stack_load(rng, walls=SIBLING.walls)
 
 
 class Maker:
@@ -97,6 +105,8 @@ class Maker:
     [
         enclosing,
         with_default,
+        with_module,
+        lambda walls: [lambda rng: 10, lambda rng: 11][walls - 10],
         Maker,
         lambda walls: Maker(walls).stack,
         lambda walls: partial(stack_load, walls=walls),

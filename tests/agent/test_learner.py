@@ -4,7 +4,6 @@ import torch
 from torch.nn.functional import smooth_l1_loss
 
 from tests.agent.runs import make_batch, peq
-from unload import DQN
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.fast.learner import FusedLearner
 
@@ -57,12 +56,3 @@ def test_the_fused_update_takes_tanh_in_double_precision(batch, kind):
     for _ in range(3):
         learner.start(batch, np.full(SIZE, -1, np.float32))()
     assert (saturated.scorer.bias.item() < 12) == (kind is FusedLearner)
-
-
-def test_plain_means_plain_everywhere(rng, batch, monkeypatch):
-    """Without the fused update, nothing of it is called, neither to learn nor to choose."""
-    for name in ("start_gradients", "best_actions"):
-        monkeypatch.setattr(f"unload.fast.fused.{name}", lambda *_, **__: pytest.fail("not plain"))
-    agent = DQN(peq(), fused_update=False)
-    agent.update(batch)
-    agent.choose(batch["observations"], np.ones((SIZE, ITEMS), bool), 0.0, rng)

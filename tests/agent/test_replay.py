@@ -49,15 +49,6 @@ def test_the_oldest_picks_are_overwritten(rng):
     assert set(kept.tolist()) == set(range(13, 24))
 
 
-def test_samples_are_uniform_and_seeded(rng):
-    replay = ReplayBuffer(8, 4)
-    replay.add(**picks(0, 8))
-    counts = np.bincount(replay.sample_rows(40_000, rng))
-    assert counts / 40_000 == pytest.approx(np.full(8, 1 / 8), abs=0.01)
-    first, same = (replay.sample_rows(50, np.random.default_rng(1)) for _ in range(2))
-    assert (first == same).all()
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -26,11 +26,6 @@ def own_network(n_features, generator):
     return HeightNetwork(0.1)
 
 
-def of(network) -> dict:
-    """The argument of ``train`` for a network that a factory returns."""
-    return {"config": TrainConfig(**CONTAINER | {"network": lambda n, generator: network})}
-
-
 def metres(run) -> None:
     run.reward = lambda picks, distances: distances
 
@@ -88,6 +83,7 @@ def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, coun
             Training(TrainConfig(**CONTAINER, seed=seed))
     assert len(said) == count
     assert all(f"PyTorch uses {found} instructions" in str(each.message) for each in said)
+    assert all(each.filename == __file__ for each in said), "where the run was asked for"
 
 
 @pytest.mark.parametrize(
@@ -261,9 +257,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     ("given", "error", "message"),
     [
         ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
-        (of(None), TypeError, "what network returned is None; expected a torch.nn.Module"),
-        (of(HeightNetwork().double()), TypeError, "weight of dtype torch.float64; expected"),
-        (of(HeightNetwork(torch.ones(2, 1, 1))), ValueError, r"\(2, 2, 3\); expected \(2, 3\)"),
+        ({"config": replace(HIGHEST, network=lambda *_: None)}, TypeError, "returned is None; exp"),
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),

@@ -51,8 +51,9 @@ def test_16_containers_for_whole_episodes_and_beyond():
     play_both(CONTAINER, 16, 520, equalize=True)
 
 
-def test_what_can_be_seen_and_lifted_is_that_of_the_single_environments():
-    array, side_by_side = make_pair(CONTAINER, 3)
+@pytest.mark.parametrize("count", [41, 800])
+def test_what_can_be_seen_and_lifted_is_that_of_the_single_environments(count):
+    array, side_by_side = make_pair(CONTAINER, 3, stack=lambda rng: few_items(rng, count))
     with pytest.raises(ResetNeeded):
         array.liftable()
     observed, _ = array.reset(seed=4)
@@ -79,12 +80,13 @@ def test_a_load_may_be_given(rng):
     assert array.unwrapped._containers.left.min() > 700
 
 
-def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
-    envs = ContainerVectorEnv(1)
-    envs.reset(seed=0)
-    liftable = envs.liftable()
+@pytest.mark.parametrize("make", [lambda: ContainerVectorEnv(1), lambda: make_env().unwrapped])
+def test_a_lift_as_far_as_the_threshold_is_enough(make, monkeypatch):
+    env = make()
+    env.reset(seed=0)
+    liftable = env.liftable()
     monkeypatch.setattr(unload.task, "LIFT_THRESHOLD", FREE_LIFT)
-    assert_same(envs.liftable(), liftable)
+    assert_same(env.liftable(), liftable)
 
 
 def test_fewer_boxes_may_have_more_contacts():

@@ -39,9 +39,9 @@ def reference(net, batch, beta=1.0):
     return loss.item(), [parameter.grad for parameter in double.parameters()]
 
 
-def gradients(net, batch, *more):
+def gradients(net, batch, beta=1.0, rows=None):
     """The gradients of all weights, one after the other, and the loss."""
-    return fused.start_gradients(fused.weights_of(net), *batch.values(), *more)()
+    return fused.start_gradients(fused.weights_of(net), *batch.values(), beta, rows)()
 
 
 def check(net, batch, beta=1.0, tolerance=1e-5):
@@ -134,7 +134,7 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
 
 def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
     net, batch = peq(64), random_batch(rng, FOR_TWO_THREADS)
-    finish = fused.start_gradients(fused.weights_of(net), *batch.values())
+    finish = fused.start_gradients(fused.weights_of(net), *batch.values(), 1.0)
     everything = np.ones(batch["observations"].shape[:2], bool)
     fused.best_actions(fused.weights_of(net), batch["observations"], everything)
     assert np.array_equal(finish(), gradients(net, batch))
@@ -162,6 +162,8 @@ def test_choice_is_that_of_the_network(batch, rng):
     actions = fused.best_actions(fused.weights_of(net), batch["observations"], allowed)
     with pytest.raises(FloatingPointError, match="row 0 has no allowed action"):
         fused.best_actions(fused.weights_of(net), batch["observations"], np.zeros_like(allowed))
+    with pytest.raises(ValueError, match="allowed has shape"):
+        fused.best_actions(fused.weights_of(net), batch["observations"], allowed[:, 1:])
     assert np.mean(actions == expected) > 0.99  # tanh may round two scores to one value
     rows = np.arange(BATCH)
     best = values.detach().numpy()
@@ -214,7 +216,7 @@ def test_rule_of_where_it_applies(other):
 def test_bad_rows_are_refused_by_name(batch):
     for rows in ([0, BATCH], [-1, 0], [0.0, 1.0], np.zeros((2, 2), int), np.zeros(0, int)):
         with pytest.raises((TypeError, ValueError), match="rows"):
-            gradients(peq(4), batch, 1.0, np.array(rows))
+            gradients(peq(4), batch, rows=np.array(rows))
 
 
 @given(

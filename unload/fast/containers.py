@@ -98,9 +98,8 @@ def start(containers, env, equalize, average, tolerance):
 @compiled
 def show(containers, env, rows, equalize, average, tolerance):
     """Write the observation and the mask of a container that has changed."""
-    containers.masks[env] = 1
-    if rows < N_VISIBLE:
-        containers.masks[env, rows:] = 0
+    containers.masks[env, :rows] = 1
+    containers.masks[env, rows:] = 0
     features(
         containers.values[env], containers.ranks[env], equalize, average, tolerance,
         containers.observations[env], rows,

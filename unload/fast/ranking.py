@@ -81,13 +81,11 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
         observation: (rows, axes) float32, filled.
         items: how many of the rows, the first ones, hold an item.
     """
-    axes, rows = values.shape
     twice, levels = np.empty(items, np.int32), LEVELS[items]
-    if items < rows:
-        observation[items:] = task.PADDING
+    observation[items:] = task.PADDING
 
     # A tie is a run of neighbours on one axis, so each axis is equalized by itself.
-    for axis in range(axes):
+    for axis in range(len(values)):
         if not equalize:
             for i in range(items):
                 observation[i, axis] = values[axis, i]
