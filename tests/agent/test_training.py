@@ -1,5 +1,6 @@
 import json
 import os
+import signal
 import warnings
 from contextlib import nullcontext
 from dataclasses import replace
@@ -143,7 +144,7 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     train(TrainConfig(**CONTAINER), tmp_path, progress=True)
     shown = capsys.readouterr()
     assert "MSR=" in shown.out and "loss=" in shown.out and "pick/s" in shown.out
-    assert shown.err == ""
+    assert shown.err == "" and max(map(len, shown.out.splitlines())) <= 100
     with open(tmp_path / "log.txt", "w") as log:
         train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
     assert "200/200" in (tmp_path / "log.txt").read_text()
@@ -195,7 +196,8 @@ def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
 
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     """The second run asks PyBullet nothing, and gives the same."""
-    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
+    config, lifts = TrainConfig(**CONTAINER, checkpoint_interval=0), tmp_path / "lifts.npz"
+    kept = []
     for name in ("first", "second"):
         table = LiftTable()
         for place in ("unload.agent.training", "unload.env.vector"):
@@ -203,7 +205,9 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
         train(
             config, tmp_path / name, progress=False, lifts=lifts,
             stack=lambda rng: own_load(rng, "continuous sizes"),
+            callback=lambda point: kept.append(len(LiftTable.load(lifts))),
         )  # fmt: skip
+        assert kept[-1] > 0, "by the checkpoints, before the end"
         assert len(LiftTable.load(lifts)) == len(table) > 10
         monkeypatch.setattr("unload.physics.table.TablePhysics.simulate_all", None)
     assert_same(tmp_path / "first", tmp_path / "second")
@@ -228,13 +232,15 @@ def test_lifts_are_kept_when_a_run_is_stopped_and_refused_where_they_are_damaged
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
-def test_a_run_of_the_fewest_picks_makes_one_update(replay_size, picks):
-    config = TrainConfig(**CONTAINER | {"replay_size": replay_size, "picks": picks})
+def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
+    fields = {"replay_size": replay_size, "picks": picks, "gradient_steps": 3}
+    config = TrainConfig(**CONTAINER | fields)
     run = Training(config)
     while not run.rollout.finished:
-        before = run.curve.sums["updates"]
+        before = run.agent.learner.steps
         run.step()
-    assert before == 0 and np.isfinite(run.curve.points[-1].loss)
+    assert (before, run.agent.learner.steps) == (0, 3)
+    assert np.isfinite(run.curve.points[-1].loss)
     with pytest.raises(ValueError, match=f"picks is {picks - 4}; expected at least {picks}, bec"):
         replace(config, picks=picks - 4)
 
@@ -251,6 +257,21 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, inter
     if interval == 0:
         stored = files.read_arrays(tmp_path / "checkpoint.npz")
         assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
+
+
+@pytest.mark.parametrize("stop", [lambda: False, lambda: 1 / 0])
+def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
+    """Whether it ends the run or raises; and the environments are closed."""
+    started = []
+
+    def callback(point):
+        torch.nn.init.constant_(started[0].agent.network.scorer.bias, torch.inf)
+        return stop()
+
+    with pytest.raises(FloatingPointError, match="scorer.bias is not finite"):
+        train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
+    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock", "owner"}
+    assert started[0].rollout.envs.closed
 
 
 @pytest.mark.parametrize(
@@ -371,9 +392,10 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
 
 @pytest.mark.parametrize("method", ["finish", "result"])
 def test_ctrl_c_in_the_last_moments_is_not_swallowed(tmp_path, method):
-    config = TrainConfig(**CONTAINER)
+    config, handler = TrainConfig(**CONTAINER), signal.getsignal(signal.SIGINT)
     with runs.at(RunFolder, method, 1, interrupt), pytest.raises(KeyboardInterrupt):
         train(config, tmp_path, progress=False)
+    assert signal.getsignal(signal.SIGINT) is handler
     with at_step(1, runs.crash):  # it is finished
         assert len(train(config, tmp_path, progress=False).curve) == 10
 
