@@ -69,15 +69,6 @@ def test_each_episode_counts_to_its_own_end(policy, mask):
     assert not mask or (frame[["deadlocked", "longest_deadlock"]] == 0).all(axis=None)
 
 
-def test_local_and_table_agree_to_the_last_item():
-    frames = [
-        evaluate(policies.random, 1, physics=p, max_picks=None, stack=lambda rng: few_items(rng, 9))
-        for p in ("local", "table")
-    ]
-    pd.testing.assert_frame_equal(*frames)
-    assert frames[0]["emptied"].all()
-
-
 def test_an_episode_that_is_stuck_is_given_up():
     frame = evaluate(lowest, 2, mask=False, max_picks=None, stack=lambda rng: few_items(rng, 40))
     assert not frame["emptied"].any() and (frame["unloaded"] < 40).all()
