@@ -125,9 +125,11 @@ def test_what_is_no_policy_or_rule_is_refused(given, error, message):
         picking_order(read_load(), **given)
 
 
-def test_what_floats_is_not_unloaded(boxes):
+def test_what_floats_or_is_no_load_is_not_unloaded(boxes):
     with pytest.raises(ValueError, match="floats"):
         picking_order(boxes((0.3, 0.9)))
+    with pytest.raises(TypeError, match="load is None; expected an unload.Load"):
+        picking_order(None)
 
 
 def test_the_command_line_prints_the_order_as_csv(capsys, tmp_path):

@@ -284,7 +284,7 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),
         ({"lifts": ""}, ValueError, "lifts is ''; expected the name of a file"),
         ({"stack": 3}, TypeError, "stack is 3; expected"),
-        ({"stack": lambda rng: "load"}, TypeError, "is 'load'; expected an unload.Load"),
+        ({"stack": lambda rng: "load"}, TypeError, "returned is 'load'; expected an unl"),
         ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
         ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
@@ -297,6 +297,8 @@ def test_bad_arguments_are_refused(tmp_path, given, error, message):
     usual = {"config": TrainConfig(**CONTAINER), "run_dir": tmp_path / "run", "progress": False}
     with pytest.raises(error, match=message):
         train(**usual | given)
+    # What a function returns is known only when it has been called.
+    assert (tmp_path / "run").exists() == ("returned" in message)
     assert not list(tmp_path.glob("*/*.*"))
 
 

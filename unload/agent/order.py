@@ -12,7 +12,7 @@ from unload.agent import policies
 from unload.agent.evaluation import Policy
 from unload.agent.greedy import SHIPPED, load_policy
 from unload.env.container import ContainerEnv
-from unload.load.boxes import OVERLAP, Load, check_load, check_stacked
+from unload.load.boxes import OVERLAP, Load, check_stacked
 from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
 
@@ -75,7 +75,7 @@ def picking_order(
             something other than a row that its mask allows, or ``rule`` other than keys.
         FileNotFoundError: there is no such policy; the message lists the names.
     """
-    check_load(load)
+    check_stacked(load)
     rng = np.random.default_rng(checks.integer("seed", seed, 0))
     if isinstance(policy, (str, Path)):
         policy = str(policy)
@@ -124,7 +124,6 @@ def _by_policy(load: Load, policy: Policy, rng: np.random.Generator) -> Iterator
 
 def _by_rule(load: Load, rule: Rule) -> Iterator[tuple[int, float]]:
     """Items and how far they move, as a rule picks them among all that are present."""
-    check_stacked(load)
     physics, failed = TablePhysics(shared_table()), np.zeros(len(load), bool)
     physics.reset(load)
     while (allowed := physics.present & ~failed).any():

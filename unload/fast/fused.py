@@ -94,12 +94,11 @@ def start_gradients(
     # Compiled code reads and writes wherever it is told to, therefore all is checked before.
     count, items = _check(observations)
     rows = np.arange(count) if rows is None else rows
-    checks.shaped("rows", rows, (None,), np.dtype(np.int64))
+    rows = checks.integer_array("rows", rows, (None,), count - 1)
     checks.shaped("actions", actions, (count,), np.dtype(np.int64))
     checks.shaped("targets", targets, (count,), np.dtype(np.float32))
     if not rows.size:
         raise ValueError("rows is empty; expected at least one")
-    checks.integer_array("rows", rows, (None,), count - 1)
     checks.integer_array("actions", actions[rows], (None,), items - 1)
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
