@@ -40,7 +40,9 @@ def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
 
 
 def test_a_load_does_not_depend_on_how_many_there_are():
-    few, many = evaluate(lowest, 2, seed=0, max_picks=30), evaluate(lowest, 70, max_picks=30)
+    few = evaluate(policies.highest, 2, seed=0, max_picks=None)
+    many = evaluate(policies.highest, 70, max_picks=None)
+    assert many["unloaded"].nunique() > 20
     pd.testing.assert_frame_equal(few, many.loc[:1])
     one, two = (evaluate(policies.random, n, physics="local", max_picks=9) for n in (1, 2))
     pd.testing.assert_frame_equal(one, two.iloc[:1])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_env, make_pair
-from tests.load.walls import crossed_bars
+from tests.load.walls import crossed_bars, own_load
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import FREE_LIFT, LiftTable
 
@@ -97,9 +97,11 @@ def test_fewer_boxes_may_have_more_contacts():
     play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])
 
 
-def test_containers_of_other_sizes_stand_side_by_side():
+def test_containers_and_boxes_of_other_sizes_stand_side_by_side():
+    """PyBullet is asked for their lifts, also after a larger load has come into another one."""
+
     def stack(rng):
-        load = few_items(rng, 150)
+        load = own_load(rng, "continuous sizes")
         container = load.container + rng.choice([0.0, 0.3, 5.0], 3)
         return unload.Load(load.positions, load.sizes, container=container)
 
@@ -189,6 +191,17 @@ def test_unknown_lifts_are_those_of_the_load_that_stands_there_now():
         assert sorted(envs.visible[seen]) == sorted(
             single.unwrapped.visible[single.unwrapped.liftable()]
         )
+
+
+def test_unknown_lifts_go_on_when_a_larger_load_has_come_into_another_container(small_load):
+    envs, other = ContainerVectorEnv(2), ContainerVectorEnv(2)
+    envs.table, other.table = LiftTable(), LiftTable()
+    envs.reset(seed=0, options={"load": small_load})
+    envs.liftable()
+    envs.reset(seed=0, options={"reset_mask": np.array([False, True])})
+    other.load_state(envs.state())
+    for row in (*range(40), *range(40)):
+        assert_same(envs.step(np.array([row, 0])), other.step(np.array([row, 0])))
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
