@@ -60,6 +60,15 @@ def test_what_a_run_leaves(tmp_path, fields):
     assert loaded.card["configuration"] == stored
 
 
+def test_loads_choices_and_weights_have_each_their_seed():
+    config = TrainConfig(**CONTAINER)
+    run, (loads, choices, weights) = Training(config), config.seeds()
+    seen, _ = ContainerVectorEnv(4, equalize=True).reset(seed=loads)
+    assert (run.rollout.observations == seen).all()
+    assert run.rng.random() == np.random.default_rng(choices).random()
+    assert torch.equal(run.agent.network.extractor.weight, runs.peq(4, weights).extractor.weight)
+
+
 def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
     """Row 5 again and again: it changes only when it is unloaded. Nothing is learned."""
     small = {"num_envs": 1, "picks": 30, "max_picks": 30, "log_interval": 30, "gradient_steps": 0}
