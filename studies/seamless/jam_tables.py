@@ -18,9 +18,7 @@ FEW_BESIDE = 3  # so many neighbours or more are one class along episodes
 BETWEEN = (0, 1, 2, 4, 7, 13, 26)  # successes between two attempts at a jammed box, from
 
 
-def jams_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def jams_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
     """Lift the boxes of all cases; write two tables in ``seamless/``.
 
     ``jams.csv`` has a row per case: its ``question``, the fields of ``jams.Case``, where ``moment``
@@ -70,9 +68,7 @@ def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
     return rows
 
 
-def episodes_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def episodes_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
     """Play the episodes of ``episodes.cases``; write three tables in ``seamless/``.
 
     ``jam_episodes.csv`` has a row per episode and 25 boxes taken out: the load and its ``walls``,
@@ -153,10 +149,12 @@ def again(attempts: pd.DataFrame, first: pd.DataFrame) -> pd.DataFrame:
     return counts.reset_index()
 
 
-def both_data(n_jobs: int = -1) -> None:
+def both_data(
+    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
+) -> None:
     """Make the data of single lifts and of episodes."""
-    jams_data(n_jobs=n_jobs)
-    episodes_data(n_jobs=n_jobs)
+    jams_data(folder, runs_dir, n_jobs)
+    episodes_data(folder, runs_dir, n_jobs)
 
 
 def read_jams(name: str = "jams", folder: str | Path = paths.DATA) -> pd.DataFrame:

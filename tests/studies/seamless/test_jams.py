@@ -1,16 +1,28 @@
 """Jams in seamless walls: what is lifted, and what is counted; and a second engine."""
 
+import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import astuple, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from studies.seamless import episodes, jam_tables, jams, mujoco_jams
-from studies.seamless.jams import Case
+from studies.seamless.jams import Case, SeamlessPhysics
 from unload import task
 from unload.load.boxes import ABOVE
+from unload.physics.bullet import World
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Instead of a simulation: ``lift`` answers, ``settled`` holds how long a load has settled."""
+    simulated = SimpleNamespace(settled=[], lift=lambda physics, box: 0.4 if box % 3 else 0.0)
+    monkeypatch.setattr(SeamlessPhysics, "_lift", lambda physics, box: simulated.lift(physics, box))
+    monkeypatch.setattr(SeamlessPhysics, "settle", lambda _, time: simulated.settled.append(time))
+    return simulated
 
 
 def test_the_walls_of_a_case_stand_at_the_rear():
@@ -51,6 +63,58 @@ def test_a_place_is_that_of_the_box():
     assert not jams.place(load, present, behind)["covered"]
 
 
+def test_the_world_of_a_case_has_its_gap_widths_friction_and_solver(monkeypatch):
+    added, add = [], World.add_box
+    monkeypatch.setattr(
+        World, "add_box", lambda *args, **kwargs: added.append(kwargs) or add(*args, **kwargs)
+    )
+    fields = {"time_step": 1 / 120, "iterations": 20, "maximal": False}
+    case = Case(0, walls=1, friction=0.64, gap=0.002, spread=1e-4, **fields)
+    physics, load = SeamlessPhysics(case), jams.load_of(case)
+    assert physics.after_pick == "restore"
+    physics.reset(load)
+    world = physics._world
+    assert (world.time_step, world._iterations, world._maximal) == tuple(fields.values())
+    assert added == [{"friction": pytest.approx(0.8)}] * (len(load) + 5)
+    narrower = load.sizes - physics._slim(load.sizes)
+    assert narrower[:, [0, 2]] == pytest.approx(np.tile([0.002, 0], (len(load), 1)))
+    assert narrower[:, 1].mean() == pytest.approx(0.002, abs=5e-5)
+    assert narrower[:, 1].std() == pytest.approx(1e-4, rel=0.3)
+
+
+@pytest.mark.parametrize(("walls", "again"), [(3, 0.0), (12, 0.25)])
+def test_visible_free_boxes_are_lifted_after_some_picks(simulated, walls, again):
+    case = Case(0, walls=walls, picks=2, again=again)
+    physics = jams.prepared(case, np.random.default_rng((case.load, case.picks)))
+    load, present = physics.load, physics.present
+    assert (~present).sum() == 2 and simulated.settled == [0.5, again][: 1 + (again > 0)]
+    free = jams.visible_free(load, present).tolist()
+    rows = jams.lifts(case)
+    boxes = [row["box"] for row in rows]
+    chosen = set(free) if walls == 3 else set(free) & set(boxes)
+    assert len(free) > 24 and boxes == sorted(chosen) and len(rows) == (24, len(free))[walls == 3]
+    for row in rows:
+        distance = {"distance": simulated.lift(physics, row["box"])}
+        assert row == jams.place(load, present, row["box"]) | distance
+
+
+def test_half_of_the_free_boxes_are_lifted_again_after_others_have_gone(simulated):
+    case = Case(0, again=0.25)
+    load = jams.load_of(case)
+    simulated.lift = lambda physics, box: len(load) - int(physics.present.sum()) + box / 1000
+    rows = jams.persistence(case)
+    boxes = [row["box"] for row in rows if row["out"] == 0]
+    free = jams.visible_free(load, np.ones(len(load), bool))
+    assert len(boxes) == len(free) // 2 and np.isin(boxes, free).all()
+    assert rows == [
+        {"box": box, "out": out, "before": box / 1000, "distance": out + box / 1000}
+        for out in jams.PERSISTENCE
+        for box in boxes
+    ]
+    assert simulated.settled == [0.5, 0.25, 0.25, 0.25, 0.25]  # at first, and after each picks
+    assert jams.answer("lasting", case) == rows and jams.answer("fresh", case) == jams.lifts(case)
+
+
 @pytest.mark.slow
 def test_the_more_friction_in_seamless_walls_the_more_jam():
     cases = [Case(0, walls=1, friction=friction) for friction in (0.25, 1.0)]
@@ -76,8 +140,8 @@ def test_a_box_that_is_lifted_again_at_once_moves_as_before(monkeypatch):
 def test_what_lasts_is_counted():
     lifts = [
         {"box": box, "out": out, "before": before, "distance": distance}
-        for out, distances in ((0, (0.1, 0.1, 0.4)), (5, (0.1, 0.3, 0.0)))
-        for box, (before, distance) in enumerate(zip((0.1, 0.1, 0.4), distances))
+        for out, distances in ((0, (0.1, 0.1, 0.2)), (5, (0.1, 0.3, 0.0)))
+        for box, (before, distance) in enumerate(zip((0.1, 0.1, 0.2), distances))
     ]
     first, second = jam_tables.lasting_rows(Case(2), lifts)
     counts = "boxes", "jammed_before", "again_jammed", "newly_jammed"
@@ -103,20 +167,34 @@ def test_each_question_has_its_cases():
     assert len(set(other)) == len(other) == 21
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("after_pick", episodes.AFTER_PICK)
-def test_an_episode_takes_out_what_is_lifted(monkeypatch, after_pick):
-    monkeypatch.setattr(episodes, "CONTAINER_ATTEMPTS", 15)
-    rows = episodes.episode(Case(0, walls=1, friction=0.64), "highest", after_pick)
-    lifted = np.array([row["distance"] >= task.LIFT_THRESHOLD for row in rows])
-    out = np.array([row["out"] for row in rows])
-    assert 0 < lifted.sum() < len(rows) == 15
-    assert (np.diff(out) == lifted[:-1]).all() and out[0] == 0
-    boxes = np.array([row["box"] for row in rows])
-    assert len(np.unique(boxes[lifted])) == lifted.sum()  # none twice
-    for success in np.flatnonzero(lifted):  # nor a jammed one before the next success
-        since = boxes[out == out[success]]
-        assert len(np.unique(since)) == len(since)
+@pytest.mark.parametrize(("walls", "most"), [(3, 9), (2, 7)])
+@pytest.mark.parametrize("policy", episodes.POLICIES)
+def test_an_episode_takes_out_what_is_lifted(simulated, monkeypatch, policy, walls, most):
+    monkeypatch.setattr(episodes, "MOST_ATTEMPTS", 9)
+    monkeypatch.setattr(episodes, "CONTAINER_ATTEMPTS", 7)
+    rows = episodes.episode(case := Case(0, walls=walls, settle=0.3), policy, "restore")
+    assert len(rows) == most and simulated.settled == [0.3]
+    load, jammed, highest = jams.load_of(case), [], []
+    present, height = np.ones(len(load), bool), load.positions[:, 2]
+    for row in rows:
+        box, free = row["box"], jams.visible_free(load, present)
+        highest.append(height[box] == max(height[np.setdiff1d(free, jammed)]))
+        found = jams.place(load, present, box) | {"out": (~present).sum()}
+        assert box in free and row == found | {"distance": simulated.lift(None, box)}
+        present[box] = stays = row["distance"] == 0
+        jammed = [*jammed, box] if stays else []
+    assert all(highest) == (policy == "highest")
+    assert {row["distance"] for row in rows} == {0.0, 0.4}
+
+
+def test_an_episode_ends_where_few_boxes_are_left_or_all_have_jammed(simulated):
+    case, left = Case(0, walls=1), len(jams.load_of(Case(0, walls=1))) - episodes.LEFT
+    simulated.lift = lambda physics, box: task.LIFT_THRESHOLD
+    assert len(episodes.episode(case, "random", "keep")) == left
+    simulated.lift = lambda physics, box: 0.19
+    boxes = [row["box"] for row in episodes.episode(case, "highest", "keep")]
+    load = jams.load_of(case)
+    assert sorted(boxes) == jams.visible_free(load, np.ones(len(load), bool)).tolist()
 
 
 def test_jams_of_an_episode_are_counted_by_what_was_taken_out():
@@ -131,7 +209,7 @@ def test_jams_of_an_episode_are_counted_by_what_was_taken_out():
 def attempt(load, box, out, jammed, covered=False, beside=1) -> dict:
     """An attempt of the random policy at a friction of 1."""
     about = {"load": load, "friction": 1.0, "policy": "random", "box": box, "out": out}
-    return about | {"covered": covered, "beside": beside, "distance": 0.0 if jammed else 0.4}
+    return about | {"covered": covered, "beside": beside, "distance": (1 - jammed) * task.LIFT_THRESHOLD}
 
 
 def test_first_attempts_are_counted_by_place():
@@ -160,6 +238,38 @@ def test_attempts_at_boxes_that_jammed_are_counted_by_the_successes_between():
     assert found["neighbours"].tolist() == [0.5, 0.5]
 
 
+def test_what_is_counted_of_all_cases_is_written(tmp_path, monkeypatch):
+    asked = [("fresh", Case(0)), ("lasting", Case(1)), ("width", Case(2, gap=-0.0001, picks=25))]
+    monkeypatch.setattr(jams, "cases", lambda: asked)
+    lift = {"box": 7, "out": 0, "before": 0.0, "distance": 0.1}
+    monkeypatch.setattr(jams, "answer", lambda kind, case: [lift] * (case.load + 1))
+    # Of these episodes the first two are of seamless walls, three, and restored.
+    played = [
+        (Case(0), "random", "restore"), (Case(1), "highest", "restore"),
+        (Case(2, gap=0.001), "random", "restore"), (Case(3), "random", "keep"),
+        (Case(4, walls=12), "random", "restore"),
+    ]  # fmt: skip
+    monkeypatch.setattr(episodes, "cases", lambda: played)
+    attempts = [attempt(9, 7, 0, True), attempt(9, 8, 0, False), attempt(9, 7, 1, True)]
+    monkeypatch.setattr(episodes, "episode", lambda *_: attempts)
+    jam_tables.both_data(tmp_path, tmp_path / "runs", 1)
+    tables = {
+        name: jam_tables.read_jams(name, tmp_path)
+        for name in ("jams", "jam_lasting", "jam_episodes", "jam_first", "jam_again")
+    }
+    counted = tables["jams"][["question", "load", "gap", "moment", "free", "jammed", "median"]]
+    assert counted.to_numpy().tolist() == [
+        ["fresh", 0, 0, 0, 1, 1, 0.1], ["width", 2, -0.0001, 25, 3, 3, 0.1],
+    ]  # fmt: skip
+    assert tables["jam_lasting"][["load", "boxes"]].to_numpy().tolist() == [[1, 2]]
+    counts = tables["jam_episodes"][["load", "walls", "gap", "after_pick", "attempts", "jammed"]]
+    assert counts.to_numpy().tolist() == [
+        [case.load, case.walls, case.gap, after_pick, 3, 2] for case, _, after_pick in played
+    ]
+    assert tables["jam_first"][["free", "jammed"]].to_numpy().tolist() == [[4, 2]]
+    assert tables["jam_again"][["between", "neighbours"]].to_numpy().tolist() == [[1, 0.5]]
+
+
 def test_the_model_of_the_second_engine_holds_the_boxes_of_the_case():
     case = Case(0, walls=1, friction=0.49, gap=0.001)
     world = ElementTree.fromstring(mujoco_jams.model_of(case)).find("worldbody")
@@ -184,7 +294,9 @@ def test_what_is_published_are_the_planned_cases():
         return [tuple(round(x, 6) if isinstance(x, float) else x for x in row) for row in rows]
 
     names = [field.name for field in fields(Case)]
-    counted = jam_tables.read_jams().rename(columns={"moment": "picks"})[["question", *names]]
+    counted = jam_tables.read_jams().rename(columns={"moment": "picks"})
+    assert (counted["free"][counted["walls"] == 12] == jams.MOST_LIFTS).all()
+    counted = counted[["question", *names]]
     planned = [(kind, *astuple(case)) for kind, case in jams.cases() if kind != "lasting"]
     assert rounded(counted.itertuples(index=False)) == rounded(planned)
 
@@ -195,7 +307,13 @@ def test_what_is_published_are_the_planned_cases():
     assert list(lasting.itertuples(index=False, name=None)) == planned
 
     keys = ["load", "walls", "friction", "gap", "policy", "after_pick"]
-    played = jam_tables.read_jams("jam_episodes").drop_duplicates(keys)[keys]
+    played = jam_tables.read_jams("jam_episodes")
+    counts = played[played["policy"] == "random"].groupby(keys)[["attempts", "jammed"]].sum()
+    for (load, walls, *_), (attempts, jammed) in counts.iterrows():
+        left = len(jams.load_of(Case(load, walls))) - attempts + jammed
+        most = episodes.MOST_ATTEMPTS if walls == 3 else episodes.CONTAINER_ATTEMPTS
+        assert left == episodes.LEFT or attempts == most
+    played = played.drop_duplicates(keys)[keys]
     assert list(played.itertuples(index=False, name=None)) == [
         (case.load, case.walls, case.friction, case.gap, policy, after_pick)
         for case, policy, after_pick in episodes.cases()
@@ -204,6 +322,46 @@ def test_what_is_published_are_the_planned_cases():
     other = mujoco_jams.read_mujoco()[["load", "friction", "gap", "settle"]]
     planned = [(case.load, case.friction, case.gap, case.settle) for case in mujoco_jams.cases()]
     assert list(other.itertuples(index=False, name=None)) == planned
+
+
+def test_each_box_is_lifted_from_the_settled_state(tmp_path, monkeypatch):
+    """In place of MuJoCo: in a step, a body rises by a ten-thousandth of the force on it, in N."""
+
+    def data_of(bodies: int) -> SimpleNamespace:
+        arrays = {"xpos": np.ones((bodies, 3)), "xfrc_applied": np.zeros((bodies, 6))}
+        return SimpleNamespace(**arrays, heights=np.ones(bodies), steps=0)
+
+    def step(_, data) -> None:
+        data.steps += 1
+        data.heights += data.xfrc_applied[:, 2] / 10_000
+        forward(_, data)
+
+    def forward(_, data) -> None:
+        data.xpos[:, 2] = data.heights
+
+    def get(_, data, state, kind) -> None:
+        state[:] = [data.steps, *data.heights, *data.xfrc_applied[:, 2]]
+        settled.append(data.steps)
+
+    def put(_, data, state, kind) -> None:
+        data.steps, (data.heights, data.xfrc_applied[:, 2]) = state[0], state[1:].reshape(2, -1)
+
+    settled, case = [], Case(0, walls=1, settle=0.25)
+    engine = SimpleNamespace(
+        MjModel=SimpleNamespace(from_xml_string=lambda text: text.count("<body") + 1),
+        MjData=data_of, mjtState=SimpleNamespace(mjSTATE_INTEGRATION=None), mj_step=step,
+        mj_stateSize=lambda bodies, _: 2 * bodies + 1, mj_getState=get, mj_setState=put,
+        mj_forward=forward,
+    )  # fmt: skip
+    monkeypatch.setitem(sys.modules, "mujoco", engine)
+    load = jams.load_of(case)
+    free = jams.visible_free(load, np.ones(len(load), bool))
+    assert mujoco_jams.distances(case) == pytest.approx([20 * 72 / 10_000] * len(free))
+    assert settled == [60]
+    monkeypatch.setattr(mujoco_jams, "cases", lambda: [case])
+    mujoco_jams.mujoco_data(tmp_path, tmp_path / "runs", 1)
+    row = mujoco_jams.read_mujoco(tmp_path).iloc[0]
+    assert row[["settle", "free", "jammed", "median"]].tolist() == [0.25, 7, 7, 0.144]
 
 
 def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too():
