@@ -209,7 +209,8 @@ def test_jams_of_an_episode_are_counted_by_what_was_taken_out():
 def attempt(load, box, out, jammed, covered=False, beside=1) -> dict:
     """An attempt of the random policy at a friction of 1."""
     about = {"load": load, "friction": 1.0, "policy": "random", "box": box, "out": out}
-    return about | {"covered": covered, "beside": beside, "distance": (1 - jammed) * task.LIFT_THRESHOLD}
+    distance = 0.0 if jammed else task.LIFT_THRESHOLD
+    return about | {"covered": covered, "beside": beside, "distance": distance}
 
 
 def test_first_attempts_are_counted_by_place():
