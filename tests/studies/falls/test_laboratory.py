@@ -24,21 +24,14 @@ from unload.network.variants import NETWORKS
 
 
 @pytest.mark.slow
-def test_a_reduced_laboratory_is_written_beside_the_published_one(tmp_path):
+def test_in_the_laboratory_runs_fall_unless_places_are_shuffled():
     """Two runs as long as all; they show what the laboratory is for."""
-    laboratory.laboratory_data(["ranks", "shuffled"], 1, tmp_path, tmp_path / "runs", n_jobs=2)
-    folder = tmp_path / "reduced" / "falls"
-    rows = pd.read_csv(folder / "laboratory.csv")
-    assert list(rows.columns) == laboratory.COLUMNS
-    ranks, shuffled = rows.itertuples()
-    assert (ranks.cell, ranks.seed, shuffled.cell) == ("ranks", cells.FIRST_SEED, "shuffled")
-    assert ranks.end < 0.9 < 0.98 < shuffled.end
-    assert ranks.judged_place == shuffled.judged_place == 1
-    trace = pd.read_csv(folder / "trace.csv")
-    assert (trace.groupby("cell").size() == laboratory.CONFIG.picks / laboratory.EVERY).all()
-    assert trace["picks"].iloc[0] == laboratory.EVERY - 64
-    assert read_provenance(folder, "laboratory")["reduced"]
-    assert not (tmp_path / "falls").exists()
+    ranks, shuffled = (
+        laboratory.run_cell(name, cells.CELLS[name], cells.FIRST_SEED)["row"]
+        for name in ("ranks", "shuffled")
+    )
+    assert ranks["end"] < 0.9 < 0.98 < shuffled["end"]
+    assert ranks["judged_place"] == shuffled["judged_place"] == 1
 
 
 def test_cells_are_trained_measured_and_written(tmp_path, monkeypatch):
@@ -72,7 +65,11 @@ def test_cells_are_trained_measured_and_written(tmp_path, monkeypatch):
         run.agent.network, replace(config, equalize=False), seen=cells.SEEN["averaged_x"]
     )
     assert laboratory.read_fresh()["judged_averaged_x"].tolist() == pytest.approx([averaged], 1e-3)
+
     assert not (tmp_path / "reduced").exists()
+    laboratory.laboratory_data(["mirrored"], None, tmp_path, tmp_path / "runs", 1)
+    assert [path.name for path in (tmp_path / "reduced/falls").glob("*.csv")] == ["laboratory.csv"]
+    assert read_provenance(tmp_path / "reduced/falls", "laboratory")["reduced"]
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from studies.statistics import share_interval
 from unload import policies, task
 from unload.load.substacks import stack_load
 from unload.physics.table import LiftTable
+from unload.support import files
 
 
 def test_choice_for_full():
@@ -33,6 +34,17 @@ def test_choice_for_full():
     assert ((walls == 0) == (why == "")).all()
     assert (walls[why == "drawn"] == 12).sum() == 2 * agreement.PER_STATE
     assert (walls[np.isin(why, ("buried", "close"))] == 5).all()
+
+
+def test_a_fresh_lift_is_in_the_boxes_left_in_the_walls_around(full_load):
+    present = np.ones(len(full_load), bool)
+    present[:3] = False
+    (item,) = np.flatnonzero(full_load.walls == 4)[-1:]
+    for walls, kept in ((5, [2, 3, 4, 5, 6]), (12, range(12))):
+        question, (left, box) = agreement.fresh_lift(full_load, present, item, walls)
+        assert np.unique(left.walls).tolist() == [*kept] and question["item"] == box
+        assert (left.positions[box] == full_load.positions[item]).all()
+        assert len(left) == (present & np.isin(full_load.walls, kept)).sum()
 
 
 def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
@@ -91,20 +103,39 @@ def test_committed_lifts_can_be_computed_again():
     assert len(agreement.disagreements(committed, "table", "local")) == 0
     of = {why: committed[committed["asked_full"] == why] for why in agreement.ASKED_FULL}
     assert len(of["drawn"]) >= agreement.FULL_COUNT and len(of["buried"]) == agreement.FULL_COUNT
+    assert agreement.LIFT_COUNT <= len(committed) < agreement.LIFT_COUNT + 100
     close = committed["local"].between(*agreement.CLOSE)
     assert committed.loc[close, "full"].notna().all()
     settings = read_provenance(agreement.paths.DATA, agreement.NAME)["settings"]
     assert settings["lifts"] == len(committed)
     assert all(settings[f"in full, {why}"] == len(rows) for why, rows in of.items())
     assert settings["lift table"] == agreement.table_digest(), "another table ships: compare again"
-    _, frame = agreement.collect_lifts(100, agreement.FIRST_SEED)
+    _, frame = agreement.collect_lifts(220, agreement.FIRST_SEED)
+    assert frame["policy"].unique().tolist() == [*agreement.UNLOADED_BY]
     first = committed[: len(frame)]
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
     assert (frame[columns] == first[columns]).all(axis=None)
     assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
 
 
+def test_the_table_is_filled_by_policies_that_pick_at_random_to_various_degrees(rng):
+    observations, masks = rng.random((4000, 128, 3)), np.ones((4000, 128), bool)
+    played = lifts._filling_policies(np.random.default_rng(0))
+    assert played[: lifts.RANDOM_SHARE] == [policies.random] * lifts.RANDOM_SHARE
+    directions = np.random.default_rng(0).normal(size=(12, 3))
+    expected = [
+        (favourite, share)
+        for favourite in (policies.highest, policies.nearest)
+        for share in (0.0, 0.1, 0.3, 0.6)
+    ]
+    expected += [(lambda seen, *_, d=d: (seen @ d).argmax(axis=1), 0.2) for d in directions]
+    for policy, (favourite, share) in zip(played[lifts.RANDOM_SHARE :], expected, strict=True):
+        same = policy(observations, masks, rng) == favourite(observations, masks, rng)
+        assert same.mean() == pytest.approx(1 - share * 127 / 128, abs=0.03)
+
+
 def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
+    planned = [lifts.EPISODES, lifts.RANDOM_SHARE * lifts.EPISODES, lifts.SEED]
     monkeypatch.setattr(task, "NUM_ENVS", 1)
     monkeypatch.setattr(lifts, "EPISODES", 1)
     monkeypatch.setattr(lifts, "_filling_policies", lambda rng: [policies.random, policies.highest])
@@ -115,6 +146,8 @@ def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
     assert count > 50
     provenance = read_provenance(tmp_path / "a", "lifts")
     assert provenance["settings"]["lifts"] == count
+    shipped = read_provenance(files.SHIPPED, "lifts")["settings"]
+    assert [*shipped.values()][:3] == planned
     # What is kept is not computed again.
     lifts.lift_data(tmp_path / "c", tmp_path / "a/runs")
     again = read_provenance(tmp_path / "c", "lifts")
