@@ -5,8 +5,9 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import pytest
 
-from studies import grid
+from studies import grid, paths
 from studies.grid import Cell, Grid, read_policies
 from studies.paper import training
 from studies.paper.training import PAPER
@@ -28,10 +29,29 @@ def test_a_full_grid_leaves_the_policies_that_play_elsewhere(tmp_path, monkeypat
         assert all(stored[key].equal(weights[key]) for key in weights)
 
 
+@pytest.mark.parametrize(
+    ("cells", "picks", "written"),
+    [
+        (None, None, True),
+        (["paper_mask", training.DEFAULTS], None, True),
+        (["paper_mask"], None, False),
+        (None, 64_000, False),
+    ],
+)
+def test_policies_play_elsewhere_once_their_cell_is_trained(cells, picks, written, monkeypatch):
+    names = []
+    monkeypatch.setattr(training, "train_grid", lambda *_: None)
+    monkeypatch.setattr(training, "save_policy", lambda policy, path: names.append(path.stem))
+    training.training_data(cells, picks)
+    assert names == (["paper", "paper_seed_2", "paper_seed_3"] if written else [])
+
+
 def test_committed_policies_are_those_of_the_grid():
+    policies = read_policies(paths.DATA / "falls/paper.safetensors")
+    assert [*policies] == [*PAPER.configs()]
     for seed, name in training.PLAYERS.items():
         stored = load_policy(name).network.state_dict()
-        weights = training.default_policies()[seed].network.state_dict()
+        weights = policies[f"{training.DEFAULTS}/seed_{seed}"].network.state_dict()
         assert all(stored[key].equal(weights[key]) for key in weights)
 
 

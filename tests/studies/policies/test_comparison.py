@@ -40,9 +40,29 @@ def test_a_comparison_holds_the_rows_of_evaluate(tmp_path, monkeypatch):
     assert read_provenance(tmp_path / "policies", "comparison")["settings"]["loads"] == 1
 
 
-@pytest.mark.parametrize("name", ["comparison", "robustness"])
-def test_committed_data_is_of_the_committed_policies(name):
-    assert read_provenance(paths.DATA / "policies", name)["settings"]["policies"] == digests()
+@pytest.mark.parametrize("condition", comparison.CONDITIONS)
+def test_the_first_containers_of_a_condition_are_those_of_the_committed_data(
+    condition, monkeypatch
+):
+    monkeypatch.setattr(comparison, "LOADS", 2)
+    rows = comparison.read_comparison().query("policy == 'nearest' and condition == @condition")
+    found = comparison.compare("nearest", policies.nearest, True, condition)["success_rate"]
+    assert rows["success_rate"].head(2).tolist() == pytest.approx(found.tolist(), abs=1e-5)
+
+
+def test_committed_data_is_of_the_committed_policies_and_of_the_plan():
+    settings = {
+        "comparison": {"loads": comparison.LOADS, "seed": comparison.SEED},
+        "robustness": {
+            "episodes": robustness.EPISODES, "picks": robustness.PICKS, "seed": robustness.SEED,
+            "front walls": FRONT_WALLS,
+        },
+    }  # fmt: skip
+    for name, planned in settings.items():
+        found = read_provenance(paths.DATA / "policies", name)["settings"]
+        assert found == {"policies": digests()} | planned
+    played = pd.read_csv(paths.DATA / "policies/robustness.csv")[["policy", "after_pick"]]
+    assert [*played.drop_duplicates().itertuples(index=False, name=None)] == [*robustness.PLAYED]
 
 
 def test_cards_are_measured_and_written(tmp_path, monkeypatch):
@@ -59,6 +79,11 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
     }
     known = card["on the paper's loads"]
     assert known["picks"] == 1000 and known["misses"] == round(1000 * (1 - known["msr"]))
+    monkeypatch.undo()
+    assert (
+        comparison.measure(load_policy("paper"), 1)
+        == load_policy("paper").card[comparison.loads_of(1)]
+    )
 
 
 @pytest.mark.parametrize("name", comparison.ORIGINS)
