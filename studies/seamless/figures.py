@@ -94,8 +94,6 @@ def draw_start_and_end(groups: Mapping[str, tuple[pd.DataFrame, dict]]) -> Figur
             textcoords="offset points", fontsize=8, color="0.4",
         )  # fmt: skip
     for name, (rows, look) in groups.items():
-        if rows.empty:  # none of them has been published
-            continue
         axes.plot(
             100 * rows["start"], 100 * rows["end"], label=name, linestyle="", alpha=0.7, **look
         )

@@ -1,5 +1,6 @@
 """What is published of the jams: counts by case, by place, and how long a jam lasts."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -35,19 +36,20 @@ def jams_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
         if kind == "lasting":
             lasting += lasting_rows(case, result.value)
         else:
-            counts.append(count_row(kind, case, result.value))
+            distances = [lift["distance"] for lift in result.value]
+            about = {"question": kind, "walls": case.walls}
+            counts.append(about | count_row(case, distances))
     counts = pd.DataFrame(counts).rename(columns={"picks": "moment"})
     tables = {"jams": counts, "jam_lasting": pd.DataFrame(lasting)}
     settings = {"loads": len(jams.LOADS), "cases": len(cases)}
     publish(Path(folder) / "seamless", "jams", tables, MADE_BY, settings, results)
 
 
-def count_row(kind: str, case: Case, lifts: list[dict]) -> dict:
-    """The row of a case in ``jams.csv``, see ``jams_data``."""
-    distances = np.array([each["distance"] for each in lifts])
-    return {"question": kind, "walls": case.walls, **asdict(case)} | {
+def count_row(case: Case, distances: Sequence[float]) -> dict:
+    """The row of a case in ``jams.csv``, of how far its boxes were lifted, see ``jams_data``."""
+    return asdict(case) | {
         "free": len(distances),
-        "jammed": int((distances < task.LIFT_THRESHOLD).sum()),
+        "jammed": sum(distance < task.LIFT_THRESHOLD for distance in distances),
         "median": np.median(distances),
     }
 

@@ -14,6 +14,7 @@ import pandas as pd
 
 from studies import paths
 from studies.results import COMMAND, keep_all, publish, read_table
+from studies.seamless.jam_tables import count_row
 from studies.seamless.jams import Case, load_of, visible_free
 from unload import task
 from unload.physics.bullet import TIME_STEP
@@ -92,12 +93,7 @@ def mujoco_data(
     """Lift the boxes of all cases; write ``seamless/mujoco_jams.csv``, with ``COLUMNS``."""
     asked = [(asdict(case), (case,)) for case in cases()]
     results = keep_all(Path(runs_dir) / "seamless" / NAME, distances, asked, n_jobs)
-    rows = []
-    for case, result in zip(cases(), results):
-        lifted = np.array(result.value)
-        about = {"load": case.load, "friction": case.friction, "gap": case.gap}
-        about |= {"settle": case.settle, "free": len(lifted), "median": np.median(lifted)}
-        rows.append(about | {"jammed": int((lifted < task.LIFT_THRESHOLD).sum())})
+    rows = [count_row(case, result.value) for case, result in zip(cases(), results)]
     table = {NAME: pd.DataFrame(rows)[COLUMNS]}
     publish(Path(folder) / "seamless", NAME, table, MADE_BY, {"loads": 3}, results)
 

@@ -10,15 +10,13 @@ import pytest
 
 from studies import grid, paths
 from studies.grid import Cell, Grid, read_grid
-from studies.paper.training import PAPER
 from studies.seamless import figures, jam_tables, training
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
-from studies.statistics import by_cell, by_run, seamless_plan
+from studies.statistics import seamless_plan
 from tests.studies.curves import curve
 from unload import TrainConfig
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
-BY_MASK = {"with the mask": "paper_b2048_mask", "without the mask": "paper_b2048_no_mask"}
 
 
 def test_the_cells_are_those_of_the_plan():
@@ -47,6 +45,11 @@ def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
         assert table["Step"].tolist() == curve["picks"].tolist()
     reward = table["Value"] / 500
     assert ((reward + 1) / 2).tolist() == pytest.approx(curve["success_rate"].tolist(), abs=1e-5)
+    # Neither of other cells nor of shorter runs.
+    monkeypatch.setattr(training, "train_grid", lambda *_: tmp_path)
+    monkeypatch.setattr(training, "export", lambda *_: pytest.fail("exported"))
+    training.seamless_data(["mask_order"])
+    training.seamless_data(None, 64_000)
 
 
 def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path):
@@ -101,53 +104,7 @@ def test_a_run_is_like_fig_12_by_its_msr_and_like_fig_11_by_its_loss(figure, run
     assert seamless_plan(run)[figure] is like
 
 
-def test_runs_are_counted_by_cell():
-    curves = pd.concat(
-        curve([0.15, end, end]).assign(cell="mask_order", seed=seed)
-        for seed, end in ((40, 0.5), (41, 0.6), (42, 0.9))
-    )
-    row = by_cell(by_run(curves, seamless_plan)).loc["mask_order"]
-    assert (row["runs"], row["fig12"], row["steady"]) == (3, 2, 3)
-    assert row["lowest"] == pytest.approx(0.5) and row["highest"] == pytest.approx(0.9)
-    assert row["end"] == pytest.approx(2 / 3, abs=1e-3)
-    assert row["low"] < row["end"] < row["high"]
-
-
-@pytest.fixture(scope="module")
-def curves() -> pd.DataFrame:
-    return read_grid(PAPER, cells=BY_MASK.values())
-
-
-@pytest.mark.parametrize("draw", [figures.fig11_loss, figures.fig12_reward])
-def test_dashed_lines_are_without_the_mask(curves, draw):
-    axes = draw(curves, {"a gap of 1 mm": BY_MASK, "seamless walls": BY_MASK}).axes
-    assert [each.get_title() for each in axes] == ["a gap of 1 mm", "seamless walls"]
-    strong = [line for line in axes[0].lines if line.get_linewidth() > 1.5]
-    assert {line.get_label(): line.get_linestyle() for line in strong} == figures.MASK_LINES
-    thin = [line for line in axes[0].lines if line.get_linewidth() < 0.5]
-    assert len(thin) == 16
-    for line, cell in zip(strong, BY_MASK.values()):  # the first run of each
-        first = curves[(curves["cell"] == cell) & (curves["seed"] == 0)].iloc[0]
-        value = first["loss"] if draw == figures.fig11_loss else 2 * first["success_rate"] - 1
-        assert line.get_ydata()[0] == pytest.approx(value, nan_ok=True)
-    stars = [line.get_xydata()[0] for line in axes[0].lines if line.get_marker() == "*"]
-    if draw == figures.fig12_reward:  # the paper's start and end
-        assert np.array(stars) == pytest.approx(np.array([(0, -0.7), (2e7, 0.2)]))
-
-
-def test_the_line_of_jams_passes_the_papers_point(curves):
-    runs, look = by_run(curves, seamless_plan), {"marker": "o"}
-    groups = {"ours": (runs, look), "none": (runs.head(0), look)}
-    bound, ours, paper = figures.draw_start_and_end(groups).axes[0].lines
+def test_the_line_of_jams_passes_the_papers_point():
+    bound, paper = figures.draw_start_and_end({}).axes[0].lines
     at_start = np.interp(15, bound.get_xdata()[::-1], bound.get_ydata()[::-1])
     assert at_start == pytest.approx(57.7, abs=0.1) and paper.get_xydata().tolist() == [[15, 60]]
-    assert len(ours.get_xdata()) == 16
-
-
-def test_a_share_of_jams_is_of_all_loads():
-    rows = [(0.25, 0.0, 0, 30, 0), (0.25, 0.0, 1, 10, 4), (1.0, 0.0, 0, 20, 20)]
-    rows.append((1.0, 0.001, 0, 20, 0))
-    table = pd.DataFrame(rows, columns=["friction", "gap", "load", "free", "jammed"])
-    axes = figures.draw_jams(table, (0.35, 0.45)).axes[0]
-    lines = {line.get_label(): line.get_ydata().tolist() for line in axes.lines}
-    assert lines["seamless"] == [10, 100] and lines["gap 1 mm"] == [0]
