@@ -53,4 +53,5 @@ def test_means_over_whole_episodes_are_drawn():
     training.draw_learning_curve(axes, curve, "run")
     points, episodes = axes.lines
     assert len(points.get_ydata()) == 120
+    assert axes.get_ylim() == (0, 1.02) and axes.get_xlim()[0] == 0
     assert episodes.get_xydata().tolist() == [[16_000, 24.5], [48_000, 74.5]]

@@ -1,6 +1,7 @@
 """The runs in seamless walls: their plan, what is published of them, their measures and figures."""
 
 import re
+from dataclasses import replace
 from fnmatch import fnmatch
 from shutil import copy
 
@@ -15,6 +16,7 @@ from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from tests.studies.curves import curve
 from unload import TrainConfig
+from unload.agent.training import Training
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
 
@@ -25,9 +27,29 @@ def test_the_cells_are_those_of_the_plan():
     patterns = re.findall(r"`([a-z_0-9.*]+)`", plan[plan.index("## Runs") :])
     assert not [name for name in CELLS if not any(fnmatch(name, each) for each in patterns)]
     assert min(seed for cell in CELLS.values() for seed in cell.seeds) == FIRST_SEED == 40
+    assert f"with probability j = {training.SHARE}" in plan
     for name, cell in CELLS.items():
         assert cell.config.mask is ("no_mask" not in name), name
-        assert (cell.config.batch_size == 2048) is ("b2048" in name), name
+        assert cell.config.batch_size == (2048 if "b2048" in name else 256), name
+        assert (cell.config.position_noise == 0) is ("order" in name), name
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["measured_1.0_mask_order", "until_success_no_mask_order", "weight_1_mask_noise"]
+    + ["positions_mask_noise", "shuffled_mask_noise"],
+)
+def test_the_first_episode_of_a_published_run_is_trained_again(name):
+    cell = CELLS[name]
+    run = Training(replace(cell.config, seed=FIRST_SEED), change=cell.change)
+    for _ in range(500):
+        run.step()
+    run.rollout.close()
+    published = read_grid(training.SEAMLESS, cells=[name]).iloc[0]
+    found = run.curve.table().iloc[0]
+    assert published["seed"] == FIRST_SEED
+    for column in ("picks", "success_rate", "loss"):
+        assert found[column] == pytest.approx(published[column], rel=1e-4)
 
 
 def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
