@@ -15,7 +15,8 @@ import pandas as pd
 
 from studies import changes, paths
 from studies.grid import Cell, Grid, read_grid, train_grid
-from studies.results import COMMAND, JOBS, write_table
+from studies.paper import training as paper
+from studies.results import COMMAND, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
 from unload.agent.checkpoint import RunFolder
@@ -83,11 +84,7 @@ CELLS: dict[str, Cell] = {
 }
 EXPORTED = "b2048_no_mask_order", 41  # chosen afterwards among those like the paper's figures
 SEAMLESS = Grid("seamless/runs", f"{COMMAND} seamless", CELLS)
-OPTIONS = {
-    "--cells": {"nargs": "+", "choices": CELLS},
-    "--picks": {"type": int, "help": "of a run, if not the paper's; the data go to data/reduced"},
-    **JOBS,
-}
+OPTIONS = paper.OPTIONS | {"--cells": {"nargs": "+", "choices": CELLS}}
 
 
 def seamless_data(

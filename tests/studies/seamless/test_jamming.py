@@ -123,15 +123,6 @@ def test_a_weight_changes_what_is_visible(random_run):
     assert len(np.setdiff1d(envs.visible[0], nearest(positions))) > 5
 
 
-def test_the_papers_weight_changes_nothing(random_run):
-    plain, weighed = random_run(lambda run: None), random_run(partial(weigh, z=4.0))
-    assert (plain.rollout.observations == weighed.rollout.observations).all()
-    for run in (plain, weighed):
-        for _ in range(50):
-            run.step()
-    assert plain.curve.sums == weighed.curve.sums
-
-
 def test_neighbours_are_those_of_the_measured_places(random_run):
     run = random_run(lambda run: None)
     for _ in range(40):
