@@ -4,6 +4,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 from dataclasses import astuple, fields, replace
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pandas as pd
@@ -315,45 +316,32 @@ def test_what_is_published_are_the_planned_cases():
 
 def test_each_box_is_lifted_from_the_settled_state(tmp_path, monkeypatch):
     """In place of MuJoCo: in a step a body rises by its number times the force, / 500,000."""
-
-    def data_of(bodies: int) -> SimpleNamespace:
-        arrays = {"xpos": np.ones((bodies, 3)), "xfrc_applied": np.zeros((bodies, 6))}
-        return SimpleNamespace(**arrays, heights=np.ones(bodies), steps=0)
-
-    def step(_, data) -> None:
-        data.steps += 1
-        data.heights += np.arange(len(data.heights)) * data.xfrc_applied[:, 2] / 500_000
-        forward(_, data)
-
-    def forward(_, data) -> None:
-        data.xpos[:, 2] = data.heights
-
-    def get(_, data, state, kind) -> None:
-        state[:] = [data.steps, *data.heights, *data.xfrc_applied[:, 2]]
-        settled.append(data.steps)
-
-    def put(_, data, state, kind) -> None:
-        data.steps, (data.heights, data.xfrc_applied[:, 2]) = state[0], state[1:].reshape(2, -1)
-
-    settled, case = [], Case(0, walls=1, settle=0.25)
-    engine = SimpleNamespace(
-        MjModel=SimpleNamespace(from_xml_string=lambda text: text.count("<body") + 1),
-        MjData=data_of, mjtState=SimpleNamespace(mjSTATE_INTEGRATION=None), mj_step=step,
-        mj_stateSize=lambda bodies, _: 2 * bodies + 1, mj_getState=get, mj_setState=put,
-        mj_forward=forward,
-    )  # fmt: skip
-    monkeypatch.setitem(sys.modules, "mujoco", engine)
+    case, engine = Case(0, walls=1, settle=0.25), MagicMock()
     load = jams.load_of(case)
-    free = jams.visible_free(load, np.ones(len(load), bool))
-    expected = (free + 1) * 20 * 72 / 500_000
-    assert mujoco_jams.distances(case) == pytest.approx(expected)
-    assert settled == [60]
+    numbers = np.arange(len(load) + 1)
+    data = SimpleNamespace(
+        xpos=np.ones((len(numbers), 3)), xfrc_applied=np.zeros((len(numbers), 6))
+    )
+
+    def step(*_) -> None:
+        data.xpos[:, 2] += numbers * data.xfrc_applied[:, 2] / 500_000
+
+    engine.MjData.return_value, engine.mj_stateSize.return_value = data, 1
+    engine.mj_step.side_effect = step
+    engine.mj_setState.side_effect = lambda *_: data.xfrc_applied.fill(0)
+    monkeypatch.setitem(sys.modules, "mujoco", engine)
     monkeypatch.setattr(mujoco_jams, "cases", lambda: [case])
     mujoco_jams.mujoco_data(tmp_path, tmp_path / "runs", 1)
+    calls = [name for name, *_ in engine.method_calls if name.startswith("mj_")]
+    lift = ["mj_setState", "mj_forward", *["mj_step"] * 72]
+    settle = [*["mj_step"] * 60, "mj_stateSize", "mj_getState"]
+    free = jams.visible_free(load, np.ones(len(load), bool))
+    assert calls == settle + lift * len(free)
+    lifted = (free + 1) * 20 * 72 / 500_000
+    assert mujoco_jams.distances(case) == pytest.approx(lifted)
     row = mujoco_jams.read_mujoco(tmp_path).iloc[0]
-    jammed = (expected < task.LIFT_THRESHOLD).sum()
-    assert row["median"] == pytest.approx(np.median(expected), 1e-5)
-    assert row[["settle", "free", "jammed"]].tolist() == [0.25, 7, jammed]
+    expected = [0.25, len(free), (lifted < task.LIFT_THRESHOLD).sum(), np.median(lifted)]
+    assert row[["settle", "free", "jammed", "median"]].tolist() == pytest.approx(expected, 1e-5)
 
 
 def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too():
