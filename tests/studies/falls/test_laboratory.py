@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from studies import changes, paths
-from studies.falls import cells, laboratory, long, measures
+from studies.falls import cells, figures, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
 from studies.paper.training import PAPER
@@ -345,6 +345,11 @@ def test_the_surface_is_level_where_the_highest_is_taken():
     assert (level[:20] > 2).all()  # at the rear nothing has been picked
     left, right = dug[50:, 0].mean(), dug[50:, -1].mean()
     assert np.ptp(level[50:].mean(axis=0)) < 0.5 < right - left
+
+
+def test_a_dug_load_is_drawn_to_scale():
+    (image,) = figures.dug(np.zeros((70, 25)), (0.5, 0.2), False, 0.6).axes[0].images
+    assert image.get_extent() == [0, 7, 0, 2.5] and image.get_clim() == (0, 2.5)
 
 
 def test_depth_misleads_only_where_ranks_are_random():
