@@ -79,6 +79,9 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
     }
     known = card["on the paper's loads"]
     assert known["picks"] == 1000 and known["misses"] == round(1000 * (1 - known["msr"]))
+    for name, mask in (("msr", True), ("msr_no_mask", False)):
+        expected = evaluate(load_policy("paper"), 2, comparison.CARD_SEED, mask=mask)
+        assert known[name] == pytest.approx(expected["success_rate"].mean(), abs=1e-5)
 
 
 @pytest.mark.parametrize("name", comparison.ORIGINS)
