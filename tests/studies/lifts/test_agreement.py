@@ -13,6 +13,7 @@ from studies.policies.robustness import front_walls
 from studies.results import read_provenance
 from studies.statistics import share_interval
 from unload import policies, task
+from unload.env.vector import ContainerVectorEnv
 from unload.load.substacks import stack_load
 from unload.physics.table import LiftTable
 from unload.support import files
@@ -139,9 +140,14 @@ def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(task, "NUM_ENVS", 1)
     monkeypatch.setattr(lifts, "EPISODES", 1)
     monkeypatch.setattr(lifts, "_filling_policies", lambda rng: [policies.random, policies.highest])
+    seeds, reset = [], ContainerVectorEnv.reset
+    monkeypatch.setattr(
+        ContainerVectorEnv, "reset", lambda env, seed: seeds.append(seed) or reset(env, seed=seed)
+    )
     for name in "ab":
         lifts.lift_data(tmp_path / name, tmp_path / name / "runs")
     assert (tmp_path / "a/lifts.npz").read_bytes() == (tmp_path / "b/lifts.npz").read_bytes()
+    assert max(seeds) > 1_000_000  # of the loads, so that hardly any is met twice
     count = len(LiftTable.load(tmp_path / "a/lifts.npz"))
     assert count > 50
     provenance = read_provenance(tmp_path / "a", "lifts")

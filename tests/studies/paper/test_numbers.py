@@ -34,7 +34,9 @@ def test_what_is_measured_agrees_where_it_should(monkeypatch):
     # Values instead of ranks do not agree, nor do lifts that differ by a little.
     monkeypatch.setattr(numbers, "equalize", lambda values: values)
     monkeypatch.setattr(numbers, "lifted_distance", lambda stack: {1: 0.466, 2: 0.0096}[stack])
-    assert numbers.measured(1, 1, 5)["agrees"].tolist()[1:4] == ["no"] * 3
+    monkeypatch.setattr(numbers, "CHANCE_ERROR", 0.1)
+    agrees = numbers.measured(1, 1, 5)["agrees"]
+    assert agrees.tolist()[1:4] == ["no"] * 3 and agrees["MSR of random picks"] == "yes"
 
 
 # Of ten million picks: it falls, rises and falls.

@@ -112,8 +112,12 @@ def test_a_masked_box_is_tried_again_and_its_mask_is_kept(random_run):
 
 
 def test_a_weight_changes_what_is_visible(random_run):
-    run = random_run(partial(weigh, z=1.0))
+    run = random_run(partial(weigh, z=1.0), max_picks=10)
     envs = run.rollout.envs.unwrapped
+    first = envs._containers.geometry.copy()
+    for _ in range(10):
+        run.step()
+    assert (envs._containers.geometry != first).any()  # after an episode other loads stand there
     seen = envs._containers.seen[0]
     count = envs._containers.present[0].sum()  # all are still there
     positions = (seen[:count] + 1) / 2 * task.CONTAINER
