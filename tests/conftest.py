@@ -1,18 +1,28 @@
-"""Fixtures that several test modules share: random numbers, and loads."""
+"""Fixtures that several test modules share: random numbers, loads, situations of their boxes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
+import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import torch
 from hypothesis import settings
 
 import unload
+from unload.physics.situation import Situation, Surroundings
 
+matplotlib.use("Agg")  # without a screen
 torch.set_num_threads(1)
 # The same examples every time, however slow the machine is, and none kept from run to run.
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True)
+def close_figures() -> Iterator[None]:
+    yield
+    plt.close("all")
 
 
 @pytest.fixture
@@ -30,6 +40,13 @@ def full_load() -> unload.Load:
 def small_load() -> unload.Load:
     """A load of one wall, for tests that simulate every box."""
     return unload.stack_load(np.random.default_rng(0), walls=1)
+
+
+@pytest.fixture(scope="session")
+def situations(full_load) -> list[Situation]:
+    """Situations of a full container, with few boxes on top and with many."""
+    surroundings = Surroundings(full_load, np.ones(len(full_load), dtype=bool))
+    return [surroundings.situation(item) for item in range(0, len(full_load), 3)]
 
 
 @pytest.fixture

@@ -107,6 +107,17 @@ def test_integer_array():
             checks.integer_array("a", value, (2,))
     with pytest.raises(ValueError, match=r"a has shape \(1,\); expected \(2,\)"):
         checks.integer_array("a", [1], (2,))
+    assert checks.integer_array("a", [0, 3], (2,), high=3).tolist() == [0, 3]
+    for value in ([-1, 3], [0, 4]):
+        with pytest.raises(ValueError, match=f"a holds {value[0]} to {value[1]}; expected 0 to 3"):
+            checks.integer_array("a", value, (2,), high=3)
+
+
+def test_shaped():
+    checks.shaped("a", np.zeros((2, 3)), (None, 3), np.float64)
+    for value in (np.zeros((2, 3), np.float32), [[0.0] * 3] * 2):
+        with pytest.raises(TypeError, match="a is a .* of dtype .*; expected <class 'numpy.float64"):
+            checks.shaped("a", value, (None, 3), np.float64)
 
 
 def test_flag_array():

@@ -8,6 +8,7 @@ import sys
 from contextlib import nullcontext
 from io import BytesIO
 from pathlib import Path
+from unittest.mock import Mock
 from zipfile import ZipFile
 
 import numpy as np
@@ -231,17 +232,27 @@ def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     assert (tmp_path / "notes").read_text() == "precious"
 
 
+def test_without_locks_of_the_file_system_nothing_is_locked(tmp_path, monkeypatch):
+    """A file in their place would outlast a killed process."""
+    missing = OSError(errno.ENOSYS, "it has no locks")
+    monkeypatch.setattr("fcntl.flock", Mock(side_effect=missing))
+    with pytest.raises(OSError, match="it has no locks"), files.locked(tmp_path):
+        pytest.fail("it is not locked")
+
+
 @pytest.mark.parametrize("refused", [False, True])
 def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
-    synced, fsync = [], os.fsync
+    synced, fsync, opened = [], os.fsync, os.listdir("/proc/self/fd")
 
     def sync(descriptor: int) -> None:
-        is_folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
-        synced.append("folder" if is_folder else "file")
+        status = os.fstat(descriptor)
+        is_folder = stat.S_ISDIR(status.st_mode)
+        synced.append("folder" if is_folder else status.st_size)
         if is_folder and refused:
             raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
         fsync(descriptor)
 
     monkeypatch.setattr(os, "fsync", sync)
     files.write_text(tmp_path / "x", "whole")
-    assert (tmp_path / "x").read_text() == "whole" and synced == ["file", "folder"]
+    assert (tmp_path / "x").read_text() == "whole" and synced == [len("whole"), "folder"]
+    assert os.listdir("/proc/self/fd") == opened
