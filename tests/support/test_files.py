@@ -189,8 +189,9 @@ def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
 def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
     """After a while, and then goes on when the folder is free."""
     monkeypatch.setattr(files, "PATIENCE", 0.1)
-    with hold(tmp_path, "time.sleep(1)") as owner, files.locked(tmp_path, wait=True):
-        assert owner.poll() is not None or owner.wait(timeout=10) == 0
+    then = "time.sleep(1); open(sys.argv[1] + '/end', 'x')"
+    with hold(tmp_path, then) as owner, files.locked(tmp_path, wait=True):
+        assert (tmp_path / "end").exists()
         assert caplog.messages == [
             f"waiting for process {owner.pid} on {caplog.messages[0].split(' on ')[1]}"
         ]
