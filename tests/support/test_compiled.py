@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import Mock
 
 import numba
 import pytest
@@ -79,6 +80,16 @@ def test_code_is_kept_where_it_can_be_written(copy):
     user.write_text("not a folder")
     printed, said = run(copy, **where)
     assert printed == "0.3 0 0.4" and said.count("set NUMBA_CACHE_DIR to a folder") == 1
+
+
+def test_a_folder_that_cannot_be_written_is_not_taken(tmp_path, monkeypatch):
+    """One that another user has made, for example."""
+    monkeypatch.setattr(compiled, "PACKAGE", tmp_path)
+    monkeypatch.setattr(compiled.tempfile, "TemporaryFile", Mock(side_effect=PermissionError))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.warns(UserWarning, match="compiled code cannot be kept"):
+        assert compiled.folder.__wrapped__() is None
 
 
 def test_the_digest_follows_sources_and_versions(copy, monkeypatch):
