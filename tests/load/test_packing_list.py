@@ -79,7 +79,7 @@ def test_separators_decimals_and_encodings(written, tmp_path, separator, mark, e
         (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {}),
         (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {"units": "cm"}),
         ('Box ID,X Min (mm),Y min [mm],z-min in mm,"L (mm)",W mm,H_mm', 1000, {"units": "m"}),
-        ('id,x_min,y_min,z_min,"depth ("")",width inches,height in', 1 / 0.0254, {}),
+        ('id,x_min inch,y_min,z_min,"depth ("")",width inches,height in', 1 / 0.0254, {}),
         ("nr,u,v,w,a,b,c", 1, {"columns": dict(zip("uvwabc", CORNERS.split(","))) | {"nr": "id"}}),
     ],
 )  # fmt: skip
@@ -94,6 +94,7 @@ def test_names_and_units(written, columns, factor, arguments):
 def test_a_table_is_a_list_too(written):
     table = pd.read_csv(written(*STACK), index_col=None).set_index(pd.Index([5, 7]))
     assert_same(read_load(table), read_load(written(*STACK)))
+    assert not read_load(table).extras
     with pytest.raises(ValueError, match=r"the table: row 2 \(id 'b'\): a cell that is no number"):
         read_load(table.assign(size_x=[0.5, None]))
     with pytest.raises(TypeError, match="path is 3; expected a path"):
@@ -126,7 +127,7 @@ def test_small_faults_are_settled_and_logged(written, caplog):
     with pytest.raises(ValueError, match=r"row 3 \(id 'c'\): floats.*, tolerance 0.002 m"):
         read_load(written(*lines), tolerance=0.002)
     caplog.clear()
-    read_load(written(*STACK))
+    read_load(written(*(f"{line},1,0" for line in STACK), columns=f"id,{CORNERS},weight,yaw"))
     assert not caplog.text
 
 
@@ -150,8 +151,12 @@ def test_other_columns_are_kept_and_named(written, caplog):
     [
         ("weight", "1", "5.4", "a weight other than 1 kg; .* 'weight' in ignore .*weight '5.4'"),
         ("Mass (g)", "1000", "1", r"a weight other than 1 kg; .* 'Mass \(g\)' in ignore"),
+        ("weight lb", "2.2046226218", "1.5", r"a weight other than 1 kg; .* 'weight lb' in ignore"),
+        ("mass [lbs]", "2.2046226218", "1.5", r"a weight other than 1 kg; .* 'mass \[lbs\]'"),
         ("mass_kg", "1.0", "", "a cell that is no number; .*mass_kg ''"),
         ("yaw", "-90", "15", "a rotation that is no quarter turn; .* 'yaw' in ignore"),
+        ("pitch deg", "180", "179", "a rotation that is no quarter turn; .* 'pitch deg' in ignore"),
+        ("roll degrees", "270", "45", "a rotation that is no quarter turn"),
         ("rotation (rad)", "3.1415926536", "1.5", "a rotation that is no quarter turn"),
         ("tilt", "0", "up", "a cell that is no number; .*tilt 'up'"),
     ],
@@ -200,13 +205,14 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,0,0,1.01,1,1,1"], r"row 2 .*: floats in load, .* at 1.01 m; .* z_min '1.01'"),
         ([UNIT, "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
         (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
-        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .* x_min '6.5'"),
+        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m \(the first"),
         ([UNIT, "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
         (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z ''"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
         ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
-        ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], "id '6'.* and 1 more: reaches from"),
+        ([f"{n},0,0,{n},1,1,1" for n in range(2, 7)], r"row 5 \(id '6'\): reaches from"),
+        ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], r"row 5 \(id '6'\) and 1 more: reaches"),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with either"),
         (["a,0,0,0,1,1,1,5,5"], "is not a readable CSV file: .*Expected 7 fields in line 2, saw 9"),
     ],

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from unload import Load, view
 from unload.load.picture import COLOURS, EYE
-from unload.load.view import PLOTLY_MIMETYPE
+from unload.load.view import OTHER_COLOURS, PLOTLY_MIMETYPE
 
 
 def vertices(trace) -> np.ndarray:
@@ -51,6 +51,7 @@ def test_the_container_has_its_true_proportions(boxes, length):
     load = boxes((1.0, 0.2))
     figure = view(Load(load.positions, load.sizes, container=(length, 2.5, 2.5)))
     scene = figure.layout.scene
+    assert figure.layout.height == 520
     drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
     assert scene.aspectmode == "manual"
     assert drawn / drawn[1] == pytest.approx([length / 2.5, 1, 1])
@@ -73,12 +74,15 @@ def test_present_chooses_what_is_drawn(small_load):
 
 
 def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
-    figure = view(small_load, groups={"visible": [0, 1, 2], "tried": [2, 3], "failed": []})
+    groups = {"visible": [0, 1, 2], "tried": [2, 3], "failed": []}
+    others = dict(zip("abcd", ([4], [5], [6], [7])))
+    figure = view(small_load, groups=groups | others)
     shown = {trace.name: items(trace) for trace in figure.data}
-    rest = list(range(4, len(small_load)))
-    assert shown == {"visible": [0, 1], "tried": [2, 3], "failed": [], "unseen": rest}
+    rest = list(range(8, len(small_load)))
+    assert shown == {"visible": [0, 1], "tried": [2, 3], "failed": [], **others, "unseen": rest}
+    colours = COLOURS | dict(zip(others, OTHER_COLOURS))
     for trace in figure.data:
-        assert trace.color == to_hex(COLOURS[trace.name])
+        assert trace.color == to_hex(colours[trace.name])
 
 
 def test_an_order_shows_its_first_ten_picks(full_load):
@@ -116,13 +120,14 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
     [
         ({"load": "walls"}, TypeError, "load is 'walls'; expected an unload.Load"),
         ({"present": np.ones(3, dtype=bool)}, ValueError, r"present has shape \(3,\)"),
-        ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to"),
+        ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to 90$"),
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
         ({"groups": {}, "order": [0]}, ValueError, "groups and order are given; expected one"),
+        ({"order": [91]}, ValueError, "order holds 91 to 91; expected 0 to 90"),
         ({"order": [0.5]}, TypeError, "order has dtype float64"),
         ({"groups": [1]}, TypeError, r"groups is \[1\]; expected a dict"),
         ({"groups": {"a": [0.5]}}, TypeError, r"groups\['a'\] has dtype float64"),
-        ({"height": "tall"}, TypeError, "height is 'tall'; expected an integer"),
+        ({"height": 49}, ValueError, "height is 49; expected an integer >= 50 and <= 5000"),
     ],
 )
 def test_bad_input_is_refused(small_load, kwargs, error, message):

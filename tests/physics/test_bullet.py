@@ -73,6 +73,7 @@ def test_two_clients_side_by_side_do_not_disturb_each_other(make_world):
     assert together[0][-1] > 0.16 and together[1] != together[0]
     first[0].close()
     first[0].close()
+    assert not first[0].client.isConnected()
     assert second[0].pose(second[1][0])[0][2] == together[1][-2]
 
 

@@ -19,11 +19,12 @@ LOGGER = logging.getLogger(__name__)
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
 CENTRE, CORNER = ("x", "y", "z"), ("x_min", "y_min", "z_min")
 SIZES = "size_x", "size_y", "size_z"
-LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": 1 / 0.0254}  # of a unit in a metre
+INCHES, POUNDS = 1 / 0.0254, 1 / 0.45359237  # in a metre, and in a kilogram
+LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": INCHES}  # of a unit in a metre
 # Of other units in a metre, a kilogram or a degree.
 UNITS = LENGTHS | {
-    "inch": 1 / 0.0254, "inches": 1 / 0.0254, "kg": 1.0, "g": 1000.0, "lb": 1 / 0.45359237,
-    "lbs": 1 / 0.45359237, "deg": 1.0, "degrees": 1.0, "rad": np.pi / 180,
+    "inch": INCHES, "inches": INCHES, "kg": 1.0, "g": 1000.0, "lb": POUNDS, "lbs": POUNDS,
+    "deg": 1.0, "degrees": 1.0, "rad": np.pi / 180,
 }  # fmt: skip
 # The names of a column, in lower case, by what it means; of several ids the first one counts.
 NAMES = {

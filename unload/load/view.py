@@ -129,7 +129,7 @@ def mesh(
     items: np.ndarray,
     name: str,
     colour: tuple[float, float, float],
-    legend: bool = False,
+    legend: bool,
     seam: float = picture.SEAM,
 ) -> go.Mesh3d:
     """Items of one colour, RGB in [0, 1], as a mesh of 8 vertices and 12 triangles each.
