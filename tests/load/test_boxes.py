@@ -76,7 +76,7 @@ def test_the_box_that_sticks_out_is_named():
     sizes = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 3.0, 1.0]])
     with pytest.raises(ValueError, match=r"^box \[2\]: reaches from"):
         Load(positions, sizes)
-    sizes[2, 1] = 1
+    sizes[2] = 1, SMALLEST_EDGE, 1
     assert len(Load(positions, sizes)) == 3
 
 

@@ -11,7 +11,6 @@ from unload.load.substacks import (
     DEPTH,
     PACKAGES,
     ROWS_HIGH,
-    WALLS,
     build_load,
     stack_load,
     substacks_that_fit,
@@ -40,17 +39,8 @@ def test_all_variants_of_all_substacks_occur(full_load):
     assert items == {item for items in same_everywhere for item in items}
 
 
-def test_a_load_keeps_the_papers_range_and_the_container(rng):
-    counts = []
-    for _ in range(30):
-        load = stack_load(rng)
-        counts.append(len(load))
-        assert (load.positions - load.sizes / 2 >= -1e-9).all()
-        assert (load.positions + load.sizes / 2 <= task.CONTAINER + 1e-9).all()
-        volume = load.sizes.prod(axis=1).sum()
-        assert volume == pytest.approx(7.0 * 2.5 * 3 * ROWS_HIGH * CELL)
-        assert set(load.walls.tolist()) == set(range(WALLS))
-        assert (load.sizes[:, 0] == DEPTH).all()
+def test_a_load_keeps_the_papers_range(rng):
+    counts = [len(stack_load(rng)) for _ in range(30)]
     assert min(counts) >= 800 and max(counts) <= 1000 and len(set(counts)) > 10
 
 
@@ -62,13 +52,6 @@ def test_a_load_of_exactly_as_many_items_as_allowed_is_kept(monkeypatch, bound):
     assert again.positions.tobytes() == first.positions.tobytes()
     monkeypatch.setattr(task, bound, len(first) + (1 if bound == "MIN_ITEMS" else -1))
     assert len(stack_load(np.random.default_rng(5))) != len(first)
-
-
-def test_build_load_places_the_walls_from_the_rear():
-    load = build_load(np.zeros((2, 3, 4), dtype=int))
-    assert np.unique(load.positions[:, 0]).tolist() == [1.75, 5.25]
-    assert (load.positions[load.walls == 1, 0] == 5.25).all()
-    assert load.positions[:, 2].max() < 3 * ROWS_HIGH * CELL
 
 
 @pytest.mark.parametrize(

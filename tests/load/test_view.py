@@ -25,6 +25,7 @@ def items(trace) -> list[int]:
 def test_a_mesh_holds_the_boxes_of_one_colour(full_load):
     figure = view(full_load)
     assert {trace.type for trace in figure.data} == {"mesh3d"}
+    assert len(figure.data) == len(np.unique(full_load.packages)), "no line for other boxes"
     assert sorted(sum(map(items, figure.data), [])) == list(range(len(full_load)))
     for trace in figure.data:
         corners = vertices(trace).reshape(-1, 8, 3)

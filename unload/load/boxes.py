@@ -238,7 +238,7 @@ def _find(low, high, order, ends):
     so are the corners ``low`` and ``high``, (3, n).
     """
     count, start = 0, 0
-    found = np.empty((8 * len(order) + 4, 3), np.int32)
+    found = np.empty((8 * len(order), 3), np.int32)
     (x0, y0, z0), (x1, y1, z1) = (low[0], low[1], low[2]), (high[0], high[1], high[2])
     # Boxes of different slabs share no depth. Within a slab, a sweep from left to right compares a
     # box with those only that begin before it ends.
