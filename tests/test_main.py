@@ -46,7 +46,12 @@ def test_every_field_is_an_option_that_is_explained_and_nothing_is_compiled(tmp_
     for field in fields(TrainConfig):
         line = done.stdout.partition(f"  --{field.name.replace('_', '-')}")[2].partition("  --")[0]
         assert f"({field.default})" in line, field.name
-    for text in ("--mask, --no-mask", "* whether failed items are masked", "μ, of Adam."):
+    for text in (
+        "train [-h] --run-dir",
+        "--mask, --no-mask",
+        "* whether failed items are masked",
+        "μ, of Adam.",
+    ):
         assert text in done.stdout
 
 
@@ -63,18 +68,22 @@ def test_options_are_explained_whether_or_not_docstrings_are_indented(monkeypatc
 
 @pytest.mark.parametrize("option", ["--help", "--version"])
 def test_help_and_version_take_no_time(tmp_path, option):
-    """A script entry point calls ``command``; nothing is compiled, and little is imported."""
+    """A script entry point calls ``command``; nothing is compiled, and little is imported.
+
+    A pipe that is closed, as by ``head``, ends the program without an error.
+    """
     entry = tomllib.loads((paths.ROOT / "pyproject.toml").read_text())["project"]["scripts"]
     module, _, name = entry["unload"].partition(":")
     slow = "{'numba', 'torch', 'pandas', 'matplotlib'}"
-    program = f"import sys\nfrom {module} import {name}\ntry:\n    {name}()\nfinally:\n"
+    program = f"import signal, sys\nfrom {module} import {name}\ntry:\n    {name}()\nfinally:\n"
+    program += "    print(signal.getsignal(signal.SIGPIPE).name, file=sys.stderr)\n"
     program += f"    print(*{slow} & {{*sys.modules}}, file=sys.stderr)"
     done = subprocess.run(
         [sys.executable, "-c", program, option],
         capture_output=True, text=True, cwd=paths.ROOT,
         env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path)},
     )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "\n") and not list(tmp_path.iterdir())
+    assert (done.returncode, done.stderr) == (0, "SIG_DFL\n\n") and not list(tmp_path.iterdir())
     if option == "--version":
         assert done.stdout == f"unload {VERSION}\n"
     else:

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from unload import Load, view
 from unload.load.picture import COLOURS, EYE
-from unload.load.view import OTHER_COLOURS, PLOTLY_MIMETYPE
+from unload.load.view import OTHER_COLOURS, PLOTLY_MIMETYPE, _short
 
 
 def vertices(trace) -> np.ndarray:
@@ -38,6 +38,7 @@ def test_a_mesh_holds_the_boxes_of_one_colour(full_load):
 def test_triangles_are_the_faces_of_their_box(boxes):
     mesh = view(boxes((1.0, 0.2), (2.0, 0.2))).data[0]
     assert mesh.i.dtype == np.int16, "of 16 vertices"
+    assert [_short(np.array([2**15 - less])).dtype for less in (1, 0)] == [np.int16, np.int32]
     points = vertices(mesh)
     triangles = np.column_stack([mesh.i, mesh.j, mesh.k])
     assert set((triangles // 8).min(axis=1)) == {0, 1}
@@ -55,7 +56,7 @@ def test_the_container_has_its_true_proportions(boxes, length):
     assert figure.layout.height == 520
     drawn = np.array([scene.aspectratio[axis] for axis in "xyz"])
     assert scene.aspectmode == "manual"
-    assert drawn / drawn[1] == pytest.approx([length / 2.5, 1, 1])
+    assert drawn == pytest.approx([2.8, 2.8 * 2.5 / length, 2.8 * 2.5 / length])
     ranges = [np.ptp(scene[f"{axis}axis"].range) for axis in "xyz"]
     assert ranges == pytest.approx([length, 2.5, 2.5])
     eye = np.array([scene.camera.eye[axis] for axis in "xyz"])  # from the container's middle
