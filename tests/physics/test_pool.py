@@ -1,6 +1,7 @@
 """Lifts that several processes share."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -98,6 +99,16 @@ def test_they_end_with_a_process_that_is_killed():
         left = [number for number in left if os.path.exists(f"/proc/{number}/cmdline")]
         time.sleep(0.05)
     assert not left
+
+
+def test_what_pybullet_says_is_no_answer():
+    script = (
+        "import os; from unload.physics.pool import LocalPhysics, serve; "
+        "LocalPhysics.simulate = lambda self, lift: os.write(1, b'noise') and 2 * lift; serve()"
+    )
+    command, question = [sys.executable, "-c", script], pickle.dumps([1, 2])
+    done = subprocess.run(command, input=question, capture_output=True, check=True)
+    assert pickle.loads(done.stdout) == [2, 4] and done.stderr.endswith(b"noisenoise")
 
 
 def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
