@@ -5,15 +5,18 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from unload import task
 from unload.load.picture import (
     COLOURS,
     CORNERS,
     EYE,
     FACES,
     INSIDES,
+    LEGEND,
     PACKAGE_COLOURS,
     back_to_front,
     package_colour,
+    project,
     snapshot,
     still,
 )
@@ -37,10 +40,17 @@ def seen(picture, colour) -> int:
 
 def test_a_nearer_box_covers_a_farther_one():
     near, far = [(6, 0, 0), (7, 2, 2)], [(4, 0.5, 0.5), (5, 1.5, 1.5)]
-    alone = seen(pixels(far[:1], far[1:], [RED]), RED)
+    picture = pixels(far[:1], far[1:], [RED])
+    alone, width = seen(picture, RED), picture.shape[1]
+    assert (picture[:, : round(LEGEND * width)] == 1).all(), "the legend's place"
+    assert (picture[:, round(0.97 * width) :] == 1).all(), "a margin"
     for (first, one), (second, other) in permutations([(near, BLUE), (far, RED)]):
         beside = seen(pixels([first[0], second[0]], [first[1], second[1]], [one, other]), RED)
         assert beside < alone / 2
+
+
+def test_a_larger_container_is_seen_from_farther_away():
+    assert project(2 * CORNERS, 2 * task.CONTAINER) == pytest.approx(project(CORNERS))
 
 
 def test_whatever_is_nearest_on_a_ray_is_drawn_last(full_load, rng):
