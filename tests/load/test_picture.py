@@ -68,9 +68,9 @@ def test_whatever_is_nearest_on_a_ray_is_drawn_last(full_load, rng):
         assert hit[rank[hit].argmax()] == hit[enters[hit].argmin()]
 
 
-def test_boxes_in_a_circle_are_all_drawn():
-    low = np.array([(0, 0, 0), (0, 1, 1), (1, 0.5, 0.2)], float)
-    assert sorted(back_to_front(low, low + 0.9)) == [0, 1, 2]
+def test_of_boxes_that_hide_each_other_in_a_circle_the_farthest_is_drawn_first():
+    low = np.array([(0, 0, 0.5), (1, 0.5, 0), (0.5, 1, 1)])
+    assert back_to_front(low, low + 1).tolist() == [0, 1, 2]
 
 
 def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
