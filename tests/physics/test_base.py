@@ -80,12 +80,12 @@ def test_calls_out_of_order_are_refused(boxes, kind):
         with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
             call()
     physics.reset(load)
-    if kind == "local":
+    if isinstance(physics, LocalPhysics):
         situation = physics.surroundings.situation(0)
     physics.close()
     physics.close()
     calls = [*calls_of(physics), lambda: physics.reset(load)]
-    if kind == "local":
+    if isinstance(physics, LocalPhysics):
         calls.append(lambda: physics.simulate(situation))
     for call in calls:
         with pytest.raises(RuntimeError, match="the physics is closed; make a new one"):
