@@ -28,7 +28,7 @@ def test_a_restored_full_world_repeats_its_answers(small_load):
     physics = make("full", small_load)
     items = range(0, len(small_load), 15)
     first = lifts(physics, items)
-    assert lifts(physics, items) == pytest.approx(first, abs=0.002)
+    assert lifts(physics, items) == pytest.approx(first, abs=1e-6), "no contact is left over"
 
 
 def test_settling_moves_boxes_a_little_and_restore_keeps_to_it(small_load):
