@@ -26,6 +26,8 @@ def test_one_box_and_two_stacked_ones_move_as_far_as_the_appendix_says(boxes, ki
     physics.remove(1)
     assert physics.present.tolist() == [True, False]
     assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
+    physics.close()
+    assert physics._world is None
 
 
 @pytest.mark.parametrize("kind", KINDS)
