@@ -82,7 +82,7 @@ class Episode:
         picks: those made so far, ``Pick`` each.
     """
 
-    def __init__(self, load: Load | None = None, seed: int = 0) -> None:
+    def __init__(self, load: Load | None, seed: int) -> None:
         self._env = ContainerEnv("table", max_picks=sys.maxsize)
         self._options = {} if load is None else {"load": load}
         self._seed = checks.integer("seed", seed, 0)
@@ -121,7 +121,7 @@ class Episode:
 
     def pick(self, item: int) -> Pick:
         """Lift a visible item."""
-        item = checks.integer("item", item, 0, len(self.load) - 1)
+        item = checks.integer("item", item, 0)
         rows = np.flatnonzero(self._env.visible == item)
         if not rows.size:
             raise ValueError(f"item is {item}; expected one of the visible items")
@@ -183,7 +183,7 @@ class Run(Episode):
     """
 
     def __init__(
-        self, player: str | Policy, load: Load | None, seed: int = 0, mask: bool = True
+        self, player: str | Policy, load: Load | None, seed: int, mask: bool = True
     ) -> None:
         self._policy = player if callable(player) else policy_of(player)
         self.mask = mask

@@ -23,7 +23,7 @@ from unload.load import substacks
 from unload.support import files
 
 FOLDER = Path(__file__).with_name("page")
-PAGE = paths.ROOT / "figures" / "train_it_yourself.html"
+PAGE = paths.FIGURES / "train_it_yourself.html"
 
 
 def task_numbers() -> dict:
@@ -77,9 +77,5 @@ def _content(name: str) -> str:
     return re.sub(rf"^import .*\n|^export |{comments}", "", text, flags=re.MULTILINE)
 
 
-def main() -> None:
-    files.write_text(PAGE, assemble())
-
-
 if __name__ == "__main__":
-    main()
+    files.write_text(PAGE, assemble())

@@ -77,7 +77,7 @@ class Playground(widgets.VBox):
         self.player = widgets.Dropdown(
             options=[YOU, *self.runs], value=player, description="Player"
         )
-        self.undo = widgets.Button(description="Undo", icon="undo", disabled=True)
+        self.undo = widgets.Button(description="Undo", icon="undo")
         self.hints = widgets.Checkbox(description="Show what can be lifted", indent=False)
         self.play = widgets.Play(max=picks, interval=PAUSE)
         self.slider = widgets.IntSlider(max=picks, description="Picks")

@@ -28,7 +28,8 @@ from queue import SimpleQueue
 import numpy as np
 import pandas as pd
 
-ROOT = Path(__file__).resolve().parents[2]
+from studies.paths import ROOT
+
 PATH = ROOT / "data" / "benchmarks" / "mutants.csv"
 COLUMNS = ["room", "module", "line", "mutation"]  # and "killed_by"
 WORKERS = 2  # processes side by side

@@ -1,17 +1,24 @@
 """The benchmarks: what they measure is what they say."""
 
+import sys
+from queue import SimpleQueue
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
+import pytest
 import stable_baselines3
 import torch
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.env_util import make_vec_env
 
 import unload
-from studies.speed import mutants, parts
+from studies.results import read_provenance
+from studies.speed import mutants, parts, run
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
-from studies.speed.run import PEQPolicy, show
+from studies.speed.run import PEQPolicy
 from unload.agent import learner
+from unload.fast import fused
 
 
 def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
@@ -60,7 +67,7 @@ def test_maskable_ppo_learns_on_64_containers():
     envs.close()
 
 
-def test_rates_are_positive_and_printed_with_their_units(small_load, monkeypatch, capsys):
+def test_rates_are_positive(small_load, monkeypatch):
     small = {"ROUNDS": 1, "LIFTS": {"full": 1, "local": 2, "table": 2}, "NUM_ENVS": 2, "PICKS": 3}
     for name, value in (small | {"BATCH_SIZE": 8, "N_FEATURES": 4}).items():
         monkeypatch.setattr(parts, name, value)
@@ -69,9 +76,57 @@ def test_rates_are_positive_and_printed_with_their_units(small_load, monkeypatch
     rates |= pick_rates() | update_times()
     assert len(rates) == 12
     assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
-    row = {"what": "lifts", "how": "table", "value": 12345.6, "unit": "lifts/s", "ratio": 0.98765}
-    show(pd.DataFrame([row]))
-    assert "12,300 lifts/s 0.988 ×" in capsys.readouterr().out
+
+
+def test_training_is_timed_where_it_counts(monkeypatch):
+    """Made-up trainings take 1 ms a pick, theirs 2 ms, and more in the picks before."""
+    memory, ours, theirs = unload.TrainConfig().replay_size, [], []
+
+    def train(config, folder, progress):
+        ours.append((torch.get_num_threads(), fused.applies(None), config.picks))
+        picks = np.arange(1, config.picks // 640 + 1) * 640
+        before = memory if config.picks > memory else run.PLAIN
+        times = (picks + 4 * np.minimum(picks, before)) / 1000
+        return SimpleNamespace(curve=pd.DataFrame({"picks": picks, "wall_time": times}))
+
+    def learn(picks, callback):
+        count = picks // 64
+        times = np.repeat([0.5, 0.128], [count - 15, 15]).cumsum().tolist()
+        monkeypatch.setattr("time.perf_counter", iter(times).__next__)
+        assert all(callback({}, {}) for _ in range(count)), "or they would stop"
+
+    def model(policy, envs, **settings):
+        names = "learning_starts", "train_freq", "policy_kwargs"
+        theirs.append((torch.get_num_threads(), envs, *(settings[name] for name in names)))
+        return SimpleNamespace(learn=learn)
+
+    monkeypatch.setattr(unload, "train", train)
+    monkeypatch.setattr(fused, "applies", lambda network: True)
+    monkeypatch.setattr(stable_baselines3, "DQN", model)
+    monkeypatch.setattr(run, "make_vec_env", lambda name, count, env_kwargs: count)
+    rates = run.training_rates()
+    assert list(rates.values()) == pytest.approx([500, 500, 1000, 1000, 1000])
+    assert ours == [
+        (1, False, 2 * run.PLAIN), (1, True, run.FUSED + memory), (2, True, run.FUSED + memory)
+    ]  # fmt: skip
+    assert theirs == [(threads, 64, 2048, 1, {"net_arch": [64]}) for threads in (1, 2)]
+    assert torch.get_num_threads() == 1
+
+
+def test_speeds_are_printed_and_published_with_ratios(tmp_path, monkeypatch, capsys):
+    for name, rates in {
+        "lift_rates": {"full": 2.0, "table": 12345.0},
+        "pick_rates": {"one": 4.0},
+        "update_times": {"PyTorch": 8.0, "fused": 2.0},
+        "training_rates": {"theirs": 5.0, "here": 4.0},
+    }.items():
+        monkeypatch.setattr(run, name, lambda *load, rates=rates: rates)
+    for module in (run, parts):
+        monkeypatch.setattr(module, "FOLDER", tmp_path)
+    run.main()
+    assert parts.read_speeds()["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
+    assert "12,300 lifts/s 6,170 ×" in capsys.readouterr().out
+    assert read_provenance(tmp_path, "benchmarks")["runs"] == 1
 
 
 def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
@@ -122,3 +177,53 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
         ("print(f'{a + 1}') -> pass", "pass"),
     ]
+
+
+CODE = """
+def total(a, b):
+    return a + b  # @compiled
+
+UNUSED = 1 * 2
+"""
+TESTS = """
+import os
+from unload.sums.sums import total
+
+def test_it_runs_as_plain_python():
+    assert os.environ["NUMBA_DISABLE_JIT"] == "1"
+
+def test_total():
+    assert total(2, 1) == 3
+
+def test_processes():
+    raise AssertionError("left out, because it may take long")
+"""
+
+
+def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys):
+    """In a project of one room."""
+    room, path, table = "unload/sums", tmp_path / "unload/sums/sums.py", tmp_path / "mutants.csv"
+    for folder in ("unload/sums", "tests/sums"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "unload/__init__.py").touch()
+    path.write_text(CODE)
+    (tmp_path / "tests/sums/test_sums.py").write_text(TESTS)
+    table.write_text(f"{','.join(mutants.COLUMNS)},killed_by\nother,a,1,b,\n{room},a,1,b,\n")
+    project = {"ROOT": tmp_path, "PATH": table, "MODULES": [path], "ROOMS": {room: "tests/sums"}}
+    for name, value in project.items():
+        monkeypatch.setattr(mutants, name, value)
+    monkeypatch.setattr(sys, "argv", ["mutants", "--sample", "9"])
+    mutants.main()
+    assert f"{room}: 3 of 4 survive" in capsys.readouterr().out
+    assert pd.read_csv(table, keep_default_na=False).to_numpy().tolist() == [
+        ["other", "a", 1, "b", ""],
+        [room, "sums", 3, "a + b -> a - b", "tests/sums/test_sums.py::test_total"],
+        [room, "sums", 5, "1 * 2 -> 1 / 2", ""],
+        [room, "sums", 5, "1 -> 3", ""],
+        [room, "sums", 5, "2 -> 5", ""],
+    ]
+    trees: SimpleQueue = SimpleQueue()
+    trees.put(tmp_path)
+    endless = CODE.encode() + b"while True:\n    pass\n"
+    assert mutants.killed_by(trees, room, path, endless, limit=2) == "time limit"
+    assert path.read_text() == CODE and trees.get() == tmp_path

@@ -42,7 +42,7 @@ def hidden(frame) -> list[int]:
 
 
 def test_items_vanish_in_the_order_of_the_picks_at_the_stops_of_the_slider(full_load):
-    run = Run("highest", full_load)
+    run = Run("highest", full_load, 0)
     run.play_to(100)
     figure = replay(run)
     for stop, frame in enumerate(figure.frames):
@@ -62,7 +62,7 @@ def test_items_vanish_in_the_order_of_the_picks_at_the_stops_of_the_slider(full_
 
 def test_a_failed_pick_is_marked_in_the_container_of_the_load(boxes):
     small = replace(boxes((1.0, 0.2), (1.0, 0.6)), container=np.array([6.0, 2.0, 2.0]))
-    episode = Episode(small)
+    episode = Episode(small, 0)
     for item in (0, 1, 0):
         episode.pick(item)
     figure = replay(episode)

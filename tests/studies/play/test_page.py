@@ -2,6 +2,7 @@
 
 import json
 import re
+import runpy
 import shutil
 import subprocess
 from concurrent.futures import ThreadPoolExecutor
@@ -65,10 +66,12 @@ def observations(rng: np.random.Generator, count: int) -> np.ndarray:
     return ((2 * ranks - 127) / 127).astype(np.float32)
 
 
-def test_the_file_is_that_of_its_parts():
+def test_the_file_is_that_of_its_parts(tmp_path, monkeypatch):
     """If not: ``python -m studies.play.page``."""
     text = page.PAGE.read_text()
-    assert text == page.assemble()
+    monkeypatch.setattr(paths, "FIGURES", tmp_path)
+    runpy.run_path(page.__file__, run_name="__main__")
+    assert text == (tmp_path / page.PAGE.name).read_text()
     assert len(text.encode()) <= MOST_BYTES
     assert not re.search(r"^(import|export) |^ *//", text, re.MULTILINE)
     links = re.findall(r'<a data-file="(.+?)"', text)

@@ -143,13 +143,13 @@ def test_where_no_kernel_runs_a_picture_or_a_replay_stands(game):
 
 
 BAD_INPUT = {
-    "load is 'load'; expected an unload.Load": lambda load: Episode("load"),
-    "item is 0; expected one of the visible": lambda load: Episode(load).pick(0),
-    "count is 1; expected an integer >= 0 and <= 0": lambda load: Episode(load).back_to(1),
-    "player is 'chess'; expected one of 'random'": lambda load: Run("chess", load),
-    "seed is -1": lambda load: Playground(seed=-1),
+    "load is 'load'; expected an unload.Load": lambda load: Episode("load", 0),
+    "item is 0; expected one of the visible": lambda load: Episode(load, 0).pick(0),
+    "count is 1; expected an integer >= 0 and <= 0": lambda load: Episode(load, 0).back_to(1),
+    "player is 'chess'; expected one of 'random'": lambda load: Run("chess", load, 0),
+    "seed is -1; expected an integer >= 0": lambda load: Playground(seed=-1),
     "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
-    "picks is 0": lambda load: Playground(picks=0),
+    "picks is 0; expected an integer >= 1 and <= 10000": lambda load: Playground(picks=0),
 }
 
 
@@ -176,6 +176,7 @@ def test_what_a_first_compilation_says_stands_in_the_widget(monkeypatch, capsys)
     monkeypatch.setattr(Episode, "pick", pick)
     playground = Playground(seed=4, picks=5)
     assert "compiling it for ten seconds" in playground.message.value
+    assert not logging.getLogger("unload").handlers
     assert capsys.readouterr().err == ""
 
 
