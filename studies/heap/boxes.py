@@ -65,7 +65,7 @@ class Heap:
 
     def tilts(self) -> np.ndarray:
         """(n,) float64, rad: angle between the vertical and the box's axis nearest to it."""
-        return np.arccos(np.clip(np.abs(self.axes()[:, 2]).max(axis=1), 0, 1))
+        return np.arccos(np.minimum(np.abs(self.axes()[:, 2]).max(axis=1), 1))
 
     def edge(self) -> float:
         """x of the conveyor's edge, m.

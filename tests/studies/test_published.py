@@ -40,7 +40,9 @@ PUBLISHED = {
     "11_hyperparameters": ("cell-17", "d7126e58", "cell-19", "cell-24", "cell-28"),
     "12_training": ("cell-13", "cell-19", "cell-23", "training-start-end"),
     "20_a_policy_without_a_miss": ("698c4502",),
-    "21_when_is_learning_worth_it": ("cell-06", "cell-23", "cell-28"),
+    "21_when_is_learning_worth_it": (
+        *("cell-06", "cell-09", "cell-17", "cell-23", "cell-25", "cell-27", "cell-28"),
+    ),
     "22_how_it_became_fast": ("592fcdbf",),
     **dict.fromkeys(
         ("report/01_paper_and_here", "report/02_verdicts", "report/03_outlook")

@@ -38,6 +38,7 @@ def test_the_stored_heaps_can_be_played():
     envs = [gymnasium.make("unload/Heap-v0", split=split, physics="coarse") for split in SPLITS]
     assert [len(env.unwrapped.heaps) for env in envs] == [70, 30]
     observation, info = envs[1].reset(seed=0)
+    assert envs[1].observation_space == gymnasium.spaces.Box(-20, 20, (96, 13), np.float32)
     assert observation in envs[1].observation_space and 30 < info["item_mask"].sum() < 90
     assert any(envs[1].unwrapped.heap is heap for heap in envs[1].unwrapped.heaps)
 
@@ -109,10 +110,10 @@ def test_bad_actions_and_rows_without_a_box_change_nothing(make_heap_env):
     for action, error in ((-1, ValueError), (ROWS, ValueError), (0.5, TypeError)):
         with pytest.raises(error, match=f"action is {action}"):
             env.step(action)
-    after, reward, terminated, truncated, info = env.step(ROWS - 1)
+    after, reward, terminated, truncated, info = env.step(np.array(ROWS - 1))
     assert env.heap is before and (after == observation).all()
     assert reward == 0 and not terminated and not truncated
-    assert info["box"] == -1 and info["moved"] == 0
+    assert info["box"] == -1 and info["moved"] == 0 and not info["came"]
     for _ in range(2):
         env.close()
     with pytest.raises(ClosedEnvironmentError):
@@ -124,15 +125,17 @@ BAD_INPUT = {
     "box is 9; expected an integer >= 0 and <= 8": lambda make, pile: Rake("coarse").pick(pile, 9),
     "rng is 0; expected a numpy.random.Generator": lambda make, pile: settled_heap(0),
     "split is 'all'; expected one of 'train'": lambda make, pile: stored_heaps("all"),
-    "max_picks is 0": lambda make, pile: make(max_picks=0),
+    "max_picks is 0; expected an integer >= 1": lambda make, pile: make(max_picks=0),
     "render_mode is 'human'": lambda make, pile: make(render_mode="human"),
     "expected a Heap that holds a box": lambda make, pile: make().reset(
         options={"heap": pile.only(np.array([], int))}
     ),
     "a column is 'colour'; expected one of 'behind'": lambda make, pile: linear({"colour": 1}),
-    "falls_weight is -2": lambda make, pile: Oracle(make(), -2),
-    "n_features is 0": lambda make, pile: FateNetwork(0),
-    "steps is 0": lambda make, pile: fit(Picks(*np.zeros((5, 1))), 0, steps=0),
+    "falls_weight is -2; expected a number >= 0": lambda make, pile: Oracle(make(), -2),
+    "n_features is 0; expected an integer >= 1": lambda make, pile: FateNetwork(0),
+    "steps is 0; expected an integer >= 1": lambda make, pile: fit(
+        Picks(*np.zeros((5, 1))), 0, steps=0
+    ),
     "picks is empty": lambda make, pile: fit(Picks(*np.zeros((5, 0))), 0),
     "networks is empty": lambda make, pile: Learned([]),
 }

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from studies.heap import learning
 from studies.heap.learning import (
     Learned,
     Picks,
@@ -73,12 +74,36 @@ def test_policy_weighs_falls_and_tells_fates(learned, rng):
         low[weight] = (unseen.observations[np.arange(500), rows, COLUMN["z"]] < 0.5).mean()
     assert low[50.0] > 0.95 > low[0.0]
     policy = Learned([network, network])
+    assert policy.falls_weight == 1
     chances = np.array([
         policy.fates(unseen.observations[k], int(unseen.actions[k])) for k in range(100)
     ])  # fmt: skip
     assert chances.shape == (100, ROWS, 2) and (chances[:, BOXES:] == 0).all()
     guessed, found = chances[:, :BOXES, 0] > 0.5, unseen.fates[:100, :BOXES] > 0
     assert (guessed == found).mean() > 0.9 and chances[..., 1].max() < 0.1
+
+
+def test_all_picks_are_learned_from_half_of_them_mirrored_ever_more_slowly(rng, monkeypatch):
+    seen, rates, step = [], [], torch.optim.AdamW.step
+
+    def noted_loss(network, batch):
+        seen.append(batch)
+        return batch_loss(network, batch)
+
+    def noted_step(adam):
+        rates.append(adam.param_groups[0]["lr"])
+        step(adam)
+
+    monkeypatch.setattr(learning, "batch_loss", noted_loss)
+    monkeypatch.setattr(torch.optim.AdamW, "step", noted_step)
+    picks = made_up_picks(rng, 150)
+    fit(picks, 0, steps=20)
+    assert [len(batch["actions"]) for batch in seen] == [128, 22] * 10
+    sums = [sum(int(batch["actions"].sum()) for batch in seen[at : at + 2]) for at in (0, 2)]
+    assert sums == [picks.actions.sum()] * 2, "each pick once in every two batches"
+    flipped = [bool((batch["observations"][..., COLUMN["y"]] < 0).any()) for batch in seen]
+    assert 5 < sum(flipped) < 15 and min(batch["observations"].min() for batch in seen) >= -1
+    assert rates == pytest.approx(5e-3 * (1 + np.cos(np.pi * np.arange(20) / 20)) / 2)
 
 
 def test_stored_networks_are_the_same(tmp_path, learned):

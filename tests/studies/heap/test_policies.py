@@ -4,8 +4,17 @@ import numpy as np
 import pytest
 
 from studies.heap.boxes import Heap
-from studies.heap.observation import COLUMN, COLUMNS, ROWS, SEEN, Camera, features, visible_boxes
-from studies.heap.policies import RULES, Oracle, best, linear, play
+from studies.heap.observation import (
+    COLUMN,
+    COLUMNS,
+    EYE,
+    ROWS,
+    SEEN,
+    Camera,
+    features,
+    visible_boxes,
+)
+from studies.heap.policies import RULES, Oracle, _nearness, best, linear, play
 
 
 def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(rng):
@@ -29,6 +38,12 @@ def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(rng):
     assert best(score)(observations, masks, rng).tolist() == [0]
     masks[0, [0, 1]] = 0
     assert [rule(observations, masks, rng).item() for rule in RULES.values()] == [2] * len(RULES)
+
+
+def test_the_nearest_box_is_the_one_nearest_to_the_camera(cubes):
+    heap = cubes((6.8, 1, 0), (5, 2, 1))  # at the door
+    distances = ((heap.positions - EYE) ** 2).sum(axis=1)
+    assert _nearness(features(heap, np.array([9, 9])))[:2] == pytest.approx(-distances)
 
 
 def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_sizes
-from studies.heap.generate import FEWEST, HIGHEST, stored_heaps, write_heaps
+from studies.heap.generate import FEWEST, HIGHEST, _accepted, stored_heaps, write_heaps
 from studies.heap.rake import PHYSICS, Rake
 from unload import task
 from unload.agent.identity import identity
@@ -94,6 +94,17 @@ def test_a_heap_is_disordered_and_fits_in(real_heap):
     assert package_sizes(np.array([0]))[0] == pytest.approx(package)
 
 
+def test_heaps_that_are_small_or_stick_out_or_move_are_rejected(real_heap):
+    assert _accepted(real_heap.only(np.arange(80)), fastest=0.1)
+    assert not _accepted(real_heap.only(np.arange(79)), fastest=0.1)
+    assert not _accepted(real_heap, fastest=0.11)
+    for axis, place in ((0, 3.9), (0, 7.1), (1, -0.1), (1, WIDTH + 0.1), (2, -0.1), (2, 2.45)):
+        positions = real_heap.positions.copy()
+        positions[0, axis] = place
+        moved = Heap(positions, *list(vars(real_heap).values())[1:])
+        assert not _accepted(moved, fastest=0)
+
+
 def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
     path = tmp_path / "heaps.npz"
     part = real_heap.only(np.arange(7))
@@ -102,3 +113,4 @@ def test_stored_heaps_are_the_same_to_the_bit(tmp_path, real_heap):
     (third,) = stored_heaps("test", path)
     for read, heap in ((first, real_heap), (second, part), (third, part)):
         assert identity(read) == identity(heap) and len(read) == len(heap)
+        assert not any(array.flags.writeable for array in vars(read).values())

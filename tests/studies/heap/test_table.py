@@ -7,12 +7,13 @@ import pytest
 import torch
 
 from studies import paths
-from studies.heap import picture, recording
+from studies.heap import generate, picture, recording
 from studies.heap import table as study
 from studies.heap.boxes import Heap
 from studies.heap.generate import stored_heaps
 from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
+from studies.heap.rake import Outcome
 from studies.heap.recording import HEAPS, WEIGHTS, make_heaps, make_networks
 from studies.heap.table import FAMILY_COLUMNS, best_rule, compared, family, plan, read_heap_table
 from studies.results import read_provenance, unpacked
@@ -119,6 +120,28 @@ def test_data_of_heaps_are_those_that_are_read():
     assert names == {"heaps", "networks", "rules", "episodes", "table"}
     table = study.read_heap_table()
     assert (table["heaps"] == HEAPS["test"]).all() and len(table) == 19
+    heaps, networks, rules = (
+        read_provenance(paths.DATA / "heap", name)["settings"]
+        for name in ("heaps", "networks", "rules")
+    )
+    assert heaps == {"heaps": HEAPS, "seeds": recording.SEEDS, "boxes dropped": generate.BOXES}
+    recorded = {"picks": recording.PICKS, "rounds": recording.ROUNDS, "steps": recording.STEPS}
+    assert recorded.items() <= networks.items()
+    counts = [study.FIRST_HEAPS, study.RULE_HEAPS]
+    assert (rules["heaps"], rules["picks"]) == (counts, study.MAX_PICKS)
+    played = pd.read_csv(paths.DATA / "heap" / "rules.csv")["rule"]
+    assert played.tolist() == list(study.candidates())
+
+
+def test_a_published_episode_is_played_again():
+    """The first one of the learned policy at λ = 1."""
+    place = paths.DATA / "heap"
+    episodes = pd.read_csv(place / "episodes.csv").set_index(["policy", "falls_weight", "heap"])
+    player = {"networks": place / "networks.safetensors", "falls_weight": 1.0}
+    played = study._play(player, "test", 0, study.PHYSICS)
+    assert played == pytest.approx(
+        dict(episodes.loc["learned", 1.0, 0][["boxes", "falls"]]), abs=1e-5
+    )
 
 
 def test_the_throughput_draws_its_data():
@@ -147,8 +170,9 @@ def test_a_heap_is_drawn_from_the_rear_to_the_front(cubes):
     assert np.ptp(corners[3], axis=0) == pytest.approx([wide, wide, 0.4 - seam])
     assert corners.mean(axis=1) == pytest.approx(heap.positions)
     axes = plt.figure().add_subplot()
-    colours = np.array([picture.MEANINGS[name] for name in ("comes along", "is dragged")])
-    picture.draw_heap(axes, heap.only(np.array([2, 0])), colours)
+    few, both = heap.only(np.array([2, 0])), np.array([True, True])
+    colours = picture.outcome_colours(Outcome(few, both, ~both, 0.7, True), box=1)
+    picture.draw_heap(axes, few, colours)
     painted = axes.collections[0].get_facecolors()[:, :3]
     assert len(painted) == 6, "three faces of a box are turned to the eye"
     dragged, along = (np.array(COLOURS[name]) for name in ("tried", "liftable"))
@@ -191,7 +215,7 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
     small = {"MAX_PICKS": 3, "PICKS": 12, "NETWORKS": 2, "STEPS": 2}
     for name, value in small.items():
         monkeypatch.setattr(recording, name, value)
-    learned, explorers = [], []
+    learned, explorers, explored = [], [], []
     fit, policy = recording.fit, recording.Learned
 
     def noted_fit(picks, seed, steps):
@@ -200,13 +224,15 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
 
     def noted_policy(networks, weight):
         explorers.append(weight)
-        return policy(networks, weight)
+        explorer = policy(networks, weight)
+        return lambda *given: explored.append(weight) or explorer(*given)
 
     monkeypatch.setattr(recording, "fit", noted_fit)
     monkeypatch.setattr(recording, "Learned", noted_policy)
     make_networks(tmp_path, tmp_path)
     assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
     assert len(explorers) == 2 and set(explorers) <= set(recording.WEIGHTS)
+    assert 0 < len(explored) < 6, "some picks of the second round are random"
     picks = learned[-1]
     assert np.isfinite(picks.observations).all() and picks.unloaded.sum() > 0
     came = picks.fates[np.arange(12), picks.actions] & 1

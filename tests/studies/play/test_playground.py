@@ -44,6 +44,10 @@ def test_a_click_lifts_a_box_and_undo_takes_it_back(game):
     start, liftable = bytes(game.canvas.colours), game.you.liftable()
     blocked = np.setdiff1d(game.you.visible, liftable)
     assert score(game) == [0, 0] and game.undo.disabled
+    game.hints.value = True
+    assert {colour(game, item) for item in liftable} == {"liftable"}
+    assert {colour(game, item) for item in blocked} == {"visible"}
+    game.hints.value = False
     click(game, liftable[0])
     assert score(game) == [1, 1] and not game.undo.disabled
     assert colour(game, liftable[0]) is None
@@ -109,6 +113,8 @@ def test_a_player_is_watched_by_the_slider(game):
         assert score(game) == [run.unloaded(count), count]
         shown = [colour(game, item) is not None for item in range(len(run.load))]
         assert shown == run.moment(count).present.tolist()
+    lift = game.canvas.lift  # only where the slider moved on by one pick
+    assert (lift["number"], lift["item"]) == (1, run.picks[5].item)
     click(game, run.moment(2).visible[0])
     assert "choose the player" in game.message.value and not game.you.picks
     game.player.value = "you"
