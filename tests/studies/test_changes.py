@@ -9,6 +9,7 @@ import pytest
 from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
+from unload import stack_load
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train
 
@@ -68,6 +69,9 @@ def test_only_what_is_stored_is_changed():
     assert (stored[..., 2] == seen[..., 2]).all()
     assert (stored[..., 0] != seen[..., 0]).mean() > 0.9
     assert (remembered(plain) == seen).all()
+    signs = remembered(run_of(changes.mirrored)[0]) / seen
+    assert (signs == signs[:, :1]).all() and (signs[:, 0, 2] == 1).all()
+    assert len(np.unique(signs[:, 0, :2], axis=0)) == 4, "of x and y, each with its own sign"
 
 
 def test_what_is_seen_is_changed_in_choosing_and_learning(asking):
@@ -120,7 +124,9 @@ def test_choices_see_other_signs_than_the_memory_holds(asking):
 
 
 def test_dug_loads_come_from_the_second_episode_on(monkeypatch):
-    (load,) = changes.dug_loads(0.4, count=1, seed=2)
+    load, _, third = changes.dug_loads(0.4, count=3, seed=2)
+    full = len(stack_load(np.random.default_rng(2 + 2)))
+    assert full - len(third) == np.random.default_rng(2).integers(476, size=3)[2], "no pick fails"
     monkeypatch.setattr(changes, "dug_loads", lambda preference: [load])
     run = Training(replace(SMALL, max_picks=2))
     changes.dug(run, 0.4)
@@ -134,7 +140,10 @@ def test_dug_loads_come_from_the_second_episode_on(monkeypatch):
 
 def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
     alone = Training(replace(SMALL, seed=SMALL.seed + 50))
-    run, _ = run_of(partial(changes.tandem, change=lambda run: None, seed=50), steps=4)
+    made = []
+    both = partial(changes.tandem, change=made.append, seed=50)
+    run, _ = run_of(partial(changes.several, makes=[both, made.append]), steps=4)
+    assert [each.config.seed - SMALL.seed for each in made] == [50, 0]
     first = Training(SMALL).agent.state()
     assert run.agent.choose.__self__ is not run.agent
     active, weight = run.agent.choose.__self__.state(), "network.extractor.weight"

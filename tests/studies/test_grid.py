@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from joblib import parallel_config
 
 from studies import grid, sweep
@@ -84,7 +85,8 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     assert list(report.index) == list(configs)
     assert (report["error"] == "").all()
     assert report["seed"].tolist() == [0, 1]
-    assert capfd.readouterr().err == ""
+    said = capfd.readouterr()
+    assert said.err == "" and "2/2" in said.out and "failed=0" in said.out
     for name, config in configs.items():
         folder = tmp_path / "many" / name
         assert report.loc[name, "folder"] == str(folder)
@@ -105,16 +107,18 @@ def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):
     alive = weakref.WeakSet()
 
     def change(run):
-        assert not alive
+        assert not alive and torch.get_num_threads() == 1
         alive.add(run.replay)
         run.replay.owner = run
 
+    torch.set_num_threads(2)
     gc.disable()
     try:
         report = sweep.run_sweep(configs, tmp_path, 1, dict.fromkeys(configs, change))
     finally:
         gc.enable()
     assert (report["error"] == "").all() and len(report) > 1
+    assert torch.get_num_threads() == 2
 
 
 def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path, monkeypatch):

@@ -1,5 +1,6 @@
 """The command line, the files it has made in ``data/``, what the room refuses; and exercises."""
 
+import runpy
 import sys
 from functools import partial
 
@@ -82,9 +83,10 @@ def test_numbers_that_nothing_can_run_with_are_refused_in_one_line(
     assert last.startswith(f"python -m studies: error: {message}")
 
 
-def test_help_names_every_part(called, capsys):
+def test_help_names_every_part(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["studies", "--help"])
     with pytest.raises(SystemExit):
-        called("--help")
+        runpy.run_path(command.__file__, run_name="__main__")
     shown = " ".join(capsys.readouterr().out.split())
     assert all(f" {name} {text} " in shown for name, (text, *_) in command.PARTS.items())
 

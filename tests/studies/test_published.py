@@ -19,6 +19,7 @@ from studies.falls import figures as falls
 from studies.falls.laboratory import read_laboratory, read_trace
 from studies.falls.long import read_long_trace
 from studies.grid import read_grid
+from studies.heap.table import compared, read_heap_table
 from studies.paper import diagrams, tuning
 from studies.paper.training import PAPER
 from studies.policies.comparison import comparison_msr
@@ -139,6 +140,16 @@ def test_figures_and_tables_are_those_that_the_data_give(notebook, monkeypatch):
     assert drawn == saved_by(notebook) - SIMULATED
 
 
+def test_the_table_of_heaps_follows_from_their_episodes():
+    """Of 15 picks each; the table of episodes rounds their means."""
+    episodes = pd.read_csv(paths.DATA / "heap" / "episodes.csv")
+    for name in ("boxes", "falls"):
+        episodes[name] = (15 * episodes[name]).round() / 15
+    episodes["net"] = episodes["boxes"] - episodes["falls_weight"] * episodes["falls"]
+    found, published = compared(episodes), read_heap_table()
+    pd.testing.assert_frame_equal(found, published, rtol=1e-5, check_dtype=False)
+
+
 def test_each_published_figure_is_drawn_by_a_notebook():
     notebooks = (paths.ROOT / "notebooks").rglob("*.ipynb")
     names = [path.relative_to(paths.ROOT / "notebooks").with_suffix("") for path in notebooks]
@@ -164,6 +175,7 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
     for name in (*list(cells)[:2], "code-25"):
         run(code_of(cells[name]), namespace)
     committed = paths.ROOT / "figures" / "unloading.gif"
+    assert committed.stat().st_size <= 2_000_000, "too large for a README"
     with Image.open(tmp_path / "unloading.gif") as found, Image.open(committed) as published:
         assert found.n_frames == published.n_frames
         for number in (0, 1, 15, found.n_frames - 1):

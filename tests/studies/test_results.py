@@ -50,9 +50,11 @@ def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
 def test_a_damaged_answer_is_named(tmp_path):
     kept(tmp_path, {"seed": 1}, int)
     (path,) = tmp_path.iterdir()
-    path.write_text("{")
-    with pytest.raises(ValueError, match=f"{path.name} is not a readable JSON file"):
-        kept(tmp_path, {"seed": 1}, int)
+    assert len(path.stem) == 16
+    for damaged in (path.read_text().replace('"value": 0', '"value": 1'), "{"):
+        path.write_text(damaged)
+        with pytest.raises(ValueError, match=f"{path.name} (was changed|is not)"):
+            kept(tmp_path, {"seed": 1}, int)
 
 
 def test_what_is_published_says_where_it_comes_from(tmp_path):
@@ -83,7 +85,7 @@ def test_a_table_is_read_and_another_one_refused(tmp_path):
 def test_records_are_joined():
     first = results.run_record(9.96)
     assert {"numba", "joblib", "torch", "pybullet", "numpy"} <= set(first["versions"])
-    assert str(os.cpu_count()) in first["machine"]
+    assert str(os.cpu_count()) in first["machine"] and first["wall_time_s"] == 10.0
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
     assert first["peak_memory_mib"] == pytest.approx(peak, rel=0.1)
     assert len(first["revision"].rstrip("+")) == 12 or first["revision"] == "unknown"

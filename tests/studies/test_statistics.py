@@ -86,8 +86,8 @@ def test_share_intervals_are_those_of_the_binomial_distribution():
     ("function", "arguments", "message"),
     [
         (statistics.t_interval, ([np.inf, 1],), "values"),
-        (statistics.share_interval, (3, 2), "count is 3"),
-        (statistics.share_interval, (0, 0), "total is 0"),
+        (statistics.share_interval, (3, 2), "count is 3; expected an integer >= 0 and <= 2"),
+        (statistics.share_interval, (0, 0), "total is 0; expected an integer >= 1"),
     ],
 )
 def test_bad_values_are_refused_by_name(function, arguments, message):

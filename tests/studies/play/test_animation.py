@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from studies import paths
 from studies.play import animation
 from studies.policies.robustness import front_walls
 from tests.agent.runs import lowest
@@ -64,7 +63,3 @@ def test_gif_is_saved_as_the_same_bytes_and_tells_what_happens(episodes, tmp_pat
     assert first.read_bytes() == second.read_bytes()
     with Image.open(first) as image:
         assert image.n_frames == len(frames) == len(animation.picks_of_frames(picks))
-
-
-def test_committed_picture_is_small_enough_for_a_readme():
-    assert (paths.FIGURES / "unloading.gif").stat().st_size <= 2_000_000

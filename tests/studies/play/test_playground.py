@@ -1,21 +1,26 @@
-"""The widgets: the playground, and a figure under sliders."""
+"""The widgets: the playground, a figure under sliders, and what they draw.
+
+``tests/studies/test_published.py`` compares what the notebook shows of them.
+"""
 
 import base64
 import html
 import logging
 import re
+from dataclasses import replace
 
 import ipywidgets as widgets
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from studies.play.canvas import ABSENT
-from studies.play.episode import Episode, Run
+from studies.play.agent_view import agent_view, look
+from studies.play.canvas import ABSENT, Canvas
+from studies.play.episode import Episode, Run, policy_of
 from studies.play.explore import Explore
 from studies.play.playground import SHOWN, Playground
-from unload import policies, stack_load
-from unload.load.view import PLOTLY_MIMETYPE
+from studies.play.replay import replay
+from unload import ContainerEnv, policies, stack_load
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -138,16 +143,6 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it():
     assert "this is a deadlock" in stuck.message.value
 
 
-def test_where_no_kernel_runs_a_picture_or_a_replay_stands(game):
-    still = game._repr_mimebundle_()
-    assert set(still) == {WIDGET, "image/png", "text/plain"}
-    game.player.value = "highest"
-    bundle = game._repr_mimebundle_()
-    assert set(bundle) == {*still, PLOTLY_MIMETYPE} and bundle["image/png"] != still["image/png"]
-    labels = [step["label"] for step in bundle[PLOTLY_MIMETYPE]["layout"]["sliders"][0]["steps"]]
-    assert labels[-1] == "20 picks, 20 unloaded"
-
-
 BAD_INPUT = {
     "load is 'load'; expected an unload.Load": lambda load: Episode("load", 0),
     "item is 0; expected one of the visible": lambda load: Episode(load, 0).pick(0),
@@ -208,3 +203,80 @@ def test_a_figure_under_sliders_is_drawn_at_each_change():
     assert WIDGET in bundle and base64.b64decode(bundle["image/png"]) == before
     assert before.startswith(b"\x89PNG")
     assert not plt.get_fignums(), "a figure that is open is shown twice"
+
+
+def test_the_canvas_holds_the_load_and_a_pick_is_one_small_message(full_load, monkeypatch):
+    canvas = Canvas(full_load)
+    corners = np.frombuffer(canvas.boxes, np.float32).reshape(-1, 2, 3)
+    assert np.allclose(corners.mean(axis=1), full_load.positions, atol=1e-5)
+    assert np.allclose(np.ptp(corners, axis=1), full_load.sizes, atol=1e-5)
+    x, y, z = np.rint(full_load.sizes[7] * 1000).astype(int)
+    assert canvas.labels[7] == f"item 7, package {full_load.packages[7]}: {x} × {y} × {z} mm"
+    sent = []
+    monkeypatch.setattr(canvas, "send_state", lambda key=None: sent.append(key))
+    numbers = np.zeros(len(full_load), int)
+    numbers[3] = ABSENT
+    lifts = []
+    for _ in range(2):
+        on_it = {"on it": np.array([5])}
+        canvas.show(numbers, {"visible": (0, 0.5, 1)}, on_it, (3, 0.46, (0, 1, 0)))
+        lifts.append(canvas.lift["number"])
+    assert len(sent) == 2 and not {"boxes", "labels"} & set().union(*sent)
+    assert canvas.colours[3] == ABSENT and len(canvas.colours) == len(full_load)
+    assert canvas.outlined == [5]
+    assert [line[0] for line in canvas.legend] == ["visible", "on it"]
+    assert lifts == [1, 2], "the same lift twice is seen twice"
+
+
+def test_a_failed_pick_is_marked_in_the_container_of_the_load(boxes):
+    small = replace(boxes((1.0, 0.2), (1.0, 0.6)), container=np.array([6.0, 2.0, 2.0]))
+    episode = Episode(small, 0)
+    for item in (0, 1, 0):
+        episode.pick(item)
+    figure = replay(episode)
+    marks = [frame.data[-1] for frame in figure.frames]
+    assert [mark.visible for mark in marks] == ["legendonly", True, "legendonly", "legendonly"]
+    assert marks[1].customdata[0, 0] == 0 and figure.data[-1].visible == "legendonly"
+    assert figure.layout.scene.xaxis.range == (0, 6)
+
+
+@pytest.fixture(scope="module")
+def stuck() -> Run:
+    """The paper's agent where it gets stuck."""
+    run = Run("the paper's agent", stack_load(np.random.default_rng(4)), 4, mask=False)
+    run.play_to(95)
+    return run
+
+
+SETTINGS = {
+    "agent": "the paper's agent", "epsilon": 0, "noise": 0.5, "number": 0, "ties": "noise",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changed", "can"),
+    [
+        ({}, False),
+        ({"number": 3}, True),
+        ({"agent": "the recommended agent"}, True),
+        ({"noise": 0}, True),
+        ({"ties": "average"}, True),
+    ],
+)
+def test_the_settings_show_why_the_agent_is_stuck(stuck, changed, can):
+    """Draw 0 is the noise that it is stuck with; without noise or ties it is not."""
+    title = agent_view(stuck, **SETTINGS | changed).axes[0].get_title()
+    assert f" {'can' if can else 'cannot'} be lifted" in title
+    assert ("item 637 of" in title) is not can
+    ranks = int(title.split()[0])
+    assert ranks < 30 if changed == {"ties": "average"} else ranks == 128
+
+
+def test_chance_mixes_the_greedy_and_a_random_pick(full_load):
+    env = ContainerEnv(physics="table", position_noise=0)
+    env.reset(seed=0, options={"load": full_load})
+    seen = full_load.positions[env.visible], env.liftable()
+    share = seen[1].mean()
+    for epsilon, expected in ((0, 1), (1, share), (0.5, (1 + share) / 2)):
+        chance = look(*seen, policy_of("the recommended agent"), epsilon, "noise")[2]
+        assert chance == pytest.approx(expected)
