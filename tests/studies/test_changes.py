@@ -85,16 +85,13 @@ def test_what_is_seen_is_changed_in_choosing_and_learning(asking):
 
 
 def test_failures_are_replaced_by_successes_of_the_same_step():
+    """Where all of a step failed, what was stored last is stored again."""
     run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
-    rewards = run.replay.arrays["rewards"][:256]
+    arrays = run.replay.arrays
+    rewards = arrays["rewards"][:256]
     assert (rewards[:128] < 0).any()
     assert (rewards[128:] > 0).all()
     assert run.replay.total == 256
-
-
-def test_where_all_of_a_step_failed_what_was_stored_last_is_stored_again():
-    run, _ = run_of(partial(changes.successes_only, start=128), steps=4)
-    arrays = run.replay.arrays
     failed = {name: array[:64].copy() for name, array in arrays.items()}
     run.replay.add(**failed | {"rewards": np.full(64, -1.0)})
     for array in arrays.values():

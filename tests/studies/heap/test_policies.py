@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from studies.heap.boxes import Heap
 from studies.heap.observation import (
     COLUMN,
     COLUMNS,
@@ -107,12 +106,3 @@ def test_features_of_upright_cubes(camera, cubes):
         "pixels": pixels[visible] / 1000, **dict.fromkeys(edges, [0.4] * 3),
     }.items():  # fmt: skip
         assert rows[:3, COLUMN[name]] == pytest.approx(values, abs=1e-6)
-
-
-def test_edges_are_sorted_whichever_way_a_box_lies():
-    turn = np.array([[0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)]])
-    heap = Heap(np.array([[5.0, 1, 1]]), turn, np.array([[0.2, 0.6, 0.4]]), np.array([0]))
-    row = features(heap, np.array([9]))[:1]
-    assert row[0, COLUMN["extent_x"] : COLUMN["tilt"]].tolist() == pytest.approx(
-        [0.6, 0.2, 0.4, 0.6, 0.4, 0.2]
-    )
