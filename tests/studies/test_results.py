@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -16,7 +17,17 @@ from studies.grid import read_grid, read_measures
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
-from studies.results import kept, measured, publish, read_provenance, read_table, revision
+from studies.results import (
+    keep_all,
+    kept,
+    measured,
+    packed,
+    publish,
+    read_provenance,
+    read_table,
+    revision,
+    unpacked,
+)
 from unload import TrainConfig
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
@@ -32,7 +43,7 @@ def test_a_result_is_computed_once_per_question(tmp_path, asked):
     question = {"seed": 1, "sizes": (2, 3)}
     first = kept(tmp_path, question, partial(asked, {"msr": 0.1 + 0.2, "counts": (1, 2)}))
     assert first.value == {"msr": 0.1 + 0.2, "counts": [1, 2]}
-    assert first.record["revision"] == revision() and first.record["wall_time_s"] >= 0
+    assert first.record["revision"] == revision() and 0 <= first.record["wall_time_s"] < 60
     same = kept(tmp_path, {"sizes": [2, 3], "seed": 1}, partial(asked, "not computed"))
     assert same == first and asked.call_count == 1
 
@@ -51,10 +62,29 @@ def test_a_damaged_answer_is_named(tmp_path):
     kept(tmp_path, {"seed": 1}, int)
     (path,) = tmp_path.iterdir()
     assert len(path.stem) == 16
-    for damaged in (path.read_text().replace('"value": 0', '"value": 1'), "{"):
+    for damaged, message in {
+        path.read_text().replace('"value": 0', '"value": 1'): "was changed or damaged",
+        '{"question": {"seed": 1}}': "has no record, value",
+        "{": "is not a readable JSON file",
+    }.items():
         path.write_text(damaged)
-        with pytest.raises(ValueError, match=f"{path.name} (was changed|is not)"):
+        with pytest.raises(ValueError, match=f"{path.name} {message}"):
             kept(tmp_path, {"seed": 1}, int)
+
+
+def test_answers_are_kept_for_the_code_that_gives_them(tmp_path, capsys):
+    def ramp(length):
+        return packed({"ramp": np.arange(length), "length": np.array(length)})
+
+    def falling(length):
+        return packed({"ramp": -np.arange(length), "length": np.array(length)})
+
+    asked = [({"length": length}, (length,)) for length in (2, 3)]
+    for compute, ramps in ((ramp, [[0, 1], [0, 1, 2]]), (falling, [[0, -1], [0, -1, -2]])):
+        answers = [unpacked(each.value) for each in keep_all(tmp_path, compute, asked, 1)]
+        assert [each["ramp"].tolist() for each in answers] == ramps
+        assert [each["length"] for each in answers] == [2, 3]
+    assert "2/2" in capsys.readouterr().out
 
 
 def test_what_is_published_says_where_it_comes_from(tmp_path):

@@ -67,15 +67,21 @@ def test_maskable_ppo_learns_on_64_containers():
     envs.close()
 
 
-def test_rates_are_positive(small_load, monkeypatch):
-    small = {"ROUNDS": 1, "LIFTS": {"full": 1, "local": 2, "table": 2}, "NUM_ENVS": 2, "PICKS": 3}
-    for name, value in (small | {"BATCH_SIZE": 8, "N_FEATURES": 4}).items():
+def test_rates_count_what_is_done(small_load, monkeypatch):
+    """Each call is made once, and said to take half a second."""
+
+    def timed(calls):
+        for call in calls.values():
+            call()
+        return dict.fromkeys(calls, 0.5)
+
+    small = {"LIFTS": {"full": 1, "local": 2, "table": 3}, "NUM_ENVS": 2, "PICKS": 4}
+    small |= {"BATCH_SIZE": 8, "N_FEATURES": 4, "best_times": timed}
+    for name, value in small.items():
         monkeypatch.setattr(parts, name, value)
-    rates = lift_rates(small_load)
-    assert list(rates) == ["full", "local", "table"]
-    rates |= pick_rates() | update_times()
-    assert len(rates) == 12
-    assert all(np.isfinite(rate) and rate > 0 for rate in rates.values())
+    assert lift_rates(small_load) == {"full": 2, "local": 4, "table": 6}
+    assert list(pick_rates().values()) == [6, 6, 12, 12, 12]
+    assert list(update_times().values()) == [500] * 4
 
 
 def test_training_is_timed_where_it_counts(monkeypatch):

@@ -222,9 +222,10 @@ def test_the_canvas_holds_the_load_and_a_pick_is_one_small_message(full_load, mo
         canvas.show(numbers, {"visible": (0, 0.5, 1)}, on_it, (3, 0.46, (0, 1, 0)))
         lifts.append(canvas.lift["number"])
     assert len(sent) == 2 and not {"boxes", "labels"} & set().union(*sent)
+    assert {*Canvas.class_own_traits()} <= {*canvas.get_state()}
     assert canvas.colours[3] == ABSENT and len(canvas.colours) == len(full_load)
     assert canvas.outlined == [5]
-    assert [line[0] for line in canvas.legend] == ["visible", "on it"]
+    assert canvas.legend == [("visible", (0, 0.5, 1), False), ("on it", (1, 1, 1), True)]
     assert lifts == [1, 2], "the same lift twice is seen twice"
 
 
