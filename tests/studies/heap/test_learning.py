@@ -129,17 +129,6 @@ def network() -> FateNetwork:
     return FateNetwork(16, torch.Generator().manual_seed(0))
 
 
-def test_what_is_expected_is_the_sum_of_fates(network, observations):
-    present = holds_box(observations)
-    fates = network.fates(observations, present)
-    boxes, falls = network(observations, present)
-    chance = fates.logits.sigmoid()
-    assert fates.logits.shape == (2, 5, 5, 2)
-    assert boxes.shape == falls.shape == fates.fall_logits.shape == (2, 5)
-    torch.testing.assert_close(boxes[1], chance[1, :, :3, 0].sum(1) + fates.hidden[1, :, 0])
-    torch.testing.assert_close(falls[0], chance[0, :, :, 1].sum(1) + fates.hidden[0, :, 1])
-
-
 def test_one_row_another_order_and_empty_rows_change_no_fate(network, observations):
     present, rows = holds_box(observations), torch.tensor([4, 1])
     every = network.fates(observations, present)

@@ -71,17 +71,6 @@ def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes
     assert int(episode.boxes[0]) == 1 and episode.unloaded[0] == 3
 
 
-@pytest.fixture(scope="module")
-def camera():
-    return Camera()
-
-
-def test_a_box_behind_another_is_not_visible(camera, cubes):
-    heap = cubes((6.5, 1.25, 0), (6.5, 1.25, 1), (6.5, 1.25, 2), (6.5, 1.25, 3), (4.5, 1.25, 0))
-    assert visible_boxes(heap, camera.pixels(heap)).tolist() == [0, 1, 2, 3]
-    assert camera.pixels(heap.only(np.array([4])))[0] > 50
-
-
 def test_few_pixels_show_no_box_unless_there_are_no_others_and_the_foremost_get_rows(cubes):
     heap = cubes((5, 1, 0), (6, 1, 0), (4.5, 1, 0))
     assert visible_boxes(heap, np.array([SEEN, SEEN - 1, 0])).tolist() == [0]
@@ -91,10 +80,10 @@ def test_few_pixels_show_no_box_unless_there_are_no_others_and_the_foremost_get_
     assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))
 
 
-def test_features_of_upright_cubes(camera, cubes):
+def test_features_of_upright_cubes(cubes):
     """The last stands half before the one beside it."""
     heap = cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (5.5, 1.2, 0))
-    pixels = camera.pixels(heap)
+    pixels = Camera().pixels(heap)
     visible = visible_boxes(heap, pixels)
     rows = features(heap.only(visible), pixels[visible])
     assert visible.tolist() == [2, 0, 1]
