@@ -58,8 +58,8 @@ def save_unloading(episodes: Mapping[str, Run], path: str | Path) -> list[Image.
     frames = [_frame(episodes, *span) for span in zip([0, *counts], counts)]
     palette = _palette(frames)
     first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
-    late = len(frames) - 2 - SLOW
-    durations = [FIRST, *[EARLY] * SLOW, *[LATE] * late][: len(frames) - 1] + [LAST]
+    before = [FIRST, *[EARLY] * SLOW, *[LATE] * len(frames)]
+    durations = [*before[: len(frames) - 1], LAST]
     files.write_atomically(
         path,
         lambda file: first.save(

@@ -111,14 +111,16 @@ def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):
         alive.add(run.replay)
         run.replay.owner = run
 
+    threads = torch.get_num_threads()
     torch.set_num_threads(2)
     gc.disable()
     try:
         report = sweep.run_sweep(configs, tmp_path, 1, dict.fromkeys(configs, change))
+        assert torch.get_num_threads() == 2
     finally:
         gc.enable()
+        torch.set_num_threads(threads)
     assert (report["error"] == "").all() and len(report) > 1
-    assert torch.get_num_threads() == 2
 
 
 def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path, monkeypatch):
