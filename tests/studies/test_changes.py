@@ -149,6 +149,16 @@ def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
     assert len(run.replay) == 256
 
 
+def test_a_perfect_start_has_the_weights_of_a_run_with_shuffled_places():
+    config, made = replace(SMALL, picks=1920), []
+    run = Training(replace(config, epsilon_init=0.0))
+    changes.perfect_start(run, change=made.append)
+    teacher, _ = run_of(changes.shuffled, steps=30, config=config)
+    found, expected = (each.agent.network.state_dict() for each in (run, teacher))
+    assert all(found[name].equal(expected[name]) for name in expected) and made == [run]
+    run.rollout.close()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "change",

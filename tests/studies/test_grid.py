@@ -65,6 +65,7 @@ def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained):
     with pytest.raises(ValueError, match=message):
         grid.train_grid(SMALL, ["plain"], None, trained, trained / "other", 1)
     assert not (trained / "other").exists()  # refused before hours of training
+    grid.train_grid(SMALL, None, None, trained, trained / "runs", n_jobs=1)  # as many
     grid.train_grid(SMALL, ["plain"], 320, trained, trained / "runs", 1)
     assert (trained / "some/small_loss.csv").read_bytes() == before
     provenance = read_provenance(trained / "some", "small")

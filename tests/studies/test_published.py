@@ -163,13 +163,14 @@ def test_each_published_figure_is_drawn_by_a_notebook():
     assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in published}
 
 
-@pytest.mark.parametrize("draw", [FROM_DATA["comparison"], partial(diagrams.fig07_network, 4)])
-def test_a_figure_is_saved_as_the_same_bytes(draw, tmp_path):
-    for folder in ("a", "b"):
-        style.save(draw(), "figure", tmp_path / folder)
-    for suffix in ("png", "pdf"):
-        first, second = (tmp_path / folder / f"figure.{suffix}" for folder in "ab")
-        assert first.read_bytes() == second.read_bytes()
+def test_figures_are_saved_as_the_same_bytes(tmp_path):
+    draws = {"one": FROM_DATA["comparison"], "other": partial(diagrams.fig07_network, 4)}
+    for name, draw in draws.items():
+        for folder in ("a", "b"):
+            style.save(draw(), name, tmp_path / "figures" / folder)
+        for suffix in ("png", "pdf"):
+            both = [tmp_path / "figures" / folder / f"{name}.{suffix}" for folder in "ab"]
+            assert both[0].read_bytes() == both[1].read_bytes()
 
 
 def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeypatch):
