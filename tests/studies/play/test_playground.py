@@ -194,6 +194,7 @@ def test_a_figure_under_sliders_is_drawn_at_each_change():
     end, name = widgets.IntSlider(3, max=9), widgets.ToggleButtons(options="ab")
     view = Explore(draw, end=end, name=name)
     before = bytes(view.picture.value)
+    assert not end.continuous_update, "it is drawn when the slider is let go"
     end.value = 7
     name.value = "b"
     assert seen == [(3, "a"), (7, "a"), (7, "b")] and view.picture.value != before
