@@ -55,6 +55,8 @@ PUBLISHED = {
 }
 # How Jupyter shows a table.
 JUPYTER = "display.max_columns", 20, "display.max_colwidth", 50, "display.max_rows", 60
+# The names of styled tables, and the addresses of objects.
+RANDOM = re.compile(r"T_[0-9a-f]{5}|( object)? at 0x[0-9a-f]+")
 # Figures that are drawn from data/, and take its folder.
 FROM_DATA = {
     **{f"variants_{part}": partial(variants_msr, part) for part in PARTS},
@@ -91,8 +93,16 @@ def run(code: str, namespace: dict) -> tuple[str, dict]:
     with redirect_stdout(printed):
         exec(compile(tree, "cell", "exec"), namespace)
         value = eval(compile(ast.Expression(last), "cell", "eval"), namespace)
-    bundle = getattr(value, "_repr_mimebundle_", lambda: {"text/plain": repr(value)})()
-    return printed.getvalue(), bundle
+    return printed.getvalue(), shown(value)
+
+
+def shown(value) -> dict:
+    """How Jupyter shows a value, by media type."""
+    if hasattr(value, "_repr_mimebundle_"):
+        return value._repr_mimebundle_()
+    kinds = {"html": "_repr_html_", "markdown": "_repr_markdown_"}
+    bundle = {f"text/{k}": getattr(value, of)() for k, of in kinds.items() if hasattr(value, of)}
+    return bundle | {"text/plain": repr(value)}
 
 
 def png(figure, **options) -> BytesIO:
@@ -134,8 +144,9 @@ def test_figures_and_tables_are_those_that_the_data_give(notebook, monkeypatch):
             plt.close("all")
             if "execute_result" in outputs:
                 published = outputs["execute_result"]["data"]
-                text = "".join(published["text/plain"])
-                assert found["text/plain"] == text or " at 0x" in text, name
+                for kind in published.keys() & {"text/plain", "text/html", "text/markdown"}:
+                    texts = (RANDOM.sub("", "".join(each[kind])) for each in (found, published))
+                    assert len(set(texts)) == 1, name
                 assert found.get(PLOTLY_MIMETYPE) == published.get(PLOTLY_MIMETYPE), name
                 if "image/png" in found:
                     stills = (BytesIO(b64decode(each["image/png"])) for each in (found, published))
