@@ -106,6 +106,7 @@ def test_a_teacher_chooses_by_height_and_its_preference(asking):
     best = run.agent.learner.best_actions
     assert best(seen, np.array([[True, True, True]])) == 2
     assert best(seen, np.array([[True, True, False]])) == 1
+    assert changes.best_actions(seen, np.array([[True, True, True]])) == 0
 
 
 @pytest.mark.parametrize(("given", "axes"), [({"axes": (1,)}, [1]), ({}, [0, 1])])
