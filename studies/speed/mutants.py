@@ -37,16 +37,16 @@ MODULES = sorted((ROOT / "unload").rglob("*.py")) + sorted((ROOT / "studies").rg
 # The tests that have to notice the mutants of a room, which is the modules of one folder.
 ROOMS = dict.fromkeys(path.parent.relative_to(ROOT).as_posix() for path in MODULES)
 ROOMS = {room: f"tests/{room.removeprefix('unload/')}" for room in ROOMS} | {
-    "unload": "tests/load tests/env tests/agent/test_policies.py",
+    "unload": "tests/test_main.py tests/load tests/env tests/agent/test_[op]*.py",
+    "unload/fast": "tests/fast tests/env/test_vector.py",
     "studies": "tests/studies/test_*.py",
     "studies/speed": "tests/studies/test_speed.py",
 }
-# What a study draws and tells is compared with what is published.
-PUBLISHED = " tests/studies/test_published.py"
+# What a study draws and tells is compared with what is published, and so are its settings.
+PUBLISHED = " tests/studies/test_results.py tests/studies/test_published.py"
 ROOMS |= {room: tests + PUBLISHED for room, tests in ROOMS.items() if room.startswith("studies/")}
-OPTIONS = ["-q", "-x", "-m", "not slow"]
-# Tests of the package that take long or start processes of their own.
-SLOW = "full or program_ends or processes or 16_containers"
+# What overflows in plain Python, where warnings are errors, does so in silence when compiled.
+OPTIONS = ["-q", "-x", "-m", "not slow", "-W", "ignore:overflow encountered"]
 PAIRS = {
     ast.Lt: ast.LtE, ast.Gt: ast.GtE, ast.Eq: ast.NotEq, ast.Is: ast.IsNot, ast.In: ast.NotIn,
     ast.Add: ast.Sub, ast.Mult: ast.Div, ast.And: ast.Or, ast.BitAnd: ast.BitOr,
@@ -96,6 +96,11 @@ def mutants(path: Path) -> Iterator[tuple[Path, int, str, bytes]]:
             yield path, node.lineno, f"{ast.unparse(node)} -> {ast.unparse(new)}", code
 
 
+def plain(room: str, source: bytes) -> bool:
+    """Whether a module runs without compiling, as the module's docstring says."""
+    return room != "unload/fast" and re.search(rb"^@compiled", source, re.MULTILINE) is not None
+
+
 def killed_by(trees: SimpleQueue, room: str, path: Path, code: bytes | None, limit: float) -> str:
     """What fails first in a room's tests if a module has other code, or as it is if None."""
     tree = trees.get()
@@ -105,10 +110,9 @@ def killed_by(trees: SimpleQueue, room: str, path: Path, code: bytes | None, lim
     tests = [each for pattern in ROOMS[room].split() for each in sorted(tree.glob(pattern))]
     own = [each for folder in tests for each in folder.glob(f"test_{path.stem}.py")]
     command = ["timeout", "-s", "KILL", f"{limit:.0f}", sys.executable, "-m", "pytest", *OPTIONS]
-    command += ["-k", f"not ({SLOW})"] if room.startswith("unload") else []
     # Bytecode is known by the second and the size of its source, which a mutant may share.
     env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
-    env["NUMBA_DISABLE_JIT"] = str(int(b"@compiled" in before and room != "unload/fast"))
+    env["NUMBA_DISABLE_JIT"] = str(int(plain(room, before)))
     ended = subprocess.run([*command, *own, *tests], cwd=tree, env=env, capture_output=True)
     copy.write_bytes(before)
     trees.put(tree)
@@ -122,8 +126,9 @@ def measure(room: str, sample: int, seed: int, trees: SimpleQueue) -> pd.DataFra
     """A sample of the mutants of a room: ``COLUMNS``, and ``killed_by``, empty if none is."""
     paths, start = [path for path in MODULES if path.parent == ROOT / room], time.monotonic()
     found = [mutant for path in paths for mutant in mutants(path)]
-    if failed := killed_by(trees, room, paths[0], None, limit=3600):
-        raise RuntimeError(f"the tests of {room} fail without any change: {failed}")
+    for path in {plain(room, path.read_bytes()): path for path in paths}.values():
+        if failed := killed_by(trees, room, path, None, limit=3600):
+            raise RuntimeError(f"the tests of {room} fail without any change: {failed}")
     limit = 3 * (time.monotonic() - start) + 20  # two at once, and compiled again
     rng = np.random.default_rng([seed, *room.encode()])
     numbers = rng.choice(len(found), min(sample, len(found)), replace=False)
