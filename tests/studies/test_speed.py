@@ -131,7 +131,8 @@ def test_speeds_are_printed_and_published_with_ratios(tmp_path, monkeypatch, cap
         monkeypatch.setattr(module, "FOLDER", tmp_path)
     run.main()
     assert parts.read_speeds()["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
-    assert "12,300 lifts/s 6,170 ×" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "12,300 lifts/s 6,170 ×" in said.out and "measuring: training" in said.err
     assert read_provenance(tmp_path, "benchmarks")["runs"] == 1
 
 
