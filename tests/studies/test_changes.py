@@ -143,6 +143,7 @@ def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
     both = partial(changes.tandem, change=made.append, seed=50)
     run, _ = run_of(partial(changes.several, makes=[both, made.append]), steps=4)
     assert [each.config.seed - SMALL.seed for each in made] == [50, 0]
+    assert made[0].rollout.envs.closed
     first = Training(SMALL).agent.state()
     assert run.agent.choose.__self__ is not run.agent
     active, weight = run.agent.choose.__self__.state(), "network.extractor.weight"
