@@ -176,7 +176,9 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
     path = written("a,6,0.1,0,500,40,300", columns=columns)
     with pytest.raises(ValueError, match="says no unit of x_min, y_min, z_min; expected units"):
         read_load(path)
-    assert read_load(path, units="m").sizes.tolist() == [[0.5, 0.4, 0.3]]
+    load = read_load(path, units="m")
+    assert load.sizes.tolist() == [[0.5, 0.4, 0.3]]
+    assert load.positions[0] == pytest.approx([6.25, 0.3, 0.15])
     read_load(written("a,600,10,0,50,40,30", columns=columns.replace("mm", "cm")))
     assert "in the unit of the other lengths: x_min, y_min, z_min\n" in caplog.text
 
