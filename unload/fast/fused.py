@@ -66,7 +66,7 @@ def start_gradients(
     observations: np.ndarray,
     actions: np.ndarray,
     targets: np.ndarray,
-    beta: float,
+    beta: float = 1.0,
     rows: np.ndarray | None = None,
 ) -> Callable[[], np.ndarray]:
     """Begin to compute the mean smooth-L1 loss of the chosen actions' values, and its gradients.
