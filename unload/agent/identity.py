@@ -119,7 +119,9 @@ def _used(function: FunctionType, tree: Any) -> list[Any]:
     defaults = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
     if tree is not None:  # a default that is written out stands in the source already
         written = [*tree.args.defaults, *filter(None, tree.args.kw_defaults)]
-        defaults = [value for value, node in zip(defaults, written) if not _literal(node)]
+        defaults = [
+            value for value, node in zip(defaults, written, strict=True) if not _literal(node)
+        ]
     used += defaults
     names = _names(function.__code__)
     held = [function.__globals__[name] for name in names if name in function.__globals__]

@@ -120,6 +120,7 @@ def _by_policy(load: Load, policy: Policy, rng: np.random.Generator) -> Iterator
             raise ValueError(f"what policy returned is {row}; expected a row that the mask allows")
         observation, _, emptied, _, info = env.step(row)
         yield int(info["item"]), float(info["distance"])
+    env.close()
 
 
 def _by_rule(load: Load, rule: Rule) -> Iterator[tuple[int, float]]:
@@ -138,3 +139,4 @@ def _by_rule(load: Load, rule: Rule) -> Iterator[tuple[int, float]]:
         else:
             failed[item] = True
         yield item, distance
+    physics.close()

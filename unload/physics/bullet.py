@@ -191,7 +191,7 @@ class World:
         self,
         seconds: float,
         body: int | None = None,
-        force: tuple[float, float, float] | None = None,
+        force: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         """Let time pass, rounded to whole time steps.
 

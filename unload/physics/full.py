@@ -29,6 +29,7 @@ class FullPhysics(Physics):
         self.exact = after_pick == "restore"
 
     def _reset(self, load: Load) -> None:
+        self._stop()
         self._world = self._make_world()
         length, width, height = self._container = load.container
         for position, size in (

@@ -147,6 +147,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         OSError: ``folder/lock`` is a link, or the file system has no locks, or no room.
     """
     folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     lock, owner = FileLock(folder / "lock", fallback_to_soft=False), folder / "owner"
     try:
         # Others hold such a lock for moments; who does so for longer may have been stopped.

@@ -119,13 +119,18 @@ def test_a_run_is_the_same_however_it_is_played(full_load):
     assert in_parts.picks == at_once.picks
 
 
-def test_a_recorded_episode_ends_when_the_container_is_empty_or_the_agent_stuck():
+def test_a_recorded_episode_ends_when_the_container_is_empty_or_the_agent_stuck(tmp_path):
+    """It is saved as the same bytes each time."""
     wall = front_walls(stack_load(np.random.default_rng(3)), 1)
     players = lowest, policies.highest
     stuck, empty = (animation.record_episode(player, 3, wall) for player in players)
     assert empty.unloaded() == len(empty.load) == len(empty.picks)
     assert len({pick.item for pick in stuck.picks}) == 1 and not stuck.unloaded()
     assert len(stuck.picks) == animation.STUCK
+    first, second = tmp_path / "a.gif", tmp_path / "b.gif"
+    for path in (first, second):
+        animation.save_unloading({"stuck": stuck, "empty": empty}, path)
+    assert first.read_bytes() == second.read_bytes()
 
 
 def test_frames_begin_slowly_and_show_the_end_twice():
