@@ -112,9 +112,8 @@ def compare(found, published, name: str) -> None:
     """Two pictures, as PNG files."""
     found, published = plt.imread(found), plt.imread(published)
     assert found.shape == published.shape, name
-    # A processor that rounds otherwise may shade a few pixels otherwise, but no light area.
-    difference = np.abs(found - published)
-    assert (difference > 0.1).mean() < 1e-5 and difference.mean() < 1e-4, name
+    # A processor that rounds otherwise may shade a few pixels otherwise, but no light grey area.
+    assert (np.abs(found - published) > 0.05).mean() < 1e-5, name
 
 
 @pytest.mark.parametrize("notebook", PUBLISHED)
