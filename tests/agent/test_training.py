@@ -37,7 +37,7 @@ LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
 def test_what_a_run_leaves(tmp_path, fields):
-    config = TrainConfig(**fields)
+    config = TrainConfig(**fields, epsilon_final=0.9)  # so that its points differ to the end
     folder = tmp_path / "new" / "run"
     result = train(config, folder, progress=False)
     assert {path.name for path in folder.iterdir()} == LEFT

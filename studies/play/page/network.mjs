@@ -17,14 +17,21 @@ export class PEQNetwork {
     this.features = new Float64Array(4 * n);
   }
 
+  /** The extractor's weights of one feature. */
+  weights(f) {
+    const { extractor: e } = this;
+    return { wx: e[4 * f], wy: e[4 * f + 1], wz: e[4 * f + 2], bias: e[4 * f + 3] };
+  }
+
   /** What decides among the items: tanh's argument without the pooled part, (items). */
   scores(observation) {
     const scores = new Float64Array(observation.length / 3);
     for (let f = 0; f < this.nFeatures; f++) {
-      const [x, y, z, bias] = this.extractor.subarray(4 * f, 4 * f + 4);
+      const { wx, wy, wz, bias } = this.weights(f);
       const score = this.scorer[f];
       for (let i = 0, j = 0; i < scores.length; i++, j += 3) {
-        const feature = x * observation[j] + y * observation[j + 1] + z * observation[j + 2] + bias;
+        const x = observation[j], y = observation[j + 1], z = observation[j + 2];
+        const feature = wx * x + wy * y + wz * z + bias;
         if (feature > 0) scores[i] += score * feature;
       }
     }
@@ -44,7 +51,7 @@ export class PEQNetwork {
     const { nFeatures: n, extractor, scorer, inputs, features } = this;
     const items = observation.length / 3;
     for (let f = 0; f < n; f++) {
-      const [wx, wy, wz, bias] = extractor.subarray(4 * f, 4 * f + 4);
+      const { wx, wy, wz, bias } = this.weights(f);
       let lowest = 0, highest = 0, low = Infinity, high = -Infinity;
       let sumX = 0, sumY = 0, sumZ = 0, open = 0; // over items whose ReLU is open
       for (let j = 0; j < observation.length; j += 3) {
@@ -54,11 +61,15 @@ export class PEQNetwork {
         if (feature > high) high = feature, highest = j;
         if (feature > 0) sumX += x, sumY += y, sumZ += z, open++;
       }
-      [3 * item, lowest, highest].forEach((j, source) => {
-        inputs.set(observation.subarray(j, j + 3), 4 * (source * n + f));
-        inputs[4 * (source * n + f) + 3] = 1;
-      });
-      inputs.set([sumX / items, sumY / items, sumZ / items, open / items], 4 * (3 * n + f));
+      const sources = [3 * item, lowest, highest];
+      for (let source = 0; source < 3; source++) {
+        const j = sources[source], k = 4 * (source * n + f);
+        for (let i = 0; i < 3; i++) inputs[k + i] = observation[j + i];
+        inputs[k + 3] = 1;
+      }
+      const k = 4 * (3 * n + f);
+      inputs[k] = sumX / items, inputs[k + 1] = sumY / items;
+      inputs[k + 2] = sumZ / items, inputs[k + 3] = open / items;
     }
     let total = scorer[4 * n];
     for (let k = 0; k < 4 * n; k++) {

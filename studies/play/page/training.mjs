@@ -81,9 +81,11 @@ const CHANGES = {
     return observation.map((value, i) => signs[i % 3] * value);
   },
   shuffled: (observation, choices) => {
-    const draws = Array.from({ length: observation.length / 3 }, () => choices.uniform());
-    const order = [...draws.keys()].sort((a, b) => draws[a] - draws[b]);
-    const from = (i) => 3 * order[Math.floor(i / 3)] + (i % 3);
-    return observation.map((value, i) => (i % 3 === 2 ? value : observation[from(i)]));
+    const seen = observation.slice();
+    for (let row = seen.length / 3 - 1; row > 0; row--) {
+      const [i, j] = [3 * row, 3 * choices.integer(row + 1)]; // x and y change places
+      [seen[i], seen[i + 1], seen[j], seen[j + 1]] = [seen[j], seen[j + 1], seen[i], seen[i + 1]];
+    }
+    return seen;
   },
 };
