@@ -9,6 +9,7 @@ first row of its kind and all of one run, say more. All is on one thread unless 
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from datetime import date
 from functools import partial
 from importlib.metadata import version
@@ -29,6 +30,7 @@ from unload.fast import fused
 COMMAND = "python -m studies.speed.run"
 # Picks that count, of ours with the fused update, of ours with plain PyTorch's, and of theirs.
 FUSED, PLAIN, THEIRS = 256_000, 3_200, 960
+NEW = 25_600  # of ours on loads that never repeat, with as many before, in which processes start
 THREADS = {1: "1 thread", 2: "2 threads"}
 
 
@@ -60,6 +62,9 @@ def training_rates() -> dict[str, float]:
     either: what the system takes to hand out the memory is nothing beside the paper's 20
     million picks. Exploration falls over the picks made here as it does in the paper. Ours is
     the median over episodes, theirs over steps: what else runs on the machine stalls a few.
+
+    Last are loads that never repeat: the paper's, each in boxes of other sizes, so that PyBullet
+    simulates the lifts of boxes with one or two others on top.
     """
     rates = {}
     for threads, name in THREADS.items():
@@ -69,16 +74,23 @@ def training_rates() -> dict[str, float]:
     memory = unload.TrainConfig().replay_size
     for threads, name in THREADS.items():
         rates[f"here, fused update, {name}"] = _our_rate(FUSED, threads, before=memory)
+    rates["here, loads that never repeat, 2 threads"] = _our_rate(NEW, 2, NEW, stack=resized_load)
     torch.set_num_threads(1)
     return rates
 
 
-def _our_rate(picks: int, threads: int, before: int) -> float:
+def resized_load(rng: np.random.Generator) -> unload.Load:
+    """One of the paper's loads, made smaller along each axis by a share that is drawn."""
+    load, shares = unload.stack_load(rng), rng.uniform(0.9, 1, 3)
+    return unload.Load(load.positions * shares, load.sizes * shares, load.packages, load.walls)
+
+
+def _our_rate(picks: int, threads: int, before: int, stack: Callable | None = None) -> float:
     torch.set_num_threads(threads)
     steps = picks // unload.TrainConfig().num_envs
     config = unload.TrainConfig(picks=picks + before, log_interval=min(10, steps))
     with tempfile.TemporaryDirectory() as folder:
-        curve = unload.train(config, folder, progress=False).curve
+        curve = unload.train(config, folder, progress=False, stack=stack).curve
     times = curve.loc[curve["picks"] >= before, "wall_time"].to_numpy()
     episode = min(config.max_picks // config.log_interval, len(times) - 1)  # points of the curve
     seconds = np.median(times[episode:] - times[:-episode])

@@ -88,10 +88,10 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     """Made-up trainings take 1 ms a pick, theirs 2 ms, and more in the picks before."""
     memory, ours, theirs = unload.TrainConfig().replay_size, [], []
 
-    def train(config, folder, progress):
-        ours.append((torch.get_num_threads(), fused.applies(None), config.picks))
+    def train(config, folder, progress, stack):
+        ours.append((torch.get_num_threads(), fused.applies(None), config.picks, stack))
         picks = np.arange(1, config.picks // 640 + 1) * 640
-        before = memory if config.picks > memory else run.PLAIN
+        before = memory if config.picks > memory else config.picks // 2
         times = (picks + 4 * np.minimum(picks, before)) / 1000
         return SimpleNamespace(curve=pd.DataFrame({"picks": picks, "wall_time": times}))
 
@@ -111,12 +111,20 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     monkeypatch.setattr(stable_baselines3, "DQN", model)
     monkeypatch.setattr(run, "make_vec_env", lambda name, count, env_kwargs: count)
     rates = run.training_rates()
-    assert list(rates.values()) == pytest.approx([500, 500, 1000, 1000, 1000])
+    assert list(rates.values()) == pytest.approx([500, 500, 1000, 1000, 1000, 1000])
     assert ours == [
-        (1, False, 2 * run.PLAIN), (1, True, run.FUSED + memory), (2, True, run.FUSED + memory)
-    ]  # fmt: skip
+        (1, False, 2 * run.PLAIN, None),
+        (1, True, run.FUSED + memory, None),
+        (2, True, run.FUSED + memory, None),
+        (2, True, 2 * run.NEW, run.resized_load),
+    ]
     assert theirs == [(threads, 64, 2048, 1, {"net_arch": [64]}) for threads in (1, 2)]
     assert torch.get_num_threads() == 1
+
+
+def test_loads_of_other_sizes_never_repeat(rng):
+    sizes = {tuple(size) for _ in range(3) for size in run.resized_load(rng).sizes.round(6)}
+    assert len(sizes) == 3 * 13
 
 
 def test_speeds_are_printed_and_published_with_ratios(tmp_path, monkeypatch, capsys):
