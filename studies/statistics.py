@@ -193,7 +193,7 @@ def ratio_interval(
 
     NaN where the reference's mean is not > 0 in every resample, because such a ratio means
     nothing. If all pairs have the same ratio, the interval has no width. Of fewer than two pairs,
-    it is NaN.
+    its ends are NaN.
     """
     values = checks.finite_array("values", values, (None,))
     reference = checks.finite_array("reference", reference, values.shape)
@@ -201,6 +201,8 @@ def ratio_interval(
     if (reference[rows].mean(axis=1) <= 0).any():
         return np.nan, np.nan, np.nan
     ratio = float(values.mean() / reference.mean())
+    if len(values) < 2:
+        return ratio, np.nan, np.nan
     if np.abs(values - ratio * reference).max() < 1e-12:
         return ratio, ratio, ratio
 

@@ -20,9 +20,12 @@ OPTIONS = [
 ]
 
 
-def test_training_from_the_command_line_is_training(tmp_path, capsys):
-    """With a stack and a network of one's own, and a switch that is off by default."""
-    own = ["--stack=tests.agent.runs:few_walls", "--network=unload:TwoLayerScorer", "--mask"]
+def test_training_from_the_command_line_is_training(tmp_path, capsys, monkeypatch):
+    """With a network and, in the working directory, a stack of one's own."""
+    (tmp_path / "own_loads.py").write_text("from tests.agent.runs import few_walls")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [place for place in sys.path if place])
+    own = ["--stack=own_loads:few_walls", "--network=unload:TwoLayerScorer", "--mask"]
     lifts = tmp_path / "lifts.npz"
     main(
         ["train", f"--run-dir={tmp_path / 'a'}", "--picks=200", f"--lifts={lifts}", *own, *OPTIONS]

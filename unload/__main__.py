@@ -77,8 +77,9 @@ def print_order(arguments: list[str]) -> None:
     try:
         load = read_load(EXAMPLE if path is None else path, columns=columns, **options)
         order = picking_order(load, policy)
-        order = order.apply(lambda column: column.map(_as_text))
-        order.to_csv(output, index=False, float_format="%.6f")
+        order["distance"] = order["distance"].map("{:.6f}".format)
+        order = order.apply(lambda column: column.map(_as_text)).rename(columns=_as_text)
+        order.to_csv(output, index=False)
     except (ImportError, OSError, ValueError) as error:  # ImportError: of PyBullet
         parser.exit(1, f"{error}\n")
     failed, behind = (~order["unloaded"]).sum(), order["behind"].mean()
@@ -131,6 +132,7 @@ def _parser(command: str, description: str) -> argparse.ArgumentParser:
 
 
 def _named(text: str) -> Callable:
+    sys.path.append("")  # a module that stands here is found, too, and hides no other one
     try:
         module, _, name = text.partition(":")
         return getattr(import_module(module), name)

@@ -43,7 +43,9 @@ ROOMS = {room: f"tests/{room.removeprefix('unload/')}" for room in ROOMS} | {
     "studies/speed": "tests/studies/test_speed.py",
 }
 # What a study draws and tells is compared with what is published, and so are its settings.
-PUBLISHED = " tests/studies/test_results.py tests/studies/test_published.py"
+PUBLISHED = (
+    " tests/studies/test_main.py tests/studies/test_results.py tests/studies/test_published.py"
+)
 ROOMS |= {room: tests + PUBLISHED for room, tests in ROOMS.items() if room.startswith("studies/")}
 # What overflows in plain Python, where warnings are errors, does so in silence when compiled.
 OPTIONS = ["-q", "-x", "-m", "not slow", "-W", "ignore:overflow encountered"]

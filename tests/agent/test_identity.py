@@ -6,9 +6,11 @@ import subprocess
 import sys
 import textwrap
 from functools import partial
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.agent.runs import CONTAINER, ROOT, interrupt_run
@@ -113,10 +115,28 @@ class Maker:
         lambda walls: partial(partial(stack_load, walls=walls), rows=3),
         lambda walls: partial(print, [{"load": Load([[walls / 10, 1, 0.5]], np.ones((1, 3)))}]),
         lambda walls: partial(print, np.arange(walls)),
+        lambda walls: partial(print, np.array(["a", walls], object)),
+        lambda walls: partial(print, Path(f"{walls}.csv")),
+        lambda walls: partial(print, {"a", walls}),
+        lambda walls: partial(print, pd.DataFrame({"a": [walls]})),
     ],
 )
 def test_what_a_function_holds_tells_it_from_another(made):
     assert identity(made(10)) == identity(made(10)) != identity(made(11))
+
+
+def test_identities_hold_no_addresses_and_no_place_of_a_module():
+    """Texts in arrays are objects, a set has no order, and an object may hold its own methods."""
+    one, other = ([text, "".join(reversed(text))] for text in ("ab" * 9, "".join(["ab"] * 9)))
+    assert identity(np.array(one, object)) == identity(np.array(other, object))
+    assert identity({"b", "a"}) == ["a", "b"]
+    maker = Maker(3)
+    maker.own = maker.stack
+    assert identity(maker.stack)["of"][1]["walls"] == 3
+    SIBLING.walls = Path("/one")
+    before = identity(lambda rng: SIBLING.walls)
+    SIBLING.walls = Path("/other")
+    assert identity(lambda rng: SIBLING.walls) == before
 
 
 def test_names_can_be_read():

@@ -117,6 +117,8 @@ def test_a_container_that_is_stuck_ends_the_order(boxes, monkeypatch):
         ({"rule": "reachable"}, TypeError, "rule is 'reachable'; expected a function"),
         ({"rule": reachable, "policy": "highest"}, TypeError, "and no policy beside it"),
         ({"rule": lambda load, _: load.sizes}, ValueError, r"returned has shape \(136, 3"),
+        ({"rule": lambda *_: None}, TypeError, "what rule returned is None; expected arrays of"),
+        ({"rule": lambda load, _: [load.ids]}, TypeError, r"what rule returned is \[array"),
         ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
     ],
 )
@@ -149,8 +151,8 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path):
     No cell becomes a formula in a spreadsheet.
     """
     (tmp_path / "boxes.csv").write_text(
-        "nr;x;y;z;length;width;height;weight;stop;note\n"
-        "=a;50;50;50;100;100;100;5;2;=1\n"
+        "nr;x;y;z;length;width;height;weight;stop;=note\n"
+        "=a;50;50;50;100;100;100;5;2.1234567;=1\n"
         "b;50;50;159;100;100;100;7;1;x\n"
     )
     options = "--units cm --container 12 2 2.2 --x-from door --tolerance 0.1 --ignore weight"
@@ -160,10 +162,10 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path):
     )  # fmt: skip
     order = pd.read_csv(io.StringIO(done.stdout))
     assert order["id"].tolist() == ["b", "'=a"] and order["weight"].tolist() == [7, 5]
-    assert order["stop"].tolist() == [1, 2] and order["note"].tolist() == ["x", "'=1"]
+    assert order["stop"].tolist() == [1, 2.1234567] and order["'=note"].tolist() == ["x", "'=1"]
     list_ = f"{tmp_path}/boxes.csv"
     assert done.stderr.splitlines()[-3:] == [
-        f"{list_}: kept but not used: stop, note",
+        f"{list_}: kept but not used: stop, =note",
         f"{list_}: 1 of 2 boxes moved by up to 90.0 mm, onto what is below and beside them",
         "2 picks, 0 failed, 0% behind other boxes",
     ]

@@ -289,6 +289,7 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
         ({"config": replace(HIGHEST, network=lambda *_: None)}, TypeError, "returned is None; exp"),
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
+        ({"change": None}, TypeError, "change is None; expected a function of a Training"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),
         ({"lifts": ""}, ValueError, "lifts is ''; expected the name of a file"),
@@ -335,13 +336,14 @@ def test_a_point_holds_the_means_since_the_last_one():
     assert table["wall_time"].is_monotonic_increasing
 
 
-def test_a_callback_may_end_a_run(tmp_path):
-    """By False, not by None or 0; the policy and the curve until then are its result."""
+@pytest.mark.parametrize("stop", [False, np.False_])
+def test_a_callback_may_end_a_run(tmp_path, stop):
+    """By False, NumPy's, too, not by None or 0; policy and curve until then are its result."""
     config, points = TrainConfig(**CONTAINER), []
 
     def callback(point):
         points.append(point)
-        return False if len(points) == 4 else 0 if len(points) == 3 else None
+        return stop if len(points) == 4 else 0 if len(points) == 3 else None
 
     result = train(config, tmp_path, progress=False, callback=callback)
     pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)

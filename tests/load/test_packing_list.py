@@ -95,6 +95,10 @@ def test_a_table_is_a_list_too(written):
     table = pd.read_csv(written(*STACK), index_col=None).set_index(pd.Index([5, 7]))
     assert_same(read_load(table), read_load(written(*STACK)))
     assert not read_load(table).extras
+    stops = {"stop": [1, np.nan], "share": [0.5, 1e-5]}
+    renamed = table.assign(**stops, note="a").rename(columns={"size_x": "Tiefe"})
+    kept = read_load(renamed, columns={"Tiefe": "depth"}).extras
+    assert all(np.array_equal(kept[name], stops[name], equal_nan=True) for name in stops)
     with pytest.raises(ValueError, match=r"the table: row 2 \(id 'b'\): a cell that is no number"):
         read_load(table.assign(size_x=[0.5, None]))
     with pytest.raises(TypeError, match="path is 3; expected a path"):
@@ -192,7 +196,7 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
         ({"container": (1, 2)}, "container has shape"),
         ({"ignore": ["wight"]}, "has no column 'wight'; expected one of .*'x_min'"),
         ({"columns": {"Tiefe": "size_x"}}, "has no column 'Tiefe'"),
-        ({"columns": {"size_x": "depth"}}, "columns is 'depth'; expected one of 'id', 'size_x'"),
+        ({"columns": {"size_x": ["id"]}}, r"columns is \['id'\]; expected one of 'id', 'size_x'"),
     ],
 )
 def test_wrong_arguments_are_refused(written, arguments, message):

@@ -115,6 +115,8 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
     assert picture.startswith(b"\x89PNG")
     assert int.from_bytes(picture[16:20]) == 800  # pixels wide
     assert int.from_bytes(picture[20:24]) == 300  # and high
+    emptied = view(full_load, np.zeros(len(full_load)))
+    assert "image/png" in emptied._repr_mimebundle_()
 
 
 @pytest.mark.parametrize(

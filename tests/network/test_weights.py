@@ -26,6 +26,13 @@ def test_they_come_back_as_they_were(path):
     assert all(torch.equal(tensors[name], WEIGHTS[name]) for name in WEIGHTS)
 
 
+def test_weights_that_share_memory_or_are_turned_are_kept(tmp_path):
+    shared = torch.arange(6.0).reshape(2, 3)
+    write_weights(tmp_path / "w", "pair", {}, {"a": shared, "b": shared, "c": shared.T})
+    _, tensors = read_weights(tmp_path / "w", "pair", lambda *made: made)
+    assert torch.equal(tensors["a"], tensors["b"]) and torch.equal(tensors["c"], shared.T)
+
+
 def test_the_digest_stays_so_that_published_files_can_be_read(path):
     with safe_open(path, "pt") as file:
         stored = json.loads(file.metadata()["pair"])

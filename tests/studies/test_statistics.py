@@ -100,4 +100,5 @@ def test_pairs_make_the_interval_of_a_ratio_narrow():
     ratio, low, high = statistics.ratio_interval(1.3 * reference, reference)
     assert (ratio, low, high) == pytest.approx((1.3, 1.3, 1.3))
     assert np.isnan(statistics.ratio_interval(reference, -reference)).all()
+    assert np.array_equal(statistics.mean_interval([0.7]), [0.7, np.nan, np.nan], equal_nan=True)
     assert np.isnan(statistics.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()

@@ -12,14 +12,20 @@ from dataclasses import fields, is_dataclass
 from functools import partial
 from hashlib import blake2b
 from itertools import chain
+from pathlib import PurePath
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 PLAIN = (bool, int, float, str, type(None))
 # Values whose content counts; of other objects that a function uses, nothing does.
-HELD = (*PLAIN, list, tuple, range, dict, np.ndarray, np.generic, partial)
+TABLES = (pd.DataFrame, pd.Series)
+SETS = (set, frozenset)
+HELD = (
+    *PLAIN, list, tuple, range, dict, *SETS, np.ndarray, np.generic, *TABLES, PurePath, partial,
+)  # fmt: skip
 
 
 def unchanged(run) -> None:
@@ -38,8 +44,9 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         what it encloses, and of what it uses of its own top-level package: with other code the
         digest is another one, with other comments or docstrings it is the same. Functions of
         ``unload`` have their name alone, because a version of the package is one behaviour. Of a
-        ``partial`` also its arguments, of arrays, dataclasses and other objects that can be called
-        a digest of what they hold; of anything else its type.
+        ``partial`` also its arguments, of a method what its object holds; of arrays, tables,
+        dataclasses and other objects that can be called a digest of what they hold; of anything
+        else its type.
     """
     # What JSON can hold, perhaps after its elements.
     if isinstance(value, PLAIN):
@@ -48,6 +55,8 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         return value.item()
     if isinstance(value, (list, tuple, range)):
         return [identity(each, within) for each in value]
+    if isinstance(value, SETS):
+        return sorted((identity(each, within) for each in value), key=json.dumps)
     if isinstance(value, dict):
         return {str(name): identity(each, within) for name, each in value.items()}
 
@@ -56,8 +65,12 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         named = dict(sorted(value.keywords.items()))
         parts = {"function": value.func, "arguments": value.args, "keywords": named}
         return identity(parts, within)
-    if isinstance(value, MethodType):
-        return identity({"function": value.__func__, "of": value.__self__}, within)
+    if isinstance(value, MethodType) and value.__func__ not in within:
+        function, owner = value.__func__, value.__self__
+        held = None if isinstance(owner, type) else getattr(owner, "__dict__", None)
+        of = owner if held is None else [type(owner), held]
+        # By name within itself, because an object may hold a method of its own.
+        return {"function": identity(function, within), "of": identity(of, within | {function})}
     if isinstance(value, (FunctionType, type)):
         name = f"{value.__module__}.{value.__qualname__}"
         if _package(value) == "unload" or value in within:
@@ -68,8 +81,14 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
 
     # Other objects, of which a digest tells one content from another.
     name = f"{type(value).__module__}.{type(value).__qualname__}"
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray) and value.dtype.hasobject:  # whose bytes are addresses
+        content = json.dumps(identity([value.shape, value.ravel().tolist()], within)).encode()
+    elif isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
+    elif isinstance(value, PurePath):
+        content = value.as_posix().encode()
+    elif isinstance(value, TABLES):
+        content = value.to_csv().encode()
     elif callable(value) and hasattr(value, "__dict__"):
         content = json.dumps(identity([type(value), vars(value)], within)).encode()
     elif is_dataclass(value):
@@ -124,11 +143,12 @@ def _used(function: FunctionType, tree: Any) -> list[Any]:
         ]
     used += defaults
     names = _names(function.__code__)
+    # But no paths of modules, which say where a checkout lies.
     held = [function.__globals__[name] for name in names if name in function.__globals__]
     for module in [each for each in held if isinstance(each, ModuleType)]:
         if module.__name__.partition(".")[0] == _package(function):
             held += [vars(module)[name] for name in names if name in vars(module)]
-    return used + held
+    return used + [each for each in held if not isinstance(each, PurePath)]
 
 
 def _literal(node: ast.AST) -> bool:

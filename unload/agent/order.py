@@ -128,7 +128,13 @@ def _by_rule(load: Load, rule: Rule) -> Iterator[tuple[int, float]]:
     physics, failed = TablePhysics(shared_table()), np.zeros(len(load), bool)
     physics.reset(load)
     while (allowed := physics.present & ~failed).any():
-        keys = np.array([*rule(load, physics.present.copy())], np.float64)
+        returned = rule(load, physics.present.copy())
+        try:
+            keys = np.array([*returned], np.float64)
+        except (TypeError, ValueError) as error:
+            raise TypeError(
+                f"what rule returned is {returned!r}; expected arrays of numbers"
+            ) from error
         keys = checks.finite_array("what rule returned", keys, (None, len(load)))
         candidates = np.flatnonzero(allowed)
         item = int(candidates[np.lexsort(-keys[::-1, candidates])[0]])

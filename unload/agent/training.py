@@ -290,6 +290,8 @@ def train(
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
     if callback is not None and not callable(callback):
         raise TypeError(f"callback is {callback!r}; expected a function of a dict")
+    if not callable(change):
+        raise TypeError(f"change is {change!r}; expected a function of a Training")
     for name, value in (("stack", stack), ("lifts", lifts)):
         if value is not None and config.env != ENVS[0]:
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
@@ -365,7 +367,8 @@ def _go(
                     if time.monotonic() - shown > CURVE_INTERVAL:
                         folder.save_curve(run)
                         shown = time.monotonic()
-                    if callback is not None and callback(point._asdict()) is False:
+                    answer = None if callback is None else callback(point._asdict())
+                    if isinstance(answer, (bool, np.bool_)) and not answer:
                         run.agent.check_finite()
                         return
                 if interrupts:

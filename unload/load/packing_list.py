@@ -9,6 +9,7 @@ from typing import NoReturn
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
 from unload import task
 from unload.load.boxes import BoxError, Load, check_stacked
@@ -74,6 +75,7 @@ def read_load(
         columns: name in the list → name above, for other names.
         tolerance: in m, up to 0.1. Boxes that overlap, float or stick out by no more are moved,
             down onto what is below and clear of what is beside; how many and how far is logged.
+            Of boxes below whose tops differ by more than 0.1 mm the highest alone carry a box.
         container: (3,) its inner length, width and height in m; by default the paper's.
         x_from: ``"rear"``, or ``"door"`` if x counts from there to the box's front or centre.
         ignore: columns that become ``Load.extras`` whatever they say, such as the weight.
@@ -151,6 +153,8 @@ def read_load(
         name: pd.to_numeric(cells) if cells.str.fullmatch(NUMBER).all() else cells.astype(object)
         for name, cells in table.drop(columns=shown).items()
     }
+    if isinstance(path, pd.DataFrame):  # whose numbers need not be read
+        extras |= {name: path[name] for name in extras if is_numeric_dtype(path.get(name))}
     try:
         load = Load(centres + moves, sizes, ids=ids, container=container, extras=extras)
         check_stacked(load)
@@ -160,7 +164,10 @@ def read_load(
             problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
         refuse(error.boxes, problem, shown)
     if (tipping := uncarried(load)).size:
-        refuse(tipping, "tips, because nothing carries its centre of mass", shown)
+        problem = (
+            "tips, because nothing carries its centre of mass, of what it touches within 0.1 mm"
+        )
+        refuse(tipping, problem, shown)
     if moves.any():
         LOGGER.warning(
             "%s: %d of %d boxes moved by up to %.1f mm, onto what is below and beside them",
@@ -214,7 +221,8 @@ def _columns(
     column_of: dict[str, list[str]] = {}
     rest = []
     for name in plain:
-        meaning = renamed.get(name, MEANINGS.get(plain[name]))
+        meaning = renamed.get(name, plain[name])
+        meaning = MEANINGS.get(str(meaning), meaning if name in renamed else None)
         if {name, plain[name]} & ignored:
             continue
         if meaning is None:

@@ -119,7 +119,10 @@ def view(
 
     # The still picture is drawn when the figure is displayed, if it is at all.
     figure, drawn = View(traces, layout(height, load.container)), np.flatnonzero(present)
-    boxes = *picture.corners(load, drawn), np.array([*legend.values()])[of_item[drawn]]
+    boxes = (
+        *picture.corners(load, drawn),
+        np.array([*legend.values()]).reshape(-1, 3)[of_item[drawn]],
+    )
     figure.picture = partial(picture.still, *boxes, legend, height / 100, load.container)
     return figure
 

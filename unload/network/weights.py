@@ -31,6 +31,10 @@ def weights_file(kind: str, settings: dict, tensors: dict) -> bytes:
     """The content of the file that ``write_weights`` writes."""
     _check_dtypes(kind, tensors)
     settings = settings | {"digest": _digest(settings, tensors)}
+    # Apart and in order in memory, as safetensors wants them; a network's need not be.
+    tensors = {
+        name: value.clone(memory_format=torch.contiguous_format) for name, value in tensors.items()
+    }
     # One entry only: safetensors writes several in random order.
     return save(tensors, metadata={kind: json.dumps(settings)})
 
