@@ -97,13 +97,15 @@ def test_fewer_boxes_may_have_more_contacts():
     play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])
 
 
-def test_containers_and_boxes_of_other_sizes_stand_side_by_side():
+@pytest.mark.parametrize("kind", ["continuous sizes", "measured heights"])
+def test_containers_and_boxes_of_other_sizes_stand_side_by_side(kind):
     """PyBullet is asked for their lifts, also after a larger load has come into another one."""
 
     def stack(rng):
-        load = own_load(rng, "continuous sizes")
-        container = load.container + rng.choice([0.0, 0.3, 5.0], 3)
-        return unload.Load(load.positions, load.sizes, container=container)
+        load = own_load(rng, kind)
+        fields = {"container": load.container + rng.choice([0.0, 0.3, 5.0], 3)}
+        fields["contact_tolerance"] = load.contact_tolerance
+        return unload.Load(load.positions, load.sizes, **fields)
 
     play_both(CONTAINER, 3, 60, seed=3, max_picks=20, stack=stack)
 

@@ -130,6 +130,16 @@ def test_boxes_touch_up_to_the_tolerance(gap, touches):
     assert found.of(BESIDE, 0).tolist() == ([1] if touches else [])
 
 
+@pytest.mark.parametrize("tolerance", [CONTACT_TOLERANCE, 0.003])
+def test_boxes_above_one_another_touch_up_to_the_tolerance_of_their_load(tolerance):
+    """Those side by side do not, whatever it is."""
+    for gap in (0.99 * tolerance, 1.01 * tolerance):
+        corners = [(0, 0, 0), (0, 0, 1 + gap), (0, 1.0002, 0)]
+        load = Load.from_corners(corners, np.ones((3, 3)), contact_tolerance=tolerance)
+        assert load.contacts.of(ABOVE, 0).tolist() == ([1] if gap < tolerance else [])
+        assert not load.contacts.of(BESIDE, 0).size and load.contact_tolerance == tolerance
+
+
 def test_the_two_that_overlap_are_named_in_their_order():
     low = np.array([[0, 0, 0], [0, 0.5, 0], [0, 2, 0]])
     for order, pair in (([0, 1, 2], [0, 1]), ([1, 2, 0], [0, 2])):

@@ -130,6 +130,9 @@ def test_small_faults_are_settled_and_logged(written, caplog):
     assert "2 of 4 boxes moved by up to 3.0 mm" in caplog.text
     with pytest.raises(ValueError, match=r"row 3 \(id 'c'\): floats.*, tolerance 0.002 m"):
         read_load(written(*lines), tolerance=0.002)
+    bridge = "e,0,0,1.001,1,2,1"  # stands on the higher of two boxes, and holds down both
+    load = read_load(written("a,0,0,0,1,1,1", "d,0,1,0,1,1,1.001", bridge))
+    assert load.covered(np.ones(3, bool)).tolist() == [True, True, False]
     caplog.clear()
     read_load(written(*(f"{line},1,0" for line in STACK), columns=f"id,{CORNERS},weight,yaw"))
     assert not caplog.text

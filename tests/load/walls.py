@@ -9,14 +9,15 @@ from unload.load.boxes import CONTACT_TOLERANCE, OVERLAP, BoxError, Load, check_
 # Drawn for each box: depth of its wall, width, height, in m.
 CONTINUOUS = ((0.3, 0.9), (0.1, 0.6), (0.08, 0.45))
 FEW_SIZES = ((0.5,), (0.2, 0.3, 0.4, 0.5), (0.2, 0.3))
-KINDS = ("continuous sizes", "narrow gaps", "few sizes")
+MEASURED = 0.003  # m, heights of boxes side by side may differ by so much
+KINDS = ("continuous sizes", "narrow gaps", "few sizes", "measured heights")
 
 
 def own_load(rng: np.random.Generator, kind: str) -> Load:
     """A full container of one of ``KINDS``.
 
     Narrow gaps are 0.3 µm to 3 mm at either side, and up to the tolerance of a contact above;
-    some are overlaps that a load allows.
+    some are overlaps that a load allows. Of measured heights some end below the box upon them.
     """
     low, high, walls = [], [], []
     for wall, (x0, x1) in enumerate(_cut(rng, kind, 0)):
@@ -33,9 +34,13 @@ def own_load(rng: np.random.Generator, kind: str) -> Load:
         low[:, 1] = np.maximum(low[:, 1] + gaps[0], 0)
         high[:, 1] = np.minimum(high[:, 1] - gaps[1], task.CONTAINER[1])
         high[:, 2] -= rng.uniform(-0.4 * OVERLAP, 0.9 * CONTACT_TOLERANCE, len(low))
+    tolerance = CONTACT_TOLERANCE
+    if kind == "measured heights":
+        tolerance, high[:, 2] = MEASURED, high[:, 2] - rng.uniform(0, 0.9 * MEASURED, len(low))
     walls = np.array(walls)
     while True:  # beyond the end of a layer below, boxes of the next one would float
-        load = Load((low + high) / 2, high - low, np.zeros(len(low), int), walls)
+        labels = {"packages": np.zeros(len(low), int), "walls": walls}
+        load = Load((low + high) / 2, high - low, **labels, contact_tolerance=tolerance)
         try:
             check_stacked(load)
             return load

@@ -81,7 +81,7 @@ def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
-    """5,001 boxes of three kinds of loads, of which a part has been unloaded."""
+    """6,668 boxes of four kinds of loads, of which a part has been unloaded."""
     local, asked = LocalPhysics(), 0
     while asked < 1667:
         load = own_load(rng, kind)

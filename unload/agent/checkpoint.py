@@ -17,7 +17,7 @@ from unload.agent.identity import identity, unchanged
 from unload.network.variants import make_network
 from unload.support import checks, files
 
-FORMAT = 6  # of the checkpoints
+FORMAT = 7  # of the checkpoints
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 LEFTOVER = "." + "[0-9a-f]" * 32 + ".partial"  # what ``files.write_atomically`` adds to a name
 

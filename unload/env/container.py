@@ -89,8 +89,8 @@ class ContainerEnv(PickingEnv):
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
         stack: makes a ``Load``, of any number of items and in a container of any size, from a
-            ``numpy.random.Generator``. Each box stands on the floor or, within 0.1 mm, on another
-            one: across a wider gap it would not hold down what is below.
+            ``numpy.random.Generator``. Each box stands on the floor or, within the load's
+            ``contact_tolerance``, on another one: across a wider gap it would not hold it down.
         render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:

@@ -94,7 +94,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env] = count
-        state.sizes[env] = load.container
+        state.sizes[env], state.tolerances[env] = load.container, load.contact_tolerance
         state.seen[env, :count] = scaled(positions, load.container)
         state.by_distance[env, :count] = observation.nearest(positions, count, load.container)
         containers.start(state, env, *self._features)
@@ -136,8 +136,11 @@ class ContainerVectorEnv(PickingVectorEnv):
             # The load is built again, because to keep those of all containers makes resets slower.
             count = np.flatnonzero(self._containers.present[env])[-1] + 1
             boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-            container = self._containers.sizes[env]
-            load = Load(boxes[:, :3], boxes[:, 3:], labels, labels, container=container)
+            fields = {
+                "container": self._containers.sizes[env],
+                "contact_tolerance": float(self._containers.tolerances[env]),
+            }
+            load = Load(boxes[:, :3], boxes[:, 3:], labels, labels, **fields)
             self._around[env] = Surroundings(load, self._containers.present[env, :count])
         return self._around[env]
 

@@ -26,6 +26,7 @@ class Containers(NamedTuple):
 
     Attributes:
         sizes: (E, 3) float64, inner edges of each container in m.
+        tolerances: (E,) float64, ``Load.contact_tolerance`` in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
@@ -42,6 +43,7 @@ class Containers(NamedTuple):
     """
 
     sizes: np.ndarray
+    tolerances: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -62,6 +64,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
         sizes=np.zeros((num_envs, 3)),
+        tolerances=np.zeros(num_envs),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),

@@ -18,6 +18,7 @@ from unload.support.compiled import compiled
 # Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
 SMALLEST_EDGE = 0.002
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
+LARGEST_TOLERANCE = 0.1  # m
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
 ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
 
@@ -66,6 +67,8 @@ class Load:
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
+        contact_tolerance: m, up to 0.1; boxes this close above one another touch. What bridges two
+            boxes of measured heights touches both, though it stands on the higher one.
         contacts: which boxes touch, computed from positions and sizes.
 
     Raises:
@@ -82,6 +85,7 @@ class Load:
     ids: np.ndarray | None = None
     container: np.ndarray = None
     extras: Mapping[str, np.ndarray] = None
+    contact_tolerance: float = CONTACT_TOLERANCE
     contacts: Contacts = field(init=False)
 
     def __post_init__(self) -> None:
@@ -93,6 +97,8 @@ class Load:
         container = task.CONTAINER if self.container is None else self.container
         container = checks.finite_array("container", np.array(container, np.float64), (3,))
         low, high = positions - sizes / 2, positions + sizes / 2
+        tolerance = self.contact_tolerance
+        checks.real("contact_tolerance", tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE)
 
         labels = {"packages": self.packages, "walls": self.walls}
         if labels["packages"] is None:
@@ -124,7 +130,7 @@ class Load:
             place = f"from {low[outside[0]]} to {high[outside[0]]} m"
             inside = f"inside the container, [0 0 0] to {container} m"
             raise BoxError(outside, f"reaches {place}; expected it {inside}")
-        touching = contacts(low, high)
+        touching = contacts(low, high, tolerance)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
         fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
@@ -194,7 +200,7 @@ def check_stacked(load: Load, name: str = "load") -> None:
     unsupported = np.diff(load.contacts.starts[BELOW]) == 0
     aloft = np.flatnonzero(unsupported & (bottom > CONTACT_TOLERANCE))
     if aloft.size:
-        wanted = f"expected it, within {CONTACT_TOLERANCE} m, on the floor or on another box"
+        wanted = f"expected it, within {load.contact_tolerance} m, on the floor or on another box"
         place = f"floats in {name}, its lower face at {bottom[aloft[0]]:.6g} m"
         raise BoxError(aloft, f"{place}; {wanted}")
 
@@ -214,16 +220,17 @@ def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return groups
 
 
-def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
+def contacts(low: np.ndarray, high: np.ndarray, tolerance: float = CONTACT_TOLERANCE) -> Contacts:
     """Find which boxes stand on each other, and which stand side by side; BoxError if two overlap.
 
-    Boxes touch only where they share a stretch of depth, and of height or width.
+    Boxes touch only where they share a stretch of depth, and of height or width. Between one and
+    the next one above it there may be a gap of ``tolerance``, in m.
     """
     groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
     left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
     # One row per axis: what is read next is near what was read last.
     rows = (np.ascontiguousarray(each[left_to_right].T) for each in (low, high))
-    found, *pair = _find(*rows, left_to_right, np.cumsum(np.bincount(groups)))
+    found, *pair = _find(*rows, left_to_right, np.cumsum(np.bincount(groups)), tolerance)
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
         raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected none")
@@ -231,7 +238,7 @@ def contacts(low: np.ndarray, high: np.ndarray) -> Contacts:
 
 
 @compiled
-def _find(low, high, order, ends):
+def _find(low, high, order, ends, tolerance):
     """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
     ``order`` is slab by slab, from left to right in each, and ``ends`` where in it each slab ends;
@@ -252,7 +259,7 @@ def _find(low, high, order, ends):
                     break  # j begins to the right of i, and so do all further ones
                 # Lengths of the stretches that both share; below 0 the gap between them.
                 upwards = min(z1[i], z1[j]) - max(z0[i], z0[j])
-                if upwards < -CONTACT_TOLERANCE:
+                if upwards < -tolerance:
                     continue
                 across = min(y1[i], y1[j]) - y0[j]
                 along = min(x1[i], x1[j]) - max(x0[i], x0[j])

@@ -12,7 +12,7 @@ import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
 from unload import task
-from unload.load.boxes import BoxError, Load, check_stacked
+from unload.load.boxes import CONTACT_TOLERANCE, LARGEST_TOLERANCE, BoxError, Load, check_stacked
 from unload.load.settling import settle, uncarried
 from unload.support import checks, files
 
@@ -75,7 +75,7 @@ def read_load(
         columns: name in the list → name above, for other names.
         tolerance: in m, up to 0.1. Boxes that overlap, float or stick out by no more are moved,
             down onto what is below and clear of what is beside; how many and how far is logged.
-            Of boxes below whose tops differ by more than 0.1 mm the highest alone carry a box.
+            A box touches whatever is so little below it.
         container: (3,) its inner length, width and height in m; by default the paper's.
         x_from: ``"rear"``, or ``"door"`` if x counts from there to the box's front or centre.
         ignore: columns that become ``Load.extras`` whatever they say, such as the weight.
@@ -92,7 +92,7 @@ def read_load(
     """
     checks.one_of("units", units, (None, *LENGTHS))
     checks.one_of("x_from", x_from, ("rear", "door"))
-    tolerance = checks.real("tolerance", tolerance, 0, 0.1)
+    tolerance = checks.real("tolerance", tolerance, 0, LARGEST_TOLERANCE)
     container = task.CONTAINER if container is None else container
     container = checks.finite_array("container", container, (3,))
     source, table, comma = _table(path)
@@ -156,7 +156,9 @@ def read_load(
     if isinstance(path, pd.DataFrame):  # whose numbers need not be read
         extras |= {name: path[name] for name in extras if is_numeric_dtype(path.get(name))}
     try:
-        load = Load(centres + moves, sizes, ids=ids, container=container, extras=extras)
+        fields = {"ids": ids, "container": container, "extras": extras}
+        reach = max(tolerance, CONTACT_TOLERANCE)
+        load = Load(centres + moves, sizes, **fields, contact_tolerance=reach)
         check_stacked(load)
     except BoxError as error:
         problem = f"{error.problem}, tolerance {tolerance} m"
@@ -164,10 +166,7 @@ def read_load(
             problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
         refuse(error.boxes, problem, shown)
     if (tipping := uncarried(load)).size:
-        problem = (
-            "tips, because nothing carries its centre of mass, of what it touches within 0.1 mm"
-        )
-        refuse(tipping, problem, shown)
+        refuse(tipping, "tips, because nothing carries its centre of mass", shown)
     if moves.any():
         LOGGER.warning(
             "%s: %d of %d boxes moved by up to %.1f mm, onto what is below and beside them",
