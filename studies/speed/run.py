@@ -25,6 +25,7 @@ from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 import unload
 from studies.results import measured, publish
 from studies.speed.parts import FOLDER, lift_rates, pick_rates, three_digits, update_times
+from unload import task
 from unload.fast import fused
 
 COMMAND = "python -m studies.speed.run"
@@ -63,8 +64,8 @@ def training_rates() -> dict[str, float]:
     million picks. Exploration falls over the picks made here as it does in the paper. Ours is
     the median over episodes, theirs over steps: what else runs on the machine stalls a few.
 
-    Last are loads that never repeat: the paper's, each in boxes of other sizes, so that PyBullet
-    simulates the lifts of boxes with one or two others on top.
+    Last are loads that never repeat (``new_load``), so that PyBullet simulates the lifts of boxes
+    with one or two others on top, and random picks, which meet most of these.
     """
     rates = {}
     for threads, name in THREADS.items():
@@ -74,21 +75,29 @@ def training_rates() -> dict[str, float]:
     memory = unload.TrainConfig().replay_size
     for threads, name in THREADS.items():
         rates[f"here, fused update, {name}"] = _our_rate(FUSED, threads, before=memory)
-    rates["here, loads that never repeat, 2 threads"] = _our_rate(NEW, 2, NEW, stack=resized_load)
+    name = "here, random picks in new loads"
+    rates[name] = _our_rate(NEW, 2, NEW, new_load, epsilon_final=1.0)
     torch.set_num_threads(1)
     return rates
 
 
-def resized_load(rng: np.random.Generator) -> unload.Load:
-    """One of the paper's loads, made smaller along each axis by a share that is drawn."""
-    load, shares = unload.stack_load(rng), rng.uniform(0.9, 1, 3)
-    return unload.Load(load.positions * shares, load.sizes * shares, load.packages, load.walls)
+def new_load(rng: np.random.Generator) -> unload.Load:
+    """672 boxes, each of a size of its own: 12 walls of 7 columns of 8 boxes."""
+    length, width, height = task.CONTAINER
+    sizes = np.full((12, 7, 8, 3), length / 12)
+    sizes[..., 1] = width * rng.dirichlet(np.full(7, 20.0), 12)[..., np.newaxis]
+    sizes[..., 2] = 0.95 * height * rng.dirichlet(np.full(8, 20.0), (12, 7))
+    ends = [sizes[..., axis].cumsum(axis=axis) for axis in range(3)]
+    corners = np.stack(ends, axis=-1) - sizes
+    return unload.Load.from_corners(corners.reshape(-1, 3), sizes.reshape(-1, 3))
 
 
-def _our_rate(picks: int, threads: int, before: int, stack: Callable | None = None) -> float:
+def _our_rate(
+    picks: int, threads: int, before: int, stack: Callable | None = None, **fields
+) -> float:
     torch.set_num_threads(threads)
     steps = picks // unload.TrainConfig().num_envs
-    config = unload.TrainConfig(picks=picks + before, log_interval=min(10, steps))
+    config = unload.TrainConfig(picks=picks + before, log_interval=min(10, steps), **fields)
     with tempfile.TemporaryDirectory() as folder:
         curve = unload.train(config, folder, progress=False, stack=stack).curve
     times = curve.loc[curve["picks"] >= before, "wall_time"].to_numpy()

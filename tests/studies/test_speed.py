@@ -89,7 +89,15 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     memory, ours, theirs = unload.TrainConfig().replay_size, [], []
 
     def train(config, folder, progress, stack):
-        ours.append((torch.get_num_threads(), fused.applies(None), config.picks, stack))
+        ours.append(
+            (
+                torch.get_num_threads(),
+                fused.applies(None),
+                config.picks,
+                stack,
+                config.epsilon(10**9),
+            )
+        )
         picks = np.arange(1, config.picks // 640 + 1) * 640
         before = memory if config.picks > memory else config.picks // 2
         times = (picks + 4 * np.minimum(picks, before)) / 1000
@@ -113,18 +121,18 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     rates = run.training_rates()
     assert list(rates.values()) == pytest.approx([500, 500, 1000, 1000, 1000, 1000])
     assert ours == [
-        (1, False, 2 * run.PLAIN, None),
-        (1, True, run.FUSED + memory, None),
-        (2, True, run.FUSED + memory, None),
-        (2, True, 2 * run.NEW, run.resized_load),
+        (1, False, 2 * run.PLAIN, None, 0),
+        (1, True, run.FUSED + memory, None, 0),
+        (2, True, run.FUSED + memory, None, 0),
+        (2, True, 2 * run.NEW, run.new_load, 1),
     ]
     assert theirs == [(threads, 64, 2048, 1, {"net_arch": [64]}) for threads in (1, 2)]
     assert torch.get_num_threads() == 1
 
 
-def test_loads_of_other_sizes_never_repeat(rng):
-    sizes = {tuple(size) for _ in range(3) for size in run.resized_load(rng).sizes.round(6)}
-    assert len(sizes) == 3 * 13
+def test_no_box_of_new_loads_repeats(rng):
+    loads = [run.new_load(rng) for _ in range(2)]
+    assert len({tuple(size) for load in loads for size in load.sizes.round(6)}) == 2 * 672
 
 
 def test_speeds_are_printed_and_published_with_ratios(tmp_path, monkeypatch, capsys):
