@@ -52,7 +52,7 @@ class TrainConfig:
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
-            of the run, at most 500, of the picks that are given first: ``replace`` keeps it.
+            of the run, at most 500. That is set once: ``replace`` with other picks keeps it.
         checkpoint_interval: * seconds between two checkpoints.
 
     Raises:

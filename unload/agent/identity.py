@@ -20,9 +20,9 @@ import numpy as np
 import pandas as pd
 
 PLAIN = (bool, int, float, str, type(None))
-# Values whose content counts; of other objects that a function uses, nothing does.
 TABLES = (pd.DataFrame, pd.Series)
 SETS = (set, frozenset)
+# Values whose content counts; of other objects that a function uses, nothing does.
 HELD = (
     *PLAIN, list, tuple, range, dict, *SETS, np.ndarray, np.generic, *TABLES, PurePath, partial,
 )  # fmt: skip
@@ -143,11 +143,11 @@ def _used(function: FunctionType, tree: Any) -> list[Any]:
         ]
     used += defaults
     names = _names(function.__code__)
-    # But no paths of modules, which say where a checkout lies.
     held = [function.__globals__[name] for name in names if name in function.__globals__]
     for module in [each for each in held if isinstance(each, ModuleType)]:
         if module.__name__.partition(".")[0] == _package(function):
             held += [vars(module)[name] for name in names if name in vars(module)]
+    # Paths of modules are left out, because they say where a checkout lies.
     return used + [each for each in held if not isinstance(each, PurePath)]
 
 

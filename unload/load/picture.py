@@ -131,7 +131,7 @@ def draw(
     seen = project(low[:, None] + CORNERS * (high - low)[:, None], container)
     polygons = np.stack([seen[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
     shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
-    # In one array, which Matplotlib takes four times as fast as a list.
+    # In one array, which Matplotlib takes faster than a list.
     axes.add_collection(
         PolyCollection(
             polygons,  # type: ignore[arg-type]
