@@ -53,6 +53,8 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         return value
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, PurePath):
+        return f"pathlib.Path {value.as_posix()}"
     if isinstance(value, (list, tuple, range)):
         return [identity(each, within) for each in value]
     if isinstance(value, SETS):
@@ -85,8 +87,6 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         content = json.dumps(identity([value.shape, value.ravel().tolist()], within)).encode()
     elif isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
-    elif isinstance(value, PurePath):
-        content = value.as_posix().encode()
     elif isinstance(value, TABLES):
         content = value.to_csv().encode()
     elif callable(value) and hasattr(value, "__dict__"):
