@@ -66,7 +66,7 @@ def test_permuting_the_items_permutes_the_values(kind, items, rng):
     assert kind().n_features == 64
     order = torch.from_numpy(rng.permutation(128))
     values = network(batch)
-    assert values.std(dim=1).min() > 1e-3
+    assert values.shape == (4, 128) and values.std(dim=1).min() > 1e-3
     torch.testing.assert_close(network(batch[:, order]), values[:, order], atol=1e-6, rtol=0)
 
 
