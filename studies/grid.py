@@ -225,7 +225,7 @@ def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:
     """Write many policies into one file of weights, by name."""
     tensors, settings = {}, {}
     for name, policy in policies.items():
-        tensors |= {f"{name}/{k}": v.clone() for k, v in policy.network.state_dict().items()}
+        tensors |= {f"{name}/{k}": v for k, v in policy.network.state_dict().items()}
         settings[name] = settings_of(policy)
     write_weights(path, "policies", settings, tensors)
 

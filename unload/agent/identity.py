@@ -17,15 +17,11 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 PLAIN = (bool, int, float, str, type(None))
-TABLES = (pd.DataFrame, pd.Series)
 SETS = (set, frozenset)
 # Values whose content counts; of other objects that a function uses, nothing does.
-HELD = (
-    *PLAIN, list, tuple, range, dict, *SETS, np.ndarray, np.generic, *TABLES, PurePath, partial,
-)  # fmt: skip
+HELD = (*PLAIN, list, tuple, range, dict, *SETS, np.ndarray, np.generic, PurePath, partial)
 
 
 def unchanged(run) -> None:
@@ -67,11 +63,12 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         named = dict(sorted(value.keywords.items()))
         parts = {"function": value.func, "arguments": value.args, "keywords": named}
         return identity(parts, within)
-    if isinstance(value, MethodType) and value.__func__ not in within:
+    if isinstance(value, MethodType):
         function, owner = value.__func__, value.__self__
+        if function in within:  # an object may hold a method of its own
+            return identity(function, within)
         held = None if isinstance(owner, type) else getattr(owner, "__dict__", None)
         of = owner if held is None else [type(owner), held]
-        # By name within itself, because an object may hold a method of its own.
         return {"function": identity(function, within), "of": identity(of, within | {function})}
     if isinstance(value, (FunctionType, type)):
         name = f"{value.__module__}.{value.__qualname__}"
@@ -87,7 +84,7 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
         content = json.dumps(identity([value.shape, value.ravel().tolist()], within)).encode()
     elif isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
-    elif isinstance(value, TABLES):
+    elif _is_table(value):
         content = value.to_csv().encode()
     elif callable(value) and hasattr(value, "__dict__"):
         content = json.dumps(identity([type(value), vars(value)], within)).encode()
@@ -97,6 +94,11 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
     else:
         return name
     return f"{name} {blake2b(content, digest_size=8).hexdigest()}"
+
+
+def _is_table(value: Any) -> bool:
+    """Whether this is one of pandas, which need not be imported to tell."""
+    return hasattr(value, "to_csv")
 
 
 def _package(value: Any) -> str:
@@ -125,7 +127,7 @@ def _absorb(value: Any, package: str, digest, seen: set) -> None:
         if isinstance(each, (FunctionType, type)):
             if _package(each) == package:
                 _absorb(each, package, digest, seen)
-        elif isinstance(each, HELD) or is_dataclass(each):
+        elif isinstance(each, HELD) or is_dataclass(each) or _is_table(each):
             digest.update(json.dumps(identity(each, frozenset(seen))).encode())
 
 

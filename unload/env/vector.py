@@ -136,11 +136,14 @@ class ContainerVectorEnv(PickingVectorEnv):
             # The load is built again, because to keep those of all containers makes resets slower.
             count = np.flatnonzero(self._containers.present[env])[-1] + 1
             boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-            fields = {
-                "container": self._containers.sizes[env],
-                "contact_tolerance": float(self._containers.tolerances[env]),
-            }
-            load = Load(boxes[:, :3], boxes[:, 3:], labels, labels, **fields)
+            load = Load(
+                boxes[:, :3],
+                boxes[:, 3:],
+                labels,
+                labels,
+                container=self._containers.sizes[env],
+                contact_tolerance=self._containers.tolerances[env],
+            )
             self._around[env] = Surroundings(load, self._containers.present[env, :count])
         return self._around[env]
 

@@ -97,8 +97,9 @@ class Load:
         container = task.CONTAINER if self.container is None else self.container
         container = checks.finite_array("container", np.array(container, np.float64), (3,))
         low, high = positions - sizes / 2, positions + sizes / 2
-        tolerance = self.contact_tolerance
-        checks.real("contact_tolerance", tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE)
+        tolerance = checks.real(
+            "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
+        )
 
         labels = {"packages": self.packages, "walls": self.walls}
         if labels["packages"] is None:
@@ -136,7 +137,8 @@ class Load:
         fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
         for array in (*fields.values(), *extras.values(), *touching):
             array.setflags(write=False)
-        for name, value in {**fields, "extras": extras, "contacts": touching}.items():
+        rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": touching}
+        for name, value in {**fields, **rest}.items():
             object.__setattr__(self, name, value)
 
     @classmethod

@@ -156,9 +156,14 @@ def read_load(
     if isinstance(path, pd.DataFrame):  # whose numbers need not be read
         extras |= {name: path[name] for name in extras if is_numeric_dtype(path.get(name))}
     try:
-        fields = {"ids": ids, "container": container, "extras": extras}
-        reach = max(tolerance, CONTACT_TOLERANCE)
-        load = Load(centres + moves, sizes, **fields, contact_tolerance=reach)
+        load = Load(
+            centres + moves,
+            sizes,
+            ids=ids,
+            container=container,
+            extras=extras,
+            contact_tolerance=max(tolerance, CONTACT_TOLERANCE),
+        )
         check_stacked(load)
     except BoxError as error:
         problem = f"{error.problem}, tolerance {tolerance} m"
@@ -217,11 +222,11 @@ def _columns(
         raise ValueError(f"{source} has no column {name!r}; expected one of {[*plain]}")
 
     # A column means what the caller says, or what its name says, or nothing here.
+    renamed = {name: MEANINGS.get(str(said), said) for name, said in renamed.items()}
     column_of: dict[str, list[str]] = {}
     rest = []
     for name in plain:
-        meaning = renamed.get(name, plain[name])
-        meaning = MEANINGS.get(str(meaning), meaning if name in renamed else None)
+        meaning = renamed.get(name, MEANINGS.get(plain[name]))
         if {name, plain[name]} & ignored:
             continue
         if meaning is None:
