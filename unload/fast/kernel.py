@@ -57,25 +57,6 @@ def next_number(typing_context, counter):
 
 
 @intrinsic
-def prefetch(typing_context, numbers, place):
-    """Have the float32 at ``place`` in the memory of ``numbers`` fetched without waiting for it.
-
-    There need not be such a place.
-    """
-
-    def build(context, builder, signature, arguments):
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        pointer = builder.gep(data, [arguments[1]])
-        how = [ir.Constant(ir.IntType(32), option) for option in (0, 3, 1)]  # read, keep, data
-        kind = ir.FunctionType(ir.VoidType(), [pointer.type, *(option.type for option in how)])
-        function = builder.module.declare_intrinsic("llvm.prefetch", [pointer.type], kind)
-        builder.call(function, [pointer, *how])
-        return context.get_dummy_value()
-
-    return types.void(numbers, types.int64), build
-
-
-@intrinsic
 def long_vectors(typing_context):
     """Compile the calling function for the longest vectors, and as if no two of its arrays overlap.
 
@@ -104,28 +85,22 @@ def add_chunks(
 
     Several threads may call this with the same ``counter``, and share the chunks.
     """
-    # A sample's inputs lie in one row; x holds the one that is read, in fours of items.
     n, items = len(bias), observations.shape[1]
-    samples = observations.reshape(len(observations), 3 * items)
-    x = np.empty(-(-items // 4) * 12, np.float32)  # one sample's inputs, filled up to fours
-    fours = x.reshape(-1, 12)  # the same, four items in each row
-    numbers = np.arange(4 * len(fours)).astype(np.int32).reshape(-1, 4)
+    samples = observations.reshape(len(observations), 3 * items)  # a sample's inputs in each row
 
     # A key is a value whose lowest bits are the item's number, so that to sort keys sorts items.
     bits = 0  # of an item's number
-    while numbers.size > 1 << bits:
+    while items > 1 << bits:
         bits += 1
     mask = np.int32((1 << bits) - 1)
     # The relative error of a key: three roundings of the value, and the bits that it lacks.
     precision = np.float32(2.0**-21 + 2.0 ** (bits - 23))
 
-    # Each thread takes the next chunk until none is left, and knows the one after it in advance.
+    # Each thread takes the next chunk until none is left.
     blocks = _blocks(weight, bias, score)
     chunk = next_number(counter)
     while chunk < len(partial):
-        following = next_number(counter)
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
-        coming = rows[following * CHUNK : (following + 1) * CHUNK]
         picked, wanted = actions[chosen], targets[chosen]  # asks the memory for all at once
         largest = _largest(samples, chosen)
         for b in range(len(blocks)):
@@ -134,13 +109,10 @@ def add_chunks(
         # Forward and backward for one sample at a time: nothing of it is kept for later.
         sum_slopes, sum_losses = 0.0, 0.0 * largest + 0.0 * score_bias[0]  # NaN if not finite
         for number, row in enumerate(chosen):
-            later = coming[number] if number < len(coming) else row
-            x[: 3 * items] = samples[row]
-            for i in range(3 * items, len(x)):  # its last item again, until x is full
-                x[i] = x[i - 3]
+            x = samples[row]
             logit = np.float64(score_bias[0])  # double: 1 - tanh² loses its digits near 1
             for b in range(len(blocks)):
-                _reduce_items(fours, numbers, items, mask, samples, later, blocks[b])
+                _reduce_items(x, items, mask, blocks[b])
                 _find_extremes(x, items, mask, blocks[b])
                 logit += _forward(x, picked[number], items, blocks[b])
 
@@ -165,7 +137,7 @@ def add_chunks(
             for row in range(3, 8):
                 partial[chunk, row * n + f] = block[GRADIENT + row * BLOCK + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
-        chunk = following
+        chunk = next_number(counter)
 
 
 @compiled
@@ -214,17 +186,11 @@ def _start_chunk(largest, precision, block):
 
 
 @compiled
-def _reduce_items(x, numbers, items, mask, samples, later, block):
+def _reduce_items(inputs, items, mask, block):
     """Read all items: sums of the active ones, keys of the two lowest and the two highest.
 
-    Most of the time is spent here. Four items at a time, because to sort four keys and merge
-    them takes fewer steps than to merge each; no branches, so that ``LANES`` features go side by
-    side. Meanwhile the memory may send the inputs of a sample to come.
-
-    Args:
-        x: (fours, 12), the inputs of four items in each row.
-        numbers: (fours, 4), the items' numbers; to compute them here would take longer.
-        samples, later: the row of ``samples`` to fetch.
+    Most of the time is spent here. There are no branches, so that ``LANES`` features go side by
+    side.
     """
     long_vectors()
     for f in range(BLOCK):
@@ -233,43 +199,25 @@ def _reduce_items(x, numbers, items, mask, samples, later, block):
         for axis in range(4):
             block[MEAN + axis * BLOCK + f] = ZERO
     for first in range(0, BLOCK, LANES):
-        for i in range(len(x)):
-            prefetch(samples, later * samples.shape[1] + 12 * i)
-            x0, x1, x2, x3 = x[i, 0], x[i, 3], x[i, 6], x[i, 9]
-            y0, y1, y2, y3 = x[i, 1], x[i, 4], x[i, 7], x[i, 10]
-            z0, z1, z2, z3 = x[i, 2], x[i, 5], x[i, 8], x[i, 11]
-            i0, i1, i2, i3 = numbers[i, 0], numbers[i, 1], numbers[i, 2], numbers[i, 3]
+        for i in range(items):
+            x, y, z = inputs[3 * i], inputs[3 * i + 1], inputs[3 * i + 2]
             for f in range(first, first + LANES):
-                a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
-                v0, v1 = _value(a, b, c, d, x0, y0, z0), _value(a, b, c, d, x1, y1, z1)
-                v2, v3 = _value(a, b, c, d, x2, y2, z2), _value(a, b, c, d, x3, y3, z3)
-                a0, a1, a2, a3 = _active(v0), _active(v1), _active(v2), _active(v3)
-                _add(block, MEAN + f, a0, a1, a2, a3, x0, x1, x2, x3)
-                _add(block, MEAN + BLOCK + f, a0, a1, a2, a3, y0, y1, y2, y3)
-                _add(block, MEAN + 2 * BLOCK + f, a0, a1, a2, a3, z0, z1, z2, z3)
-                block[MEAN + 3 * BLOCK + f] += (a0 + a1) + (a2 + a3)
-                k0, k1 = _key(v0, i0, mask), _key(v1, i1, mask)
-                k2, k3 = _key(v2, i2, mask), _key(v3, i3, mask)
-                # Sort the four keys: low ≤ low2, high2 ≤ high.
-                k0, k1, k2, k3 = min(k0, k1), max(k0, k1), min(k2, k3), max(k2, k3)
-                low, high = min(k0, k2), max(k1, k3)
-                k0, k1 = max(k0, k2), min(k1, k3)
-                low2, high2 = min(k0, k1), max(k0, k1)
-                # Merge them with those so far.
-                lowest, highest = _bits(block[LOW + f]), _bits(block[HIGH + f])
-                low2 = min(min(_bits(block[LOW2 + f]), low2), max(lowest, low))
-                high2 = max(max(_bits(block[HIGH2 + f]), high2), min(highest, high))
-                block[LOW + f], block[LOW2 + f] = _number(min(lowest, low)), _number(low2)
-                block[HIGH + f], block[HIGH2 + f] = _number(max(highest, high)), _number(high2)
-    x3, y3, z3 = x[-1, 9], x[-1, 10], x[-1, 11]
-    for _ in range(items, numbers.size):  # repeated items do not count
-        for f in range(BLOCK):
-            a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
-            active = _active(_value(a, b, c, d, x3, y3, z3))
-            block[MEAN + f] -= active * x3
-            block[MEAN + BLOCK + f] -= active * y3
-            block[MEAN + 2 * BLOCK + f] -= active * z3
-            block[MEAN + 3 * BLOCK + f] -= active
+                value = _value(
+                    block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f], x, y, z
+                )
+                active = _active(value)
+                block[MEAN + f] = fma(active, x, block[MEAN + f])
+                block[MEAN + BLOCK + f] = fma(active, y, block[MEAN + BLOCK + f])
+                block[MEAN + 2 * BLOCK + f] = fma(active, z, block[MEAN + 2 * BLOCK + f])
+                block[MEAN + 3 * BLOCK + f] += active
+
+                # The runner-up is the key, or what it has beaten, or the one so far.
+                key = _key(value, np.int32(i), mask)
+                low, high = _bits(block[LOW + f]), _bits(block[HIGH + f])
+                low2 = min(_bits(block[LOW2 + f]), max(low, key))
+                high2 = max(_bits(block[HIGH2 + f]), min(high, key))
+                block[LOW + f], block[LOW2 + f] = _number(min(low, key)), _number(low2)
+                block[HIGH + f], block[HIGH2 + f] = _number(max(high, key)), _number(high2)
 
 
 @compiled(forceinline=True)
@@ -293,12 +241,6 @@ def _value(a, b, c, d, x, y, z):
 @compiled(forceinline=True)
 def _active(value):
     return ONE if value > ZERO else ZERO
-
-
-@compiled(forceinline=True)
-def _add(block, place, a0, a1, a2, a3, x0, x1, x2, x3):
-    """Add the inputs of the active ones of four items."""
-    block[place] = fma(a3, x3, fma(a2, x2, fma(a1, x1, fma(a0, x0, block[place]))))
 
 
 @compiled(forceinline=True)
