@@ -1,10 +1,9 @@
 """What the tests of training share: small networks and runs, and ways to stop them."""
 
 import itertools
+import multiprocessing
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,17 +27,6 @@ RUNS = {
     "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
     "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100},
 }
-KILLED = """
-import os, signal
-from tests.agent import runs
-from unload import TrainConfig, train
-
-def kill(point):
-    if point["picks"] == {picks}:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-train(TrainConfig(**{fields!r}), {folder!r}, False, callback=kill, stack=runs.few_walls)
-"""
 
 
 class Breakdown(BaseException):
@@ -86,11 +74,19 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
         train(config, folder, progress=False)
 
 
-def kill_run(fields: dict, folder: Path, picks: int) -> None:
-    """Start a run in another process, which is killed at a point of its curve."""
-    code = KILLED.format(picks=picks, fields=fields, folder=str(folder))
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ)
-    assert done.returncode == -signal.SIGKILL
+def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
+    """Start a run in a fork of this process, which is killed at a point of its curve."""
+
+    def kill(point):
+        if point["picks"] == picks:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    given = {"progress": False, "stack": few_walls, "callback": kill}
+    fork = multiprocessing.get_context("fork")
+    process = fork.Process(target=train, args=(config, folder), kwargs=given)
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
 
 
 def content(folder: Path) -> tuple[bytes, pd.DataFrame]:

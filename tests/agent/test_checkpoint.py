@@ -3,6 +3,7 @@
 import errno
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -18,13 +19,13 @@ OWN = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz")
 
 
 def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
-    """From its last checkpoint, in another process, in which its stack is the same."""
-    fields = CONTAINER | {"max_picks": 200, "network": "two_layer", "gamma": 0.9}
-    train(TrainConfig(**fields), tmp_path / "straight", progress=False, stack=few_walls)
+    """From its last checkpoint, in another process."""
+    config = TrainConfig(**CONTAINER | {"max_picks": 200, "gamma": 0.9})
+    train(config, tmp_path / "straight", progress=False, stack=few_walls)
     for picks in (60, 160):  # before the memory is full, and after that
-        kill_run(fields | {"checkpoint_interval": 0}, tmp_path / "killed", picks)
+        kill_run(replace(config, checkpoint_interval=0), tmp_path / "killed", picks)
         assert (tmp_path / "killed" / "checkpoint.npz").exists()
-    train(TrainConfig(**fields), tmp_path / "killed", progress=False, stack=few_walls)
+    train(config, tmp_path / "killed", progress=False, stack=few_walls)
     assert_same(tmp_path / "straight", tmp_path / "killed")
     assert not (tmp_path / "killed" / "checkpoint.npz").exists()
 

@@ -149,16 +149,16 @@ def test_names_can_be_read():
 
 def test_a_function_without_source_is_the_same_in_each_process():
     """Typed at a prompt, say: its bytecode holds no addresses."""
-    code = (
-        "from unload.agent.identity import identity\n"
-        "exec('def f(run): return [lambda: 3 for each in run]')\nprint(identity(f))"
-    )
-    found = [
-        subprocess.run([sys.executable, "-c", each], cwd=ROOT, capture_output=True, text=True)
-        for each in (code, code, code.replace("3", "4"))
-    ]
-    one, same, other = (each.stdout for each in found)
-    assert one.startswith("__main__.f ") and one == same != other
+    code = "def f(run): return [lambda: 3 for each in run]"
+    elsewhere = f"from unload.agent.identity import identity\nexec({code!r})\nprint(identity(f))"
+    command = [sys.executable, "-c", elsewhere]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    found = []
+    for source in (code, code.replace("3", "4")):
+        exec(source, names := {"__name__": "__main__"})
+        found.append(identity(names["f"]))
+    assert done.stdout.startswith("__main__.f ")
+    assert found[0] == done.stdout.strip() != found[1]
 
 
 @pytest.mark.parametrize("text", ["", "def other(run): return 3\n", "f = 3\n"])
