@@ -19,13 +19,15 @@ from unload.agent.training import Training
 ROOT = Path(__file__).resolve().parents[2]
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
 # with gamma > 0, updates of the target network.
-SMALL = {"num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5}
-CONTAINER = SMALL | {"picks": 200, "max_picks": 12, "target_update_interval": 24}
+CONTAINER = {
+    "num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5,
+    "picks": 200, "max_picks": 12, "target_update_interval": 24,
+}  # fmt: skip
 RUNS = {
     "container": CONTAINER,
     "container, masked": CONTAINER | {"mask": True, "equalize": False, "gradient_steps": 2},
     "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
-    "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100},
+    "highest item": CONTAINER | {"env": "unload/HighestItem-v0"},
 }
 
 
