@@ -40,6 +40,11 @@ def few_walls(rng):
     return stack_load(rng, walls=1)
 
 
+def metres(run) -> None:
+    """A change: what is learned is how far a pick lifts."""
+    run.reward = lambda picks, distances: distances
+
+
 @contextmanager
 def at(owner: type, method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
     """Do something right after a call of a method; calls are counted from 1."""
