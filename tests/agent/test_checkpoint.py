@@ -55,15 +55,13 @@ def test_a_run_of_another_configuration_stack_or_change_is_refused(tmp_path, fin
 
 
 def test_a_damaged_checkpoint_is_refused_by_name(tmp_path):
-    """Cut short, with a flipped bit, an older one, without an array, or with another content."""
+    """Cut short, an older one, without an array, or with another content."""
     config, path = TrainConfig(**CONTAINER), tmp_path / "checkpoint.npz"
     interrupt_run(config, tmp_path, 20)
     whole, arrays = path.read_bytes(), files.read_arrays(path)
-    middle = len(whole) // 2
-    for damaged in (whole[:middle], whole[:middle] + b"!!" + whole[middle + 2 :]):
-        path.write_bytes(damaged)
-        with pytest.raises(ValueError, match="checkpoint.npz is not a readable .npz file"):
-            train(config, tmp_path, progress=False)
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(ValueError, match="checkpoint.npz is not a readable .npz file"):
+        train(config, tmp_path, progress=False)
     files.write_arrays(path, {"config": arrays["settings"], "format": np.array(5)})
     with pytest.raises(ValueError, match="checkpoint.npz was written by another version"):
         train(config, tmp_path, progress=False)
