@@ -33,8 +33,8 @@ assert len(shared_table()) > 10_000
 table = unload.evaluate(unload.policies.highest, episodes=2)
 assert table["success_rate"].eq(1).all() and "torch" not in sys.modules
 assert unload.evaluate(unload.load_policy("recommended"), episodes=2)["success_rate"].eq(1).all()
-assert unload.picking_order(unload.read_load())["unloaded"].all()
-config = unload.TrainConfig(picks=1280, batch_size=64, equalize=False)
+exec(EXAMPLE)
+config = unload.TrainConfig(picks=1280, batch_size=64, equalize=False, gradient_steps=0)
 unload.train(config, "run", progress=False)
 try:
     unload.evaluate(unload.policies.highest, episodes=1, physics="local", max_picks=1)
@@ -76,7 +76,10 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.slow
 def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_path):
-    """Without PyBullet all works but what is simulated; what is computed lies where one works."""
+    """Without PyBullet all works but what is simulated, the README's example up to its mark, too.
+
+    What is computed lies where one works.
+    """
     before = contents(installed)
     folders = {name.partition("/")[0] for name in before}
     assert folders == {"unload", f"unload-{unload.__version__}.dist-info"}
@@ -84,16 +87,17 @@ def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_pa
     assert shipped.items() <= before.items() and sum(map(len, shipped.values())) < 500_000
     work = tmp_path / "work"
     work.mkdir()
-    printed = run(f"FOLDER = {str(installed)!r}{WITHOUT_PYBULLET}", work, installed)
-    assert "pip install pybullet" in printed
+    example, mark, _ = (ROOT / "README.md").read_text().partition("# With PyBullet:\n")
+    names = f"FOLDER = {str(installed)!r}\nEXAMPLE = {example.partition('```python')[2]!r}"
+    printed = run(names + WITHOUT_PYBULLET, work, installed)
+    assert mark and printed.startswith("136 True\n") and "pip install pybullet" in printed
     assert contents(installed) == before
     assert [path.name for path in work.iterdir()] == ["run"]
 
 
 def test_the_checkout_is_found_from_anywhere(tmp_path):
     """Notebooks, which run in their own folder, import the studies and are read by the tests."""
-    code = "import notebooks.run, studies.heap, gymnasium; gymnasium.spec('unload/Heap-v0')"
-    run(code, tmp_path, tmp_path)
+    run("import notebooks.book.links, studies.paths", tmp_path, tmp_path)
 
 
 @pytest.mark.parametrize(

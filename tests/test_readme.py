@@ -1,17 +1,13 @@
 """The README's example does what its comments say; its links and commands lead somewhere."""
 
 import re
-import sys
 from pathlib import Path
-
-import pytest
 
 from studies.falls.long import read_published
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
 from studies.seamless.training import SEAMLESS
 from studies.statistics import by_cell, by_run, first_plan, seamless_plan
-from unload.physics import bullet
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text()
@@ -25,16 +21,6 @@ def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     printed = [line for line in lines if line and "pick/s" not in line]  # no progress bar
     assert printed == promised == ["136 True", "1.0", "1.0 128"]
-
-
-def test_example_runs_without_pybullet_up_to_its_mark(capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pybullet", None)
-    bullet._pybullet.cache_clear()
-    before, mark, _ = EXAMPLE.partition("# With PyBullet:\n")
-    exec(before, {"__name__": "__main__"})
-    assert capsys.readouterr().out == "136 True\n" and mark
-    with pytest.raises(ModuleNotFoundError, match="pip install pybullet"):
-        bullet.World()
 
 
 def test_links_lead_to_files():

@@ -1,10 +1,9 @@
 """What the tests of training share: small networks and runs, and ways to stop them."""
 
 import itertools
+import multiprocessing
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,25 +19,16 @@ from unload.agent.training import Training
 ROOT = Path(__file__).resolve().parents[2]
 # Small runs that still meet every event: episode ends, updates, points of the curve and,
 # with gamma > 0, updates of the target network.
-SMALL = {"num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5}
-CONTAINER = SMALL | {"picks": 200, "max_picks": 12, "target_update_interval": 24}
+CONTAINER = {
+    "num_envs": 4, "batch_size": 16, "replay_size": 100, "n_features": 4, "log_interval": 5,
+    "picks": 200, "max_picks": 12, "target_update_interval": 24,
+}  # fmt: skip
 RUNS = {
     "container": CONTAINER,
     "container, masked": CONTAINER | {"mask": True, "equalize": False, "gradient_steps": 2},
     "container, gamma": CONTAINER | {"gamma": 0.9, "mask": True},
-    "highest item": SMALL | {"env": "unload/HighestItem-v0", "picks": 2100},
+    "highest item": CONTAINER | {"env": "unload/HighestItem-v0"},
 }
-KILLED = """
-import os, signal
-from tests.agent import runs
-from unload import TrainConfig, train
-
-def kill(point):
-    if point["picks"] == {picks}:
-        os.kill(os.getpid(), signal.SIGKILL)
-
-train(TrainConfig(**{fields!r}), {folder!r}, False, callback=kill, stack=runs.few_walls)
-"""
 
 
 class Breakdown(BaseException):
@@ -48,6 +38,11 @@ class Breakdown(BaseException):
 def few_walls(rng):
     """Loads that are unloaded before an episode of many picks ends."""
     return stack_load(rng, walls=1)
+
+
+def metres(run) -> None:
+    """A change: what is learned is how far a pick lifts."""
+    run.reward = lambda picks, distances: distances
 
 
 @contextmanager
@@ -86,11 +81,19 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
         train(config, folder, progress=False)
 
 
-def kill_run(fields: dict, folder: Path, picks: int) -> None:
-    """Start a run in another process, which is killed at a point of its curve."""
-    code = KILLED.format(picks=picks, fields=fields, folder=str(folder))
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ)
-    assert done.returncode == -signal.SIGKILL
+def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
+    """Start a run in a fork of this process, which is killed at a point of its curve."""
+
+    def kill(point):
+        if point["picks"] == picks:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    given = {"progress": False, "stack": few_walls, "callback": kill}
+    fork = multiprocessing.get_context("fork")
+    process = fork.Process(target=train, args=(config, folder), kwargs=given)
+    process.start()
+    process.join()
+    assert process.exitcode == -signal.SIGKILL
 
 
 def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
@@ -132,6 +135,10 @@ class HeightNetwork(torch.nn.Module):
 
     def forward(self, observations: torch.Tensor, present=None) -> torch.Tensor:
         return observations[..., 2] * self.weight
+
+
+class Subclass(PEQNetwork):
+    """Its weights would fit the package's network, too."""
 
 
 def peq(n_features: int = 8, seed: int = 0) -> PEQNetwork:

@@ -39,21 +39,17 @@ def test_the_longest_deadlock_is_the_longest_and_not_the_sum():
     assert row["longest_deadlock"] == 3 and row["deadlocked"] == (2 + 3) / 10
 
 
-def test_a_load_does_not_depend_on_how_many_there_are():
+def test_the_highest_item_empties_containers_whose_loads_do_not_depend_on_their_number():
     few = evaluate(policies.highest, 2, seed=0, max_picks=None)
     many = evaluate(policies.highest, 70, max_picks=None)
+    assert list(many.columns) == [*COLUMNS, "picks", "emptied"]
+    assert many["emptied"].dtype == bool and many["emptied"].all()
+    assert many["picks"].dtype == np.int64 and (many["picks"] == many["unloaded"]).all()
+    assert (many["success_rate"] == 1).all() and many["unloaded"].between(800, 1000).all()
     assert many["unloaded"].nunique() > 20
     pd.testing.assert_frame_equal(few, many.loc[:1])
     one, two = (evaluate(policies.random, n, physics="local", max_picks=9) for n in (1, 2))
     pd.testing.assert_frame_equal(one, two.iloc[:1])
-
-
-def test_whole_containers_are_unloaded_by_picking_the_highest_item():
-    frame = evaluate(policies.highest, episodes=3, max_picks=None)
-    assert list(frame.columns) == [*COLUMNS, "picks", "emptied"]
-    assert frame["emptied"].dtype == bool and frame["emptied"].all()
-    assert frame["picks"].dtype == np.int64 and (frame["picks"] == frame["unloaded"]).all()
-    assert (frame["success_rate"] == 1).all() and frame["unloaded"].between(800, 1000).all()
 
 
 @pytest.mark.parametrize("policy", [policies.random, policies.nearest])
@@ -76,8 +72,6 @@ def test_an_episode_that_is_stuck_is_given_up():
     assert not frame["emptied"].any() and (frame["unloaded"] < 40).all()
     assert (frame["longest_deadlock"] == 1279).all()
     assert (frame["picks"] >= 1280).all()
-    shares = frame["unloaded"] / frame["picks"]
-    assert frame["success_rate"].tolist() == pytest.approx(shares.tolist())
 
 
 @pytest.mark.parametrize("max_picks", [200, None])

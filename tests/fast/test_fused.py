@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import make_batch, peq, without_next
+from tests.agent.runs import Subclass, make_batch, peq, without_next
 from unload.agent.dqn import DQN
 from unload.fast import fused
 from unload.network.peq import PEQNetwork
@@ -39,9 +39,9 @@ def reference(net, batch, beta=1.0):
     return loss.item(), [parameter.grad for parameter in double.parameters()]
 
 
-def gradients(net, batch, beta=1.0, rows=None):
+def gradients(net, batch, *rest):
     """The gradients of all weights, one after the other, and the loss."""
-    return fused.start_gradients(fused.weights_of(net), *batch.values(), beta, rows)()
+    return fused.start_gradients(fused.weights_of(net), *batch.values(), *rest)()
 
 
 def check(net, batch, beta=1.0, tolerance=1e-5):
@@ -192,15 +192,17 @@ def test_weights_and_inputs_that_are_not_finite_are_refused(batch, place, value)
         ("observations", np.zeros((BATCH, ITEMS, 2), np.float32), "observations has shape"),
         ("observations", np.zeros((BATCH, 0, 3), np.float32), "observations is empty"),
         ("observations", np.zeros((BATCH, ITEMS, 3)), "observations .* dtype float64"),
+        ("rows", np.array([0, BATCH]), "rows holds 0 to 300; expected 0 to 299"),
+        ("rows", np.array([-1, 0]), "rows holds -1"),
+        ("rows", np.array([0.0, 1.0]), "rows has dtype float64"),
+        ("rows", np.zeros((2, 2), int), "rows has shape"),
+        ("rows", np.zeros(0, int), "rows is empty"),
     ],
 )
 def test_bad_batches_are_refused(batch, name, value, message):
+    batch |= {"beta": 1.0, "rows": None, name: value}
     with pytest.raises((TypeError, ValueError), match=message):
-        gradients(peq(4), batch | {name: value})
-
-
-class Subclass(PEQNetwork):
-    pass
+        gradients(peq(4), batch)
 
 
 @pytest.mark.parametrize(
@@ -211,12 +213,6 @@ def test_rule_of_where_it_applies(other):
     assert not fused.applies(other)
     with pytest.raises(ValueError, match="fused_update is True"):
         DQN(other, fused_update=True)
-
-
-def test_bad_rows_are_refused_by_name(batch):
-    for rows in ([0, BATCH], [-1, 0], [0.0, 1.0], np.zeros((2, 2), int), np.zeros(0, int)):
-        with pytest.raises((TypeError, ValueError), match="rows"):
-            gradients(peq(4), batch, rows=np.array(rows))
 
 
 @given(

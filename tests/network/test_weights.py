@@ -77,14 +77,9 @@ def test_a_file_of_another_dtype_is_refused(path, monkeypatch):
 
 
 def test_what_is_no_path_is_refused(tmp_path):
-    for call in (
-        lambda: write_weights(None, "pair", {}, WEIGHTS),
-        lambda: read_weights(None, "pair", print),
-    ):
-        with pytest.raises(TypeError, match="path is None; expected a path"):
-            call()
-    for path in ("", "."):
-        with pytest.raises(ValueError, match=f"path is '{path}'; expected the name of a file"):
-            write_weights(path, "pair", {}, WEIGHTS)
+    with pytest.raises(TypeError, match="path is None; expected a path"):
+        read_weights(None, "pair", print)
+    with pytest.raises(ValueError, match="path is ''; expected the name of a file"):
+        write_weights("", "pair", {}, WEIGHTS)
     with pytest.raises(FileNotFoundError, match=r"expected a .safetensors file \(pair\)"):
         read_weights(tmp_path, "pair", print)
