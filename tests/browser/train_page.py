@@ -4,9 +4,9 @@ import os
 import re
 import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 
 from playwright.sync_api import Browser, Error, Page, sync_playwright
@@ -18,9 +18,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stab
 OPTIONS = ("--use-gl=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
 SIZES = {"desktop": (1400, 900), "tablet": (820, 1180), "phone": (390, 844)}
 SCHEMES = ("light", "dark")
-SEEDS = (0, 1, 2)
 TRAIN_LIMIT = 240  # s, for a run of 96,000 picks on a busy machine
-AT_ONCE = 10  # s, for fresh picks of frozen weights (0.3 s) on a busy machine
 FINGER = 44  # pixels, the height of what is touched
 STARTED = "#picks:has-text('0 picks')"
 
@@ -49,39 +47,39 @@ def browser() -> Iterator[Browser]:
 
 
 def look_at_page(chromium: Browser, pictures: Path) -> Iterator[str]:
-    """Yield what is wrong with the page; keep pictures of it before and after training."""
+    """Yield what is wrong with the page; keep pictures of it before and after training.
+
+    Each size has a seed of its own: what is learned does not depend on the size.
+    """
     yield from without_scripts(chromium)
-    for scheme in SCHEMES:
-        for size, (width, height) in SIZES.items():
-            context = chromium.new_context(
-                viewport={"width": width, "height": height}, color_scheme=scheme
-            )
-            page, errors, requests = context.new_page(), [], []
-            page.on("pageerror", lambda error, to=errors: to.append(str(error)))
-            page.on("request", lambda request, to=requests: to.append(request.url))
-            for seed in SEEDS if scheme == SCHEMES[0] else SEEDS[:1]:
-                name = f"{scheme}, {size}, seed {seed}"
-                stem = pictures / f"train-{scheme}-{size}-{seed}"
-                start(page, f"seed={seed}")
-                for problems in (fits(page, size), five_steps(page, stem), fits(page, size)):
-                    yield from (f"{name}: {each}" for each in problems)
-            if (scheme, size) == (SCHEMES[0], "desktop"):
-                for look in (keys, settings, bad_address, controls, jams):
-                    start(page)
-                    yield from look(page)
-            yield from (f"the page says {error!r}" for error in errors)
-            known = (PAGE.as_uri(), "blob:", "about:")
-            others = [url for url in requests if not url.startswith(known)]
-            if others:
-                yield f"the page asks for {others}"
-            context.close()
+    for scheme, (seed, size) in product(SCHEMES, enumerate(SIZES)):
+        width, height = SIZES[size]
+        context = chromium.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme
+        )
+        page, errors, requests = context.new_page(), [], []
+        page.on("pageerror", lambda error, to=errors: to.append(str(error)))
+        page.on("request", lambda request, to=requests: to.append(request.url))
+        start(page, f"seed={seed}")
+        steps = five_steps(page, pictures / f"train-{scheme}-{size}")
+        for problems in (fits(page, size), steps, fits(page, size)):
+            yield from (f"{scheme}, {size}: {each}" for each in problems)
+        if (scheme, size) == (SCHEMES[0], "desktop"):
+            for look in (keys, settings, bad_address, controls, jams):
+                start(page)
+                yield from look(page)
+        yield from (f"the page says {error!r}" for error in errors)
+        known = (PAGE.as_uri(), "blob:", "about:")
+        others = [url for url in requests if not url.startswith(known)]
+        if others:
+            yield f"the page asks for {others}"
+        context.close()
 
 
 def five_steps(page: Page, stem: Path) -> Iterator[str]:
     """Yield whether a step does not do what it says; keep a picture of each."""
 
-    def ends(step: str, after: Callable[[], object], expected: str) -> Iterator[str]:
-        after()
+    def ends(step: str, expected: str) -> Iterator[str]:
         if not until(page, lambda: "done" in (page.get_attribute(button(step), "class") or "")):
             yield f"step {step} does not end"
         until(page, lambda: not page.evaluate("run.running") and judged(page))
@@ -91,25 +89,22 @@ def five_steps(page: Page, stem: Path) -> Iterator[str]:
             yield f"the verdict of step {step} is {said!r}; expected {expected!r}"
 
     page.screenshot(path=f"{stem}-start.png", full_page=True)
-    yield from ends("unload", lambda: click(page, 0.28), "Unloaded: .* 1 of your 1 picks")
-    train = lambda: page.click(button("positions"))  # noqa: E731
-    yield from ends("positions", train, r"It learned: 100 % of its last picks succeeded, after \d")
-    ranks = lambda: page.click(button("paper"))  # noqa: E731
-    yield from ends("paper", ranks, "It (fell, from|did not|learned)")
-    frozen, began = weights(page), time.monotonic()
+    click(page, 0.28)
+    yield from ends("unload", "Unloaded: .* 1 of your 1 picks")
+    page.click(button("positions"))
+    yield from ends("positions", r"It learned: 100 % of its last picks succeeded, after \d")
+    page.click(button("paper"))
+    yield from ends("paper", "It (fell, from|did not|learned)")
+    frozen = weights(page)
     page.click(button("blank"))
-    if not until(page, lambda: page.text_content("#rate-true")):
-        yield "z alone shows no number"
-    if time.monotonic() - began > AT_ONCE:
-        yield f"z alone shows its number after {time.monotonic() - began:.1f} s"
-    yield from ends("blank", lambda: None, r"With z alone .* in \d+ % .* with x and y in \d+ %: ")
+    yield from ends("blank", r"With z alone .* in \d+ % .* with x and y in \d+ %: ")
     if weights(page) != frozen:
         yield "blank coordinates change the weights"
     both = [page.text_content(f"#rate-{blank}") for blank in ("true", "false")]
     if re.findall(r"\d+ %", page.text_content("#verdict")) != both:
         yield f"the verdict {page.text_content('#verdict')!r} is not of {both}"
-    remedy = lambda: page.click(button("shuffled"))  # noqa: E731
-    yield from ends("shuffled", remedy, "It (learned|did not fall): ")
+    page.click(button("shuffled"))
+    yield from ends("shuffled", "It (learned|did not fall): ")
 
 
 def fits(page: Page, size: str) -> Iterator[str]:
@@ -174,12 +169,8 @@ def settings(page: Page) -> Iterator[str]:
         if there != value:
             yield f"{address} gives {name} as {there!r}; expected {value!r}"
     first = weights(copy)
-    for number in (1, 2, 3):
+    for _ in range(3):
         copy.click("#step")
-        if not until(copy, lambda count=number: copy.evaluate("run.points.length") == count):
-            yield f"step {number} adds no point"
-        if not until(copy, lambda: "%" in copy.text_content("#rate")):
-            yield f"after a step the rate is {copy.text_content('#rate')!r}"
     if not until(copy, lambda: copy.text_content("#picks") == "192 picks"):
         yield f"three steps make {copy.text_content('#picks')}"
     if weights(copy) == first:

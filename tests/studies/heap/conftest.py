@@ -1,4 +1,4 @@
-"""Small heaps that are made at once: towers of upright cubes, and a real one."""
+"""Small heaps that are made at once: towers of upright cubes, and a pile."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,6 @@ import pytest
 
 from studies.heap.boxes import Heap
 from studies.heap.env import HeapEnv
-from studies.heap.generate import settled_heap
 from unload.physics.bullet import World
 
 EDGE = 0.4  # m
@@ -36,12 +35,6 @@ def pile(cubes) -> Heap:
     turns = heap.orientations.copy()
     turns[6:] = (0, 0, np.sin(0.2), np.cos(0.2))
     return Heap(heap.positions, turns, heap.sizes, heap.packages)
-
-
-@pytest.fixture(scope="session")
-def real_heap() -> Heap:
-    """A heap of the generator, about 4 s."""
-    return settled_heap(np.random.default_rng(0))
 
 
 @pytest.fixture

@@ -50,7 +50,7 @@ def made_up_picks(rng: np.random.Generator, count: int) -> Picks:
 def learned() -> tuple[FateNetwork, Picks]:
     """A network of made-up picks, and others that it has not seen."""
     rng = np.random.default_rng(0)
-    return fit(made_up_picks(rng, 3000), 0, steps=480), made_up_picks(rng, 500)
+    return fit(made_up_picks(rng, 2000), 0, steps=240), made_up_picks(rng, 500)
 
 
 def test_it_learns_what_neighbours_do(learned):

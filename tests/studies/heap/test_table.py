@@ -13,9 +13,9 @@ from studies.heap.generate import stored_heaps
 from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.rake import Outcome
-from studies.heap.recording import HEAPS, WEIGHTS, make_heaps, make_networks
+from studies.heap.recording import HEAPS, make_heaps, make_networks
 from studies.heap.table import best_rule, family, plan
-from studies.results import read_provenance, unpacked
+from studies.results import read_provenance
 from unload.agent.identity import identity
 from unload.load.picture import COLOURS
 
@@ -32,10 +32,8 @@ def test_the_best_rule_depends_on_the_weight_of_falls():
     assert best_rule(rules, 0.0) == "bold"
     assert best_rule(rules, 1.0) == "shy"
     players = plan(rules, "networks")
-    assert len(players) == len(study.RULES) + 2 * len(WEIGHTS) + 1
     assert players[0.0, "best rule"] == {"rule": "bold"}
     assert players[4.0, "best rule"] == {"rule": "shy"}
-    assert {weight for weight, policy in players if policy in ("random", "oracle")} == {1.0}
 
 
 def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pile):
@@ -106,14 +104,14 @@ def test_data_of_heaps_are_those_that_are_read():
 
 
 def test_a_published_episode_is_played_again():
-    """The first one of the learned policy at λ = 1."""
+    """The learned policy at λ = 1 on the smallest heap."""
     place = paths.DATA / "heap"
     episodes = pd.read_csv(place / "episodes.csv").set_index(["policy", "falls_weight", "heap"])
     player = {"networks": place / "networks.safetensors", "falls_weight": 1.0}
     assert len(load_networks(player["networks"])) == recording.NETWORKS
-    played = study._play(player, "test", 0, study.PHYSICS)
+    played = study._play(player, "test", 18, study.PHYSICS)
     assert played == pytest.approx(
-        dict(episodes.loc["learned", 1.0, 0][["boxes", "falls"]]), abs=1e-5
+        dict(episodes.loc["learned", 1.0, 18][["boxes", "falls"]]), abs=1e-5
     )
 
 
@@ -128,12 +126,6 @@ def test_a_box_is_drawn_in_the_colour_of_what_a_pick_does_to_it(cubes):
     along, dragged = (np.array(COLOURS[name]) for name in ("liftable", "tried"))
     for face, colour in zip(painted, [along] * 3 + [dragged] * 3):
         assert face / face.max() == pytest.approx(colour / colour.max(), abs=0.02)
-
-
-def test_the_shipped_heaps_are_what_the_generator_makes():
-    """Of number 60, boxes were still leaving in the last round of settling."""
-    made = unpacked(recording._new_heap(recording.SEEDS["train"], 60))
-    assert stored_heaps("train")[60].positions.tolist() == made["positions"].tolist()
 
 
 def test_heaps_are_those_of_their_seeds(tmp_path, monkeypatch):
@@ -156,10 +148,16 @@ def test_heaps_are_those_of_their_seeds(tmp_path, monkeypatch):
     assert made["more", "train"][0] != made["more", "test"][0]
 
 
-def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch):
-    small = {"MAX_PICKS": 3, "PICKS": 12, "NETWORKS": 2, "STEPS": 2}
-    for name, value in small.items():
+def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch, pile):
+    for name, value in {
+        "stored_heaps": lambda split: [pile, pile.only(np.arange(8))],
+        "MAX_PICKS": 3,
+        "PICKS": 12,
+        "NETWORKS": 2,
+        "STEPS": 2,
+    }.items():
         monkeypatch.setattr(recording, name, value)
+    monkeypatch.setattr("studies.heap.env.stored_heaps", recording.stored_heaps)
     learned, explorers, explored = [], [], []
     fit, policy = recording.fit, recording.Learned
 

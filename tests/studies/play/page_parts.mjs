@@ -113,15 +113,16 @@ test("the choice is the highest score that is allowed", () => {
 
 test("weights are judged by fresh picks", () => {
   const [height, side, low] = [prefers(0, 0, 1), prefers(0, 2, 1), prefers(0, 0, -1)];
+  const task = { ...TASK, max_picks: 100 };
   const judged = (network, settings) =>
-    policy.judge(network, { ...DEFAULTS, equalize: true, ...settings }, TASK);
+    policy.judge(network, { ...DEFAULTS, equalize: true, ...settings }, task);
   assert.deepEqual(judged(height, {}), { success_rate: 1, repeated: 0 });
   near([judged(height, { seamless: true }).success_rate], [0.6], 0.03);
   assert.ok(judged(side, {}).success_rate < TASK.errs);
   assert.deepEqual(judged(side, {}), judged(side, {}), "the containers are the same");
   assert.equal(judged(side, { blank: true }).success_rate, 1);
-  // Eight containers of 500 picks each, of which all but the first repeat the same failure.
-  assert.deepEqual(judged(low, { mask: false }), { success_rate: 0, repeated: 499 / 500 });
+  // Eight containers of 100 picks each, of which all but the first repeat the same failure.
+  assert.deepEqual(judged(low, { mask: false }), { success_rate: 0, repeated: 99 / 100 });
   const masked = judged(low, {});
   assert.ok(masked.repeated === 0 && masked.success_rate < 0.1);
 });
@@ -531,7 +532,7 @@ function startWorker(changes) {
     for (let i = 0; i < count && queue.length; i++) queue.shift()();
     return said.splice(0).map(brief);
   };
-  const config = { ...DEFAULTS, picks: 480, ...changes };
+  const config = { ...DEFAULTS, picks: 480, batch_size: 8, ...changes };
   const tell = (command, settings) => {
     const data = { command, config: { ...config, ...settings }, task: SMALL, number: 7 };
     context.onmessage({ data });
@@ -562,7 +563,7 @@ test("the worker trains until its goal, and judges", () => {
 });
 
 test("the worker pauses, steps, and takes over changes", () => {
-  const { tell, some, rest } = startWorker({ batch_size: 8 });
+  const { tell, some, rest } = startWorker({});
   tell("reset");
   tell("train");
   some(2);

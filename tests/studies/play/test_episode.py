@@ -6,11 +6,9 @@ import pytest
 import unload
 from studies.play import animation
 from studies.play.episode import PLAYERS, Episode, Pick, Run, explain, policy_of
-from studies.policies.robustness import front_walls
 from tests.agent.runs import lowest
 from tests.env.comparing import make_env
 from unload import policies
-from unload.load.substacks import stack_load
 
 
 @pytest.fixture
@@ -119,23 +117,17 @@ def test_a_run_is_the_same_however_it_is_played(full_load):
     assert in_parts.picks == at_once.picks
 
 
-def test_a_recorded_episode_ends_when_the_container_is_empty_or_the_agent_stuck(tmp_path):
-    """It is saved as the same bytes each time."""
-    wall = front_walls(stack_load(np.random.default_rng(3)), 1)
-    players = lowest, policies.highest
-    stuck, empty = (animation.record_episode(player, 3, wall) for player in players)
-    assert empty.unloaded() == len(empty.load) == len(empty.picks)
-    assert len({pick.item for pick in stuck.picks}) == 1 and not stuck.unloaded()
-    assert len(stuck.picks) == animation.STUCK
+def test_a_recorded_episode_ends_when_the_container_is_empty_or_the_agent_stuck(
+    boxes, tmp_path, monkeypatch
+):
+    """It is saved as the same bytes each time: no pick, one more in each frame, the end twice."""
+    monkeypatch.setattr(animation, "STUCK", 5)
+    tower, players = boxes((1.0, 0.2), (1.0, 0.6)), (lowest, policies.highest)
+    stuck, empty = (animation.record_episode(player, 3, tower) for player in players)
+    assert [pick.item for pick in empty.picks] == [1, 0] and empty.unloaded() == 2
+    assert [pick.item for pick in stuck.picks] == [0] * 5 and not stuck.unloaded()
     first, second = tmp_path / "a.gif", tmp_path / "b.gif"
     for path in (first, second):
-        animation.save_unloading({"stuck": stuck, "empty": empty}, path)
+        frames = animation.save_unloading({"stuck": stuck, "empty": empty}, path)
+        assert len(frames) == 1 + 5 + 1
     assert first.read_bytes() == second.read_bytes()
-
-
-def test_frames_begin_slowly_and_show_the_end_twice():
-    counts = animation.picks_of_frames(900)
-    assert counts[:11] == list(range(11)) and counts[-2:] == [900, 900]
-    steps = np.diff(counts[:-2])
-    assert (np.diff(steps) >= 0).all() and steps.max() == animation.STEP
-    assert animation.picks_of_frames(2) == [0, 1, 2, 2]
