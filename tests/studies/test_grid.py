@@ -57,9 +57,12 @@ def test_a_grid_is_read_as_it_was_trained(trained):
 
 def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained):
     before = (trained / "some/small_loss.csv").read_bytes()
-    message = "would hold 2 finished runs; expected at least as many as the 4"
-    with pytest.raises(ValueError, match=message):
-        grid.train_grid(SMALL, ["plain"], None, trained, trained / "other", 1)
+    for cell, message in {
+        "nothing": "cells is 'nothing'; expected one of 'plain', ",
+        "plain": "would hold 2 finished runs; expected at least as many as the 4",
+    }.items():
+        with pytest.raises(ValueError, match=message):
+            grid.train_grid(SMALL, [cell], None, trained, trained / "other", 1)
     assert not (trained / "other").exists()  # refused before hours of training
     grid.train_grid(SMALL, None, None, trained, trained / "runs", n_jobs=1)  # as many
     grid.train_grid(SMALL, ["plain"], 320, trained, trained / "runs", 1)
