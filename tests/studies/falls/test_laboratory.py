@@ -24,19 +24,13 @@ from unload.network.variants import NETWORKS
 
 
 @pytest.mark.slow
-def test_published_runs_are_trained_and_measured_again():
-    """Two of them, which show what the laboratory is for."""
+def test_a_published_run_is_trained_and_measured_again():
+    """The first one that falls."""
     published = laboratory.read_laboratory().set_index(["cell", "seed"])
-    rows = {
-        name: laboratory.run_cell(name, cells.CELLS[name], cells.FIRST_SEED)["row"]
-        for name in ("ranks", "shuffled")
-    }
-    for name, row in rows.items():
-        expected = published.loc[name, cells.FIRST_SEED].to_dict()
-        assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
-    ranks, shuffled = rows.values()
-    assert ranks["end"] < 0.9 < 0.98 < shuffled["end"]
-    assert ranks["judged_place"] == shuffled["judged_place"] == 1
+    expected = published.loc["ranks", cells.FIRST_SEED].to_dict()
+    row = laboratory.run_cell("ranks", cells.CELLS["ranks"], cells.FIRST_SEED)["row"]
+    assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
+    assert row["end"] < 0.9 and row["judged_place"] == 1
 
 
 def test_cells_are_trained_measured_and_written(tmp_path, monkeypatch):
