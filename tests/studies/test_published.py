@@ -173,7 +173,7 @@ def test_each_published_figure_is_drawn_by_a_notebook():
 
 
 def test_figures_are_saved_as_the_same_bytes(tmp_path):
-    draws = {"one": FROM_DATA["a_fall"], "other": partial(diagrams.fig07_network, 4)}
+    draws = {"one": FROM_DATA["comparison"], "other": partial(diagrams.fig07_network, 4)}
     for name, draw in draws.items():
         for folder in ("a", "b"):
             style.save(draw(), name, tmp_path / "figures" / folder)
