@@ -28,9 +28,10 @@ from studies.results import (
     revision,
     unpacked,
 )
+from studies.seamless.training import SEAMLESS
 from unload import TrainConfig
 
-PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, *GRIDS.values())}
+PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, SEAMLESS, *GRIDS.values())}
 
 
 @pytest.fixture

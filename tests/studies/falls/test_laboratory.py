@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from studies import changes, paths
-from studies.falls import cells, figures, laboratory, long, measures
+from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
 from studies.paper.training import PAPER
@@ -24,19 +24,13 @@ from unload.network.variants import NETWORKS
 
 
 @pytest.mark.slow
-def test_published_runs_are_trained_and_measured_again():
-    """Two of them, which show what the laboratory is for."""
+def test_a_published_run_is_trained_and_measured_again():
+    """The first one that falls."""
     published = laboratory.read_laboratory().set_index(["cell", "seed"])
-    rows = {
-        name: laboratory.run_cell(name, cells.CELLS[name], cells.FIRST_SEED)["row"]
-        for name in ("ranks", "shuffled")
-    }
-    for name, row in rows.items():
-        expected = published.loc[name, cells.FIRST_SEED].to_dict()
-        assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
-    ranks, shuffled = rows.values()
-    assert ranks["end"] < 0.9 < 0.98 < shuffled["end"]
-    assert ranks["judged_place"] == shuffled["judged_place"] == 1
+    expected = published.loc["ranks", cells.FIRST_SEED].to_dict()
+    row = laboratory.run_cell("ranks", cells.CELLS["ranks"], cells.FIRST_SEED)["row"]
+    assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
+    assert row["end"] < 0.9 and row["judged_place"] == 1
 
 
 def test_cells_are_trained_measured_and_written(tmp_path, monkeypatch):
@@ -129,7 +123,7 @@ def test_teachers_and_loads_have_the_preferences_of_the_plan():
     assert cells.SHORT["max_picks"] + changes.DEEPEST == TrainConfig().max_picks
 
 
-@pytest.mark.parametrize("planned", [PAPER.cells, long.LONG.cells, cells.CELLS, cells.FRESH])
+@pytest.mark.parametrize("planned", [cells.CELLS, cells.FRESH])
 def test_names_of_cells_tell_the_mask_and_the_batch(planned):
     for name, cell in planned.items():
         assert cell.config.mask is ("no_mask" not in name), name
@@ -169,14 +163,9 @@ def test_a_label_says_who_chooses_and_who_watches(cell, label):
     assert (published > 0.99) == (chooser[0] == "shuffled")
 
 
-def test_the_rule_of_two_thresholds():
-    table = pd.DataFrame(
-        [(0.2, 0.4, 1.0), (0.3, 0.0, 1.0), (0.0, -0.5, 1.0), (-0.3, 0.0, -1.0)],
-        columns=laboratory.SLOPES,
-    )
-    assert laboratory.predicted(table).tolist() == [False, True, True, True]
-    averaged = cells.FRESH["averaged"].config
-    assert laboratory.predicted(table, averaged).tolist() == [False, False, True, False]
+def test_the_rule_knows_no_sign_of_a_slope():
+    table = pd.DataFrame([(-0.3, 0.0, -1.0)], columns=laboratory.SLOPES)
+    assert laboratory.predicted(table).all()
 
 
 def test_the_rule_was_fitted_on_the_published_networks():
@@ -338,19 +327,6 @@ def test_a_surface_is_the_height_of_the_highest_boxes(boxes, monkeypatch):
     expected[33:37, 8:12] = 0.8
     assert measures.surface(policies.highest) == pytest.approx(expected)
     assert asked == [(300, seed) for seed in range(8)]
-
-
-def test_the_surface_is_level_where_the_highest_is_taken():
-    level = measures.surface(policies.highest, picks=200, containers=2)
-    dug = measures.surface(measures.preferring(0, -1), picks=200, containers=2)
-    assert (level[:20] > 2).all()  # at the rear nothing has been picked
-    left, right = dug[50:, 0].mean(), dug[50:, -1].mean()
-    assert np.ptp(level[50:].mean(axis=0)) < 0.5 < right - left
-
-
-def test_a_dug_load_is_drawn_to_scale():
-    (image,) = figures.dug(np.zeros((70, 25)), (0.5, 0.2), False, 0.6).axes[0].images
-    assert image.get_extent() == [0, 7, 0, 2.5] and image.get_clim() == (0, 2.5)
 
 
 def test_depth_misleads_only_where_ranks_are_random():

@@ -26,11 +26,7 @@ def test_each_cell_differs_from_the_paper_in_little():
         assert len(set(map(repr, cells.values()))) == len(cells)
 
 
-@pytest.mark.parametrize("part", PARTS)
-def test_what_is_shown_together_stands_beside_its_control(part):
-    rows = read_variants(part)
-    assert rows["cell"].unique().tolist() == [*PARTS[part]]
-    assert part == "networks" or rows["cell"].iloc[0] == "unchanged"
+def test_an_unknown_part_is_refused():
     with pytest.raises(ValueError, match="part is 'loss'; expected one of 'networks', "):
         read_variants("loss")
 
@@ -55,7 +51,7 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
     small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5, picks=200)
     for name, cells in (("variants", REWARDS), ("recommended", GRIDS["recommended"].cells)):
         cells = {
-            cell: one._replace(config=replace(small, equalize=one.config.equalize))
+            cell: one._replace(config=replace(small, equalize=one.config.equalize), seeds=[0])
             for cell, one in cells.items()
         }
         monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
@@ -63,8 +59,7 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
     folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
     variants_data(n_jobs=1, **folders)
     rows = read_measures(GRIDS["variants"], tmp_path)
-    assert rows["seed"].tolist() == 3 * [0, 1, 2]
-    assert rows["cell"].nunique() == 3 and rows["msr_mask"].between(0, 1).all()
+    assert rows["cell"].tolist() == [*REWARDS] and rows["msr_mask"].between(0, 1).all()
     provenance = read_provenance(tmp_path, "variants/recommended")
     assert provenance["fingerprint"] == "f"
     assert not load_policy(tmp_path / "policies/recommended.safetensors").equalize

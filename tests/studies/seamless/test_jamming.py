@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from studies.falls.laboratory import CONFIG
-from studies.seamless.jamming import jam, jam_by_place, neighbours, uniform, weigh
+from studies.seamless.jamming import jam, neighbours, uniform, weigh
 from studies.seamless.jams import place
 from unload import task
 from unload.agent.training import Training
@@ -145,17 +145,3 @@ def test_neighbours_are_those_of_the_measured_places(random_run):
             assert (covered[env], beside[env]) == (found["covered"], found["beside"])
             seen.add((found["covered"], found["beside"]))
     assert len(seen) >= 6
-
-
-def test_boxes_jam_by_their_places(random_run):
-    shares = np.zeros((2, 4))
-    shares[1, 2] = 1.0
-    plain = random_run(lambda run: None)
-    jammed = random_run(partial(jam_by_place, shares=shares, lasts=20))
-    state = plain.rollout.envs.unwrapped._containers
-    for row in range(0, 128, 5):
-        covered, beside = neighbours(state, state.visible[:, row].astype(np.int64))
-        free = attempts(plain, row) >= task.LIFT_THRESHOLD
-        held = (covered == 1) & (beside == 2)
-        lifted = attempts(jammed, row) >= task.LIFT_THRESHOLD
-        assert (lifted == (free & ~held)).all()

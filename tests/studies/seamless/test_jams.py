@@ -7,7 +7,6 @@ from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies.seamless import episodes, jam_tables, jams, mujoco_jams
@@ -138,21 +137,7 @@ def test_a_box_that_is_lifted_again_at_once_moves_as_before(monkeypatch):
     assert {row["out"] for row in rows} == {0, 1}
 
 
-def test_what_lasts_is_counted():
-    lifts = [
-        {"box": box, "out": out, "before": before, "distance": distance}
-        for out, distances in ((0, (0.1, 0.1, 0.2)), (5, (0.1, 0.3, 0.0)))
-        for box, (before, distance) in enumerate(zip((0.1, 0.1, 0.2), distances))
-    ]
-    first, second = jam_tables.lasting_rows(Case(2), lifts)
-    counts = "boxes", "jammed_before", "again_jammed", "newly_jammed"
-    assert [first[name] for name in counts] == [3, 2, 2, 0]
-    assert [second[name] for name in counts] == [3, 2, 1, 1]
-    assert (first["out"], second["out"], second["load"]) == (0, 5, 2)
-
-
-@pytest.mark.parametrize(("walls", "most"), [(3, 9), (2, 7)])
-@pytest.mark.parametrize("policy", episodes.POLICIES)
+@pytest.mark.parametrize(("policy", "walls", "most"), [("random", 3, 9), ("highest", 2, 7)])
 def test_an_episode_takes_out_what_is_lifted(simulated, monkeypatch, policy, walls, most):
     monkeypatch.setattr(episodes, "MOST_ATTEMPTS", 9)
     monkeypatch.setattr(episodes, "CONTAINER_ATTEMPTS", 7)
@@ -181,64 +166,36 @@ def test_an_episode_ends_where_few_boxes_are_left_or_all_have_jammed(simulated):
     assert sorted(boxes) == jams.visible_free(load, np.ones(len(load), bool)).tolist()
 
 
-def test_jams_of_an_episode_are_counted_by_what_was_taken_out():
-    attempts = [{"out": out, "distance": 0.3 * (out % 2)} for out in (0, 1, 24, 25, 49, 50)]
-    rows = jam_tables.episode_rows(Case(3, friction=1.0), "random", "keep", attempts)
-    assert [(row["out"], row["attempts"], row["jammed"]) for row in rows] == [
-        (0, 3, 2), (25, 2, 0), (50, 1, 1)
-    ]  # fmt: skip
-    assert (rows[0]["load"], rows[0]["friction"], rows[0]["policy"]) == (3, 1.0, "random")
-
-
-def attempt(load, box, out, jammed, covered=False, beside=1) -> dict:
-    """An attempt of the random policy at a friction of 1."""
-    about = {"load": load, "friction": 1.0, "policy": "random", "box": box, "out": out}
+def attempt(box, out, jammed, covered=False, beside=1) -> dict:
     distance = 0.0 if jammed else task.LIFT_THRESHOLD
-    return about | {"covered": covered, "beside": beside, "distance": distance}
-
-
-def test_first_attempts_are_counted_by_place():
-    rows = [
-        attempt(0, 7, 0, True), attempt(0, 7, 3, False),  # the second one is no first one
-        attempt(1, 7, 0, False), attempt(0, 8, 0, True, True, 5), attempt(0, 9, 0, True, True, 3),
-    ]  # fmt: skip
-    first = jam_tables.first_attempts(jam_tables.in_classes(pd.DataFrame(rows)))
-    assert first.to_dict("records") == [
-        {"friction": 1.0, "covered": False, "beside": 1, "free": 2, "jammed": 1},
-        {"friction": 1.0, "covered": True, "beside": 3, "free": 2, "jammed": 2},
-    ]
-
-
-def test_attempts_at_boxes_that_jammed_are_counted_by_the_successes_between():
-    rows = [
-        attempt(0, 7, 0, True), attempt(0, 8, 0, False), attempt(0, 7, 1, True),
-        attempt(0, 9, 1, False), attempt(0, 7, 30, False), attempt(0, 6, 31, True, True, 2),
-        attempt(1, 7, 31, True),
-    ]  # fmt: skip
-    attempts = jam_tables.in_classes(pd.DataFrame(rows))
-    found = jam_tables.again(attempts, jam_tables.first_attempts(attempts))
-    assert found["between"].tolist() == [1, 26]
-    assert found["attempts"].tolist() == [1, 1] and found["jammed"].tolist() == [1, 0]
-    # Of the four first attempts with one neighbour two jammed.
-    assert found["neighbours"].tolist() == [0.5, 0.5]
+    return {"box": box, "out": out, "covered": covered, "beside": beside, "distance": distance}
 
 
 def test_what_is_counted_of_all_cases_is_written(tmp_path, monkeypatch):
+    """Each case by itself; attempts by what was taken out, by place, and by what was between."""
     asked = [("fresh", Case(0)), ("lasting", Case(1)), ("width", Case(2, gap=-0.0001, picks=25))]
     monkeypatch.setattr(jams, "cases", lambda: asked)
-    lifts = [
-        {"box": 7, "out": 0, "before": 0.0, "distance": distance}
-        for distance in (0.1, task.LIFT_THRESHOLD, 0.46)
+    lifts = [{"distance": distance} for distance in (0.1, task.LIFT_THRESHOLD, 0.46)]
+    lasting = [
+        {"box": box, "out": out, "before": before, "distance": distance}
+        for out, distances in ((0, (0.1, 0.1, 0.2)), (5, (0.1, 0.3, 0.0)))
+        for box, (before, distance) in enumerate(zip((0.1, 0.1, 0.2), distances))
     ]
-    monkeypatch.setattr(jams, "answer", lambda kind, case: lifts[: case.load + 1])
-    # Of these episodes the first two are of seamless walls, three, and restored.
+    monkeypatch.setattr(
+        jams, "answer", lambda kind, case: lasting if kind == "lasting" else lifts[: case.load + 1]
+    )
+    # Of these episodes the first three are of seamless walls, three, and restored.
     played = [
-        (Case(0), "random", "restore"), (Case(1), "highest", "restore"),
+        (Case(0, friction=1.0), "random", "restore"), (Case(1, friction=1.0), "random", "restore"),
+        (Case(1, friction=1.0), "highest", "restore"),
         (Case(2, gap=0.001), "random", "restore"), (Case(3), "random", "keep"),
         (Case(4, walls=12), "random", "restore"),
     ]  # fmt: skip
     monkeypatch.setattr(episodes, "cases", lambda: played)
-    attempts = [attempt(9, 7, 0, True), attempt(9, 8, 0, False), attempt(9, 7, 1, True)]
+    attempts = [
+        attempt(7, 1, True), attempt(8, 1, False), attempt(7, 2, True), attempt(9, 24, False),
+        attempt(7, 30, False), attempt(6, 31, True, True, 5), attempt(5, 31, False, True, 3),
+    ]  # fmt: skip
     monkeypatch.setattr(episodes, "episode", lambda *_: attempts)
     jam_tables.both_data(tmp_path, tmp_path / "runs", 1)
     tables = {
@@ -251,13 +208,20 @@ def test_what_is_counted_of_all_cases_is_written(tmp_path, monkeypatch):
     assert counted.to_numpy().tolist() == [
         ["fresh", 0, 0, 0, 1, 1, 0.1], ["width", 2, -0.0001, 25, 3, 1, 0.2],
     ]  # fmt: skip
-    assert tables["jam_lasting"][["load", "boxes"]].to_numpy().tolist() == [[1, 2]]
-    counts = tables["jam_episodes"][["load", "walls", "gap", "after_pick", "attempts", "jammed"]]
-    assert counts.to_numpy().tolist() == [
-        [case.load, case.walls, case.gap, after_pick, 3, 2] for case, _, after_pick in played
+    counts = ["load", "out", "boxes", "jammed_before", "again_jammed", "newly_jammed"]
+    assert tables["jam_lasting"][counts].to_numpy().tolist() == [
+        [1, 0, 3, 2, 2, 0],
+        [1, 5, 3, 2, 1, 1],
     ]
-    assert tables["jam_first"][["free", "jammed"]].to_numpy().tolist() == [[4, 2]]
-    assert tables["jam_again"][["between", "neighbours"]].to_numpy().tolist() == [[1, 0.5]]
+    assert tables["jam_episodes"].to_numpy().tolist() == [
+        [case.load, case.walls, case.friction, case.gap, policy, after_pick, *counts]
+        for case, policy, after_pick in played
+        for counts in ((0, 4, 2), (25, 3, 1))
+    ]
+    assert tables["jam_first"].to_numpy().tolist() == [[1, False, 1, 9, 3], [1, True, 3, 6, 3]]
+    # Box 7 of two episodes; of the first attempts with one neighbour a third jammed.
+    again = tables["jam_again"][["between", "attempts", "jammed", "neighbours"]]
+    assert again.to_numpy() == pytest.approx(np.array([[1, 2, 2, 2 / 3], [26, 2, 0, 2 / 3]]))
 
 
 def test_the_model_of_the_second_engine_holds_the_boxes_of_the_case():
