@@ -9,7 +9,6 @@ Read ``grid`` first (an experiment of training runs, spread over processes by ``
 ``changes`` holds what experiments change in a run, ``fingerprint`` says whether the code still
 trains as it did, ``exercise`` whether a reader's answer is right. ``__main__`` is the command line.
 
-Everywhere, "folder" is that of the data, "runs_dir" that of what is kept on the way to them,
-and "n_jobs" a number of processes as in joblib. A bad argument is refused by a TypeError or
-ValueError that names it, missing data by a FileNotFoundError that names the command to make them.
+Everywhere "n_jobs" is a number of processes as in joblib. A bad argument is refused by a TypeError
+or ValueError that names it, missing data by a FileNotFoundError that names the command to make it.
 """

@@ -19,7 +19,14 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.results import joined, read_provenance, read_table, write_provenance, write_table
+from studies.results import (
+    joined,
+    provenance_file,
+    read_provenance,
+    read_table,
+    write_provenance,
+    write_table,
+)
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
@@ -55,7 +62,7 @@ class Grid(NamedTuple):
         command: what trains the grid.
         cells: by name.
         measure: of a trained policy and its configuration. A grid with one publishes what it
-            returns, a row per run, instead of curves and policies.
+            returns, a table of its own name with a row per run, instead of curves and policies.
         policies: whether the trained policies are published beside the curves.
     """
 
@@ -79,8 +86,6 @@ def train_grid(
     grid: Grid,
     cells: Sequence[str] | None = None,
     picks: int | None = None,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
     n_jobs: int = -1,
 ) -> Path:
     """Train the runs of a grid that are not finished, and publish all that are.
@@ -104,9 +109,9 @@ def train_grid(
         name: config for name, config in configs.items() if not cells or cell_of(name) in cells
     }
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
-    kept = Path(runs_dir) / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
+    kept = paths.RUNS / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
-    place = Path(folder) / ("" if picks is None else "reduced") / grid.name
+    place = Path("" if picks is None else "reduced", grid.name)
     _check_count(place, kept, len(_records(kept, configs).keys() | wanted.keys()))
     report = run_sweep(wanted, kept, n_jobs, changes=changes)
     _publish(grid, configs, kept, place, picks is not None, fingerprint)
@@ -124,12 +129,11 @@ def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
 
 def _check_count(place: Path, kept: Path, runs: int) -> None:
     """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
-    provenance = place.parent / f"{place.name}.provenance.json"
-    there = read_provenance(place.parent, place.name)["runs"] if provenance.exists() else 0
+    there = read_provenance(place)["runs"] if provenance_file(place).exists() else 0
     if runs < there:
         raise ValueError(
             f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "
-            f"that {place}.csv holds"
+            f"of {place}"
         )
 
 
@@ -152,19 +156,19 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
         for column, digits in COLUMNS.items():
             tables: dict[Path, dict[str, pd.Series]] = {}
             for name, curve in curves.items():
-                path = _table_path(place, cell_of(name), column)
-                tables.setdefault(path, {"picks": picks})[name] = curve[column]
-            for path, table in tables.items():
-                write_table(path, pd.DataFrame(table), digits)
+                table = _table_name(place, cell_of(name), column)
+                tables.setdefault(table, {"picks": picks})[name] = curve[column]
+            for table, content in tables.items():
+                write_table(table, pd.DataFrame(content), digits)
         if grid.policies:
-            write_policies(place.with_name(f"{place.name}.safetensors"), policies)
+            write_policies(paths.DATA / f"{place}.safetensors", policies)
     else:
         names = [name.rpartition("/seed_") for name in done]
         rows = [
             {"cell": cell, "seed": int(seed), **grid.measure(policies[name], config)}
             for (cell, _, seed), (name, config) in zip(names, done.items())
         ]
-        write_table(place.with_name(f"{place.name}.csv"), pd.DataFrame(rows))
+        write_table(place, pd.DataFrame(rows))
 
     # The first seed stands for the others of its cell: it rebuilds their configurations, too.
     first = {
@@ -172,7 +176,7 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
     }
     record = joined(map(files.read_json, records.values()))
     record |= {"fingerprint": fingerprint, "planned": len(configs)}
-    write_provenance(place.parent, place.name, grid.command, first, reduced, record)
+    write_provenance(place, grid.command, first, reduced, record)
 
 
 def cell_of(run: str) -> str:
@@ -180,14 +184,12 @@ def cell_of(run: str) -> str:
     return run.rpartition("/seed_")[0]
 
 
-def _table_path(place: Path, cell: str, column: str) -> Path:
+def _table_name(place: Path, cell: str, column: str) -> Path:
     """Of the table of a column of a cell's curves: a row per point, a column per run."""
-    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}.csv")
+    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}")
 
 
-def read_grid(
-    grid: Grid, folder: str | Path = paths.DATA, cells: Iterable[str] | None = None
-) -> pd.DataFrame:
+def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
     """The published curves of a grid, in the order of its cells.
 
     Args:
@@ -201,11 +203,11 @@ def read_grid(
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
-    place, columns = Path(folder) / grid.name, []
+    place, columns = Path(grid.name), []
     for column in COLUMNS:
         parts = []
-        for path in dict.fromkeys(_table_path(place, cell, column) for cell in wanted):
-            table = read_table(path, grid.command, ["picks"])
+        for name in dict.fromkeys(_table_name(place, cell, column) for cell in wanted):
+            table = read_table(name)
             table = table[[name for name in table if name == "picks" or cell_of(name) in wanted]]
             parts.append(table.melt("picks", var_name="run", value_name=column))
         columns.append(pd.concat(parts, ignore_index=True))
@@ -214,11 +216,6 @@ def read_grid(
     curves.insert(0, "cell", names[0])
     curves.insert(1, "seed", names[2].astype(int))
     return curves
-
-
-def read_measures(grid: Grid, folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """What a grid's ``measure`` has returned, a row per run: ``cell``, ``seed`` and its entries."""
-    return read_table(Path(folder) / f"{grid.name}.csv", grid.command, ["cell", "seed"])
 
 
 def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:

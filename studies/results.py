@@ -101,17 +101,17 @@ def unpacked(text: str) -> dict[str, np.ndarray]:
 
 
 def keep_all(
-    folder: str | Path, compute: Callable, asked: Sequence[tuple[dict, tuple]], n_jobs: int
+    place: str, compute: Callable, asked: Sequence[tuple[dict, tuple]], n_jobs: int
 ) -> list[Result]:
     """``kept`` for several questions to the same code, side by side.
 
     Args:
-        folder: see ``kept``.
+        place: the folder in ``runs/``.
         compute: gives an answer; its ``identity`` is a part of each question.
         asked: the rest of each question, and the arguments of ``compute``.
         n_jobs: processes.
     """
-    code = {"code": identity(compute)}
+    folder, code = paths.RUNS / place, {"code": identity(compute)}
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question | code, partial(compute, *arguments))
         for question, arguments in asked
@@ -121,8 +121,7 @@ def keep_all(
 
 
 def publish(
-    folder: str | Path,
-    name: str,
+    name: str | Path,
     tables: Mapping[str, pd.DataFrame],
     command: str,
     settings: dict,
@@ -134,52 +133,56 @@ def publish(
     """Write tables of results and, last, their provenance.
 
     Args:
-        folder: of ``<table>.csv`` and ``<name>.provenance.json``.
-        name: of the data.
-        tables: by name.
+        name: of the data, with its folder in ``data/``, such as ``"falls/laboratory"``.
+        tables: by name; they stand in the same folder.
         command: what computes them again.
         settings: configuration and seeds.
         results: of which they are made; their records are joined.
         fingerprint: of the training that the results rest on, see ``training_fingerprint``;
             None if they rest on none, or on one that is not known.
         float_format: of the tables.
-        reduced: whether the run is smaller than the one that ``data/`` holds.
+        reduced: whether the run is smaller than the one that ``data/`` holds; what it gives goes
+            to ``data/reduced``.
     """
-    folder = Path(folder)
+    place = Path("reduced" if reduced else "", name)
     for table_name, table in tables.items():
-        write_table(folder / f"{table_name}.csv", table, float_format)
+        write_table(place.with_name(table_name), table, float_format)
     record = joined(result.record for result in results)
     if fingerprint is not None:
         record["fingerprint"] = fingerprint
-    write_provenance(folder, name, command, settings, reduced, record)
+    write_provenance(place, command, settings, reduced, record)
 
 
-def write_table(path: str | Path, table: pd.DataFrame, float_format: str = "%.6g") -> None:
-    """Write a table as CSV, without its index, in one atomic step."""
+def write_table(name: str | Path, table: pd.DataFrame, float_format: str = "%.6g") -> None:
+    """Write ``data/<name>.csv``, without the table's index, in one atomic step."""
+    path = paths.DATA / f"{name}.csv"
     files.write_text(path, table.to_csv(index=False, float_format=float_format))
 
 
-def read_table(path: str | Path, command: str, columns: Sequence[str]) -> pd.DataFrame:
-    """A table, a CSV file, that a ``command`` has made; it must have the ``columns``."""
-    path = Path(path)
+def read_table(name: str | Path) -> pd.DataFrame:
+    """The table ``data/<name>.csv``; what publishes it says what its columns are."""
+    path = paths.DATA / f"{name}.csv"
     if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; {command} makes it")
-    table = pd.read_csv(path)
-    checks.entries(str(path), dict(table), columns)
-    return table
+        raise FileNotFoundError(f"{path} is missing; {COMMAND} paper makes all tables")
+    return pd.read_csv(path)
 
 
 def write_provenance(
-    folder: str | Path, name: str, command: str, settings: dict, reduced: bool, record: dict
+    name: str | Path, command: str, settings: dict, reduced: bool, record: dict
 ) -> None:
-    """Write ``folder/name.provenance.json``, see ``results.publish``; the record is ``joined``."""
+    """Write the provenance of data, see ``publish``; the record is ``joined``."""
     content = {"command": command, "reduced": reduced, "settings": settings, **record}
-    files.write_json(Path(folder) / f"{name}.provenance.json", content)
+    files.write_json(provenance_file(name), content)
 
 
-def read_provenance(folder: str | Path, name: str) -> dict:
-    """Return the content of ``folder/name.provenance.json``."""
-    return files.read_json(Path(folder) / f"{name}.provenance.json")
+def read_provenance(name: str | Path) -> dict:
+    """Return the provenance of data."""
+    return files.read_json(provenance_file(name))
+
+
+def provenance_file(name: str | Path) -> Path:
+    """Of data in ``data/``, or of a file elsewhere if ``name`` is an absolute path."""
+    return paths.DATA / f"{name}.provenance.json"
 
 
 def run_record(seconds: float) -> dict:

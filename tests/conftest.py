@@ -1,6 +1,7 @@
-"""Fixtures that several test modules share: random numbers, loads, situations of their boxes."""
+"""Fixtures that several test modules share: random numbers, loads, their boxes, and folders."""
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -10,6 +11,7 @@ import torch
 from hypothesis import settings
 
 import unload
+from studies import paths
 from unload.physics.situation import Situation, Surroundings
 
 matplotlib.use("Agg")  # without a screen
@@ -28,6 +30,14 @@ def close_figures() -> Iterator[None]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(0)
+
+
+@pytest.fixture
+def own_data(tmp_path, monkeypatch) -> Path:
+    """A new folder in the place of ``data/``; what experiments keep in ``runs/`` stands in it."""
+    monkeypatch.setattr(paths, "DATA", tmp_path)
+    monkeypatch.setattr(paths, "RUNS", tmp_path / "runs")
+    return tmp_path
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-from studies.falls.long import read_published
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
+from studies.results import read_table
 from studies.seamless.training import SEAMLESS
 from studies.statistics import by_cell, by_run, first_plan, seamless_plan
 
@@ -58,7 +58,7 @@ def test_the_result_is_that_of_the_data():
     assert sentence + f"and end at {low:.0f}–{fallen.max():.0f} %" in text
     assert high.max() > 99  # the one that stays up
     assert f"none of {table['runs'].sum()} runs rises steadily" in text and not table["fig12"].any()
-    published = read_published()
+    published = read_table("falls/published")
     blanked = published[published["cell"].isin(order)]["judged_place"]
     assert (blanked == 1).all() and f"These {len(blanked)} networks" in text
 

@@ -85,8 +85,7 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
     """How a preference grows: what it does to the load, and what a network learns from that.
 
     Args:
-        trace: see ``laboratory.read_trace``.
-        runs: see ``laboratory.read_laboratory``.
+        trace, runs: the tables of ``laboratory.laboratory_data``.
     """
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9, 3.5))
     for cell in ("ranks", "shuffled"):

@@ -8,17 +8,15 @@ How its cells are trained and measured, and when a preference becomes a mistake.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from studies import paths
 from studies.falls import measures
 from studies.falls.cells import CELLS, CONFIG, FRESH, SEEN, Change
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, Result, keep_all, publish, read_table
+from studies.results import COMMAND, JOBS, Result, keep_all, publish
 from studies.statistics import end_msr
 from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
@@ -106,7 +104,7 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
     return {"row": row, "trace": trace if name in TRACED else []}
 
 
-def keep_cells(folder: Path, cells: Mapping[str, Cell], n_jobs: int) -> list[Result]:
+def keep_cells(place: str, cells: Mapping[str, Cell], n_jobs: int) -> list[Result]:
     """What ``run_cell`` returns of each seed of some cells, see ``results.kept``."""
     asked, fingerprint = [], training_fingerprint()
     for name, cell in cells.items():
@@ -114,15 +112,11 @@ def keep_cells(folder: Path, cells: Mapping[str, Cell], n_jobs: int) -> list[Res
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
             asked.append((question | config, (name, cell, seed)))
-    return keep_all(folder, run_cell, asked, n_jobs)
+    return keep_all(place, run_cell, asked, n_jobs)
 
 
 def laboratory_data(
-    cells: Sequence[str] = tuple(CELLS),
-    seeds: int | None = None,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = -1,
+    cells: Sequence[str] = tuple(CELLS), seeds: int | None = None, n_jobs: int = -1
 ) -> None:
     """Train the laboratory's cells; write ``falls/laboratory.csv`` and ``falls/trace.csv``.
 
@@ -136,16 +130,15 @@ def laboratory_data(
     A part of the ``cells``, or fewer ``seeds`` of each, goes to the folder ``reduced``.
     """
     chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
-    results = keep_cells(Path(runs_dir) / "laboratory", chosen, n_jobs)
+    results = keep_cells("laboratory", chosen, n_jobs)
     rows = [result.value["row"] for result in results]
     tables = {"laboratory": pd.DataFrame(rows)[COLUMNS]}
     if trace := [point for result in results for point in result.value["trace"]]:
         tables["trace"] = pd.DataFrame(trace)[["cell", "seed", *POINT]].astype({"picks": int})
     reduced = seeds is not None or set(cells) < set(CELLS)
-    place = Path(folder) / ("reduced/falls" if reduced else "falls")
-    command = f"{COMMAND} laboratory"
+    name, command = "falls/laboratory", f"{COMMAND} laboratory"
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(rows)}, training_fingerprint()
-    publish(place, "laboratory", tables, command, settings, results, fingerprint, "%.4g", reduced)
+    publish(name, tables, command, settings, results, fingerprint, "%.4g", reduced)
 
 
 def fresh_data(n_jobs: int = -1) -> None:
@@ -154,27 +147,11 @@ def fresh_data(n_jobs: int = -1) -> None:
     Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
     containers if equal x share one rank when the trained network chooses.
     """
-    results = keep_cells(paths.RUNS / "fresh", FRESH, n_jobs)
+    results = keep_cells("fresh", FRESH, n_jobs)
     table = pd.DataFrame([result.value["row"] for result in results])[FRESH_COLUMNS]
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
-    place, command = paths.DATA / "falls", f"{COMMAND} fresh"
-    publish(place, "fresh", {"fresh": table}, command, settings, results, fingerprint, "%.4g")
-
-
-def read_laboratory(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """A row per run of the laboratory, see ``laboratory_data``."""
-    return read_table(Path(folder) / "falls/laboratory.csv", f"{COMMAND} laboratory", COLUMNS)
-
-
-def read_trace(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """A row per point of a traced run, see ``point``."""
-    columns = ["cell", "seed", *POINT]
-    return read_table(Path(folder) / "falls/trace.csv", f"{COMMAND} laboratory", columns)
-
-
-def read_fresh() -> pd.DataFrame:
-    """A row per run, see ``fresh_data``."""
-    return read_table(paths.DATA / "falls/fresh.csv", f"{COMMAND} fresh", FRESH_COLUMNS)
+    name, command = "falls/fresh", f"{COMMAND} fresh"
+    publish(name, {"fresh": table}, command, settings, results, fingerprint, "%.4g")
 
 
 def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:

@@ -9,7 +9,6 @@ training.
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import pandas as pd
 import torch
@@ -20,7 +19,7 @@ from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
-from studies.results import COMMAND, JOBS, digest, keep_all, packed, publish, read_table
+from studies.results import COMMAND, JOBS, digest, keep_all, packed, publish
 from unload.agent.config import TrainConfig
 from unload.network.peq import PEQNetwork
 
@@ -62,22 +61,20 @@ def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
         published_data(n_jobs=n_jobs)
 
 
-def trace_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def trace_data(n_jobs: int = -1) -> None:
     """Trace runs with the mask, every 32,000 picks: ``falls/long_trace.csv``."""
     fingerprint = training_fingerprint()
     question = {"every": TRACE_EVERY, "fingerprint": fingerprint}
     configs = [replace(CONFIG, seed=seed) for seed in TRACED_SEEDS]
     asked = [(question | config.plain(), (config,)) for config in configs]
-    results = keep_all(Path(runs_dir) / "falls/trace", _trace, asked, n_jobs)
+    results = keep_all("falls/trace", _trace, asked, n_jobs)
     traces = [
         pd.DataFrame(result.value).assign(seed=seed) for seed, result in zip(TRACED_SEEDS, results)
     ]
     tables = {"long_trace": pd.concat(traces)[["seed", *POINT]].astype({"picks": int})}
     settings = {"seeds": list(TRACED_SEEDS), "picks": CONFIG.picks}
-    place, command = Path(folder) / "falls", f"{COMMAND} falls"
-    publish(place, "long_trace", tables, command, settings, results, fingerprint, "%.4g")
+    name, command = "falls/long_trace", f"{COMMAND} falls"
+    publish(name, tables, command, settings, results, fingerprint, "%.4g")
 
 
 def _trace(config: TrainConfig) -> list[dict[str, float]]:
@@ -87,15 +84,7 @@ def _trace(config: TrainConfig) -> list[dict[str, float]]:
     return points
 
 
-def read_long_trace(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """The points of the traced long runs."""
-    path = Path(folder) / "falls/long_trace.csv"
-    return read_table(path, f"{COMMAND} falls", ["seed", *POINT])
-
-
-def published_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def published_data(n_jobs: int = -1) -> None:
     """Judge each published policy in fresh containers: ``falls/published.csv``.
 
     A row per policy: its cell and seed; its MSR as it is and with x, y or both set to 0, with the
@@ -105,7 +94,7 @@ def published_data(
     judged = {
         name: (replace(grid.cells[cell_of(name)].config, mask=True), policy.network)
         for grid in (PAPER, LONG)
-        for name, policy in read_policies(Path(folder) / f"{grid.name}.safetensors").items()
+        for name, policy in read_policies(paths.DATA / f"{grid.name}.safetensors").items()
     }
     # Networks as they are drawn say what those of the trained ones owe to their training.
     for seed in range(UNTRAINED):
@@ -119,18 +108,12 @@ def published_data(
         question = {"name": name, "weights": digest(packed(weights)), **config.plain(), **LOADS}
         question["fingerprint"] = fingerprint
         asked.append((question, (name, config, network)))
-    results = keep_all(Path(runs_dir) / "published", _judge, asked, n_jobs)
+    results = keep_all("published", _judge, asked, n_jobs)
     tables = {"published": pd.DataFrame([result.value for result in results])[COLUMNS]}
-    place, command = Path(folder) / "falls", f"{COMMAND} falls"
-    publish(place, "published", tables, command, LOADS, results, fingerprint)
+    publish("falls/published", tables, f"{COMMAND} falls", LOADS, results, fingerprint)
 
 
 def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     cell, _, seed = name.partition("/seed_")
     row = {"cell": cell, "seed": int(seed)}
     return row | measures.judged_blanked(network, config, loads=LOADS)
-
-
-def read_published(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """The table of ``published_data``."""
-    return read_table(Path(folder) / "falls/published.csv", f"{COMMAND} falls", COLUMNS)

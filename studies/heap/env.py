@@ -143,9 +143,7 @@ class HeapEnv(EpisodeEnv):
 
     def step(self, action: int):
         self._check_running()
-        if isinstance(action, np.ndarray) and action.ndim == 0:
-            action = action.item()  # what a learned policy may return
-        row = checks.integer("action", action, 0, ROWS - 1)
+        row = self._row(action)
         box, seen = int(self.visible[row]), self.visible >= 0
         none = np.zeros(len(self.heap), bool)
         outcome = Outcome(self.heap, none, none, 0.0, False)

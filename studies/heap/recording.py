@@ -5,7 +5,6 @@ around the networks that were learned from the first.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -30,9 +29,7 @@ WEIGHTS = 0.0, 0.25, 0.5, 1.0, 2.0, 4.0  # λ, the price of a fall
 EXPLORED = "z", "behind", "extent_y", "clear_above"  # columns that a random rule weighs
 
 
-def make_heaps(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
-) -> None:
+def make_heaps(n_jobs: int = 1) -> None:
     """Make the heaps of both splits; write ``heap/heaps.npz`` and its provenance.
 
     Heap i of a split is the same however many there are.
@@ -40,14 +37,14 @@ def make_heaps(
     names = [(split, number) for split, count in HEAPS.items() for number in range(count)]
     seeds = [(SEEDS[split], number) for split, number in names]
     asked = [({"heap": seed}, seed) for seed in seeds]
-    answers = keep_all(Path(runs_dir) / NAME / "heaps", _new_heap, asked, n_jobs)
+    answers = keep_all(f"{NAME}/heaps", _new_heap, asked, n_jobs)
     heaps: dict[str, list[Heap]] = {split: [] for split in HEAPS}
     for (split, _), answer in zip(names, answers):
         arrays = unpacked(answer.value)
         heaps[split].append(Heap(**arrays, sizes=package_sizes(arrays["packages"])))
-    write_heaps(Path(folder) / NAME / "heaps.npz", heaps)
+    write_heaps(paths.DATA / NAME / "heaps.npz", heaps)
     settings = {"heaps": HEAPS, "seeds": SEEDS, "boxes dropped": BOXES}
-    publish(Path(folder) / NAME, "heaps", {}, f"{COMMAND} {NAME}", settings, answers)
+    publish(f"{NAME}/heaps", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
 def _new_heap(seed: int, number: int) -> str:
@@ -56,11 +53,9 @@ def _new_heap(seed: int, number: int) -> str:
     return packed({name: getattr(heap, name) for name in ("positions", "orientations", "packages")})
 
 
-def make_networks(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
-) -> None:
+def make_networks(n_jobs: int = 1) -> None:
     """Record and learn in both rounds; write ``heap/networks.safetensors`` and its provenance."""
-    place, episodes = Path(runs_dir) / NAME, -(-PICKS // ROUNDS // MAX_PICKS)
+    episodes = -(-PICKS // ROUNDS // MAX_PICKS)
     heaps = stored_heaps("train")
     recorded: list[str] = []
     learned: list[str] = []
@@ -72,21 +67,21 @@ def make_networks(
             one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
             asked.append((one, (round_number, number, explorer)))
-        found = keep_all(place / "picks", _record, asked, n_jobs)
+        found = keep_all(f"{NAME}/picks", _record, asked, n_jobs)
         answers += found
         recorded += [answer.value for answer in found]
 
         # All networks learn from the picks of all rounds so far.
         question = {"picks": digest(recorded), "steps": STEPS}
         asked = [(question | {"seed": seed}, (recorded, seed)) for seed in range(NETWORKS)]
-        found = keep_all(place / "networks", _learn, asked, n_jobs)
+        found = keep_all(f"{NAME}/networks", _learn, asked, n_jobs)
         answers += found
         learned = [answer.value for answer in found]
-    save_networks(list(map(_network, learned)), Path(folder) / NAME / "networks.safetensors")
+    save_networks(list(map(_network, learned)), paths.DATA / NAME / "networks.safetensors")
     settings = {
         "picks": PICKS, "physics": PHYSICS, "rounds": ROUNDS, "networks": NETWORKS, "steps": STEPS,
     }  # fmt: skip
-    publish(Path(folder) / NAME, "networks", {}, f"{COMMAND} {NAME}", settings, answers)
+    publish(f"{NAME}/networks", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
 def _record(round_number: int, number: int, explorer: str | None) -> str:

@@ -79,36 +79,30 @@ def candidates() -> dict[str, Callable]:
     return named | {name: best(linear(weights)) for name, weights in family().items()}
 
 
-def choose_rules(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
-) -> pd.DataFrame:
+def choose_rules(n_jobs: int = 1) -> pd.DataFrame:
     """Let the rules play training heaps, and the best of them more; write ``heap/rules.csv``.
 
     Returns:
         One row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and ``falls`` a pick.
     """
     first = {name: ({"rule": name}, FIRST_HEAPS) for name in candidates()}
-    answers = _played(first, "train", RULE_PHYSICS, runs_dir, n_jobs)
+    answers = _played(first, "train", RULE_PHYSICS, n_jobs)
     frame = _means(answers)
     chosen = {rule: None for weight in WEIGHTS for rule in _ranked(frame, weight)[:KEPT]}
     more = {name: ({"rule": name}, RULE_HEAPS) for name in chosen}
-    answers |= _played(more, "train", RULE_PHYSICS, runs_dir, n_jobs)
+    answers |= _played(more, "train", RULE_PHYSICS, n_jobs)
     rules = _means(answers)
     settings = {
         "heaps": [FIRST_HEAPS, RULE_HEAPS], "split": "train", "physics": RULE_PHYSICS,
         "picks": MAX_PICKS,
     }  # fmt: skip
     results = [answer for of in answers.values() for answer in of]
-    publish(Path(folder) / NAME, "rules", {"rules": rules}, f"{COMMAND} {NAME}", settings, results)
+    publish(f"{NAME}/rules", {"rules": rules}, f"{COMMAND} {NAME}", settings, results)
     return rules
 
 
 def _played(
-    players: Mapping[Hashable, tuple[dict, int]],
-    split: str,
-    physics: str,
-    runs_dir: str | Path,
-    n_jobs: int,
+    players: Mapping[Hashable, tuple[dict, int]], split: str, physics: str, n_jobs: int
 ) -> dict[Hashable, list[Result]]:
     """The episodes of players, see ``_play``, each on the first heaps of a split, by their names.
 
@@ -123,7 +117,7 @@ def _played(
             question = {"player": known, "heap": identity(heap), "number": number}
             question |= {"physics": physics, "picks": MAX_PICKS}
             asked.append((question, (player, split, number, physics)))
-    answers = iter(keep_all(Path(runs_dir) / NAME / "episodes", _play, asked, n_jobs))
+    answers = iter(keep_all(f"{NAME}/episodes", _play, asked, n_jobs))
     return {name: list(islice(answers, heaps)) for name, (_, heaps) in players.items()}
 
 
@@ -184,19 +178,17 @@ def plan(rules: pd.DataFrame, networks: str | Path) -> dict[tuple[float, str], d
     return players | {(SHOWN_WEIGHT, ORACLE): {"oracle": SHOWN_WEIGHT}}
 
 
-def compare(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
-) -> pd.DataFrame:
+def compare(n_jobs: int = 1) -> pd.DataFrame:
     """Let all policies play the unseen heaps; write ``heap/{episodes,table}.csv``.
 
     Returns:
         ``table.csv``, see ``compared``.
     """
-    place, command = Path(folder) / NAME, f"{COMMAND} {NAME}"
-    rules = read_table(place / "rules.csv", command, RULE_COLUMNS)
-    planned = plan(rules, place / "networks.safetensors")
+    command = f"{COMMAND} {NAME}"
+    rules = read_table(f"{NAME}/rules")
+    planned = plan(rules, paths.DATA / NAME / "networks.safetensors")
     players = {cell: (player, TEST_HEAPS) for cell, player in planned.items()}
-    played = _played(players, "test", PHYSICS, runs_dir, n_jobs)
+    played = _played(players, "test", PHYSICS, n_jobs)
 
     # What a policy brings is weighed by the λ that it has played for.
     episodes = pd.DataFrame(
@@ -211,7 +203,8 @@ def compare(
         "best rules": {str(weight): best_rule(rules, weight) for weight in WEIGHTS},
     }  # fmt: skip
     results = [answer for of in played.values() for answer in of]
-    publish(place, "table", {"episodes": episodes, "table": table}, command, settings, results)
+    tables = {"episodes": episodes, "table": table}
+    publish(f"{NAME}/table", tables, command, settings, results)
     return table
 
 
@@ -247,18 +240,11 @@ def compared(episodes: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def read_heap_table(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """``heap/table.csv``, see ``compared``."""
-    columns = [f"{measure}{end}" for measure in MEASURES for end in ENDS]
-    path, command = Path(folder) / NAME / "table.csv", f"{COMMAND} {NAME}"
-    return read_table(path, command, ["falls_weight", "policy", *columns])
-
-
 @styled
 def throughput_falls() -> Figure:
     """Boxes and falls a pick on unseen heaps: a point for each rule, a curve over λ for others."""
     figure, axes = plt.subplots(figsize=(6.4, 4.2))
-    for name, rows in read_heap_table().groupby("policy", sort=False):
+    for name, rows in read_table(f"{NAME}/table").groupby("policy", sort=False):
         rows = rows.sort_values("falls_weight")
         colour = LINES.get(name, "0.6")
         x, y = (

@@ -14,13 +14,11 @@ of a policy, ``studies.policies.robustness`` tells.
 from collections.abc import Iterator
 from functools import partial
 from hashlib import blake2b
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pandas as pd
 
-from studies import paths
 from studies.lifts.lift_table import mixed
 from studies.results import COMMAND, keep_all, measured, publish, read_table
 from studies.statistics import share_interval
@@ -33,6 +31,7 @@ from unload.physics.bullet import SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import HELD_DOWN, LIFTS_FILE
+from unload.support import files
 
 NAME = "lift_agreement"
 NEAR_WALLS = 5  # the item's own wall and two on each side
@@ -57,10 +56,8 @@ UNLOADED_BY = {
 }
 
 
-def agreement_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
-) -> None:
-    """Compare lifts; write ``folder/lift_agreement.csv`` and its provenance.
+def agreement_data(n_jobs: int = 1) -> None:
+    """Compare lifts; write ``lift_agreement.csv`` and its provenance.
 
     A run that was stopped goes on with the answers of ``full`` that it has.
     """
@@ -73,7 +70,7 @@ def agreement_data(
     asked = frame.index[frame["asked_full"] != ""]
     columns = (frame.loc[asked, name] for name in ("state", "item", "walls"))
     lifts = [fresh_lift(*states[state], item, walls) for state, item, walls in zip(*columns)]
-    answers = keep_all(Path(runs_dir) / "agreement", fresh_distance, lifts, n_jobs)
+    answers = keep_all("agreement", fresh_distance, lifts, n_jobs)
     frame["full"] = pd.Series([answer.value for answer in answers], asked, "float64")
     settings = {
         "lifts": len(frame),
@@ -82,13 +79,13 @@ def agreement_data(
         "first seed": FIRST_SEED,
         "policies": list(UNLOADED_BY),
         "stages (picks)": STAGES,
-        "lift table": table_digest(),
+        "lift table": files.digest(LIFTS_FILE),
     }
     tables, command = {NAME: frame[COLUMNS]}, f"{COMMAND} lifts"
-    publish(folder, NAME, tables, command, settings, [collected, *answers], float_format="%.6f")
+    publish(NAME, tables, command, settings, [collected, *answers], float_format="%.6f")
 
 
-def read_agreement(folder: str | Path = paths.DATA) -> pd.DataFrame:
+def read_agreement() -> pd.DataFrame:
     """The table that ``agreement_data`` wrote, one row per lift.
 
     Returns:
@@ -99,8 +96,7 @@ def read_agreement(folder: str | Path = paths.DATA) -> pd.DataFrame:
         or "close", and is empty where it was not; ``walls`` is how many item walls it simulated:
         5 for the item's own and two on each side, 12 for the whole container.
     """
-    frame = read_table(Path(folder) / f"{NAME}.csv", f"{COMMAND} lifts", COLUMNS)
-    return frame.fillna({"asked_full": ""})
+    return read_table(NAME).fillna({"asked_full": ""})
 
 
 def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
@@ -140,11 +136,6 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
         rows[name] = len(lifts), states, lifts["situation"].nunique(), differ, low, high
     columns = ["lifts", "states", "situations", "differ", "low", "high"]
     return pd.DataFrame(rows.values(), index=rows, columns=columns)
-
-
-def table_digest() -> str:
-    """Name of the lift table that ships: a digest of its file."""
-    return blake2b(LIFTS_FILE.read_bytes(), digest_size=8).hexdigest()
 
 
 def container_states(policy: str, seed: int) -> Iterator[tuple[int, ContainerEnv]]:

@@ -22,28 +22,27 @@ from studies.results import COMMAND, kept, publish
 from unload import task
 from unload.agent import policies
 from unload.physics.bullet import SETTINGS
-from unload.physics.table import LiftTable
-from unload.support import files
+from unload.physics.table import LIFTS_FILE, LiftTable
 
 EPISODES, SEED = 12, 0  # of 64 containers, for each policy
 RANDOM_SHARE = 40  # times as many episodes of random picks
 
 
-def lift_data(folder: str | Path = files.SHIPPED, runs_dir: str | Path = paths.RUNS) -> None:
-    """Write ``folder/lifts.npz``, see ``LiftTable``; ``runs_dir`` keeps what has been computed."""
+def lift_data() -> None:
+    """Fill the table that comes with the package; ``runs/`` keeps what has been computed."""
     settings = {
         "episodes of 64 containers per taste": EPISODES,
         "of random picks": RANDOM_SHARE * EPISODES,
         "seed": SEED,
     }
-    runs_dir = Path(runs_dir) / "lifts"
-    path = runs_dir / f"{EPISODES}_episodes_seed_{SEED}.npz"
+    folder = paths.RUNS / "lifts"
+    path = folder / f"{EPISODES}_episodes_seed_{SEED}.npz"
     question = settings | {"physics": SETTINGS}
-    filled = kept(runs_dir, question, partial(_fill, path))
+    filled = kept(folder, question, partial(_fill, path))
     table = LiftTable.load(path)
-    table.save(Path(folder) / "lifts.npz")
+    table.save(LIFTS_FILE)
     settings["lifts"] = len(table)
-    publish(folder, "lifts", {}, f"{COMMAND} lifts", settings, [filled])
+    publish(LIFTS_FILE.with_suffix(""), {}, f"{COMMAND} lifts", settings, [filled])
 
 
 def _fill(path: Path) -> None:

@@ -7,7 +7,6 @@ The first plan, ``data/falls/FIRST_PLAN.md``, says why its grid has these cells 
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -60,28 +59,22 @@ OPTIONS = {
 
 
 def training_data(
-    cells: Sequence[str] | None = None,
-    picks: int | None = None,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = -1,
-    shipped: str | Path = files.SHIPPED,
+    cells: Sequence[str] | None = None, picks: int | None = None, n_jobs: int = -1
 ) -> None:
     """Train the paper's configuration, see ``train_grid``.
 
-    The policies that play elsewhere are written to ``shipped``, too:
-    ``policies/paper.safetensors`` and ``policies/paper_seed_<seed>.safetensors``.
+    The policies that play elsewhere are those that come with the package, too.
     """
-    train_grid(PAPER, cells, picks, folder, runs_dir, n_jobs)
+    train_grid(PAPER, cells, picks, n_jobs)
     if picks is None and (cells is None or DEFAULTS in cells):
         for seed, name in PLAYERS.items():
-            policy = default_policies(folder)[seed]
-            save_policy(policy, Path(shipped) / "policies" / f"{name}.safetensors")
+            policy = default_policies()[seed]
+            save_policy(policy, files.SHIPPED / "policies" / f"{name}.safetensors")
 
 
-def default_policies(folder: str | Path = paths.DATA) -> dict[int, Greedy]:
+def default_policies() -> dict[int, Greedy]:
     """The policies that ``DEFAULT_SEEDS`` of the paper's configuration have learned."""
-    policies = read_policies(Path(folder) / f"{PAPER.name}.safetensors")
+    policies = read_policies(paths.DATA / f"{PAPER.name}.safetensors")
     return {seed: policies[f"{DEFAULTS}/seed_{seed}"] for seed in DEFAULT_SEEDS}
 
 

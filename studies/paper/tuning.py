@@ -5,7 +5,6 @@ python -m studies tuning
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -84,15 +83,13 @@ def tuning_grid(
 TUNING = tuning_grid()
 
 
-def tuning_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def tuning_data(n_jobs: int = -1) -> None:
     """Train the search, see ``train_grid``, and write what the paper's plots read of it."""
-    train_grid(TUNING, folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
-    export_tuning(folder)
+    train_grid(TUNING, n_jobs=n_jobs)
+    export_tuning()
 
 
-def export_tuning(folder: str | Path) -> None:
+def export_tuning() -> None:
     """Write the curves that the paper's plots read of the published search.
 
     ``dummy_sim_{with,without}_hist_equal/{hitrate,loss}_curve_bz_<b>_lr_<μ>_agent_<run>.csv``: a
@@ -101,22 +98,18 @@ def export_tuning(folder: str | Path) -> None:
     """
     for fe, kind, batch_size, rate, run in SHOWN:
         cell = tuning_cell(batch_size, rate, fe == "with")
-        curves = read_grid(TUNING, folder, [cell])
+        curves = read_grid(TUNING, [cell])
         name = f"{kind}_curve_bz_{batch_size}_lr_{rate:g}_agent_{run}.csv"
         column = {"hitrate": "success_rate", "loss": "loss"}[kind]
         values = curves.loc[curves["seed"] == run, column]
         files.write_text(
-            Path(folder) / f"dummy_sim_{fe}_hist_equal" / name,
+            paths.DATA / f"dummy_sim_{fe}_hist_equal" / name,
             values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g"),
         )
 
 
 def read_curves(
-    column: str,
-    batch_size: int,
-    learning_rate: float,
-    equalize: bool = True,
-    folder: str | Path = paths.DATA,
+    column: str, batch_size: int, learning_rate: float, equalize: bool = True
 ) -> dict[int, np.ndarray]:
     """The curves of all runs of a configuration, by the number of the run.
 
@@ -127,7 +120,7 @@ def read_curves(
     Returns:
         A value per training step, (steps,) float64, NaN where there is none yet.
     """
-    curves = read_grid(TUNING, folder, [tuning_cell(batch_size, learning_rate, equalize)])
+    curves = read_grid(TUNING, [tuning_cell(batch_size, learning_rate, equalize)])
     return {int(run): curve[column].to_numpy() for run, curve in curves.groupby("seed")}
 
 
@@ -225,14 +218,14 @@ def run_summary(success_rate: np.ndarray, loss: np.ndarray) -> dict[str, float]:
     }
 
 
-def tuning_summary(folder: str | Path = paths.DATA) -> pd.DataFrame:
+def tuning_summary() -> pd.DataFrame:
     """One row per configuration of the published search: means over its runs of ``run_summary``.
 
     Columns: ``equalize``, ``batch_size``, ``learning_rate``; the means, but of ``solved`` the
     number of runs; ``final_msr_std``, a standard deviation; and ``runs``.
     """
     searched, rows = ["equalize", "batch_size", "learning_rate"], []
-    for (cell, _), curve in read_grid(TUNING, folder).groupby(["cell", "seed"]):
+    for (cell, _), curve in read_grid(TUNING).groupby(["cell", "seed"]):
         settings = {name: getattr(TUNING.cells[cell].config, name) for name in searched}
         rows.append(settings | run_summary(*curve[["success_rate", "loss"]].to_numpy().T))
     groups = pd.DataFrame(rows).groupby(searched)

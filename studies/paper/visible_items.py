@@ -4,7 +4,6 @@ python -m studies observation
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import gymnasium
 import matplotlib.pyplot as plt
@@ -12,7 +11,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from studies import paths
 from studies.results import COMMAND, measured, publish, read_table
 from studies.style import styled
 from unload.env import observation
@@ -24,7 +22,7 @@ SEED = 0  # of the load
 BINS = np.linspace(-1.001, 1.001, 111)
 
 
-def observation_data(folder: str | Path = paths.DATA) -> None:
+def observation_data() -> None:
     """Write ``obs_hist_equal/{all_items,Observation,Equalized_Observation}.csv``.
 
     Columns ``x`` and ``y``: scaled x and z of all items, of the 128 observed ones, and of the
@@ -35,9 +33,8 @@ def observation_data(folder: str | Path = paths.DATA) -> None:
         name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
         for name, positions in result.value.items()
     }
-    place, command = Path(folder) / FOLDER, f"{COMMAND} observation"
-    settings = {"seed": SEED}
-    publish(place, "observation", tables, command, settings, [result], float_format="%.6f")
+    name, command, settings = f"{FOLDER}/observation", f"{COMMAND} observation", {"seed": SEED}
+    publish(name, tables, command, settings, [result], float_format="%.6f")
 
 
 def _positions() -> dict[str, np.ndarray]:
@@ -61,8 +58,7 @@ def read_points(name: str) -> np.ndarray:
     Returns:
         (n, 2) float64, x and z of each item, scaled to [-1, 1].
     """
-    path = paths.DATA / FOLDER / f"{name}.csv"
-    return read_table(path, f"{COMMAND} observation", ["x", "y"])[["x", "y"]].to_numpy()
+    return read_table(f"{FOLDER}/{name}").to_numpy()
 
 
 @styled

@@ -11,7 +11,6 @@ boxes of other sizes. The figure shows those with every box simulated beside the
 from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pandas as pd
@@ -20,7 +19,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from studies import paths
 from studies.paper import training
 from studies.policies.variants import GRIDS, RECOMMENDED
 from studies.results import COMMAND, measured, publish, read_provenance, read_table
@@ -37,7 +35,8 @@ from unload.support import files
 
 # Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
 CARD_LOADS, CARD_SEED = 200, 5000
-SCALES = 1.0, 0.8, 1.2  # of the boxes
+# What a card calls the measures on loads whose boxes have another scale, by the scale.
+SCALES = {1.0: "on the paper's loads", 0.8: "on boxes × 0.8", 1.2: "on boxes × 1.2"}
 _DEFAULT = training.PAPER.cells[training.DEFAULTS].config
 # By name: the grid whose run it is, and the run's configuration.
 ORIGINS: dict[str, tuple[str, TrainConfig]] = {
@@ -76,24 +75,19 @@ LINES = {(policy, mask): policy if mask else f"{policy}, no mask" for policy, ma
 SEEN = {"paper": "ranks", "paper_seed_2": "ranks", "recommended": "positions"}
 
 
-def write_cards(folder: str | Path = files.SHIPPED) -> None:
-    """Measure the policies in ``folder/policies`` and write their cards into their files."""
+def write_cards() -> None:
+    """Measure the policies that come with the package and write their cards into their files."""
     for name, (grid, config) in ORIGINS.items():
-        path = Path(folder) / "policies" / f"{name}.safetensors"
+        path = files.SHIPPED / "policies" / f"{name}.safetensors"
         policy = load_policy(path)
         policy.card = {
             "configuration": config.plain(),
             "loads": "the paper's",
             "picks": config.picks,
-            "fingerprint": read_provenance(paths.DATA, grid)["fingerprint"],
-            **{loads_of(scale): measure(policy, scale) for scale in SCALES},
+            "fingerprint": read_provenance(grid)["fingerprint"],
+            **{name: measure(policy, scale) for scale, name in SCALES.items()},
         }
         save_policy(policy, path)
-
-
-def loads_of(scale: float) -> str:
-    """What a card calls the measures on loads of boxes of a scale."""
-    return "on the paper's loads" if scale == 1 else f"on boxes × {scale:g}"
 
 
 def measure(policy: Policy, scale: float) -> dict[str, float]:
@@ -119,7 +113,7 @@ def measure(policy: Policy, scale: float) -> dict[str, float]:
     }
 
 
-def comparison_data(folder: str | Path = paths.DATA, n_jobs: int = -1) -> None:
+def comparison_data(n_jobs: int = -1) -> None:
     """Let policies unload the same containers under each condition: ``policies/comparison.csv``.
 
     One row per policy, condition and container, with the columns of ``compare``. The learned
@@ -133,8 +127,7 @@ def comparison_data(folder: str | Path = paths.DATA, n_jobs: int = -1) -> None:
     )
     tables = {"comparison": pd.concat([result.value for result in results])}
     settings = {"policies": digests(), "loads": LOADS, "seed": SEED}
-    place, command = Path(folder) / "policies", f"{COMMAND} policies"
-    publish(place, "comparison", tables, command, settings, results)
+    publish("policies/comparison", tables, f"{COMMAND} policies", settings, results)
 
 
 def compare(name: str, policy: Policy, mask: bool, condition: str) -> pd.DataFrame:
@@ -163,28 +156,26 @@ def digests() -> dict[str, str]:
     return found
 
 
-def read_comparison(folder: str | Path = paths.DATA) -> pd.DataFrame:
+def read_comparison() -> pd.DataFrame:
     """Every container that a policy has unloaded.
 
     Returns:
         One row per container: ``policy``, ``mask``, ``condition`` (one of ``PANELS``) and
         ``success_rate``.
     """
-    place, command = Path(folder) / "policies", f"{COMMAND} policies"
     columns = ["policy", "mask", "condition", "success_rate"]
-    table = read_table(place / "comparison.csv", command, columns)
-    full = read_table(place / "robustness.csv", command, ["policy", "after_pick", "success_rate"])
+    table, full = read_table("policies/comparison"), read_table("policies/robustness")
     full = full.assign(mask=True, condition=full["after_pick"].map(FULL))
     return pd.concat([table, full], ignore_index=True)[columns]
 
 
 @styled
-def comparison_msr(folder: str | Path = paths.DATA) -> Figure:
+def comparison_msr() -> Figure:
     """MSR of every policy: a panel for each condition, dots with 95 % intervals.
 
     Hollow dots are played without the mask.
     """
-    table = read_comparison(folder)
+    table = read_comparison()
     figure, panels = plt.subplots(3, 3, figsize=(8.4, 6.2), sharex=True, sharey=True)
     for axes, condition in zip(panels.flat, PANELS):
         _panel(axes, table[table["condition"] == condition])

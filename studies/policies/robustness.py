@@ -9,12 +9,10 @@ and a box on which nothing lies may be jammed between its neighbours.
 
 from collections.abc import Callable
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from studies import paths
 from studies.policies.comparison import LEARNED, SIMPLE, digests, find_policy
 from studies.results import COMMAND, keep_all, publish
 from unload.agent.evaluation import Policy, success_rate
@@ -34,9 +32,7 @@ COLUMNS = ["policy", "after_pick", "episode", "success_rate", "free", "jammed"]
 PLAYED = (*((name, "keep") for name in (*SIMPLE, *LEARNED)), ("recommended", "restore"))
 
 
-def robustness_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = 1
-) -> None:
+def robustness_data(n_jobs: int = 1) -> None:
     """Let policies unload the same containers: ``policies/robustness.csv``.
 
     One row per ``policy``, ``after_pick`` and ``episode``, with the columns of ``play``. An
@@ -51,13 +47,12 @@ def robustness_data(
         size = {"seed": seed, "picks": PICKS, "walls": FRONT_WALLS, "settings": SETTINGS}
         question = containers[-1] | size | {"weights": weights.get(name)}
         asked.append((question, (find_policy(name), after_pick, seed, PICKS)))
-    answers = keep_all(Path(runs_dir) / "robustness", play, asked, n_jobs)
+    answers = keep_all("robustness", play, asked, n_jobs)
     rows = [one | answer.value for one, answer in zip(containers, answers)]
     tables = {"robustness": pd.DataFrame(rows)[COLUMNS]}
     settings = {"policies": weights, "episodes": EPISODES, "picks": PICKS, "seed": SEED}
     settings["front walls"] = FRONT_WALLS
-    place, command = Path(folder) / "policies", f"{COMMAND} policies"
-    publish(place, "robustness", tables, command, settings, answers)
+    publish("policies/robustness", tables, f"{COMMAND} policies", settings, answers)
 
 
 def front_walls(load: Load, count: int = FRONT_WALLS) -> Load:

@@ -10,7 +10,6 @@ too, and so is the paper's beside them.
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -18,11 +17,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from studies import paths
 from studies.changes import height_reward
 from studies.falls import measures
-from studies.grid import Cell, Grid, read_measures, train_grid
-from studies.results import COMMAND, JOBS
+from studies.grid import Cell, Grid, train_grid
+from studies.results import COMMAND, JOBS, read_table
 from studies.statistics import t_interval
 from studies.style import styled
 from unload.agent.config import TrainConfig
@@ -78,35 +76,29 @@ GRIDS = {
 OPTIONS = {"--grids": {"nargs": "+", "choices": GRIDS, "default": tuple(GRIDS)}, **JOBS}
 
 
-def variants_data(
-    grids: Sequence[str] = tuple(GRIDS),
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = -1,
-    shipped: str | Path = files.SHIPPED,
-) -> None:
+def variants_data(grids: Sequence[str] = tuple(GRIDS), n_jobs: int = -1) -> None:
     """Train some grids, see ``train_grid``.
 
-    The recommended agent's first run also leaves ``policies/recommended.safetensors``.
+    The recommended agent's first run is also the policy that comes with the package.
     """
     for name in grids:
-        kept = train_grid(GRIDS[name], folder=folder, runs_dir=runs_dir, n_jobs=n_jobs)
+        kept = train_grid(GRIDS[name], n_jobs=n_jobs)
         if name == "recommended":
             best = load_policy(kept / "positions/seed_0/policy.safetensors")
-            save_policy(best, Path(shipped) / "policies/recommended.safetensors")
+            save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
 
 
-def read_variants(part: str, folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """What the policies of one of ``PARTS`` reach, see ``read_measures``."""
+def read_variants(part: str) -> pd.DataFrame:
+    """What the policies of one of ``PARTS`` reach, a row per ``cell`` and ``seed``: ``judged``."""
     checks.one_of("part", part, PARTS)
-    rows = read_measures(GRIDS["variants"], folder)
+    rows = read_table(GRIDS["variants"].name)
     return rows[rows["cell"].isin(PARTS[part])]
 
 
 @styled
-def variants_msr(part: str, folder: str | Path = paths.DATA) -> Figure:
+def variants_msr(part: str) -> Figure:
     """MSR of the policies of a part: each seed pale, their mean strong, with its 95 % interval."""
-    cells = dict(list(read_variants(part, folder).groupby("cell", sort=False)))
+    cells = dict(list(read_variants(part).groupby("cell", sort=False)))
     figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
     for row, cell in enumerate(cells.values()):
         for place, (name, (colour, marker, label)) in enumerate(APPLIED.items()):

@@ -16,46 +16,23 @@ CHANCE = 0.26  # MSR of random picks with a gap of 1 mm
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
 SMOOTH = 16  # episodes of all containers, about half a million picks
 
-Panels = Mapping[str, Mapping[str, str]]
 
-
-@styled
-def fig11_loss(curves: pd.DataFrame, panels: Panels) -> Figure:
-    """Training loss over picks (Fig. 11), a panel for each setting.
+def draw_panels(
+    curves: pd.DataFrame, column: str, panels: Mapping[str, Mapping[str, str]]
+) -> tuple[Figure, np.ndarray]:
+    """A measure of all runs over picks, a panel for each setting (Figs. 11 and 12).
 
     Thin lines are means over episodes of all containers, strong ones running means of the first
     seed over half a million picks.
 
     Args:
-        curves: of ``read_grid``.
+        curves: ``cell``, ``seed``, ``picks`` and the measure.
+        column: which measure.
         panels: the cells of each by a key of ``MASK_LINES``, by its title.
+
+    Returns:
+        The figure, and its panels' axes.
     """
-    figure, all_axes = _panels(curves.assign(value=curves["loss"]), panels)
-    all_axes[0].set(ylabel=r"loss $\ell$", ylim=(0, 0.6))
-    return figure
-
-
-@styled
-def fig12_reward(curves: pd.DataFrame, panels: Panels) -> Figure:
-    """Mean reward of the 64 environments over picks (Fig. 12), a panel for each setting.
-
-    The marks are the paper's: −0.7 at the start, 0.2 at the end. Arguments as of ``fig11_loss``.
-    """
-    figure, all_axes = _panels(curves.assign(value=2 * curves["success_rate"] - 1), panels)
-    for axes in all_axes:
-        for place, reward in ((0.0, 2 * PAPER_START - 1), (2e7, 2 * PAPER_MSR - 1)):
-            axes.axhline(reward, color="0.4", linestyle=":", linewidth=1)
-            axes.plot(place, reward, "k*", markersize=11, clip_on=False, zorder=4)
-    all_axes[-1].annotate(
-        "the paper: steady …", (3e6, -0.58), (4.2e6, -0.85), fontsize=8, color="0.25"
-    )
-    all_axes[-1].annotate("… then slower and noisier", (10.2e6, -0.2), fontsize=8, color="0.25")
-    all_axes[0].set(ylabel=r"$r_\mathrm{mean}$", ylim=(-1, 1))
-    return figure
-
-
-def _panels(curves: pd.DataFrame, panels: Panels) -> tuple[Figure, np.ndarray]:
-    """A panel for each setting, with the ``value`` of every run's curve."""
     figure, (all_axes,) = plt.subplots(
         1, len(panels), figsize=(3 + 2.6 * len(panels), 3.6), sharex=True, sharey=True,
         squeeze=False,
@@ -63,9 +40,9 @@ def _panels(curves: pd.DataFrame, panels: Panels) -> tuple[Figure, np.ndarray]:
     for axes, (title, cells) in zip(all_axes, panels.items()):
         for (name, cell), colour in zip(cells.items(), ("C1", "C0")):
             for number, (_, run) in enumerate(curves[curves["cell"] == cell].groupby("seed")):
-                axes.plot(run["picks"], run["value"], colour, linewidth=0.4, alpha=0.35)
+                axes.plot(run["picks"], run[column], colour, linewidth=0.4, alpha=0.35)
                 if number == 0:
-                    smooth = run["value"].rolling(SMOOTH, min_periods=1).mean()
+                    smooth = run[column].rolling(SMOOTH, min_periods=1).mean()
                     look = {"linestyle": MASK_LINES[name], "linewidth": 1.8, "zorder": 3}
                     axes.plot(run["picks"], smooth, colour, label=name, **look)
         axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7), xticks=np.arange(5) * 5e6)
@@ -103,28 +80,4 @@ def draw_start_and_end(groups: Mapping[str, tuple[pd.DataFrame, dict]]) -> Figur
         xlim=(0, 32), ylim=(0, 102),
     )  # fmt: skip
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
-    return figure
-
-
-@styled
-def draw_jams(table: pd.DataFrame, wanted: tuple[float, float]) -> Figure:
-    """Share of the free boxes that jam over the friction of the contact, a line for each gap.
-
-    Args:
-        table: rows of ``jams.csv`` of fresh loads, with ``friction``, ``gap``, ``load``, ``free``
-            and ``jammed``.
-        wanted: the shares between which the paper's start and end lie; shaded.
-    """
-    figure, axes = plt.subplots(figsize=(5.2, 3.4))
-    axes.axhspan(100 * wanted[0], 100 * wanted[1], color="0.9", label="j of the model")
-    colours = plt.get_cmap("viridis")(np.linspace(0, 0.85, table["gap"].nunique()))
-    for (gap, rows), colour in zip(table.groupby("gap"), colours):
-        groups = rows.groupby("friction")[["free", "jammed"]].sum()
-        share = 100 * groups["jammed"] / groups["free"]
-        name = "seamless" if gap == 0 else f"gap {1000 * gap:g} mm"
-        axes.plot(share.index, share, "o-", color=colour, label=name)
-        by_load = 100 * rows["jammed"] / rows["free"]
-        axes.plot(rows["friction"], by_load, ".", color=colour, alpha=0.4, markersize=4)
-    axes.set(xlabel="friction of a contact", ylabel="free boxes that jam (%)", ylim=(-2, 102))
-    axes.legend(fontsize=8)
     return figure

@@ -2,13 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from studies import paths
-from studies.results import COMMAND, keep_all, publish, read_table
+from studies.results import COMMAND, keep_all, publish
 from studies.seamless import episodes, jams
 from studies.seamless.jams import Case
 from unload import task
@@ -19,7 +17,7 @@ FEW_BESIDE = 3  # so many neighbours or more are one class along episodes
 BETWEEN = (0, 1, 2, 4, 7, 13, 26)  # successes between two attempts at a jammed box, from
 
 
-def jams_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
+def jams_data(n_jobs: int) -> None:
     """Lift the boxes of all cases; write two tables in ``seamless/``.
 
     ``jams.csv`` has a row per case: its ``question``, the fields of ``jams.Case``, where ``moment``
@@ -30,7 +28,7 @@ def jams_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
     """
     cases = list(jams.cases())
     asked = [({"kind": kind, **asdict(case)}, (kind, case)) for kind, case in cases]
-    results = keep_all(Path(runs_dir) / "seamless/jams", jams.answer, asked, n_jobs)
+    results = keep_all("seamless/jams", jams.answer, asked, n_jobs)
     counts, lasting = [], []
     for (kind, case), result in zip(cases, results):
         if kind == "lasting":
@@ -42,7 +40,7 @@ def jams_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
     counts = pd.DataFrame(counts).rename(columns={"picks": "moment"})
     tables = {"jams": counts, "jam_lasting": pd.DataFrame(lasting)}
     settings = {"loads": len(jams.LOADS), "cases": len(cases)}
-    publish(Path(folder) / "seamless", "jams", tables, MADE_BY, settings, results)
+    publish("seamless/jams", tables, MADE_BY, settings, results)
 
 
 def count_row(case: Case, distances: Sequence[float]) -> dict:
@@ -70,7 +68,7 @@ def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
     return rows
 
 
-def episodes_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None:
+def episodes_data(n_jobs: int) -> None:
     """Play the episodes of ``episodes.cases``; write three tables in ``seamless/``.
 
     ``jam_episodes.csv`` has a row per episode and 25 boxes taken out: the load and its ``walls``,
@@ -85,7 +83,7 @@ def episodes_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None
     for case, policy, after_pick in cases:
         question = {"case": asdict(case), "policy": policy, "after_pick": after_pick}
         asked.append((question, (case, policy, after_pick)))
-    results = keep_all(Path(runs_dir) / "seamless/episodes", episodes.episode, asked, n_jobs)
+    results = keep_all("seamless/episodes", episodes.episode, asked, n_jobs)
     rows, attempts = [], []
     for (case, policy, after_pick), result in zip(cases, results):
         rows += episode_rows(case, policy, after_pick, result.value)
@@ -99,7 +97,7 @@ def episodes_data(folder: str | Path, runs_dir: str | Path, n_jobs: int) -> None
         "jam_again": again(attempts[attempts["policy"] == "random"], first),
     }  # fmt: skip
     settings = {"episodes": len(cases)}
-    publish(Path(folder) / "seamless", "jam_episodes", tables, MADE_BY, settings, results)
+    publish("seamless/jam_episodes", tables, MADE_BY, settings, results)
 
 
 def episode_rows(case: Case, policy: str, after_pick: str, attempts: list[dict]) -> list[dict]:
@@ -151,14 +149,7 @@ def again(attempts: pd.DataFrame, first: pd.DataFrame) -> pd.DataFrame:
     return counts.reset_index()
 
 
-def both_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def both_data(n_jobs: int = -1) -> None:
     """Make the data of single lifts and of episodes."""
-    jams_data(folder, runs_dir, n_jobs)
-    episodes_data(folder, runs_dir, n_jobs)
-
-
-def read_jams(name: str = "jams", folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """A table of ``jams_data`` or ``episodes_data``, by its name."""
-    return read_table(Path(folder) / "seamless" / f"{name}.csv", MADE_BY, ["friction"])
+    jams_data(n_jobs)
+    episodes_data(n_jobs)

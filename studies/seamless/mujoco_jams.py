@@ -7,13 +7,11 @@ MuJoCo's contacts are soft, and the friction of a contact is the larger one of b
 
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from studies import paths
-from studies.results import COMMAND, keep_all, publish, read_table
+from studies.results import COMMAND, keep_all, publish
 from studies.seamless.jam_tables import count_row
 from studies.seamless.jams import Case, load_of, visible_free
 from unload import task
@@ -87,20 +85,13 @@ def cases() -> Iterator[Case]:
         yield Case(load, friction=1.0, gap=-0.0001)
 
 
-def mujoco_data(
-    folder: str | Path = paths.DATA, runs_dir: str | Path = paths.RUNS, n_jobs: int = -1
-) -> None:
+def mujoco_data(n_jobs: int = -1) -> None:
     """Lift the boxes of all cases; write ``seamless/mujoco_jams.csv``, with ``COLUMNS``."""
     asked = [(asdict(case), (case,)) for case in cases()]
-    results = keep_all(Path(runs_dir) / "seamless" / NAME, distances, asked, n_jobs)
+    results = keep_all(f"seamless/{NAME}", distances, asked, n_jobs)
     rows = [count_row(case, result.value) for case, result in zip(cases(), results)]
     table = {NAME: pd.DataFrame(rows)[COLUMNS]}
-    publish(Path(folder) / "seamless", NAME, table, MADE_BY, {"loads": 3}, results)
-
-
-def read_mujoco(folder: str | Path = paths.DATA) -> pd.DataFrame:
-    """A row per case, see ``mujoco_data``."""
-    return read_table(Path(folder) / "seamless" / f"{NAME}.csv", MADE_BY, COLUMNS)
+    publish(f"seamless/{NAME}", table, MADE_BY, {"loads": 3}, results)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,11 @@ The plan, ``data/seamless/PLAN.md``, says why its grid has these cells and seeds
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from studies import changes, paths
+from studies import changes
 from studies.grid import Cell, Grid, read_grid, train_grid
 from studies.paper import training as paper
 from studies.results import COMMAND, write_table
@@ -88,22 +87,18 @@ OPTIONS = paper.OPTIONS | {"--cells": {"nargs": "+", "choices": CELLS}}
 
 
 def seamless_data(
-    cells: Sequence[str] | None = None,
-    picks: int | None = None,
-    folder: str | Path = paths.DATA,
-    runs_dir: str | Path = paths.RUNS,
-    n_jobs: int = -1,
+    cells: Sequence[str] | None = None, picks: int | None = None, n_jobs: int = -1
 ) -> None:
     """Train the cells, see ``train_grid``; export the run ``EXPORTED``."""
-    kept = train_grid(SEAMLESS, cells, picks, folder, runs_dir, n_jobs)
+    kept = train_grid(SEAMLESS, cells, picks, n_jobs)
     cell, seed = EXPORTED
     if picks is None and (cells is None or cell in cells):
         config, change = replace(CELLS[cell].config, seed=seed), CELLS[cell].change
         run = RunFolder(kept / f"{cell}/seed_{seed}").result(config, change=change)
-        export(run.curve["wall_time"], folder)
+        export(run.curve["wall_time"])
 
 
-def export(wall_time: Sequence[float], folder: str | Path = paths.DATA) -> None:
+def export(wall_time: Sequence[float]) -> None:
     """Write a published run as TensorBoard exports it, which the paper's plots read.
 
     ``loss_function_agent.csv`` has the loss, ``total_rew_function_agent.csv`` the rewards summed
@@ -112,14 +107,13 @@ def export(wall_time: Sequence[float], folder: str | Path = paths.DATA) -> None:
 
     Args:
         wall_time: of each point of its curve, s since the epoch.
-        folder: of the data.
     """
     cell, seed = EXPORTED
-    curves = read_grid(SEAMLESS, folder, [cell])
+    curves = read_grid(SEAMLESS, [cell])
     curve = curves[curves["seed"] == seed].reset_index(drop=True)
     for name, values in (
         ("loss_function_agent", curve["loss"]),
         ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
     ):
         table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
-        write_table(Path(folder) / f"{name}.csv", table.dropna(), "%.12g")
+        write_table(name, table.dropna(), "%.12g")

@@ -6,31 +6,21 @@ from unittest import mock
 
 import gymnasium
 import numpy as np
-import pandas as pd
 import torch
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 import unload
-from studies import paths
-from studies.results import read_table
 from unload import task
 from unload.agent import learner
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
-FOLDER = paths.DATA / "benchmarks"
-COLUMNS = ["what", "how", "value", "unit", "ratio"]
 CONTAINER = "unload/Container-v0"
 ROUNDS = 4  # in which each call is timed
 LIFTS = {"full": 2, "local": 100, "table": 100}  # of a round; each of full takes seconds
 NUM_ENVS, PICKS = task.NUM_ENVS, task.MAX_PICKS  # of the containers that are many; of an episode
 BATCH_SIZE, N_FEATURES = 2048, 64  # of an update
-
-
-def read_speeds() -> pd.DataFrame:
-    """The table that ``studies.speed.run`` has published, a row per way of doing a thing."""
-    return read_table(FOLDER / "speeds.csv", "python -m studies.speed.run", COLUMNS)
 
 
 def three_digits(value: float) -> str:

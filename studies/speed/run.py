@@ -24,7 +24,7 @@ from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 
 import unload
 from studies.results import measured, publish
-from studies.speed.parts import FOLDER, lift_rates, pick_rates, three_digits, update_times
+from studies.speed.parts import lift_rates, pick_rates, three_digits, update_times
 from unload import task
 from unload.fast import fused
 
@@ -171,7 +171,7 @@ def main() -> None:
     result = measured(speeds)
     show(result.value)
     settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
-    publish(FOLDER, "benchmarks", {"speeds": result.value}, COMMAND, settings, [result])
+    publish("benchmarks/benchmarks", {"speeds": result.value}, COMMAND, settings, [result])
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import pytest
 import torch
 from joblib import parallel_config
 
-from studies import grid, sweep
+from studies import grid, paths, sweep
 from studies.changes import shuffled
 from studies.paper import tuning
 from studies.results import read_provenance
@@ -37,12 +37,14 @@ def trained(tmp_path_factory):
     folder = tmp_path_factory.mktemp("grid")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(grid, "training_fingerprint", lambda networks: "f")
-        grid.train_grid(SMALL, None, None, folder, folder / "runs", n_jobs=1)
+        patch.setattr(paths, "DATA", folder)
+        patch.setattr(paths, "RUNS", folder / "runs")
+        grid.train_grid(SMALL, n_jobs=1)
         yield folder
 
 
 def test_a_grid_is_read_as_it_was_trained(trained):
-    curves = grid.read_grid(SMALL, trained)
+    curves = grid.read_grid(SMALL)
     runs = dict(list(curves.groupby(["cell", "seed"], sort=False)))
     assert [*runs] == [("plain", 0), ("plain", 1), ("averaged_mask", 3), ("shuffled", 0)]
     assert all(run["picks"].max() == 640 for run in runs.values())
@@ -55,22 +57,23 @@ def test_a_grid_is_read_as_it_was_trained(trained):
     assert all(not np.array_equal(first[name], second[name]) for name in first)
 
 
-def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained):
+def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained, monkeypatch):
     before = (trained / "some/small_loss.csv").read_bytes()
     for cell, message in {
         "nothing": "cells is 'nothing'; expected one of 'plain', ",
         "plain": "would hold 2 finished runs; expected at least as many as the 4",
     }.items():
-        with pytest.raises(ValueError, match=message):
-            grid.train_grid(SMALL, [cell], None, trained, trained / "other", 1)
+        with monkeypatch.context() as patch, pytest.raises(ValueError, match=message):
+            patch.setattr(paths, "RUNS", trained / "other")
+            grid.train_grid(SMALL, [cell], n_jobs=1)
     assert not (trained / "other").exists()  # refused before hours of training
-    grid.train_grid(SMALL, None, None, trained, trained / "runs", n_jobs=1)  # as many
-    grid.train_grid(SMALL, ["plain"], 320, trained, trained / "runs", 1)
+    grid.train_grid(SMALL, n_jobs=1)  # as many
+    grid.train_grid(SMALL, ["plain"], 320, n_jobs=1)
     assert (trained / "some/small_loss.csv").read_bytes() == before
-    provenance = read_provenance(trained / "some", "small")
+    provenance = read_provenance(SMALL.name)
     assert (provenance["runs"], provenance["planned"], provenance["reduced"]) == (4, 4, False)
     assert provenance["settings"]["averaged_mask"]["mask"] is True
-    assert read_provenance(trained / "reduced/some", "small")["reduced"]
+    assert read_provenance(f"reduced/{SMALL.name}")["reduced"]
 
 
 @pytest.fixture

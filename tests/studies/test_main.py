@@ -83,12 +83,12 @@ def test_no_committed_file_is_too_large():
     assert max(sizes.values()) <= 1_000_000
 
 
-def test_committed_data_is_written_again_byte_for_byte(tmp_path):
-    visible_items.observation_data(tmp_path)
+def test_committed_data_is_written_again_byte_for_byte(own_data):
+    visible_items.observation_data()
     for name in ("all_items", "Observation", "Equalized_Observation"):
         path = f"obs_hist_equal/{name}.csv"
-        assert (tmp_path / path).read_bytes() == (paths.DATA / path).read_bytes()
-    assert read_provenance(tmp_path / "obs_hist_equal", "observation")["settings"] == {"seed": 0}
+        assert (own_data / path).read_bytes() == (paths.ROOT / "data" / path).read_bytes()
+    assert read_provenance("obs_hist_equal/observation")["settings"] == {"seed": 0}
 
 
 @pytest.mark.parametrize(

@@ -17,15 +17,11 @@ from PIL import Image
 
 from studies import paths, style
 from studies.falls import figures as falls
-from studies.falls.laboratory import read_laboratory, read_trace
-from studies.falls.long import read_long_trace
-from studies.grid import read_grid
-from studies.heap.table import compared, read_heap_table
+from studies.heap.table import compared
 from studies.paper import diagrams
-from studies.paper.training import PAPER
 from studies.play import animation
 from studies.policies.comparison import comparison_msr
-from studies.policies.variants import PARTS, variants_msr
+from studies.results import read_table
 from unload.load.view import PLOTLY_MIMETYPE
 
 SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
@@ -54,16 +50,6 @@ PUBLISHED = {
 JUPYTER = "display.max_columns", 20, "display.max_colwidth", 50, "display.max_rows", 60
 # The names of styled tables, and the addresses of objects.
 RANDOM = re.compile(r"T_[0-9a-f]{5}|( object)? at 0x[0-9a-f]+")
-# Figures that are drawn from data/, and take its folder.
-FROM_DATA = {
-    **{f"variants_{part}": partial(variants_msr, part) for part in PARTS},
-    "comparison": comparison_msr,
-    "why_60": lambda folder=paths.DATA: falls.four_cells(read_grid(PAPER, folder)),
-    "why_runs_fall": lambda folder=paths.DATA: falls.loop(
-        read_trace(folder), read_laboratory(folder)
-    ),
-    "a_fall": lambda folder=paths.DATA: falls.fall(read_long_trace(folder).head(40)),
-}
 
 
 def cells_of(notebook: str) -> dict[str, dict]:
@@ -154,11 +140,11 @@ def test_figures_and_tables_are_those_that_the_data_give(notebook, monkeypatch):
 
 def test_the_table_of_heaps_follows_from_their_episodes():
     """Of 15 picks each; the table of episodes rounds their means."""
-    episodes = pd.read_csv(paths.DATA / "heap" / "episodes.csv")
+    episodes = read_table("heap/episodes")
     for name in ("boxes", "falls"):
         episodes[name] = (15 * episodes[name]).round() / 15
     episodes["net"] = episodes["boxes"] - episodes["falls_weight"] * episodes["falls"]
-    found, published = compared(episodes), read_heap_table()
+    found, published = compared(episodes), read_table("heap/table")
     pd.testing.assert_frame_equal(found, published, rtol=1e-5, check_dtype=False)
 
 
@@ -173,7 +159,7 @@ def test_each_published_figure_is_drawn_by_a_notebook():
 
 
 def test_figures_are_saved_as_the_same_bytes(tmp_path):
-    draws = {"one": FROM_DATA["comparison"], "other": partial(diagrams.fig07_network, 4)}
+    draws = {"one": comparison_msr, "other": partial(diagrams.fig07_network, 4)}
     for name, draw in draws.items():
         for folder in ("a", "b"):
             style.save(draw(), name, tmp_path / "figures" / folder)
@@ -209,12 +195,6 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
             assert found.info == published.info
             both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
             assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
-
-
-@pytest.mark.parametrize("name", FROM_DATA)
-def test_missing_data_name_the_command_that_makes_them(name, tmp_path):
-    with pytest.raises(FileNotFoundError, match="python -m studies"):
-        FROM_DATA[name](tmp_path)
 
 
 @pytest.mark.parametrize(("msr", "title"), [(0.6, "60.0%: it errs"), (0.95, "95.0%: it does not")])

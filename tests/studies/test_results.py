@@ -13,7 +13,7 @@ import pytest
 
 from studies import paths, results
 from studies.falls.long import LONG
-from studies.grid import read_grid, read_measures
+from studies.grid import read_grid
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
@@ -73,7 +73,7 @@ def test_a_damaged_answer_is_named(tmp_path):
             kept(tmp_path, {"seed": 1}, int)
 
 
-def test_answers_are_kept_for_the_code_that_gives_them(tmp_path, capsys):
+def test_answers_are_kept_for_the_code_that_gives_them(own_data, capsys):
     def ramp(length):
         return packed({"ramp": np.arange(length), "length": np.array(length)})
 
@@ -82,35 +82,33 @@ def test_answers_are_kept_for_the_code_that_gives_them(tmp_path, capsys):
 
     asked = [({"length": length}, (length,)) for length in (2, 3)]
     for compute, ramps in ((ramp, [[0, 1], [0, 1, 2]]), (falling, [[0, -1], [0, -1, -2]])):
-        answers = [unpacked(each.value) for each in keep_all(tmp_path, compute, asked, 1)]
+        answers = [unpacked(each.value) for each in keep_all("some", compute, asked, 1)]
         assert [each["ramp"].tolist() for each in answers] == ramps
         assert [each["length"] for each in answers] == [2, 3]
     assert "2/2" in capsys.readouterr().out
+    assert len(list((own_data / "runs/some").iterdir())) == 4
 
 
-def test_what_is_published_says_where_it_comes_from(tmp_path):
+def test_what_is_published_says_where_it_comes_from(own_data):
     table = pd.DataFrame({"seed": [0], "msr": [1 / 3]})
     results = [measured(int), measured(int)]
     command, settings = "make tea", {"seeds": [0]}
-    publish(tmp_path, "tea", {"a": table, "b": table}, command, settings, results, reduced=True)
-    publish(tmp_path, "more", {"c": table}, command, settings, results[:1], "f00", "%.12g")
-    texts = [(tmp_path / f"{name}.csv").read_text() for name in "abc"]
+    publish("t/tea", {"a": table, "b": table}, command, settings, results, reduced=True)
+    publish("more", {"c": table}, command, settings, results[:1], "f00", "%.12g")
+    texts = [(own_data / f"{name}.csv").read_text() for name in ("reduced/t/a", "reduced/t/b", "c")]
     assert texts == ["seed,msr\n0,0.333333\n"] * 2 + ["seed,msr\n0,0.333333333333\n"]
-    tea, more = (read_provenance(tmp_path, name) for name in ("tea", "more"))
+    tea, more = map(read_provenance, ("reduced/t/tea", "more"))
     assert (tea["command"], tea["settings"], tea["reduced"]) == (command, settings, True)
     assert (tea["runs"], more["runs"]) == (2, 1)
     assert "fingerprint" not in tea and more["fingerprint"] == "f00"
     assert not more["reduced"]
 
 
-def test_a_table_is_read_and_another_one_refused(tmp_path):
-    path = tmp_path / "t.csv"
-    with pytest.raises(FileNotFoundError, match="t.csv is missing; make tea makes it"):
-        read_table(path, "make tea", ["a", "b"])
-    path.write_text("a,b,c\n1,,x\n")
-    assert read_table(path, "make tea", ["b", "a"]).shape == (1, 3)
-    with pytest.raises(ValueError, match="t.csv has no d; expected a, d"):
-        read_table(path, "make tea", ["a", "d"])
+def test_a_table_is_read_and_a_missing_one_names_the_command_that_makes_it(own_data):
+    with pytest.raises(FileNotFoundError, match="t.csv is missing; python -m studies paper makes"):
+        read_table("t")
+    (own_data / "t.csv").write_text("a,b,c\n1,,x\n")
+    assert read_table("t").shape == (1, 3)
 
 
 def test_records_are_joined():
@@ -160,7 +158,7 @@ def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_the_settings_of_published_runs_are_their_configurations(name):
     """Those that stand beside them train the runs again."""
-    settings = read_provenance(paths.DATA, name)["settings"]
+    settings = read_provenance(name)["settings"]
     for cell, plan in PUBLISHED[name].cells.items():
         assert TrainConfig(**settings.pop(cell)) == replace(plan.config, seed=plan.seeds[0])
     assert not settings
@@ -168,11 +166,11 @@ def test_the_settings_of_published_runs_are_their_configurations(name):
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_all_planned_runs_are_published_in_full_length(name):
-    grid, provenance = PUBLISHED[name], read_provenance(paths.DATA, name)
+    grid, provenance = PUBLISHED[name], read_provenance(name)
     planned = grid.configs()
     assert provenance["runs"] == provenance["planned"] == len(planned)
     assert not provenance["reduced"]
-    rows = read_grid(grid) if grid.measure is None else read_measures(grid)
+    rows = read_grid(grid) if grid.measure is None else read_table(name)
     runs = [f"{cell}/seed_{seed}" for cell, seed in zip(rows["cell"], rows["seed"])]
     assert [*dict.fromkeys(runs)] == list(planned)
     if grid.measure is None:

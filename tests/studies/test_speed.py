@@ -13,7 +13,7 @@ from sb3_contrib import MaskablePPO
 from stable_baselines3.common.env_util import make_vec_env
 
 import unload
-from studies.results import read_provenance
+from studies.results import read_provenance, read_table
 from studies.speed import mutants, parts, run
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
 from studies.speed.run import PEQPolicy
@@ -135,7 +135,7 @@ def test_no_box_of_new_loads_repeats(rng):
     assert len({tuple(size) for load in loads for size in load.sizes.round(6)}) == 2 * 672
 
 
-def test_speeds_are_printed_and_published_with_ratios(tmp_path, monkeypatch, capsys):
+def test_speeds_are_printed_and_published_with_ratios(own_data, monkeypatch, capsys):
     for name, rates in {
         "lift_rates": {"full": 2.0, "table": 12345.0},
         "pick_rates": {"one": 4.0},
@@ -143,13 +143,11 @@ def test_speeds_are_printed_and_published_with_ratios(tmp_path, monkeypatch, cap
         "training_rates": {"theirs": 5.0, "here": 4.0},
     }.items():
         monkeypatch.setattr(run, name, lambda *load, rates=rates: rates)
-    for module in (run, parts):
-        monkeypatch.setattr(module, "FOLDER", tmp_path)
     run.main()
-    assert parts.read_speeds()["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
+    assert read_table("benchmarks/speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
     said = capsys.readouterr()
     assert "12,300 lifts/s 6,170 ×" in said.out and "measuring: training" in said.err
-    assert read_provenance(tmp_path, "benchmarks")["runs"] == 1
+    assert read_provenance("benchmarks/benchmarks")["runs"] == 1
 
 
 def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):

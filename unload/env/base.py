@@ -97,6 +97,11 @@ class EpisodeEnv(InOrder, gymnasium.Env):
         kind = type(self).__name__
         raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
 
+    def _row(self, action: int) -> int:
+        if isinstance(action, np.ndarray) and action.ndim == 0:
+            action = action.item()  # what Stable-Baselines3's predict returns
+        return checks.integer("action", action, 0, self.observation_space.shape[0] - 1)
+
 
 class Picking:
     """What single environments and arrays of them have in common: settings and spaces.
@@ -148,11 +153,6 @@ class PickingEnv(Picking, EpisodeEnv):
             return seen
         present = np.arange(task.N_VISIBLE) < len(positions)
         return equalize(seen, self.ties, present=present)
-
-    def _row(self, action: int) -> int:
-        if isinstance(action, np.ndarray) and action.ndim == 0:
-            action = action.item()  # what Stable-Baselines3's predict returns
-        return checks.integer("action", action, 0, task.N_VISIBLE - 1)
 
 
 class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):

@@ -14,7 +14,7 @@ from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
 from studies.paper.training import PAPER
-from studies.results import read_provenance
+from studies.results import read_provenance, read_table
 from unload import evaluate, policies
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
@@ -26,28 +26,26 @@ from unload.network.variants import NETWORKS
 @pytest.mark.slow
 def test_a_published_run_is_trained_and_measured_again():
     """The first one that falls."""
-    published = laboratory.read_laboratory().set_index(["cell", "seed"])
+    published = read_table("falls/laboratory").set_index(["cell", "seed"])
     expected = published.loc["ranks", cells.FIRST_SEED].to_dict()
     row = laboratory.run_cell("ranks", cells.CELLS["ranks"], cells.FIRST_SEED)["row"]
     assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
     assert row["end"] < 0.9 and row["judged_place"] == 1
 
 
-def test_cells_are_trained_measured_and_written(tmp_path, monkeypatch):
+def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
     """Runs of one episode, of which a trace has two points."""
     monkeypatch.setattr(laboratory, "training_fingerprint", lambda: "f")
     monkeypatch.setitem(measures.LOADS, "episodes", 2)
-    monkeypatch.setattr(paths, "DATA", tmp_path)
-    monkeypatch.setattr(paths, "RUNS", tmp_path / "runs")
     config = replace(CONFIG, picks=32_000, seed=7)
     small = {
         name: cells.CELLS[name]._replace(config=config, seeds=[7]) for name in ("ranks", "mirrored")
     }
     monkeypatch.setattr(laboratory, "CELLS", small)
     monkeypatch.setattr(laboratory, "FRESH", {"ranks": small["ranks"]})
-    laboratory.laboratory_data([*small], None, tmp_path, tmp_path / "runs", 1)
+    laboratory.laboratory_data([*small], n_jobs=1)
     laboratory.fresh_data(1)
-    rows, trace = laboratory.read_laboratory(tmp_path), laboratory.read_trace(tmp_path)
+    rows, trace = read_table("falls/laboratory"), read_table("falls/trace")
     assert rows["cell"].tolist() == ["ranks", "mirrored"]
     assert trace[["cell", "picks"]].to_numpy().tolist() == [["ranks", 15_936], ["ranks", 31_936]]
     ranks, slopes, tilts = rows.iloc[0], laboratory.SLOPES, laboratory.TILTS
@@ -63,30 +61,27 @@ def test_cells_are_trained_measured_and_written(tmp_path, monkeypatch):
     averaged = measures.judged(
         run.agent.network, replace(config, equalize=False), seen=cells.SEEN["averaged_x"]
     )
-    assert laboratory.read_fresh()["judged_averaged_x"].tolist() == pytest.approx([averaged], 1e-3)
+    fresh = read_table("falls/fresh")
+    assert fresh["judged_averaged_x"].tolist() == pytest.approx([averaged], 1e-3)
 
-    assert not (tmp_path / "reduced").exists()
-    laboratory.laboratory_data(["mirrored"], None, tmp_path, tmp_path / "runs", 1)
-    assert [path.name for path in (tmp_path / "reduced/falls").glob("*.csv")] == ["laboratory.csv"]
-    assert read_provenance(tmp_path / "reduced/falls", "laboratory")["reduced"]
+    assert not (own_data / "reduced").exists()
+    laboratory.laboratory_data(["mirrored"], n_jobs=1)
+    assert [path.name for path in (own_data / "reduced/falls").glob("*.csv")] == ["laboratory.csv"]
+    assert read_provenance("reduced/falls/laboratory")["reduced"]
 
 
 @pytest.mark.parametrize(
-    ("part", "planned", "rows"),
-    [
-        ("laboratory", cells.CELLS, laboratory.read_laboratory),
-        ("fresh", cells.FRESH, laboratory.read_fresh),
-    ],
+    ("name", "planned"), [("falls/laboratory", cells.CELLS), ("falls/fresh", cells.FRESH)]
 )
-def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(part, planned, rows):
-    seeds = {cell: sorted(group["seed"]) for cell, group in rows().groupby("cell")}
+def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(name, planned):
+    seeds = {cell: sorted(group["seed"]) for cell, group in read_table(name).groupby("cell")}
     assert seeds == {name: list(cell.seeds) for name, cell in planned.items()}
-    published = read_provenance(paths.DATA / "falls", part)["settings"]["config"]
+    published = read_provenance(name)["settings"]["config"]
     assert TrainConfig(**published).plain() == CONFIG.plain()
 
 
 def test_the_published_trace_is_of_the_runs_that_are_traced():
-    trace = laboratory.read_trace()
+    trace = read_table("falls/trace")
     assert trace["cell"].unique().tolist() == [*laboratory.TRACED]
     assert set(trace["picks"]) == set(range(15_936, 384_000, laboratory.EVERY))
 
@@ -159,7 +154,7 @@ def test_a_label_says_who_chooses_and_who_watches(cell, label):
     for words, replay in ((chooser, choosing), (watcher, run.replay)):
         kept = (replay.arrays["observations"][: len(seen)] == seen).all()
         assert kept == (words[0] == "ranks"), words
-    published = laboratory.read_laboratory().query("cell == @cell")["end"].mean()
+    published = read_table("falls/laboratory").query("cell == @cell")["end"].mean()
     assert (published > 0.99) == (chooser[0] == "shuffled")
 
 
@@ -173,7 +168,7 @@ def test_the_rule_was_fitted_on_the_published_networks():
     fitted = ["ranks", "mirrored", "shuffled", "untilted", "untilted_y", "averaged_y", "averaged_z"]
     fitted += [f"episodes_{picks}" for picks in (25, 100, 250)]
     fitted += [f"ranks_{name}" for name in cells.TAKEN_BACK]
-    rows = laboratory.read_laboratory().query("cell in @fitted")
+    rows = read_table("falls/laboratory").query("cell in @fitted")
     right = laboratory.predicted(rows) == (rows["judged_as_is"] < laboratory.ERRS)
     assert len(rows) == 290 and right.sum() == 278
 
@@ -196,45 +191,48 @@ def test_a_slope_is_kept_from_sinking(cell, scaled):
     assert ratio == pytest.approx(1 + 0.05 * np.array(scaled), abs=0.02)
 
 
-def test_runs_are_traced(tmp_path, monkeypatch):
+def test_runs_are_traced(own_data, monkeypatch):
     monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
     monkeypatch.setattr(long, "CONFIG", replace(long.CONFIG, picks=64_000))
-    long.trace_data(tmp_path, tmp_path / "runs", 1)
-    table = long.read_long_trace(tmp_path)
+    long.trace_data(1)
+    table = read_table("falls/long_trace")
     assert list(table["seed"]) == [20, 20, 21, 21]
     assert list(table["picks"]) == [31_936, 63_936] * 2
-    assert read_provenance(tmp_path / "falls", "long_trace")["settings"]["picks"] == 64_000
-    published = long.read_long_trace()
+    assert read_provenance("falls/long_trace")["settings"]["picks"] == 64_000
+
+
+def test_the_published_long_trace_is_of_whole_runs():
+    published = read_table("falls/long_trace")
     assert list(published["seed"].unique()) == [*long.TRACED_SEEDS]
     assert (published["wrong_without_place"] == 0).mean() > 0.99
     assert set(published["picks"]) == set(range(31_936, 20_000_000, 32_000))
 
 
-def test_policies_and_networks_are_judged_alike(tmp_path, monkeypatch):
+def test_policies_and_networks_are_judged_alike(own_data, monkeypatch):
     """One published policy and one network without training, in one container with the mask."""
     monkeypatch.setattr(long, "UNTRAINED", 1)
     name = "paper_no_mask/seed_0"
-    policy = read_policies(paths.DATA / "falls/paper.safetensors")[name]
+    policy = read_policies(paths.ROOT / "data/falls/paper.safetensors")[name]
     published = {"paper": {name: policy}, "long": {}}
     monkeypatch.setattr(long, "read_policies", lambda path: published[path.stem])
     monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
     monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
-    long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
-    trained, drawn = long.read_published(tmp_path).itertuples()
+    long.published_data(n_jobs=1)
+    trained, drawn = read_table("falls/published").itertuples()
     assert (trained.cell, drawn.cell) == ("paper_no_mask", "untrained")
     assert trained.judged_place == 1 > trained.judged_as_is and drawn.judged_as_is < 0.9
     assert trained.judged_as_is == evaluate(policy, 1, 0, mask=True)["success_rate"].mean()
-    assert len(list((tmp_path / "runs/published").iterdir())) == 2
+    assert len(list((own_data / "runs/published").iterdir())) == 2
     policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
-    long.published_data(tmp_path, tmp_path / "runs", n_jobs=1)
-    assert len(list((tmp_path / "runs/published").iterdir())) == 3
+    long.published_data(n_jobs=1)
+    assert len(list((own_data / "runs/published").iterdir())) == 3
 
 
 def test_the_published_table_holds_every_policy():
-    rows, planned = long.read_published(), [f"untrained/seed_{seed}" for seed in range(36)]
+    rows, planned = read_table("falls/published"), [f"untrained/seed_{seed}" for seed in range(36)]
     planned += [*PAPER.configs(), *long.LONG.configs()]
     assert sorted(rows["cell"] + "/seed_" + rows["seed"].astype(str)) == sorted(planned)
-    assert read_provenance(paths.DATA / "falls", "published")["settings"] == long.LOADS
+    assert read_provenance("falls/published")["settings"] == long.LOADS
     assert long.UNTRAINED == 36
 
 

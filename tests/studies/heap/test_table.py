@@ -15,7 +15,7 @@ from studies.heap.network import FateNetwork
 from studies.heap.rake import Outcome
 from studies.heap.recording import HEAPS, make_heaps, make_networks
 from studies.heap.table import best_rule, family, plan
-from studies.results import read_provenance
+from studies.results import read_provenance, read_table
 from unload.agent.identity import identity
 from unload.load.picture import COLOURS
 
@@ -36,7 +36,7 @@ def test_the_best_rule_depends_on_the_weight_of_falls():
     assert players[4.0, "best rule"] == {"rule": "shy"}
 
 
-def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pile):
+def test_all_policies_play_the_same_heaps_and_are_kept(own_data, monkeypatch, pile):
     small = [pile, pile.only(np.arange(8))]
     for name, value in {
         "stored_heaps": lambda split: small,
@@ -53,24 +53,21 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
     some = dict(list(family().items())[:2])
     monkeypatch.setattr(study, "family", lambda: some)
     monkeypatch.setattr("studies.heap.env.stored_heaps", study.stored_heaps)
-    where = {"folder": tmp_path, "runs_dir": tmp_path}
-    with pytest.raises(FileNotFoundError, match="python -m studies heap makes it"):
-        study.compare(**where)
-    rules = study.choose_rules(**where)
+    rules = study.choose_rules()
     assert rules["rule"].tolist() == ["lowest", "highest", *some]
     assert sorted(set(rules["heaps"])) == [1, 2] and (rules["heaps"] == 2).sum() <= 2
     networks = [FateNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 1)]
-    save_networks(networks, tmp_path / "heap" / "networks.safetensors")
-    table = study.compare(**where)
+    save_networks(networks, own_data / "heap" / "networks.safetensors")
+    table = study.compare()
     by = table.set_index(["policy", "falls_weight"])
     curve = [(name, weight) for name in ("best rule", "learned") for weight in (0.0, 1.0)]
     others = [(name, 1.0) for name in ("random", "lowest", "highest", "oracle")]
     assert sorted(by.index) == sorted(curve + others) and (table["heaps"] == 2).all()
     assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
-    assert read_provenance(tmp_path / "heap", "table")["settings"]["heaps"] == 2
-    pd.testing.assert_frame_equal(study.read_heap_table(tmp_path), table, check_dtype=False)
-    kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "heap/episodes").iterdir()}
-    pd.testing.assert_frame_equal(study.compare(**where), table)
+    assert read_provenance("heap/table")["settings"]["heaps"] == 2
+    pd.testing.assert_frame_equal(read_table("heap/table"), table, check_dtype=False)
+    kept = {path: path.stat().st_mtime_ns for path in (own_data / "runs/heap/episodes").iterdir()}
+    pd.testing.assert_frame_equal(study.compare(), table)
     assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
     players = []
 
@@ -79,7 +76,7 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
         return {"boxes": 2.0 + number, "falls": 0.5}
 
     monkeypatch.setattr(study, "_play", made_up)
-    table = study.compare(tmp_path, tmp_path / "made up")
+    table = study.compare()
     assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
     weights = [player["falls_weight"] for player in players if "networks" in player]
     assert weights == [0.0, 0.0, 1.0, 1.0]
@@ -88,11 +85,10 @@ def test_all_policies_play_the_same_heaps_and_are_kept(tmp_path, monkeypatch, pi
 def test_data_of_heaps_are_those_that_are_read():
     names = {path.name.split(".")[0] for path in (paths.DATA / "heap").iterdir()}
     assert names == {"heaps", "networks", "rules", "episodes", "table"}
-    table = study.read_heap_table()
+    table = read_table("heap/table")
     assert (table["heaps"] == HEAPS["test"]).all() and len(table) == 19
     heaps, networks, rules = (
-        read_provenance(paths.DATA / "heap", name)["settings"]
-        for name in ("heaps", "networks", "rules")
+        read_provenance(f"heap/{name}")["settings"] for name in ("heaps", "networks", "rules")
     )
     assert heaps == {"heaps": HEAPS, "seeds": recording.SEEDS, "boxes dropped": generate.BOXES}
     recorded = {"picks": recording.PICKS, "rounds": recording.ROUNDS, "steps": recording.STEPS}
@@ -128,7 +124,7 @@ def test_a_box_is_drawn_in_the_colour_of_what_a_pick_does_to_it(cubes):
         assert face / face.max() == pytest.approx(colour / colour.max(), abs=0.02)
 
 
-def test_heaps_are_those_of_their_seeds(tmp_path, monkeypatch):
+def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):
     """The generator is replaced by parts of a stored heap, which the seed chooses."""
     whole = stored_heaps("train")[0]
     monkeypatch.setattr(
@@ -137,18 +133,19 @@ def test_heaps_are_those_of_their_seeds(tmp_path, monkeypatch):
     made = {}
     for name, counts in {"few": {"train": 2, "test": 1}, "more": {"train": 3, "test": 2}}.items():
         monkeypatch.setattr(recording, "HEAPS", counts)
-        make_heaps(tmp_path / name, tmp_path / name / "runs")
-        path = tmp_path / name / "heap"
-        assert read_provenance(path, "heaps")["settings"]["heaps"] == counts
+        monkeypatch.setattr(paths, "DATA", own_data / name)
+        make_heaps()
+        path = paths.DATA / "heap/heaps.npz"
+        assert read_provenance("heap/heaps")["settings"]["heaps"] == counts
         for split, count in counts.items():
-            made[name, split] = [identity(heap) for heap in stored_heaps(split, path / "heaps.npz")]
+            made[name, split] = [identity(heap) for heap in stored_heaps(split, path)]
             assert len(set(made[name, split])) == count
     for split, count in (("train", 2), ("test", 1)):
         assert made["few", split] == made["more", split][:count]
     assert made["more", "train"][0] != made["more", "test"][0]
 
 
-def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch, pile):
+def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pile):
     for name, value in {
         "stored_heaps": lambda split: [pile, pile.only(np.arange(8))],
         "MAX_PICKS": 3,
@@ -172,7 +169,7 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch, pi
 
     monkeypatch.setattr(recording, "fit", noted_fit)
     monkeypatch.setattr(recording, "Learned", noted_policy)
-    make_networks(tmp_path, tmp_path)
+    make_networks()
     assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
     assert len(explorers) == 2 and set(explorers) <= set(recording.WEIGHTS)
     assert 0 < len(explored) < 6, "some picks of the second round are random"
@@ -180,15 +177,19 @@ def test_both_rounds_are_recorded_and_learned_and_kept(tmp_path, monkeypatch, pi
     assert np.isfinite(picks.observations).all() and picks.unloaded.sum() > 0
     came = picks.fates[np.arange(12), picks.actions] & 1
     assert (came <= picks.unloaded).all(), "fates are those of the picks"
-    published = tmp_path / "heap" / "networks.safetensors"
+    published = own_data / "heap" / "networks.safetensors"
     assert len(load_networks(published)) == 2
-    assert read_provenance(tmp_path / "heap", "networks")["runs"] == 4 + 4
+    assert read_provenance("heap/networks")["runs"] == 4 + 4
     written = published.read_bytes()
-    make_networks(tmp_path, tmp_path)
+    make_networks()
     assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
-    make_networks(tmp_path / "again", tmp_path / "again")
-    assert (tmp_path / "again" / "heap" / "networks.safetensors").read_bytes() == written
+    with monkeypatch.context() as patch:
+        patch.setattr(paths, "RUNS", own_data / "again")
+        make_networks()
+    assert published.read_bytes() == written and len(learned) == 8
     monkeypatch.setattr(recording, "STEPS", 3)
-    make_networks(tmp_path, tmp_path)
+    make_networks()
     assert len(learned) == 12 and published.read_bytes() != written, "another question"
-    assert len(list((tmp_path / "heap" / "picks").glob("*.json"))) == 6, "other explorers, too"
+    assert len(list((own_data / "runs" / "heap" / "picks").glob("*.json"))) == 6, (
+        "other explorers, too"
+    )

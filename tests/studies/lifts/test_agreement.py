@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from studies import paths
 from studies.lifts import agreement
 from studies.lifts import lift_table as lifts
 from studies.policies.robustness import front_walls
@@ -15,7 +16,7 @@ from studies.statistics import share_interval
 from unload import policies, task
 from unload.env.vector import ContainerVectorEnv
 from unload.load.substacks import stack_load
-from unload.physics.table import LiftTable
+from unload.physics.table import LIFTS_FILE, LiftTable
 from unload.support import files
 
 
@@ -48,7 +49,7 @@ def test_a_fresh_lift_is_in_the_boxes_left_in_the_walls_around(full_load):
         assert len(left) == (present & np.isin(full_load.walls, kept)).sum()
 
 
-def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
+def test_full_is_asked_and_a_stopped_run_goes_on(own_data, monkeypatch):
     """Three lifts in a container of two walls, after 30 picks."""
     stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
     monkeypatch.setattr(agreement.gymnasium, "make", partial(gymnasium.make, **stack))
@@ -56,21 +57,19 @@ def test_full_is_asked_and_a_stopped_run_goes_on(tmp_path, monkeypatch):
     small |= {"UNLOADED_BY": {"highest": policies.highest}, "FIRST_SEED": 5}
     for name, value in small.items():
         monkeypatch.setattr(agreement, name, value)
-    folders = tmp_path / "data", tmp_path / "runs"
-    agreement.agreement_data(*folders)
-    frame = agreement.read_agreement(folders[0])
+    agreement.agreement_data()
+    frame = agreement.read_agreement()
     assert (frame["asked_full"] == "drawn").all() and frame["full"].notna().all()
     assert not len(agreement.disagreements(frame, "local", "full"))
     assert frame["full"].max() == pytest.approx(frame["local"].max(), abs=0.01)
-    provenance = read_provenance(tmp_path / "data", agreement.NAME)
-    assert provenance["settings"]["lifts"] == 3
-    written = (tmp_path / "data" / "lift_agreement.csv").read_bytes()
+    assert read_provenance(agreement.NAME)["settings"]["lifts"] == 3
+    written = (own_data / "lift_agreement.csv").read_bytes()
     monkeypatch.setattr(agreement.FullPhysics, "reset", None)
-    agreement.agreement_data(*folders)
-    assert (tmp_path / "data" / "lift_agreement.csv").read_bytes() == written
+    agreement.agreement_data()
+    assert (own_data / "lift_agreement.csv").read_bytes() == written
     monkeypatch.setattr(agreement, "FIRST_SEED", 6)
     with pytest.raises(TypeError):  # an answer to another question is not taken
-        agreement.agreement_data(*folders)
+        agreement.agreement_data()
 
 
 def test_bounds_count_each_kind_of_lift():
@@ -107,10 +106,10 @@ def test_committed_lifts_can_be_computed_again():
     assert agreement.LIFT_COUNT <= len(committed) < agreement.LIFT_COUNT + 100
     close = committed["local"].between(*agreement.CLOSE)
     assert committed.loc[close, "full"].notna().all()
-    settings = read_provenance(agreement.paths.DATA, agreement.NAME)["settings"]
+    settings = read_provenance(agreement.NAME)["settings"]
     assert settings["lifts"] == len(committed)
     assert all(settings[f"in full, {why}"] == len(rows) for why, rows in of.items())
-    assert settings["lift table"] == agreement.table_digest(), "another table ships: compare again"
+    assert settings["lift table"] == files.digest(LIFTS_FILE), "another table ships: compare again"
     _, frame = agreement.collect_lifts(220, agreement.FIRST_SEED)
     assert frame["policy"].unique().tolist() == [*agreement.UNLOADED_BY]
     first = committed[: len(frame)]
@@ -135,7 +134,8 @@ def test_the_table_is_filled_by_policies_that_pick_at_random_to_various_degrees(
         assert same.mean() == pytest.approx(1 - share * 127 / 128, abs=0.03)
 
 
-def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
+def test_lift_data_depends_on_the_command_alone(own_data, monkeypatch):
+    shipped = read_provenance(LIFTS_FILE.with_suffix(""))["settings"]
     planned = [lifts.EPISODES, lifts.RANDOM_SHARE * lifts.EPISODES, lifts.SEED]
     monkeypatch.setattr(task, "NUM_ENVS", 1)
     monkeypatch.setattr(lifts, "EPISODES", 1)
@@ -145,16 +145,16 @@ def test_lift_data_depends_on_the_command_alone(tmp_path, monkeypatch):
         ContainerVectorEnv, "reset", lambda env, seed: seeds.append(seed) or reset(env, seed=seed)
     )
     for name in "ab":
-        lifts.lift_data(tmp_path / name, tmp_path / name / "runs")
-    assert (tmp_path / "a/lifts.npz").read_bytes() == (tmp_path / "b/lifts.npz").read_bytes()
+        monkeypatch.setattr(paths, "RUNS", own_data / f"runs_{name}")
+        monkeypatch.setattr(lifts, "LIFTS_FILE", own_data / f"{name}.npz")
+        lifts.lift_data()
+    assert (own_data / "a.npz").read_bytes() == (own_data / "b.npz").read_bytes()
     assert max(seeds) > 1_000_000  # of the loads, so that hardly any is met twice
-    count = len(LiftTable.load(tmp_path / "a/lifts.npz"))
-    assert count > 50
-    provenance = read_provenance(tmp_path / "a", "lifts")
+    count = len(LiftTable.load(own_data / "a.npz"))
+    assert count > 50 and [*shipped.values()][:3] == planned
+    provenance = read_provenance("b")
     assert provenance["settings"]["lifts"] == count
-    shipped = read_provenance(files.SHIPPED, "lifts")["settings"]
-    assert [*shipped.values()][:3] == planned
     # What is kept is not computed again.
-    lifts.lift_data(tmp_path / "c", tmp_path / "a/runs")
-    again = read_provenance(tmp_path / "c", "lifts")
-    assert again["wall_time_s"] == provenance["wall_time_s"]
+    monkeypatch.setattr(lifts, "LIFTS_FILE", own_data / "c.npz")
+    lifts.lift_data()
+    assert read_provenance("c") == provenance

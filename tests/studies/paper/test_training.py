@@ -12,6 +12,7 @@ from studies.grid import read_policies
 from studies.paper import training
 from studies.paper.training import PAPER
 from unload import TrainConfig, load_policy
+from unload.support import files
 
 
 @pytest.mark.parametrize(
@@ -28,8 +29,9 @@ def test_policies_play_elsewhere_once_their_cell_is_trained(
 ):
     trained = []
     monkeypatch.setattr(training, "train_grid", lambda *given: trained.append(given))
-    training.training_data(cells, picks, shipped=tmp_path)
-    assert trained == [(PAPER, cells, picks, paths.DATA, paths.RUNS, -1)]
+    monkeypatch.setattr(files, "SHIPPED", tmp_path)
+    training.training_data(cells, picks)
+    assert trained == [(PAPER, cells, picks, -1)]
     policies = read_policies(paths.DATA / "falls/paper.safetensors")
     assert [*policies] == [*PAPER.configs()]
     for seed, name in {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}.items():

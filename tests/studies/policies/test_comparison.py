@@ -8,12 +8,11 @@ import pandas as pd
 import pytest
 import torch
 
-from studies import paths
 from studies.policies import comparison, robustness
 from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
-from studies.results import read_provenance
+from studies.results import read_provenance, read_table
 from tests.agent.runs import lowest
 from unload import PEQNetwork, evaluate, load_policy, policies, task
 from unload.env.observation import nearest
@@ -24,19 +23,19 @@ from unload.physics.situation import Surroundings
 from unload.support import files
 
 
-def test_a_comparison_holds_the_rows_of_evaluate(tmp_path, monkeypatch):
+def test_a_comparison_holds_the_rows_of_evaluate(own_data, monkeypatch):
     monkeypatch.setattr(comparison, "LOADS", 1)
     conditions = {"500 picks": {}, "σ 5 cm": {"position_noise": 0.05}}
     monkeypatch.setattr(comparison, "CONDITIONS", conditions)
-    comparison_data(tmp_path, n_jobs=1)
-    table = pd.read_csv(tmp_path / "policies/comparison.csv")
+    comparison_data(n_jobs=1)
+    table = read_table("policies/comparison")
     played = table[["condition", "policy", "mask"]].itertuples(index=False, name=None)
     assert list(played) == [(name, *player) for name in conditions for player in PLAYERS]
     rows = table.query("policy == 'highest' and condition == 'σ 5 cm'").reset_index()
     expected = evaluate(policies.highest, 1, comparison.SEED, position_noise=0.05)
     pd.testing.assert_frame_equal(rows[expected.columns], expected, rtol=1e-5)
     assert table["load"].unique().tolist() == [0]
-    assert read_provenance(tmp_path / "policies", "comparison")["settings"]["loads"] == 1
+    assert read_provenance("policies/comparison")["settings"]["loads"] == 1
 
 
 @pytest.mark.parametrize("condition", comparison.CONDITIONS)
@@ -58,9 +57,9 @@ def test_committed_data_is_of_the_committed_policies_and_of_the_plan():
         },
     }  # fmt: skip
     for name, planned in settings.items():
-        found = read_provenance(paths.DATA / "policies", name)["settings"]
+        found = read_provenance(f"policies/{name}")["settings"]
         assert found == {"policies": digests()} | planned
-    played = pd.read_csv(paths.DATA / "policies/robustness.csv")[["policy", "after_pick"]]
+    played = read_table("policies/robustness")[["policy", "after_pick"]]
     assert [*played.drop_duplicates().itertuples(index=False, name=None)] == [*robustness.PLAYED]
 
 
@@ -70,11 +69,12 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
     file = "policies/paper.safetensors"
     (tmp_path / file).write_bytes((files.SHIPPED / file).read_bytes())
     monkeypatch.setattr(comparison, "CARD_LOADS", 2)
-    comparison.write_cards(tmp_path)
+    monkeypatch.setattr(files, "SHIPPED", tmp_path)
+    comparison.write_cards()
     card = load_policy(tmp_path / file).card
     assert card == load_policy("paper").card | {
-        comparison.loads_of(scale): comparison.measure(load_policy("paper"), scale)
-        for scale in comparison.SCALES
+        name: comparison.measure(load_policy("paper"), scale)
+        for scale, name in comparison.SCALES.items()
     }
     known = card["on the paper's loads"]
     assert known["picks"] == 1000 and known["misses"] == round(1000 * (1 - known["msr"]))
@@ -87,13 +87,13 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", comparison.ORIGINS)
 def test_what_ships_is_of_the_training_of_its_grid(name):
     card, (grid, _) = load_policy(name).card, comparison.ORIGINS[name]
-    assert card["fingerprint"] == read_provenance(paths.DATA, grid)["fingerprint"]
+    assert card["fingerprint"] == read_provenance(grid)["fingerprint"]
     assert card["picks"] == card["configuration"]["picks"]
 
 
 def test_the_recommended_policy_does_not_miss():
     card = load_policy("recommended").card
-    measured = [card[comparison.loads_of(scale)] for scale in comparison.SCALES]
+    measured = [card[name] for name in comparison.SCALES.values()]
     assert [each["misses"] for each in measured] == [0, 0, 0]
     assert measured[0]["picks"] == 500 * comparison.CARD_LOADS
 
@@ -132,23 +132,24 @@ def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, fre
     assert row["success_rate"] == (distance > 0.2)
 
 
-def test_a_stopped_run_goes_on(tmp_path, monkeypatch):
+def test_a_stopped_run_goes_on(own_data, monkeypatch):
     play = robustness.play
     small = {"PLAYED": (("highest", "keep"), ("highest", "restore")), "EPISODES": 2, "PICKS": 2}
     small["play"] = partial(play, stack=lambda rng: front_walls(stack_load(rng), 1))
     for name, value in small.items():
         monkeypatch.setattr(robustness, name, value)
-    robustness.robustness_data(tmp_path, tmp_path / "runs")
-    written = (tmp_path / "policies/robustness.csv").read_text()
-    table = pd.read_csv(tmp_path / "policies/robustness.csv")
-    assert table["after_pick"].tolist() == 2 * ["keep"] + 2 * ["restore"]
-    assert read_provenance(tmp_path / "policies", "robustness")["settings"]["episodes"] == 2
+    robustness.robustness_data()
+    written = (own_data / "policies/robustness.csv").read_text()
+    assert read_table("policies/robustness")["after_pick"].tolist() == 2 * ["keep"] + 2 * [
+        "restore"
+    ]
+    assert read_provenance("policies/robustness")["settings"]["episodes"] == 2
     monkeypatch.setattr(robustness, "ContainerEnv", lambda *_, **__: pytest.fail("played again"))
-    robustness.robustness_data(tmp_path, tmp_path / "runs")
-    assert (tmp_path / "policies/robustness.csv").read_text() == written
+    robustness.robustness_data()
+    assert (own_data / "policies/robustness.csv").read_text() == written
     monkeypatch.setattr(robustness, "play", partial(play, stack=two_walls))
     with pytest.raises(pytest.fail.Exception, match="played again"):
-        robustness.robustness_data(tmp_path, tmp_path / "runs")
+        robustness.robustness_data()
 
 
 def test_front_walls_keep_their_place(full_load):

@@ -5,11 +5,11 @@ from dataclasses import asdict, replace
 import pytest
 
 from studies import grid
-from studies.grid import read_measures
 from studies.policies import variants
 from studies.policies.variants import GRIDS, PARTS, REWARDS, judged, read_variants, variants_data
-from studies.results import read_provenance
+from studies.results import read_provenance, read_table
 from unload import TrainConfig, evaluate, load_policy
+from unload.support import files
 
 FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
 
@@ -42,11 +42,11 @@ def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
 
 def test_the_recommended_policy_is_judged_as_the_data_say():
     policy = load_policy("recommended")
-    first = read_measures(GRIDS["recommended"]).iloc[0]
+    first = read_table("variants/recommended").iloc[0]
     assert judged(policy, variants.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
 
 
-def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
+def test_grids_are_trained_and_read_back(own_data, monkeypatch):
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
     small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5, picks=200)
     for name, cells in (("variants", REWARDS), ("recommended", GRIDS["recommended"].cells)):
@@ -56,10 +56,9 @@ def test_grids_are_trained_and_read_back(tmp_path, monkeypatch):
         }
         monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
     monkeypatch.setattr(variants, "LOADS", {"episodes": 1, "seed": 1000})
-    folders = {"folder": tmp_path, "runs_dir": tmp_path / "runs", "shipped": tmp_path}
-    variants_data(n_jobs=1, **folders)
-    rows = read_measures(GRIDS["variants"], tmp_path)
+    monkeypatch.setattr(files, "SHIPPED", own_data)
+    variants_data(n_jobs=1)
+    rows = read_table("variants/variants")
     assert rows["cell"].tolist() == [*REWARDS] and rows["msr_mask"].between(0, 1).all()
-    provenance = read_provenance(tmp_path, "variants/recommended")
-    assert provenance["fingerprint"] == "f"
-    assert not load_policy(tmp_path / "policies/recommended.safetensors").equalize
+    assert read_provenance("variants/recommended")["fingerprint"] == "f"
+    assert not load_policy(own_data / "policies/recommended.safetensors").equalize

@@ -9,6 +9,8 @@ from unittest.mock import MagicMock
 import numpy as np
 import pytest
 
+from studies import paths
+from studies.results import read_table
 from studies.seamless import episodes, jam_tables, jams, mujoco_jams
 from studies.seamless.jams import Case, SeamlessPhysics
 from unload import task
@@ -171,7 +173,7 @@ def attempt(box, out, jammed, covered=False, beside=1) -> dict:
     return {"box": box, "out": out, "covered": covered, "beside": beside, "distance": distance}
 
 
-def test_what_is_counted_of_all_cases_is_written(tmp_path, monkeypatch):
+def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
     """Each case by itself; attempts by what was taken out, by place, and by what was between."""
     asked = [("fresh", Case(0)), ("lasting", Case(1)), ("width", Case(2, gap=-0.0001, picks=25))]
     monkeypatch.setattr(jams, "cases", lambda: asked)
@@ -197,13 +199,14 @@ def test_what_is_counted_of_all_cases_is_written(tmp_path, monkeypatch):
         attempt(7, 30, False), attempt(6, 31, True, True, 5), attempt(5, 31, False, True, 3),
     ]  # fmt: skip
     monkeypatch.setattr(episodes, "episode", lambda *_: attempts)
-    jam_tables.both_data(tmp_path, tmp_path / "runs", 1)
+    jam_tables.both_data(1)
     tables = {
-        name: jam_tables.read_jams(name, tmp_path)
+        name: read_table(f"seamless/{name}")
         for name in ("jams", "jam_lasting", "jam_episodes", "jam_first", "jam_again")
     }
     for name, table in tables.items():
-        assert [*table] == [*jam_tables.read_jams(name)]
+        committed = paths.ROOT / f"data/seamless/{name}.csv"
+        assert committed.read_text().startswith(",".join(table) + "\n")
     counted = tables["jams"][["question", "load", "gap", "moment", "free", "jammed", "median"]]
     assert counted.to_numpy().tolist() == [
         ["fresh", 0, 0, 0, 1, 1, 0.1], ["width", 2, -0.0001, 25, 3, 1, 0.2],
@@ -248,20 +251,20 @@ def test_what_is_published_are_the_planned_cases():
         return [tuple(round(x, 6) if isinstance(x, float) else x for x in row) for row in rows]
 
     names = [field.name for field in fields(Case)]
-    counted = jam_tables.read_jams().rename(columns={"moment": "picks"})
+    counted = read_table("seamless/jams").rename(columns={"moment": "picks"})
     assert (counted["free"][counted["walls"] == 12] == jams.MOST_LIFTS).all()
     counted = counted[["question", *names]]
     planned = [(kind, *astuple(case)) for kind, case in jams.cases() if kind != "lasting"]
     assert rounded(counted.itertuples(index=False)) == rounded(planned)
 
     keys = ["load", "friction", "again"]
-    lasting = jam_tables.read_jams("jam_lasting").drop_duplicates(keys)[keys]
+    lasting = read_table("seamless/jam_lasting").drop_duplicates(keys)[keys]
     planned = [case for kind, case in jams.cases() if kind == "lasting"]
     planned = [(case.load, case.friction, case.again) for case in planned]
     assert list(lasting.itertuples(index=False, name=None)) == planned
 
     keys = ["load", "walls", "friction", "gap", "policy", "after_pick"]
-    played = jam_tables.read_jams("jam_episodes")
+    played = read_table("seamless/jam_episodes")
     counts = played[played["policy"] == "random"].groupby(keys)[["attempts", "jammed"]].sum()
     for (load, walls, *_), (attempts, jammed) in counts.iterrows():
         left = len(jams.load_of(Case(load, walls))) - attempts + jammed
@@ -273,12 +276,12 @@ def test_what_is_published_are_the_planned_cases():
         for case, policy, after_pick in episodes.cases()
     ]
 
-    other = mujoco_jams.read_mujoco()[["load", "friction", "gap", "settle"]]
+    other = read_table("seamless/mujoco_jams")[["load", "friction", "gap", "settle"]]
     planned = [(case.load, case.friction, case.gap, case.settle) for case in mujoco_jams.cases()]
     assert list(other.itertuples(index=False, name=None)) == planned
 
 
-def test_each_box_is_lifted_from_the_settled_state(tmp_path, monkeypatch):
+def test_each_box_is_lifted_from_the_settled_state(own_data, monkeypatch):
     """In place of MuJoCo: in a step a body rises by its number times the force, / 500,000."""
     case, engine = Case(0, walls=1, settle=0.25), MagicMock()
     load = jams.load_of(case)
@@ -295,7 +298,7 @@ def test_each_box_is_lifted_from_the_settled_state(tmp_path, monkeypatch):
     engine.mj_setState.side_effect = lambda *_: data.xfrc_applied.fill(0)
     monkeypatch.setitem(sys.modules, "mujoco", engine)
     monkeypatch.setattr(mujoco_jams, "cases", lambda: [case])
-    mujoco_jams.mujoco_data(tmp_path, tmp_path / "runs", 1)
+    mujoco_jams.mujoco_data(1)
     calls = [name for name, *_ in engine.method_calls if name.startswith("mj_")]
     lift = ["mj_setState", "mj_forward", *["mj_step"] * 72]
     settle = [*["mj_step"] * 60, "mj_stateSize", "mj_getState"]
@@ -303,7 +306,7 @@ def test_each_box_is_lifted_from_the_settled_state(tmp_path, monkeypatch):
     assert calls == settle + lift * len(free)
     lifted = (free + 1) * 20 * 72 / 500_000
     assert mujoco_jams.distances(case) == pytest.approx(lifted)
-    row = mujoco_jams.read_mujoco(tmp_path).iloc[0]
+    row = read_table("seamless/mujoco_jams").iloc[0]
     expected = [0.25, len(free), (lifted < task.LIFT_THRESHOLD).sum(), np.median(lifted)]
     assert row[["settle", "free", "jammed", "median"]].tolist() == pytest.approx(expected, 1e-5)
 

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from fnmatch import fnmatch
-from shutil import copy
+from shutil import copytree
 
 import numpy as np
 import pandas as pd
@@ -11,7 +11,8 @@ import pytest
 
 from studies import grid, paths
 from studies.grid import Cell, Grid, read_grid
-from studies.seamless import figures, jam_tables, training
+from studies.results import read_table
+from studies.seamless import figures, training
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from tests.studies.curves import curve
@@ -48,42 +49,42 @@ def test_the_first_episode_of_a_published_run_is_trained_again(name):
         assert found[column] == pytest.approx(published[column], rel=1e-4)
 
 
-def test_a_full_grid_leaves_what_the_papers_plots_read(tmp_path, monkeypatch):
+def test_a_full_grid_leaves_what_the_papers_plots_read(own_data, monkeypatch):
     monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
     config = TrainConfig(picks=64 * 500, batch_size=64, n_features=4, log_interval=500)
     cells = {EXPORTED[0]: Cell(config, [EXPORTED[1]], training.ANEW)}
     small = Grid("seamless/runs", "make it", cells)
     for name, value in (("SEAMLESS", small), ("CELLS", cells)):
         monkeypatch.setattr(training, name, value)
-    training.seamless_data(None, None, tmp_path, tmp_path / "runs", n_jobs=1)
-    curve = read_grid(small, tmp_path)
+    training.seamless_data(n_jobs=1)
+    curve = read_grid(small)
     for name in NAMES:
-        table = pd.read_csv(tmp_path / name)
+        table = pd.read_csv(own_data / name)
         assert list(table.columns) == ["Wall time", "Step", "Value"]
         assert table["Step"].tolist() == curve["picks"].tolist()
     reward = table["Value"] / 500
     assert ((reward + 1) / 2).tolist() == pytest.approx(curve["success_rate"].tolist(), abs=1e-5)
     # Neither of other cells nor of shorter runs.
-    monkeypatch.setattr(training, "train_grid", lambda *_: tmp_path)
+    monkeypatch.setattr(training, "train_grid", lambda *_: own_data)
     monkeypatch.setattr(training, "export", lambda *_: pytest.fail("exported"))
     training.seamless_data(["mask_order"])
     training.seamless_data(None, 64_000)
 
 
-def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path):
+def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path, monkeypatch):
     curves = read_grid(training.SEAMLESS, cells=[EXPORTED[0]])
     found = seamless_plan(curves[curves["seed"] == EXPORTED[1]])
     assert found["fig11"] and found["fig12"]
-    (tmp_path / "seamless").mkdir()
-    for name in ("seamless/runs_success_rate.csv", "seamless/runs_loss.csv"):
-        copy(paths.DATA / name, tmp_path / name)
-    training.export(pd.read_csv(paths.DATA / NAMES[1])["Wall time"], tmp_path)
+    committed = paths.DATA
+    copytree(committed / "seamless", tmp_path / "seamless")
+    monkeypatch.setattr(paths, "DATA", tmp_path)
+    training.export(pd.read_csv(committed / NAMES[1])["Wall time"])
     for name in NAMES:
-        assert (tmp_path / name).read_bytes() == (paths.DATA / name).read_bytes()
+        assert (tmp_path / name).read_bytes() == (committed / name).read_bytes()
 
 
 def test_measured_jams_are_those_of_the_published_table():
-    first = jam_tables.read_jams("jam_first")
+    first = read_table("seamless/jam_first")
     first = first.assign(share=first["jammed"] / first["free"])
     for friction, shares in training.BY_PLACE.items():
         table = first[first["friction"] == friction]
