@@ -152,9 +152,6 @@ def test_spaces_and_metadata():
     assert envs.observation_space.shape == (5, 128, 3) and envs.num_envs == 5
     assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
     assert envs.spec.max_episode_steps is None  # but max_picks
-    for env in (single, envs, gymnasium.make(HIGHEST), gymnasium.make_vec(HIGHEST, 2)):
-        assert not env.unwrapped.equalize
-    assert envs.observation_space.contains(envs.reset(seed=0)[0])
 
 
 def test_seeds():
@@ -172,12 +169,9 @@ def test_seeds():
     ("name", "value", "error", "message"),
     [
         ("actions", [0, 128], ValueError, "actions holds 0 to 128; expected 0 to 127"),
-        ("actions", [-1, 0], ValueError, "actions holds -1 to 0"),
         ("actions", [0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
-        ("actions", [0.0, 1.0], TypeError, "actions has dtype float64"),
         ("seed", -1, ValueError, "seed is -1"),
         ("seed", [1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
-        ("seed", [1, "2"], TypeError, "seed is '2'"),
         ("seed", [1, -1], ValueError, "seed is -1; expected an integer >= 0"),
     ],
 )
