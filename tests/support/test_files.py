@@ -58,17 +58,6 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
     assert "*.partial" in (ROOT / ".gitignore").read_text().splitlines()
 
 
-def test_of_two_that_write_one_file_the_last_to_finish_wins(tmp_path):
-    path = tmp_path / "file"
-
-    def write(file):
-        files.write_text(path, "the other's")
-        file.write(b"whole")
-
-    files.write_atomically(path, write)
-    assert path.read_text() == "whole" and [path] == list(tmp_path.iterdir())
-
-
 def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
     path, objects = tmp_path / "arrays.npz", {"a": np.array([{"x": 1}], dtype=object)}
     files.write_arrays(path, ARRAYS)
