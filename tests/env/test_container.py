@@ -89,6 +89,7 @@ def test_the_reward_needs_the_threshold(monkeypatch):
     for distance, reward in ((0.2, 1), (0.1999, -1), (0.46, 1), (0.0, -1)):
         monkeypatch.setattr(env.unwrapped.physics, "lift", lambda item, d=distance: d)
         assert env.step(0)[1] == reward
+        assert env.unwrapped.liftable().tolist() == [reward == 1] * 128
 
 
 def test_truncation_after_max_picks():
@@ -112,13 +113,14 @@ def test_drifting_boxes_are_seen_where_they_are():
     seen, *_ = env.step(127)
     drift = container.observed_positions() - neat
     assert 0 < np.abs(drift).max() < 0.02
-    expected = observation.scale((neat + drift)[container.visible])
-    assert (seen == expected).all()
-    present = container.physics.present
-    pictures = [
-        snapshot(container.physics.load, present, places) for places in (neat + drift, neat)
-    ]
-    assert [(picture == env.render()).all() for picture in pictures] == [True, False]
+    assert (seen == observation.scale((neat + drift)[container.visible])).all()
+    _, reward, *_ = env.step(seen[:, 2].argmax())
+    load, present = container.physics.load, container.physics.present
+    places = container.observed_positions()
+    picture = snapshot(load, present, places)
+    assert reward == 1 and (picture == env.render()).all()
+    for shown, where in ((np.ones_like(present), places), (present, neat)):
+        assert (snapshot(load, shown, where) != picture).any()
     with pytest.raises(ValueError, match="after_pick lets .*expected 'restore'"):
         container.liftable()
 
@@ -174,22 +176,19 @@ def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing():
     ids=str,
 )
 def test_every_physics_goes_to_the_last_item(kwargs):
-    env = small_env(3, render_mode="rgb_array", **kwargs)
+    env = small_env(3, **kwargs)
     seen, _ = env.reset(seed=0)
-    before = env.render()
-    env.step(100)
     rewards, terminated = [], False
     while not terminated:
         row = int(np.where(observation.holds_item(seen), seen[:, 2], -2).argmax())
         seen, reward, terminated, _, _ = env.step(row)
         rewards.append(reward)
-    assert rewards == [1, 1, 1] and env.render().shape == (480, 640, 3)
-    assert (env.render() != before).any()
+    assert rewards == [1, 1, 1]
 
 
 @pytest.mark.parametrize(
     ("action", "error"),
-    [(128, ValueError), (-1, ValueError), (3.5, TypeError), (np.array([3]), TypeError)],
+    [(128, ValueError), (-1, ValueError), (np.array([3]), TypeError)],
 )
 def test_bad_actions_change_nothing(action, error):
     env, untouched = (ContainerEnv(physics="table") for _ in range(2))

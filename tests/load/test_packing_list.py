@@ -217,7 +217,6 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m \(the first"),
         ([UNIT, "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
-        (["a,0,0,0,1,1,"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z ''"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
         ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 7)], r"row 5 \(id '6'\): reaches from"),
@@ -242,12 +241,8 @@ def test_files_that_are_no_lists_are_refused(written, tmp_path):
     ):
         with pytest.raises(ValueError, match=message):
             read_load(written("a,1", columns=columns))
-    (tmp_path / "picture.csv").write_bytes(b"\x89PNG\xff\xfe")
-    (tmp_path / "empty.csv").write_bytes(b"")
-    archives = [f"boxes.csv{ending}" for ending in (".zip", ".gz", ".xz", ".zst", ".bz2")]
-    for name in archives:  # damaged: the beginning of one, and then nothing
-        (tmp_path / name).write_bytes(b"PK\x03\x04\x1f\x8b\xfd7zXZ\x00(\xb5/\xfd")
-    for name in ("picture.csv", "empty.csv", *archives):
+    for name, content in (("boxes.csv.gz", b"\x1f\x8b"), ("empty.csv", b"")):
+        (tmp_path / name).write_bytes(content)
         with pytest.raises(ValueError, match=f"{name} is not a readable CSV file"):
             read_load(tmp_path / name)
     with pytest.raises(FileNotFoundError):

@@ -1,7 +1,6 @@
 """What all three physics have in common, and lifts of a box in its situation."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -10,11 +9,10 @@ import pytest
 
 from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES, lifts, make
 from unload.load.boxes import SMALLEST_EDGE, Load
-from unload.physics.base import Physics
+from unload.load.substacks import build_load
 from unload.physics.bullet import World
-from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
-from unload.physics.situation import Situation, Surroundings
+from unload.physics.situation import Situation
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -26,16 +24,14 @@ def test_one_box_and_two_stacked_ones_move_as_far_as_the_appendix_says(boxes, ki
     physics.remove(1)
     assert physics.present.tolist() == [True, False]
     assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
-    physics.close()
-    assert physics._world is None
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_free_boxes_of_a_neat_wall_do_not_jam(small_load, kind):
+def test_free_boxes_of_a_neat_row_do_not_jam(kind):
     """They would, mostly, if the boxes had no gap between them."""
-    physics = make(kind, small_load)
-    around = Surroundings(small_load, physics.present)
-    free = [item for item in range(len(small_load)) if not around.on_top(item)]
+    load = build_load([[[0, 1, 1, 0]]])
+    physics = make(kind, load)
+    free = np.flatnonzero(~load.covered(physics.present))
     assert len(free) >= 8
     assert lifts(physics, free[:8]) == pytest.approx([ONE_BOX] * 8, rel=0.02)
 
@@ -57,7 +53,6 @@ def test_the_smallest_boxes_of_a_load_are_simulated(kind):
         (1, ValueError, "item 1 has been removed"),
         (2, ValueError, "item is 2; expected an integer >= 0 and <= 1"),
         (-1, ValueError, "item is -1"),
-        (0.0, TypeError, "item is 0.0"),
     ],
 )
 def test_bad_items_are_refused(boxes, kind, call, item, error, message):
@@ -68,28 +63,21 @@ def test_bad_items_are_refused(boxes, kind, call, item, error, message):
     assert physics.present.tolist() == [True, False]
 
 
-def calls_of(physics: Physics) -> list[Callable]:
-    calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
-    if isinstance(physics, FullPhysics):
-        calls.append(lambda: physics.settle(0.1))
-    return calls
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_calls_out_of_order_are_refused(boxes, kind):
     physics, load = KINDS[kind](), boxes((1.2, 0.2))
-    for call in calls_of(physics):
+    calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
+    calls += [lambda: physics.settle(0.1)] if kind == "full" else []
+    for call in calls:
         with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
             call()
     physics.reset(load)
-    if isinstance(physics, LocalPhysics):
+    if kind != "full":
         situation = physics.surroundings.situation(0)
-    physics.close()
-    physics.close()
-    calls = [*calls_of(physics), lambda: physics.reset(load)]
-    if isinstance(physics, LocalPhysics):
         calls.append(lambda: physics.simulate(situation))
-    for call in calls:
+    physics.close()
+    physics.close()
+    for call in (*calls, lambda: physics.reset(load)):
         with pytest.raises(RuntimeError, match="the physics is closed; make a new one"):
             call()
 
@@ -113,7 +101,7 @@ def test_an_interrupted_reset_needs_another_one(boxes, kind, monkeypatch):
 @pytest.mark.parametrize("kind", ["local", "table"])
 def test_a_lift_has_no_effect(small_load, kind):
     physics = make(kind, small_load)
-    items = range(20, len(small_load))
+    items = range(20, len(small_load), 3)
     forwards = [physics.lift(item) for item in items]
     assert [physics.lift(item) for item in reversed(items)] == forwards[::-1]
     assert (physics.positions() == small_load.positions).all() and physics.present.all()
@@ -124,30 +112,30 @@ def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
         patch.setattr(World, "pull", Mock(side_effect=KeyboardInterrupt))
         interrupted.simulate(situations[0])
-    for situation in situations[:10]:
+    for situation in situations[:3]:
         assert interrupted.simulate(situation) == fresh.simulate(situation)
 
 
 def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
     physics, fresh = LocalPhysics(), LocalPhysics()
-    expected = [fresh.simulate(situation) for situation in situations[:30]]
+    expected = [fresh.simulate(situation) for situation in situations[:10]]
     monkeypatch.setattr("unload.physics.local.MOST_BODIES", 3)
     for situation, distance in zip(situations, expected):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
-    assert fresh._world.bodies > 100
+    assert fresh._world.bodies > 30
 
 
-@pytest.mark.slow
 def test_the_memory_of_many_lifts_is_flat(monkeypatch):
     """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
     monkeypatch.setattr(World, "pull", lambda world, body: 0.0)
+    monkeypatch.setattr("unload.physics.local.MOST_BODIES", 1_500)
     physics, resident = LocalPhysics(), []
-    for number in range(20_001):
+    for number in range(6_001):
         boxes = np.array([(0, 0, 0, 500_000, 400_000, 300_000 + number)] * 2)
         boxes[:, 2] = 350_000 * np.arange(2)
         physics.simulate(Situation(boxes, 1, -200_000, ()))
-        if number % 5_000 == 0:
+        if number % 1_500 == 0:
             pages = int(Path("/proc/self/statm").read_text().split()[1])
             resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
-    assert max(resident[2:]) - resident[1] < 10, "MiB"
+    assert max(resident[2:]) - resident[1] < 5, "MiB"

@@ -38,14 +38,6 @@ def test_a_box_at_rest_for_long_still_lifts(make_world):
     assert world.pull(box) == pytest.approx(ONE_BOX, rel=0.02)
 
 
-def test_a_box_whose_support_is_removed_falls(make_world):
-    world, (lower, upper) = make_world(boxes=2)
-    world.step(5.0)
-    world.remove(lower)
-    world.step(0.5)
-    assert world.pose(upper)[0][2] == pytest.approx(0.15, abs=0.01)
-
-
 def test_place_puts_a_box_at_rest(make_world):
     world, (box,) = make_world()
     world.pull(box)
@@ -54,27 +46,6 @@ def test_place_puts_a_box_at_rest(make_world):
     world.step(0.1)
     fallen = np.array((1.0, 0.5, 2.0)) - world.pose(box)[0]
     assert fallen == pytest.approx([0, 0, 0.5 * task.GRAVITY * 0.1**2], abs=0.003)
-
-
-def test_two_clients_side_by_side_do_not_disturb_each_other(make_world):
-    def heights(*worlds: tuple[World, list[int]]) -> list[list[float]]:
-        """Of all boxes after each of 30 steps, the worlds taking turns."""
-        records = [[] for _ in worlds]
-        for _ in range(30):
-            for (world, boxes), record in zip(worlds, records):
-                world.pull(boxes[0], seconds=TIME_STEP)
-                record.extend(world.pose(box)[0][2] for box in boxes)
-        return records
-
-    separate = [heights(make_world(boxes=count))[0] for count in (1, 2)]
-    first, second = worlds = [make_world(boxes=count) for count in (1, 2)]
-    together = heights(*worlds)
-    assert together == separate
-    assert together[0][-1] > 0.16 and together[1] != together[0]
-    first[0].close()
-    first[0].close()
-    assert not first[0].client.isConnected()
-    assert second[0].pose(second[1][0])[0][2] == together[1][-2]
 
 
 def test_a_force_lasts_as_long_as_the_call(make_world):

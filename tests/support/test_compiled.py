@@ -41,12 +41,12 @@ def copy(tmp_path) -> Path:
     return tmp_path
 
 
-def run(copy: Path, **environment: str) -> tuple[str, str]:
+def run(copy: Path) -> tuple[str, str]:
     """What a new process that imports the module prints, and what it says besides."""
     outcome = subprocess.run(
         [sys.executable, "-c", "import unload.load.made"], cwd=copy, text=True,
         capture_output=True, check=True,
-        env=os.environ | {"PYTHONPATH": ""} | environment,
+        env=os.environ | {"PYTHONPATH": "", "NUMBA_CACHE_DIR": ""},
     )  # fmt: skip
     return outcome.stdout.strip(), outcome.stderr
 
@@ -56,40 +56,35 @@ def edit(copy: Path, old: str, new: str) -> None:
     path.write_text(path.read_text().replace(old, new))
 
 
-def test_code_is_compiled_once_until_a_constant_changes(copy):
-    printed, said = run(copy, NUMBA_CACHE_DIR="")
+def test_code_is_compiled_once_for_each_value_of_a_constant(copy):
+    printed, said = run(copy)
     assert printed == "0.3 0 0.4"
     assert said.count("compiling for this processor") == said.count("\n") == 1
     assert str(copy / "unload/__pycache__/compiled-") in said
-    assert run(copy, NUMBA_CACHE_DIR="") == ("0.3 1 0.4", "")
     edit(copy, "LIFT_THRESHOLD = 0.2", "LIFT_THRESHOLD = 0.5")
-    printed, said = run(copy, NUMBA_CACHE_DIR="")
+    printed, said = run(copy)
     assert printed == "0.6 0 0.4" and "compiling" in said
     edit(copy, "LIFT_THRESHOLD = 0.5", "LIFT_THRESHOLD = 0.2")
-    assert run(copy, NUMBA_CACHE_DIR="") == ("0.3 1 0.4", "")
+    assert run(copy) == ("0.3 1 0.4", "")
 
 
-def test_code_is_kept_where_it_can_be_written(copy):
-    chosen, user = copy / "chosen", copy / "user"
-    assert str(chosen / "compiled-") in run(copy, NUMBA_CACHE_DIR=str(chosen))[1]
-    shutil.rmtree(copy / "unload/__pycache__", ignore_errors=True)
-    (copy / "unload/__pycache__").write_text("not a folder")
-    where = {"NUMBA_CACHE_DIR": "", "XDG_CACHE_HOME": str(user)}
-    assert str(user / "unload/compiled-") in run(copy, **where)[1]
-    shutil.rmtree(user)
-    user.write_text("not a folder")
-    printed, said = run(copy, **where)
-    assert printed == "0.3 0 0.4" and said.count("set NUMBA_CACHE_DIR to a folder") == 1
-
-
-def test_a_folder_that_cannot_be_written_is_not_taken(tmp_path, monkeypatch):
-    """One that another user has made, for example."""
-    monkeypatch.setattr(compiled, "PACKAGE", tmp_path)
-    monkeypatch.setattr(compiled.tempfile, "TemporaryFile", Mock(side_effect=PermissionError))
+def test_code_is_kept_in_the_first_of_three_places_that_can_be_written(tmp_path, monkeypatch):
+    """And in memory where there is none, as in a folder that another user has made."""
+    package, chosen, user = (tmp_path / name for name in ("package", "chosen", "user"))
+    find = compiled.folder.__wrapped__
+    monkeypatch.setattr(compiled, "PACKAGE", package)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(chosen))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(user))
+    assert find().parent == chosen
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    with pytest.warns(UserWarning, match="compiled code cannot be kept"):
-        assert compiled.folder.__wrapped__() is None
+    package.mkdir()
+    (package / "__pycache__").write_text("not a folder")
+    assert find().parent == user / "unload"
+    monkeypatch.setattr(compiled.tempfile, "TemporaryFile", Mock(side_effect=PermissionError))
+    with pytest.warns(UserWarning, match="cannot be kept.* set NUMBA_CACHE_DIR to a folder"):
+        assert find() is None
+    monkeypatch.setattr(compiled, "folder", lambda: None)
+    assert compiled.compiled(lambda number: number + 1)(1) == 2
 
 
 def test_the_digest_follows_sources_and_versions(copy, monkeypatch):
@@ -98,7 +93,6 @@ def test_the_digest_follows_sources_and_versions(copy, monkeypatch):
     (package / "__init__.py").write_text("# compiled code reads nothing of this file")
     assert compiled.digest(package) == before
     for folder in ("load", "physics", "fast", "support"):
-        (package / folder / "new.py").write_text("")
         (package / folder / "new.py").write_text(f"LIMIT = {folder!r}")
         assert compiled.digest(package) != before
         (package / folder / "new.py").unlink()
