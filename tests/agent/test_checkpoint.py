@@ -114,6 +114,13 @@ def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypat
         assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
 
 
+def test_a_run_that_another_process_finishes_meanwhile_is_read(finished, monkeypatch):
+    answers = iter([False, True])
+    monkeypatch.setattr(RunFolder, "finished", property(lambda folder: next(answers)))
+    monkeypatch.setattr("unload.agent.training.Training", None)
+    assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
