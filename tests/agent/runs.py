@@ -90,9 +90,9 @@ def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
 
     given = {"progress": False, "stack": few_walls, "callback": kill}
     fork = multiprocessing.get_context("fork")
-    process = fork.Process(target=train, args=(config, folder), kwargs=given)
+    process = fork.Process(target=train, args=(config, folder), kwargs=given, daemon=True)
     process.start()
-    process.join()
+    process.join(timeout=100)  # s; a fork that hangs is a failure
     assert process.exitcode == -signal.SIGKILL
 
 
