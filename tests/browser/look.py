@@ -184,9 +184,8 @@ def shot(view: Locator, file: Path | None = None) -> np.ndarray:
 
 
 def is_drawn(pixels: np.ndarray) -> bool:
-    """Whether a picture shows boxes: they are coloured or dark, and more than text and axes."""
-    marked = (np.ptp(pixels, axis=2) > 40) | (pixels.max(axis=2) < 225)
-    return float(marked.mean()) > 0.02
+    """Whether a picture shows boxes: they alone are coloured, on a ground of either theme."""
+    return float((np.ptp(pixels, axis=2) > 25).mean()) > 0.02
 
 
 def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:
