@@ -10,5 +10,5 @@ Read ``grid`` first (an experiment of training runs, spread over processes by ``
 trains as it did, ``exercise`` whether a reader's answer is right. ``__main__`` is the command line.
 
 Everywhere "n_jobs" is a number of processes as in joblib. A bad argument is refused by a TypeError
-or ValueError that names it, missing data by a FileNotFoundError that names the command to make it.
+or ValueError that names it, missing data by a FileNotFoundError that names the file.
 """

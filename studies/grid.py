@@ -62,7 +62,7 @@ class Grid(NamedTuple):
         command: what trains the grid.
         cells: by name.
         measure: of a trained policy and its configuration. A grid with one publishes what it
-            returns, a table of its own name with a row per run, instead of curves and policies.
+            returns instead of curves and policies: one table, with a row per run.
         policies: whether the trained policies are published beside the curves.
     """
 

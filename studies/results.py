@@ -163,7 +163,8 @@ def read_table(name: str | Path) -> pd.DataFrame:
     """The table ``data/<name>.csv``; what publishes it says what its columns are."""
     path = paths.DATA / f"{name}.csv"
     if not path.is_file():
-        raise FileNotFoundError(f"{path} is missing; {COMMAND} paper makes all tables")
+        said = f"the command that makes it stands in a {path.parent}/*.provenance.json"
+        raise FileNotFoundError(f"{path} is missing; {said}")
     return pd.read_csv(path)
 
 

@@ -35,7 +35,7 @@ from unload.support import files
 
 # Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
 CARD_LOADS, CARD_SEED = 200, 5000
-# What a card calls the measures on loads whose boxes have another scale, by the scale.
+# What a card calls the measures on the paper's loads, and on those with boxes of another scale.
 SCALES = {1.0: "on the paper's loads", 0.8: "on boxes × 0.8", 1.2: "on boxes × 1.2"}
 _DEFAULT = training.PAPER.cells[training.DEFAULTS].config
 # By name: the grid whose run it is, and the run's configuration.

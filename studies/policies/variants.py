@@ -89,7 +89,7 @@ def variants_data(grids: Sequence[str] = tuple(GRIDS), n_jobs: int = -1) -> None
 
 
 def read_variants(part: str) -> pd.DataFrame:
-    """What the policies of one of ``PARTS`` reach, a row per ``cell`` and ``seed``: ``judged``."""
+    """What ``judged`` says of the policies of one of ``PARTS``, a row per ``cell`` and ``seed``."""
     checks.one_of("part", part, PARTS)
     rows = read_table(GRIDS["variants"].name)
     return rows[rows["cell"].isin(PARTS[part])]

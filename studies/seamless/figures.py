@@ -17,9 +17,10 @@ MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: 
 SMOOTH = 16  # episodes of all containers, about half a million picks
 
 
-def draw_panels(
+@styled
+def over_picks(
     curves: pd.DataFrame, column: str, panels: Mapping[str, Mapping[str, str]]
-) -> tuple[Figure, np.ndarray]:
+) -> Figure:
     """A measure of all runs over picks, a panel for each setting (Figs. 11 and 12).
 
     Thin lines are means over episodes of all containers, strong ones running means of the first
@@ -29,9 +30,6 @@ def draw_panels(
         curves: ``cell``, ``seed``, ``picks`` and the measure.
         column: which measure.
         panels: the cells of each by a key of ``MASK_LINES``, by its title.
-
-    Returns:
-        The figure, and its panels' axes.
     """
     figure, (all_axes,) = plt.subplots(
         1, len(panels), figsize=(3 + 2.6 * len(panels), 3.6), sharex=True, sharey=True,
@@ -50,7 +48,7 @@ def draw_panels(
     figure.get_layout_engine().set(wspace=0.06)  # the last tick of a panel, the first of the next
     handles, labels = all_axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2)
-    return figure, all_axes
+    return figure
 
 
 @styled

@@ -88,9 +88,11 @@ def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
         if point["picks"] == picks:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    given = {"progress": False, "stack": few_walls, "callback": kill}
-    fork = multiprocessing.get_context("fork")
-    process = fork.Process(target=train, args=(config, folder), kwargs=given, daemon=True)
+    def run():
+        torch.set_num_threads(1)  # OpenMP's threads do not live in a fork
+        train(config, folder, progress=False, stack=few_walls, callback=kill)
+
+    process = multiprocessing.get_context("fork").Process(target=run, daemon=True)
     process.start()
     process.join(timeout=100)  # s; a fork that hangs is a failure
     assert process.exitcode == -signal.SIGKILL

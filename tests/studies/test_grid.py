@@ -33,14 +33,18 @@ SMALL = grid.Grid("some/small", "make small", CELLS)
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("grid")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(grid, "training_fingerprint", lambda networks: "f")
-        patch.setattr(paths, "DATA", folder)
-        patch.setattr(paths, "RUNS", folder / "runs")
-        grid.train_grid(SMALL, n_jobs=1)
-        yield folder
+def folder(tmp_path_factory):
+    """Of all tests of the small grid, which is trained once."""
+    return tmp_path_factory.mktemp("grid")
+
+
+@pytest.fixture
+def trained(folder, monkeypatch):
+    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
+    monkeypatch.setattr(paths, "DATA", folder)
+    monkeypatch.setattr(paths, "RUNS", folder / "runs")
+    grid.train_grid(SMALL, n_jobs=1)
+    return folder
 
 
 def test_a_grid_is_read_as_it_was_trained(trained):
@@ -58,7 +62,8 @@ def test_a_grid_is_read_as_it_was_trained(trained):
 
 
 def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained, monkeypatch):
-    before = (trained / "some/small_loss.csv").read_bytes()
+    names = ("some/small_loss.csv", "some/small.safetensors")
+    before = [(trained / name).read_bytes() for name in names]
     for cell, message in {
         "nothing": "cells is 'nothing'; expected one of 'plain', ",
         "plain": "would hold 2 finished runs; expected at least as many as the 4",
@@ -69,7 +74,7 @@ def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained, monke
     assert not (trained / "other").exists()  # refused before hours of training
     grid.train_grid(SMALL, n_jobs=1)  # as many
     grid.train_grid(SMALL, ["plain"], 320, n_jobs=1)
-    assert (trained / "some/small_loss.csv").read_bytes() == before
+    assert [(trained / name).read_bytes() for name in names] == before
     provenance = read_provenance(SMALL.name)
     assert (provenance["runs"], provenance["planned"], provenance["reduced"]) == (4, 4, False)
     assert provenance["settings"]["averaged_mask"]["mask"] is True

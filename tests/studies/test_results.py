@@ -104,8 +104,9 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     assert not more["reduced"]
 
 
-def test_a_table_is_read_and_a_missing_one_names_the_command_that_makes_it(own_data):
-    with pytest.raises(FileNotFoundError, match="t.csv is missing; python -m studies paper makes"):
+def test_a_table_is_read_and_of_a_missing_one_is_said_where_its_command_stands(own_data):
+    message = f"t.csv is missing; the command that makes it stands in a {own_data}/"
+    with pytest.raises(FileNotFoundError, match=message):
         read_table("t")
     (own_data / "t.csv").write_text("a,b,c\n1,,x\n")
     assert read_table("t").shape == (1, 3)

@@ -68,6 +68,10 @@ def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
     laboratory.laboratory_data(["mirrored"], n_jobs=1)
     assert [path.name for path in (own_data / "reduced/falls").glob("*.csv")] == ["laboratory.csv"]
     assert read_provenance("reduced/falls/laboratory")["reduced"]
+    full = (own_data / "falls/laboratory.csv").stat().st_mtime_ns
+    laboratory.laboratory_data([*small], seeds=1, n_jobs=1)
+    assert len(read_table("reduced/falls/laboratory")) == 2
+    assert (own_data / "falls/laboratory.csv").stat().st_mtime_ns == full
 
 
 @pytest.mark.parametrize(
@@ -318,7 +322,7 @@ def test_a_surface_is_the_height_of_the_highest_boxes(boxes, monkeypatch):
 
     def left(policy, picks, seed):
         asked.append((picks, seed))
-        return boxes((1.0, 0.2), (1.0, 0.6))
+        return boxes((1.0, 0.6), (1.0, 0.2))
 
     monkeypatch.setattr(measures, "left", left)
     expected = np.zeros((70, 25))

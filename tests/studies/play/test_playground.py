@@ -21,6 +21,7 @@ from studies.play.explore import Explore
 from studies.play.playground import SHOWN, Playground
 from studies.play.replay import replay
 from unload import ContainerEnv, policies, stack_load
+from unload.env.observation import drift
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -272,6 +273,18 @@ def test_the_settings_show_why_the_agent_is_stuck(stuck, changed, can):
     assert ("item 637 of" in title) is not can
     ranks = int(title.split()[0])
     assert ranks < 30 if changed == {"ties": "average"} else ranks == 128
+
+
+def test_noise_is_in_millimetres(stuck, monkeypatch):
+    asked = []
+
+    def noted(count, sigma, rng):
+        asked.append(sigma)
+        return drift(count, sigma, rng)
+
+    monkeypatch.setattr("studies.play.agent_view.drift", noted)
+    agent_view(stuck, **SETTINGS)
+    assert set(asked) == {0.0005}
 
 
 def test_chance_mixes_the_greedy_and_a_random_pick(full_load):
