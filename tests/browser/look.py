@@ -184,8 +184,12 @@ def shot(view: Locator, file: Path | None = None) -> np.ndarray:
 
 
 def is_drawn(pixels: np.ndarray) -> bool:
-    """Whether a picture shows boxes: they alone are coloured, on a ground of either theme."""
-    return float((np.ptp(pixels, axis=2) > 25).mean()) > 0.02
+    """Whether a picture shows boxes: coloured or grey ones, more than text, on a white ground.
+
+    A view that is not drawn is all white, or as dark as the page.
+    """
+    marked = (np.ptp(pixels, axis=2) > 40) | (pixels.max(axis=2) < 225)
+    return 0.02 < float(marked.mean()) < 0.9
 
 
 def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:
