@@ -184,7 +184,6 @@ def compare(n_jobs: int = 1) -> pd.DataFrame:
     Returns:
         ``table.csv``, see ``compared``.
     """
-    command = f"{COMMAND} {NAME}"
     rules = read_table(f"{NAME}/rules")
     planned = plan(rules, paths.DATA / NAME / "networks.safetensors")
     players = {cell: (player, TEST_HEAPS) for cell, player in planned.items()}
@@ -204,7 +203,7 @@ def compare(n_jobs: int = 1) -> pd.DataFrame:
     }  # fmt: skip
     results = [answer for of in played.values() for answer in of]
     tables = {"episodes": episodes, "table": table}
-    publish(f"{NAME}/table", tables, command, settings, results)
+    publish(f"{NAME}/table", tables, f"{COMMAND} {NAME}", settings, results)
     return table
 
 
