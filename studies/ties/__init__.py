@@ -1,0 +1,5 @@
+"""How equal coordinates are ranked, and what that does to a run of the paper's length.
+
+In reading order: ``noise`` (ties broken by noise that goes on while a container is unloaded),
+``training`` (the runs).
+"""
