@@ -12,6 +12,7 @@ from studies.policies import comparison, robustness, variants
 from studies.results import COMMAND, JOBS
 from studies.seamless import jam_tables
 from studies.seamless import training as seamless
+from studies.ties import creep, leak
 from studies.ties import training as ties
 from unload.agent.config import TrainConfig
 from unload.support import checks
@@ -44,6 +45,8 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
+    "creep": ("how long the order of equals lasts in PyBullet", creep.creep_data, JOBS),
+    "leak": ("what ties by the items' order tell a network", leak.leak_data, JOBS),
     "ties": ("how equal coordinates are ranked", ties.ties_data, ties.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),

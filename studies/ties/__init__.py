@@ -1,5 +1,6 @@
 """How equal coordinates are ranked, and what that does to a run of the paper's length.
 
-In reading order: ``noise`` (ties broken by noise that goes on while a container is unloaded),
-``training`` (the runs).
+In reading order: ``creep`` (what PyBullet's own noise does), ``noise`` (ties broken by noise that
+goes on while a container is unloaded), ``training`` (the runs), ``criterion`` (whether a run is
+like the paper's).
 """

@@ -3,6 +3,7 @@
 import runpy
 import sys
 from functools import partial
+from importlib.util import find_spec
 
 import pytest
 
@@ -11,6 +12,7 @@ from studies import paths
 from studies.exercise import check
 from studies.paper import visible_items
 from studies.results import read_provenance
+from unload.support import files
 
 
 @pytest.fixture
@@ -72,6 +74,17 @@ def test_help_names_every_part(monkeypatch, capsys):
         runpy.run_path(command.__file__, run_name="__main__")
     shown = " ".join(capsys.readouterr().out.split())
     assert all(f" {name} {text} " in shown for name, (text, *_) in command.PARTS.items())
+
+
+def test_every_provenance_names_a_command_of_today():
+    for path in paths.DATA.rglob("*.provenance.json"):
+        record = files.read_json(path)
+        today = record.get("present_command", record["command"]).split()
+        assert today[:2] == ["python", "-m"], path
+        if today[2] == "studies":
+            assert today[3] in command.PARTS, path
+        else:
+            assert find_spec(today[2]), path
 
 
 def test_no_committed_file_is_too_large():
