@@ -1,10 +1,10 @@
-"""Twenty runs of the first plan, taken out of this repository's history.
+"""The runs of the first plan, taken out of this repository's history.
 
     python -m studies.ties.earlier
 
-They differ from the paper's configuration in their ties alone: broken by the items' order, or by the
-creep of settled PyBullet walls, which was measured once and is frozen for a load. The code that
-made the latter stands at the same revision.
+Twenty of them differ from the paper's configuration in their ties alone, which are broken by the
+items' order, or by the creep of settled PyBullet walls, measured once and frozen for a load. The
+code that made all of them stands at the same revision.
 """
 
 import json
@@ -14,47 +14,64 @@ from io import StringIO
 import pandas as pd
 
 from studies import paths
-from studies.results import joined, write_provenance, write_table
+from studies.results import joined, read_table, write_provenance, write_table
+from studies.statistics import end_msr, fell
+from studies.ties.criterion import likeness
 
 REVISION = "c062fca"
 FOLDER = "data/answer"
-CELLS = tuple(
+TIES = tuple(
     f"ties_by_{ties}_{mask}" for ties in ("order", "drift") for mask in ("mask", "no_mask")
 )
-SEEDS = range(5)
 COLUMNS = {"success_rate": "%.6g", "loss": "%.5g"}
 NAME, COMMAND = "ties/earlier", "python -m studies.ties.earlier"
 
 
-def committed(path: str) -> str:
-    """The text of a file at ``REVISION``."""
-    show = ["git", "-C", str(paths.ROOT), "show", f"{REVISION}:{path}"]
-    return subprocess.run(show, check=True, capture_output=True, encoding="utf-8").stdout
+def git(*arguments: str) -> str:
+    """What git prints about this repository's history."""
+    command = ["git", "-C", str(paths.ROOT), *arguments]
+    return subprocess.run(command, check=True, capture_output=True, encoding="utf-8").stdout
 
 
 def earlier_data() -> None:
-    """Write ``ties/earlier_success_rate.csv`` and ``ties/earlier_loss.csv``, a column per run."""
-    runs, records = {}, []
-    for cell in CELLS:
-        for seed in SEEDS:
-            path = f"{FOLDER}/{cell}/seed_{seed}"
-            runs[f"{cell}/seed_{seed}"] = pd.read_csv(StringIO(committed(f"{path}.csv")))
-            records.append(json.loads(committed(f"{path}.provenance.json")))
+    """Write ``ties/earlier.csv``, a row per run of the plan, and the curves of twenty.
+
+    The rows hold ``cell``, ``seed`` and ``criterion.likeness``; of a run that went on from another
+    one after 12 million picks (``interventions/…``) the ``end`` and whether it ``fell`` alone. The
+    curves stand in ``ties/earlier_success_rate.csv`` and ``ties/earlier_loss.csv``.
+    """
+    listed = git("ls-tree", "-r", "--name-only", REVISION, f"{FOLDER}/").split()
+    rows, runs, records = [], {}, []
+    for path in listed:
+        folder, _, seed = path.removesuffix(".csv").rpartition("/seed_")
+        if not (path.endswith(".csv") and folder):
+            continue
+        cell = folder.removeprefix(f"{FOLDER}/")
+        curve = pd.read_csv(StringIO(git("show", f"{REVISION}:{path}")))
+        whole = curve["picks"].iloc[0] <= 32_000
+        measures = likeness(curve) if whole else {"end": end_msr(curve), "fell": fell(curve)}
+        rows.append({"cell": cell, "seed": int(seed), **measures})
+        record = path.replace(".csv", ".provenance.json")
+        records.append(json.loads(git("show", f"{REVISION}:{record}")))
+        if cell in TIES:
+            runs[f"{cell}/seed_{seed}"] = curve
+    write_table(NAME, pd.DataFrame(rows))
     for column, digits in COLUMNS.items():
         curves = {name: run[column] for name, run in runs.items()}
         picks = next(iter(runs.values()))["picks"]
         write_table(f"{NAME}_{column}", pd.DataFrame({"picks": picks} | curves), digits)
     settings = {"from": f"{REVISION}:{FOLDER}", "made by": records[0]["command"].split(" --")[0]}
-    settings["fingerprint then"] = records[0]["fingerprint"]
+    settings["fingerprints then"] = sorted({record["fingerprint"] for record in records})
     write_provenance(NAME, COMMAND, settings, False, joined(records))
 
 
 def read_earlier() -> pd.DataFrame:
     """The twenty curves, with the columns of ``studies.grid.read_grid``."""
-    parts = []
-    for column in COLUMNS:
-        table = pd.read_csv(paths.DATA / f"{NAME}_{column}.csv")
-        parts.append(table.melt("picks", var_name="run", value_name=column))
+    tables = [read_table(f"{NAME}_{column}") for column in COLUMNS]
+    parts = [
+        table.melt("picks", var_name="run", value_name=column)
+        for table, column in zip(tables, COLUMNS)
+    ]
     curves = parts[0].assign(loss=parts[1]["loss"])
     names = curves.pop("run").str.rpartition("/seed_")
     curves.insert(0, "cell", names[0])
