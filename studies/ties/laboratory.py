@@ -1,0 +1,91 @@
+"""The laboratory's answers: how long an order of equals lasts, and where a preference comes from.
+
+    python -m studies ties_laboratory
+
+``data/ties/PLAN.md`` says what was expected of its cells.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from studies.falls import measures
+from studies.falls.cells import CONFIG
+from studies.falls.laboratory import SLOPES, train_in_laboratory
+from studies.fingerprint import training_fingerprint
+from studies.grid import Cell
+from studies.results import COMMAND, JOBS, keep_all, publish
+from studies.seamless.jamming import weigh
+from studies.statistics import end_msr
+from studies.ties.noise import drifting
+from unload import task
+from unload.agent.identity import identity
+from unload.agent.training import Training
+from unload.load.boxes import Load
+from unload.load.substacks import stack_load
+
+RHOS = (0.0, 0.8, 0.9, 0.965, 0.985, 0.997, 1.0)
+SEEDS, SIGN_SEEDS = range(4000, 4010), range(4100, 4120)
+POSITIONS = replace(CONFIG, equalize=False)
+OPTIONS = JOBS
+
+
+def mirrored_load(rng: np.random.Generator) -> Load:
+    """One of the paper's loads, its left and right exchanged."""
+    load = stack_load(rng)
+    positions = load.positions * [1, -1, 1] + [0, task.CONTAINER[1], 0]
+    return Load(positions, load.sizes, load.packages, load.walls)
+
+
+def mirror_loads(run: Training) -> None:
+    """Fill the containers with loads whose left and right are exchanged."""
+    run.rollout.envs.unwrapped.stack = mirrored_load
+    run.rollout._see(*run.rollout.envs.reset(seed=run.config.seeds()[0]))
+
+
+def _ties(rho: float, mask: bool) -> Cell:
+    config = replace(CONFIG, position_noise=0.0, mask=mask)
+    return Cell(config, SEEDS, partial(drifting, correlation=(rho, rho, rho)))
+
+
+CELLS = {
+    **{f"rho_{rho}_no_mask": _ties(rho, False) for rho in RHOS},
+    **{f"rho_{rho}": _ties(rho, True) for rho in RHOS},
+    "positions": Cell(POSITIONS, SIGN_SEEDS),
+    "positions_mirrored": Cell(POSITIONS, SIGN_SEEDS, mirror_loads),
+    "positions_whole_walls": Cell(POSITIONS, SIGN_SEEDS, partial(weigh, z=0.0)),
+    "ranks": Cell(CONFIG, SIGN_SEEDS),
+    "ranks_mirrored": Cell(CONFIG, SIGN_SEEDS, mirror_loads),
+    "ranks_whole_walls": Cell(CONFIG, SIGN_SEEDS, partial(weigh, z=0.0)),
+}
+
+
+def run_cell(name: str, cell: Cell, seed: int) -> dict:
+    """Train a run: its MSR over the last tenth, and its slopes and the tilt before its last pick."""
+    last: dict[str, float] = {}
+
+    def watch(run: Training) -> None:
+        seen = run.rollout.observations
+        last.update(zip(SLOPES, map(float, measures.slopes(run.agent.network, seen))))
+        tilts = measures.tilt(seen, run.rollout.envs.liftable())
+        last.update(zip(("tilt_x", "tilt_y"), map(float, tilts)))
+
+    run = train_in_laboratory(replace(cell.config, seed=seed), cell.change, watch)
+    return {"cell": name, "seed": seed, "end": end_msr(run.curve.table()), **last}
+
+
+def laboratory_data(n_jobs: int = -1) -> None:
+    """Train all cells; write ``ties/laboratory.csv``, a row per run, see ``run_cell``."""
+    fingerprint, asked = training_fingerprint(), []
+    for name, cell in CELLS.items():
+        question = {"cell": name, "change": identity(cell.change), "fingerprint": fingerprint}
+        for seed in cell.seeds:
+            config = replace(cell.config, seed=seed).plain()
+            asked.append((question | config, (name, cell, seed)))
+    results = keep_all("ties/laboratory", run_cell, asked, n_jobs)
+    table = pd.DataFrame([result.value for result in results])
+    settings = {"config": CONFIG.plain(), "runs": len(table)}
+    name, command = "ties/laboratory", f"{COMMAND} ties_laboratory"
+    publish(name, {"laboratory": table}, command, settings, results, fingerprint, "%.4g")
