@@ -63,7 +63,7 @@ CELLS = {
 
 
 def run_cell(name: str, cell: Cell, seed: int) -> dict:
-    """Train a run: its MSR over the last tenth, and its slopes and the tilt before its last pick."""
+    """Train a run: its MSR over the last tenth, slopes and tilt before its last pick."""
     last: dict[str, float] = {}
 
     def watch(run: Training) -> None:
