@@ -32,6 +32,10 @@ def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(rng):
     assert set(expected) == set(RULES) - {"random"}
     for name, row in expected.items():
         assert RULES[name](observations, masks, rng).tolist() == [row]
+    # A tenth may be covered, and no more.
+    for clear, row in ((0.91, 0), (0.89, 1)):
+        observations[0, 0, COLUMN["clear_above"]] = clear
+        assert RULES["clear above"](observations, masks, rng).tolist() == [row]
     score = linear({"z": -1, "behind": -1})
     assert score(observations)[0, :3] == pytest.approx([-1.0, -2.5, -2.1])
     assert best(score)(observations, masks, rng).tolist() == [0]

@@ -9,6 +9,7 @@ from studies import grid, paths
 from studies.paper import tuning
 from studies.paper.tuning import tuning_grid
 from studies.results import read_table
+from unload import task
 from unload.env.vector import HighestItemVectorEnv
 
 
@@ -75,6 +76,13 @@ def test_chance_is_the_share_of_the_highest_items():
         heights = observations[..., 2]
         shares.append((heights > heights.max(axis=1, keepdims=True) - 0.01).mean())
     assert tuning.chance() == pytest.approx(np.mean(shares), abs=0.002)
+
+
+def test_chance_counts_all_others(monkeypatch):
+    """Of three items of two heights: one below is among the highest if both others are below."""
+    monkeypatch.setattr(tuning, "GRID", np.array([[0, 0, 0.1], [0, 0, 0.2]]))
+    monkeypatch.setattr(task, "N_VISIBLE", 3)
+    assert tuning.chance() == pytest.approx(0.5 + 0.5 * 0.25)
 
 
 def test_greedy_msr_is_found_again_in_that_of_the_exploring_agent():

@@ -84,6 +84,13 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
     assert comparison.measure(policies.random, 1.0)["picks"] == 1000
 
 
+def test_a_policy_that_unloads_nothing_has_missed_with_every_pick(monkeypatch):
+    nothing = pd.DataFrame({"success_rate": [0.0, 0.5], "unloaded": [0, 250]})
+    monkeypatch.setattr(comparison, "evaluate", lambda *_, **__: nothing)
+    card = comparison.measure(policies.random, 1.0)
+    assert (card["picks"], card["misses"]) == (1000, 750)
+
+
 @pytest.mark.parametrize("name", comparison.ORIGINS)
 def test_what_ships_is_of_the_training_of_its_grid(name):
     card, (grid, _) = load_policy(name).card, comparison.ORIGINS[name]

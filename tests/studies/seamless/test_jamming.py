@@ -101,6 +101,15 @@ def test_a_jam_lasts_for_some_successes(random_run):
     assert changed[-1] == pytest.approx(changed[9], rel=0.15)  # all of them are drawn again
 
 
+def test_the_jams_of_the_next_episode_are_others(random_run):
+    run = random_run(partial(jam, share=0.5, lasts=10_000))
+    first = all_attempts(run)
+    run.rollout.steps += run.config.max_picks
+    second = all_attempts(run)
+    free = np.maximum(first, second) >= task.LIFT_THRESHOLD
+    assert (first[free] != second[free]).mean() == pytest.approx(2 / 3, abs=0.1)
+
+
 def test_a_masked_box_is_tried_again_and_its_mask_is_kept(random_run):
     run = random_run(partial(jam, share=0.0))
     state = run.rollout.envs.unwrapped._containers
