@@ -12,9 +12,8 @@ import numpy as np
 
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
-from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
-from unload.physics.situation import RESOLUTION
-from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, absorb, slot_of
+from unload.physics.situation import find_movers, key_length, write_key
+from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, digest_of, slot_of
 from unload.support.compiled import compiled
 
 N_VISIBLE = task.N_VISIBLE
@@ -116,7 +115,8 @@ def look_up(containers, actions, digests, micrometres):
     Where the row is padded, the item is -1 and moves by 0.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
-    members = np.empty(containers.present.shape[1], np.int32)
+    capacity = containers.present.shape[1]
+    members, key = np.empty(capacity, np.int32), np.empty(key_length(capacity), np.int32)
     for env in range(len(actions)):
         row = actions[env]
         items[env] = containers.visible[env, row]
@@ -130,12 +130,16 @@ def look_up(containers, actions, digests, micrometres):
             continue
 
         # Free boxes and those under three others need no table, see TablePhysics.
-        dynamic = movers(containers, env, items[env], members)
+        starts, links = containers.starts[env], containers.links[env]
+        present, right = containers.present[env], containers.sizes[env, 1]
+        dynamic = find_movers(starts, links, present, items[env], members, HELD_DOWN + 1)
         if dynamic == 1 or dynamic > HELD_DOWN:
             distances[env] = FREE_LIFT if dynamic == 1 else 0.0
             continue
 
-        digest = situation_digest(containers, env, members, dynamic)
+        geometry = containers.geometry[env]
+        words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+        digest = digest_of(key[:words])
         slot = slot_of(digests, digest)
         known = digests[slot] != EMPTY
         distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
@@ -182,94 +186,3 @@ def pick(containers, actions, distances, equalize, average, tolerance):
         # After a success no row counts as failed.
         show(containers, env, rows, equalize, average, tolerance)
     return rewards
-
-
-@compiled
-def movers(containers, env, item, members):
-    """How many boxes a lift moves: the item and all on top of it, at most ``HELD_DOWN + 1``.
-
-    They are written to the start of ``members``, (capacity,) int32.
-    """
-    starts, links = containers.starts[env], containers.links[env]
-    members[0], dynamic, done = item, 1, 0
-    while done < dynamic:
-        box = members[done]
-        done += 1
-        for link in range(starts[ABOVE, box], starts[ABOVE, box + 1]):
-            if containers.present[env, links[link]] and not _holds(members, dynamic, links[link]):
-                members[dynamic] = links[link]
-                dynamic += 1
-                if dynamic > HELD_DOWN:
-                    return dynamic
-    return dynamic
-
-
-@compiled
-def situation_digest(containers, env, members, dynamic):
-    """The digest of ``Surroundings.situation``.
-
-    ``members`` begins with the ``dynamic`` boxes that ``movers`` found; the rest is overwritten.
-    """
-    starts, links = containers.starts[env], containers.links[env]
-    present, geometry, item = containers.present[env], containers.geometry[env], members[0]
-    # The key's order: the item, what rests on it, and what these touch besides, each sorted.
-    for end in range(1, dynamic):  # sorts them; numba's sort takes a second more to compile
-        _insert(members, 1, end, members[end])
-    count = dynamic
-    for mover in range(dynamic):
-        box = members[mover]
-        for kind in (BELOW, BESIDE):
-            for link in range(starts[kind, box], starts[kind, box + 1]):
-                if present[links[link]] and not _holds(members, count, links[link]):
-                    count = _insert(members, dynamic, count, links[link])
-
-    # The floor and the side walls count where a box that can move touches them.
-    on_floor = geometry[item, 2] - geometry[item, 5] / 2 <= CONTACT_TOLERANCE
-    lowest, highest = np.inf, -np.inf
-    for mover in range(dynamic):
-        y, width = geometry[members[mover], 1], geometry[members[mover], 4]
-        lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
-    right = containers.sizes[env, 1]
-    at_left, at_right = lowest <= CONTACT_TOLERANCE, highest >= right - CONTACT_TOLERANCE
-
-    # Word for word as digest_of reads Situation.key, without writing the key down.
-    digest = np.uint64(2 + on_floor + at_left + at_right + 6 * count)  # words of the key
-    digest = absorb(digest, np.int32(dynamic))
-    digest = absorb(digest, np.int32(on_floor))
-    if on_floor:
-        digest = absorb(digest, _micrometres(-geometry[item, 2]))
-    if at_left:
-        digest = absorb(digest, _micrometres(-geometry[item, 1]))
-    if at_right:
-        digest = absorb(digest, _micrometres(right - geometry[item, 1]))
-    for number in range(count):
-        for axis in range(3):
-            offset = geometry[members[number], axis] - geometry[item, axis]
-            digest = absorb(digest, _micrometres(offset))
-        for edge in range(3, 6):
-            digest = absorb(digest, _micrometres(geometry[members[number], edge]))
-    return max(digest, np.uint64(1))
-
-
-@compiled
-def _micrometres(length):
-    return np.int32(np.rint(length / RESOLUTION))
-
-
-@compiled
-def _holds(members, end, box):
-    for i in range(end):
-        if members[i] == box:
-            return True
-    return False
-
-
-@compiled
-def _insert(members, first, end, box):
-    """Put a box into its place among the sorted ``members[first:end]``; the new end."""
-    place = end
-    while place > first and members[place - 1] > box:
-        members[place] = members[place - 1]
-        place -= 1
-    members[place] = box
-    return end + 1

@@ -264,7 +264,7 @@ def _digest_of_file(arrays: dict[str, np.ndarray]) -> np.ndarray:
 
 
 @compiled
-def absorb(digest, word):
+def _absorb(digest, word):
     """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
     digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
     return digest ^ (digest >> np.uint64(29))
@@ -275,7 +275,7 @@ def digest_of(words):
     """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
     digest = np.uint64(len(words))
     for word in words:
-        digest = absorb(digest, word)
+        digest = _absorb(digest, word)
     return max(digest, np.uint64(1))
 
 
