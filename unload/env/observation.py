@@ -8,7 +8,6 @@ can lie.
 import numpy as np
 
 from unload import task
-from unload.support import checks
 
 # Drift of the boxes of a settled full simulation, measured in notebook 02: how far they
 # spread around the places they were put at, and how far they sink on average (m).
@@ -27,7 +26,6 @@ def distance(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> n
     Returns:
         (n,) float64: m, y not counting and z counting double.
     """
-    positions = checks.finite_array("positions", positions, (None, 3))
     offset = container * VIEWPOINT - positions
     return np.sqrt(offset**2 @ task.DISTANCE_WEIGHTS)
 
@@ -45,7 +43,6 @@ def nearest(
         (min(count, n),) int64, indices of the nearest items, nearest first. Of items at the
         same distance the one with the smaller index comes first.
     """
-    checks.integer("count", count, 1)
     return np.argsort(distance(positions, container), kind="stable")[:count]
 
 

@@ -1,4 +1,4 @@
-"""The environments for many containers at once, in arrays (Sec. III-A, Fig. 2)."""
+"""Many containers at once, in arrays (Sec. III-A, Fig. 2)."""
 
 from collections.abc import Callable
 
@@ -7,8 +7,7 @@ import numpy as np
 from unload import task
 from unload.env import observation
 from unload.env.base import PickingVectorEnv, stacked
-from unload.env.equalization import TIE_TOLERANCE, equalize
-from unload.env.highest_item import GRID, highest_places
+from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import drift, scaled
 from unload.fast import containers
 from unload.load.boxes import Load, check_stack
@@ -76,9 +75,9 @@ class ContainerVectorEnv(PickingVectorEnv):
     ) -> None:
         for env, rng in zip(envs, rngs):
             chosen = stacked(self.stack, rng) if load is None else load
-            self._put(env, chosen, drift(len(chosen), self.position_noise, rng))
+            self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
 
-    def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
+    def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
         self._around.pop(env, None)
         starts, links = load.contacts
@@ -86,18 +85,24 @@ class ContainerVectorEnv(PickingVectorEnv):
         state, count = self._containers, len(load)
 
         # Lifts follow where the boxes are put, observations where they are seen.
-        positions = load.positions + blur
         state.geometry[env, :count, :3] = load.positions
         state.geometry[env, :count, 3:] = load.sizes
         state.starts[env, :, : count + 1] = starts
         state.links[env, : len(links)] = links
         state.present[env, :count] = True
         state.present[env, count:] = False
-        state.left[env] = count
+        state.left[env], state.unloaded[env] = count, 0
         state.sizes[env], state.tolerances[env] = load.container, load.contact_tolerance
-        state.seen[env, :count] = scaled(positions, load.container)
-        state.by_distance[env, :count] = observation.nearest(positions, count, load.container)
-        containers.start(state, env, *self._features)
+        self._show_items(env, np.arange(count), load.positions + blur, load)
+
+    def _show_items(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
+        """Show the items that are left, (k,) int64, where all are seen to be, (n, 3) in m."""
+        state = self._containers
+        order = observation.nearest(positions[items], len(items), load.container)
+        first = state.unloaded[env]
+        state.by_distance[env, first : first + len(items)] = items[order]
+        state.seen[env, : len(load)] = scaled(positions, load.container)
+        containers.show_nearest(state, env, *self._features)
 
     def _make_room(self, items: int, links: int) -> None:
         """Let the arrays hold loads of so many items and contacts."""
@@ -150,7 +155,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0
 
-    def _look(self) -> np.ndarray:
+    def _copy_observations(self) -> np.ndarray:
         return self._containers.observations.copy()
 
     def _infos(self) -> dict[str, np.ndarray]:
@@ -166,52 +171,3 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _hold(self, arrays: dict[str, np.ndarray]) -> None:
         self._containers = containers.Containers(**arrays)
         self._around.clear()
-
-
-class HighestItemVectorEnv(PickingVectorEnv):
-    """``unload/HighestItem-v0``, many at once. See ``HighestItemEnv``."""
-
-    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
-        super().__init__(num_envs, **settings)
-        self._observations = np.zeros(self.observation_space.shape, np.float32)
-        self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
-
-    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
-        # The draws are those of the single environment, one generator after the other.
-        shape = len(rngs), task.N_VISIBLE
-        places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
-        for number, rng in enumerate(rngs):
-            places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
-            offsets[number] = drift(task.N_VISIBLE, self.position_noise, rng)
-
-        # The rest is done for all environments at once.
-        positions = (places + offsets).reshape(-1, 3)
-        order = observation.distance(positions).reshape(shape).argsort(axis=1, kind="stable")
-        rows = order[:, :, np.newaxis]
-        seen = np.take_along_axis(scaled(positions).reshape(*shape, 3), rows, axis=1)
-        self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
-        self._highest[envs] = np.take_along_axis(highest_places(places), order, axis=1)
-
-    def _pick(
-        self, actions: np.ndarray, playing: np.ndarray
-    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        rewards = np.where(self._highest[np.arange(self.num_envs), actions], 1.0, -1.0)
-        envs = np.flatnonzero(playing)
-        self._fill(envs, [self._rngs[env] for env in envs])
-        return rewards, {}
-
-    def _emptied(self) -> np.ndarray:
-        return np.zeros(self.num_envs, bool)  # there are always 128 items
-
-    def _look(self) -> np.ndarray:
-        return self._observations.copy()
-
-    def _infos(self) -> dict[str, np.ndarray]:
-        shape = (self.num_envs, task.N_VISIBLE)
-        return {name: np.ones(shape, np.int8) for name in ("action_mask", "item_mask")}
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {"observations": self._observations, "highest": self._highest}
-
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        self._observations, self._highest = arrays["observations"], arrays["highest"]

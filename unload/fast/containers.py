@@ -82,16 +82,16 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
 
 
 @compiled
-def start(containers, env, equalize, average, tolerance):
-    """Set up all that depends on the geometry, contacts and order of a fresh load."""
+def show_nearest(containers, env, equalize, average, tolerance):
+    """Show the nearest items of a container, by ``by_distance`` behind those unloaded."""
+    first = containers.unloaded[env]
     rows = min(containers.left[env], N_VISIBLE)
     for row in range(rows):
-        item = containers.by_distance[env, row]
+        item = containers.by_distance[env, first + row]
         containers.visible[env, row] = item
         for axis in range(3):
             containers.values[env, axis, row] = containers.seen[env, item, axis]
     containers.visible[env, rows:] = -1
-    containers.unloaded[env] = 0
     for axis in range(3):
         rank(containers.values[env, axis, :rows], containers.ranks[env, axis, :rows])
     show(containers, env, rows, equalize, average, tolerance)
