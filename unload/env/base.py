@@ -239,6 +239,11 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
                 infos |= _flagged(picked, ~began)
         return self._copy_observations(), rewards, terminations, truncations, infos | final
 
+    def action_masks(self) -> np.ndarray:
+        """(num_envs, 128) bool, False for rows without a box or failed since the last success."""
+        self._check_started()
+        return self._infos()["action_mask"].astype(bool)
+
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of the arrays that ``load_state`` needs to go on from here."""
         self._check_started()

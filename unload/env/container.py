@@ -107,6 +107,7 @@ class ContainerEnv(PickingEnv):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
+    _envs: "_OneContainer"
 
     def __init__(
         self,

@@ -31,11 +31,6 @@ class HighestItemVectorEnv(PickingVectorEnv):
         self._observations = np.zeros(self.observation_space.shape, np.float32)
         self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
 
-    def action_masks(self) -> np.ndarray:
-        """(num_envs, 128) bool, all True."""
-        self._check_started()
-        return np.ones((self.num_envs, task.N_VISIBLE), bool)
-
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
         # Each environment draws from a generator of its own.
         shape = len(rngs), task.N_VISIBLE
@@ -109,7 +104,7 @@ class HighestItemEnv(PickingEnv):
     Arguments and errors are as for ``ContainerEnv``, but there is nothing to draw.
     """
 
-    def __init__(self, render_mode: str | None = None, **settings) -> None:
+    def __init__(self, *, render_mode: str | None = None, **settings) -> None:
         mode = AutoresetMode.DISABLED
         super().__init__(HighestItemVectorEnv(1, autoreset_mode=mode, **settings), render_mode)
 

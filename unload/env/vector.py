@@ -58,11 +58,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._check_started()
         return self._containers.visible.copy()
 
-    def action_masks(self) -> np.ndarray:
-        """(num_envs, 128) bool, False for rows without a box or failed since the last success."""
-        self._check_started()
-        return self._containers.masks.astype(bool)
-
     def liftable(self) -> np.ndarray:
         """(num_envs, 128) bool, which rows of the observations can be unloaded now."""
         self._check_started()

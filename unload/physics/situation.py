@@ -2,7 +2,7 @@
 
 A box is held down by what rests on it, directly or over others. It may rub against its
 neighbours in the same wall, and it can tip aside only what its surroundings let fall.
-All else in the container is left out. The search is compiled, because ``unload.fast`` needs it, too.
+All else in the container is left out. The search is compiled, for ``unload.fast`` as well.
 """
 
 from dataclasses import dataclass
