@@ -15,17 +15,26 @@ CHUNK = 32  # samples whose gradients are summed in single precision
 BLOCK = 64  # features handled together: loops of constant length become vector instructions
 LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# What is kept of BLOCK features: rows of BLOCK numbers in one flat array, and where they start.
-ROWS = 42
-STARTS = range(0, ROWS * BLOCK, BLOCK)
-WX, WY, WZ, BIAS = STARTS[:4]  # of the extractor
-LOW, LOW2, HIGH, HIGH2 = STARTS[4:8]  # keys of the two lowest and the two highest values
-MEAN, OWN, LOWEST, HIGHEST = STARTS[8:24:4]  # the four inputs each
-SLACK = STARTS[24]  # values closer than this may be in the wrong order
-SCORE = STARTS[25]  # 4 rows: the scorer's weights of the own, minimum, maximum, mean feature
-FEATURE = STARTS[29]  # 4 rows: these features
-PARTS = STARTS[33]  # of the value before tanh
-GRADIENT = STARTS[34]  # 8 rows: of the extractor's weights and bias, of the scorer's weights
+# What is kept of BLOCK features: rows of BLOCK numbers in one flat array. Each name is where its
+# first row starts. What has four rows has one for each of x, y, z and the constant 1, or one for
+# each kind of feature: the chosen item's own, the minimum, the maximum, the mean.
+X, Y, Z, CONSTANT = 0, BLOCK, 2 * BLOCK, 3 * BLOCK
+WX, WY, WZ, BIAS = X, Y, Z, CONSTANT  # the extractor's weights
+LOW = BIAS + BLOCK  # the key of the lowest value,
+LOW2 = LOW + BLOCK  # and of the lowest but one
+HIGH = LOW2 + BLOCK  # the same of the highest values
+HIGH2 = HIGH + BLOCK
+MEAN = HIGH2 + BLOCK  # 4 rows: the inputs of the mean,
+OWN = MEAN + 4 * BLOCK  # 4 rows: of the chosen item,
+LOWEST = OWN + 4 * BLOCK  # 4 rows: of the lowest item,
+HIGHEST = LOWEST + 4 * BLOCK  # 4 rows: and of the highest
+SLACK = HIGHEST + 4 * BLOCK  # values closer than this may be in the wrong order
+SCORE = SLACK + BLOCK  # 4 rows: the scorer's weights, by kind
+FEATURE = SCORE + 4 * BLOCK  # 4 rows: the features, by kind
+PART = FEATURE + 4 * BLOCK  # what they add to the value before tanh
+GRADIENT = PART + BLOCK  # 4 rows: of the extractor's weights and bias,
+SCORE_GRADIENT = GRADIENT + 4 * BLOCK  # 4 rows: and of the scorer's weights
+SIZE = SCORE_GRADIENT + 4 * BLOCK  # of all this
 
 FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
 ZERO, ONE = np.float32(0), np.float32(1)
@@ -134,8 +143,9 @@ def add_chunks(
             block, place = blocks[f // BLOCK], f % BLOCK
             for axis in range(3):
                 partial[chunk, 3 * f + axis] = block[GRADIENT + axis * BLOCK + place]
-            for row in range(3, 8):
-                partial[chunk, row * n + f] = block[GRADIENT + row * BLOCK + place]
+            partial[chunk, 3 * n + f] = block[GRADIENT + CONSTANT + place]
+            for kind in range(4):
+                partial[chunk, (4 + kind) * n + f] = block[SCORE_GRADIENT + kind * BLOCK + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
         chunk = next_number(counter)
 
@@ -147,10 +157,10 @@ def _blocks(weight, bias, score):
     Where there are no more features, a bias of -1 keeps the ReLU closed.
     """
     count = -(-len(bias) // BLOCK)
-    memory = np.zeros(count * ROWS * BLOCK + 16, np.float32)
+    memory = np.zeros(count * SIZE + 16, np.float32)
     start = (-memory.ctypes.data // 4) % 16  # of a cache line, which a vector fills
-    blocks = memory[start : start + count * ROWS * BLOCK].reshape(count, ROWS * BLOCK)
-    blocks[:, BIAS:LOW] = -1
+    blocks = memory[start : start + count * SIZE].reshape(count, SIZE)
+    blocks[:, BIAS : BIAS + BLOCK] = -1
     for f in range(len(bias)):
         block, place = blocks[f // BLOCK], f % BLOCK
         for axis in range(3):
@@ -206,10 +216,10 @@ def _reduce_items(inputs, items, mask, block):
                     block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f], x, y, z
                 )
                 active = _active(value)
-                block[MEAN + f] = fma(active, x, block[MEAN + f])
-                block[MEAN + BLOCK + f] = fma(active, y, block[MEAN + BLOCK + f])
-                block[MEAN + 2 * BLOCK + f] = fma(active, z, block[MEAN + 2 * BLOCK + f])
-                block[MEAN + 3 * BLOCK + f] += active
+                block[MEAN + X + f] = fma(active, x, block[MEAN + X + f])
+                block[MEAN + Y + f] = fma(active, y, block[MEAN + Y + f])
+                block[MEAN + Z + f] = fma(active, z, block[MEAN + Z + f])
+                block[MEAN + CONSTANT + f] += active
 
                 # The runner-up is the key, or what it has beaten, or the one so far.
                 key = _key(value, np.int32(i), mask)
@@ -261,8 +271,8 @@ def _find_extremes(x, items, mask, block):
     unsure = 0
     for f in range(BLOCK):
         low, high = block[LOW + f], block[HIGH + f]
-        _put(_inputs(x, low, mask), low > ZERO, LOWEST + f, block)
-        _put(_inputs(x, high, mask), high > ZERO, HIGHEST + f, block)
+        _set_inputs(_inputs(x, low, mask), low > ZERO, LOWEST + f, block)
+        _set_inputs(_inputs(x, high, mask), high > ZERO, HIGHEST + f, block)
         unsure += not (_lowest_is_sure(f, block) & _highest_is_sure(f, block))
     if unsure:  # rare, so that the loop above need not branch
         for f in range(BLOCK):
@@ -296,12 +306,12 @@ def _highest_is_sure(f, block):
 
 
 @compiled(forceinline=True)
-def _put(inputs, active, place, block):
+def _set_inputs(inputs, active, place, block):
     """Set four inputs; zeros if the ReLU is closed."""
-    block[place] = inputs[0] if active else ZERO
-    block[place + BLOCK] = inputs[1] if active else ZERO
-    block[place + 2 * BLOCK] = inputs[2] if active else ZERO
-    block[place + 3 * BLOCK] = ONE if active else ZERO
+    block[place + X] = inputs[0] if active else ZERO
+    block[place + Y] = inputs[1] if active else ZERO
+    block[place + Z] = inputs[2] if active else ZERO
+    block[place + CONSTANT] = ONE if active else ZERO
 
 
 @compiled
@@ -320,7 +330,7 @@ def _decide(x, items, sign, f, place, block):
         elif value == best:
             count, px, py, pz = count + 1, px + x[3 * i], py + x[3 * i + 1], pz + x[3 * i + 2]
     mean = np.float32(px / count), np.float32(py / count), np.float32(pz / count)
-    _put(mean, sign * best > 0, place, block)
+    _set_inputs(mean, sign * best > 0, place, block)
 
 
 @compiled
@@ -333,32 +343,32 @@ def _forward(inputs, item, items, block):
     for f in range(BLOCK):
         own = np.float64(block[WX + f]) * x + np.float64(block[WY + f]) * y
         own += np.float64(block[WZ + f]) * z + block[BIAS + f]
-        _put((x, y, z), own > 0, OWN + f, block)
-        block[MEAN + f] *= share
-        block[MEAN + BLOCK + f] *= share
-        block[MEAN + 2 * BLOCK + f] *= share
-        block[MEAN + 3 * BLOCK + f] *= share
+        _set_inputs((x, y, z), own > 0, OWN + f, block)
+        block[MEAN + X + f] *= share
+        block[MEAN + Y + f] *= share
+        block[MEAN + Z + f] *= share
+        block[MEAN + CONSTANT + f] *= share
 
     # All four features, and what each adds to the value.
     for f in range(BLOCK):
         part = _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
-        block[PARTS + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
+        block[PART + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
     half = BLOCK // 2
     while half:  # in an order that needs few steps one after the other
         for f in range(half):
-            block[PARTS + f] += block[PARTS + half + f]
+            block[PART + f] += block[PART + half + f]
         half //= 2
-    return block[PARTS]
+    return block[PART]
 
 
 @compiled(forceinline=True)
 def _feature(inputs, kind, f, block):
     """Set one feature, weights · inputs; its part of the value before tanh."""
     place = inputs + f
-    feature = block[BIAS + f] * block[place + 3 * BLOCK]
-    feature = fma(block[WZ + f], block[place + 2 * BLOCK], feature)
-    feature = fma(block[WY + f], block[place + BLOCK], feature)
-    feature = fma(block[WX + f], block[place], feature)
+    feature = block[BIAS + f] * block[place + CONSTANT]
+    feature = fma(block[WZ + f], block[place + Z], feature)
+    feature = fma(block[WY + f], block[place + Y], feature)
+    feature = fma(block[WX + f], block[place + X], feature)
     block[FEATURE + kind * BLOCK + f] = feature
     return block[SCORE + kind * BLOCK + f] * feature
 
@@ -377,7 +387,7 @@ def _backward(slope, block):
             gradient = fma(high, block[HIGHEST + row], gradient)
             block[GRADIENT + row] = fma(mean, block[MEAN + row], gradient)
         for kind in range(4):
-            row = GRADIENT + (4 + kind) * BLOCK + f
+            row = SCORE_GRADIENT + kind * BLOCK + f
             block[row] = fma(slope, block[FEATURE + kind * BLOCK + f], block[row])
 
 
