@@ -1,9 +1,8 @@
 """Many containers in arrays: what a pick does in each of them, compiled.
 
-A container of ``unload.env`` looks at all its boxes at each pick. But in a neat load no
-box moves, so the order of the boxes by distance is settled when the load is: the 128
-nearest are the first 128 that are left, and a box that is unloaded makes room for the next
-one in that order, as long as there is one. Here a pick touches these 128 at most.
+In a neat load no box moves, so the order of the boxes by distance is settled when the load is:
+the 128 nearest are the first 128 that are left, and a box that is unloaded makes room for the
+next one in that order, as long as there is one. So a pick touches these 128 at most.
 """
 
 from typing import NamedTuple
