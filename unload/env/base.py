@@ -29,7 +29,7 @@ from unload.env.observation import MOST_NOISE
 from unload.load.boxes import Load, check_stacked
 from unload.support import checks
 
-MOST_ENVS = 2**16  # several GB
+_MOST_ENVS = 2**16  # several GB
 
 
 def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Load]:
@@ -142,7 +142,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         position_noise: float = observation.POSITION_NOISE,
         render_mode: None = None,
     ) -> None:
-        self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         self.autoreset_mode = checks.one_of("autoreset_mode", autoreset_mode, AutoresetMode)
         self.equalize = checks.boolean("equalize", equalize)
         self.ties = checks.one_of("ties", ties, TIES)

@@ -10,17 +10,17 @@ from unload.env.equalization import equalize
 from unload.env.observation import drift, scaled
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 
-HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
+_HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
 # Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
 GRID = np.concatenate(
     [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
 )
 
 
-def highest_places(places: np.ndarray) -> np.ndarray:
+def _highest_places(places: np.ndarray) -> np.ndarray:
     """(..., items) bool, True where no other of the (..., items, 3) places in m is higher."""
     heights = places[..., 2]
-    return heights > heights.max(axis=-1, keepdims=True) - HEIGHT_TOLERANCE
+    return heights > heights.max(axis=-1, keepdims=True) - _HEIGHT_TOLERANCE
 
 
 class HighestItemVectorEnv(PickingVectorEnv):
@@ -45,7 +45,7 @@ class HighestItemVectorEnv(PickingVectorEnv):
         rows = order[:, :, np.newaxis]
         seen = np.take_along_axis(scaled(positions).reshape(*shape, 3), rows, axis=1)
         self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
-        self._highest[envs] = np.take_along_axis(highest_places(places), order, axis=1)
+        self._highest[envs] = np.take_along_axis(_highest_places(places), order, axis=1)
 
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray

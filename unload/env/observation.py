@@ -14,7 +14,7 @@ from unload import task
 POSITION_NOISE = 0.0005
 SINK = 0.001
 MOST_NOISE = 10.0  # m, more than the container is long
-VIEWPOINT = task.VIEWPOINT / task.CONTAINER  # as a share of the container
+_VIEWPOINT = task.VIEWPOINT / task.CONTAINER  # as a share of the container
 
 
 def distance(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
@@ -26,7 +26,7 @@ def distance(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> n
     Returns:
         (n,) float64: m, y not counting and z counting double.
     """
-    offset = container * VIEWPOINT - positions
+    offset = container * _VIEWPOINT - positions
     return np.sqrt(offset**2 @ task.DISTANCE_WEIGHTS)
 
 

@@ -15,7 +15,7 @@ from unload.physics.situation import find_movers, key_length, write_key
 from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, digest_of, slot_of
 from unload.support.compiled import compiled
 
-N_VISIBLE = task.N_VISIBLE
+_N_VISIBLE = task.N_VISIBLE
 UNKNOWN = -1.0  # in place of a distance that is not in the table
 
 
@@ -71,12 +71,12 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
         unloaded=np.zeros(num_envs, np.int64),
         seen=np.zeros((num_envs, capacity, 3), np.float32),
         by_distance=np.zeros((num_envs, capacity), np.int32),
-        visible=np.zeros((num_envs, N_VISIBLE), np.int32),
-        values=np.zeros((num_envs, 3, N_VISIBLE), np.float32),
-        ranks=np.zeros((num_envs, 3, N_VISIBLE), np.int32),
-        observations=np.zeros((num_envs, N_VISIBLE, 3), np.float32),
-        masks=np.ones((num_envs, N_VISIBLE), np.int8),
-        failed=np.zeros((num_envs, N_VISIBLE)),
+        visible=np.zeros((num_envs, _N_VISIBLE), np.int32),
+        values=np.zeros((num_envs, 3, _N_VISIBLE), np.float32),
+        ranks=np.zeros((num_envs, 3, _N_VISIBLE), np.int32),
+        observations=np.zeros((num_envs, _N_VISIBLE, 3), np.float32),
+        masks=np.ones((num_envs, _N_VISIBLE), np.int8),
+        failed=np.zeros((num_envs, _N_VISIBLE)),
     )
 
 
@@ -84,7 +84,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
 def show_nearest(containers, env, equalize, average, tolerance):
     """Show the nearest items of a container, by ``by_distance`` behind those unloaded."""
     first = containers.unloaded[env]
-    rows = min(containers.left[env], N_VISIBLE)
+    rows = min(containers.left[env], _N_VISIBLE)
     for row in range(rows):
         item = containers.by_distance[env, first + row]
         containers.visible[env, row] = item
@@ -93,11 +93,11 @@ def show_nearest(containers, env, equalize, average, tolerance):
     containers.visible[env, rows:] = -1
     for axis in range(3):
         rank(containers.values[env, axis, :rows], containers.ranks[env, axis, :rows])
-    show(containers, env, rows, equalize, average, tolerance)
+    _show(containers, env, rows, equalize, average, tolerance)
 
 
 @compiled
-def show(containers, env, rows, equalize, average, tolerance):
+def _show(containers, env, rows, equalize, average, tolerance):
     """Write the observation and the mask of a container that has changed."""
     containers.masks[env, :rows] = 1
     containers.masks[env, rows:] = 0
@@ -163,14 +163,14 @@ def pick(containers, actions, distances, equalize, average, tolerance):
         containers.present[env, visible[row]] = False
         containers.left[env] -= 1
         containers.unloaded[env] += 1
-        rows = min(containers.left[env], N_VISIBLE)
-        for i in range(row, N_VISIBLE - 1):
+        rows = min(containers.left[env], _N_VISIBLE)
+        for i in range(row, _N_VISIBLE - 1):
             visible[i] = visible[i + 1]
 
         # The last row goes to the nearest item that has not been seen yet, if there is one.
-        if rows == N_VISIBLE:
-            item = containers.by_distance[env, containers.unloaded[env] + N_VISIBLE - 1]
-            visible[N_VISIBLE - 1] = item
+        if rows == _N_VISIBLE:
+            item = containers.by_distance[env, containers.unloaded[env] + _N_VISIBLE - 1]
+            visible[_N_VISIBLE - 1] = item
             for axis in range(3):
                 replace(
                     containers.values[env, axis], containers.ranks[env, axis], row,
@@ -183,5 +183,5 @@ def pick(containers, actions, distances, equalize, average, tolerance):
                 remove(values[: rows + 1], ranks[: rows + 1], row)
 
         # After a success no row counts as failed.
-        show(containers, env, rows, equalize, average, tolerance)
+        _show(containers, env, rows, equalize, average, tolerance)
     return rewards

@@ -78,7 +78,7 @@ def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
     return counts, cells
 
 
-def substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
+def _substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
     """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
     cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # the width; the height
     columns = 1 + int((cells - _LEFT_CELLS) / _OTHER_CELLS)
@@ -101,7 +101,7 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
-    columns = substacks_that_fit(scale)[2]
+    columns = _substacks_that_fit(scale)[2]
     variants = checks.integer_array("variants", variants, (None, None, columns), 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
@@ -133,7 +133,7 @@ def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float 
         TypeError, ValueError: an argument is not as described.
     """
     checks.generator("rng", rng)
-    most, rows, columns = substacks_that_fit(scale)
+    most, rows, columns = _substacks_that_fit(scale)
     walls = most if walls is None else checks.integer("walls", walls, 1, 100)
     while True:
         load = build_load(rng.integers(3, size=(walls, rows, columns)), scale)

@@ -26,17 +26,17 @@ from unload.physics.situation import Situation
 from unload.support import files
 from unload.support.compiled import compiled
 
-LOGGER = logging.getLogger(__name__)
+_LOGGER = logging.getLogger(__name__)
 HELD_DOWN = 3  # boxes on top that no lift moves
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
-FEWEST_SLOTS = 1024
-ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
-SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
-CLOSE = 1e-5  # m, other processors may round otherwise
-FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
-FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
-PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
+_FEWEST_SLOTS = 1024
+_ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
+_SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
+_CLOSE = 1e-5  # m, other processors may round otherwise
+_FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
+_FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
+_PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
 
 
 def _free_lift() -> float:
@@ -111,14 +111,14 @@ class LiftTable:
 
     def _hold(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
         """Start new arrays with these entries."""
-        size = max(FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
+        size = max(_FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
         slots = np.full(size, EMPTY), np.zeros(size, np.int32)
         _fill(*slots, digests, micrometres)
         self.slots, self._count = slots, len(digests)
 
     def _take_samples(self, samples: dict[int, Situation]) -> None:
         """Keep the lowest ones, which do not depend on the order in which they came."""
-        self.samples = dict(sorted((self.samples | samples).items())[:SAMPLES])
+        self.samples = dict(sorted((self.samples | samples).items())[:_SAMPLES])
 
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
@@ -137,7 +137,7 @@ class LiftTable:
     def load(cls, path: str | Path) -> "LiftTable":
         """Read a table that ``save`` wrote; ValueError if damaged or of other physics settings."""
         arrays = files.read_arrays(path)
-        if set(arrays) != ARRAYS:
+        if set(arrays) != _ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
         if not np.array_equal(arrays.pop("digest"), _digest_of_file(arrays)):
             raise ValueError(f"{path} was changed or damaged: its digest is another")
@@ -160,7 +160,7 @@ class LiftTable:
         with closing(LocalPhysics()) as local, suppress(ModuleNotFoundError):
             for situation in self.samples.values():
                 known, distance = self.find(situation), local.simulate(situation)
-                if known is None or abs(known - distance) > CLOSE:
+                if known is None or abs(known - distance) > _CLOSE:
                     raise ValueError(
                         f"{path} says that a box moves by {known} m, PyBullet that it "
                         f"moves by {distance} m. Remove it to fill a new one"
@@ -194,9 +194,9 @@ class LiftTable:
                 if len(self) > len(stored):
                     self.save(path)
         except OSError as error:
-            if error.errno not in FULL:
+            if error.errno not in _FULL:
                 raise
-            LOGGER.warning("lifts are kept in memory only: %s", error)
+            _LOGGER.warning("lifts are kept in memory only: %s", error)
 
 
 class TablePhysics(LocalPhysics):
@@ -234,9 +234,9 @@ class TablePhysics(LocalPhysics):
 
         Where such lists keep coming, other processes share the lifts.
         """
-        if len(situations) >= FEWEST_SHARED:
+        if len(situations) >= _FEWEST_SHARED:
             self._waited += len(situations)
-            if self._waited > PATIENCE:
+            if self._waited > _PATIENCE:
                 shared = self._pool.simulate(situations, super().simulate)
                 for situation, distance in zip(situations, shared):
                     self.table.add(situation, distance)
