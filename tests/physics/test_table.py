@@ -68,15 +68,6 @@ def test_a_situation_is_simulated_once(known, monkeypatch):
     assert len(fresh.table) == 0
 
 
-def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
-    tower = boxes((1.2, 0.2), (1.2, 0.6), (1.2, 1.0), (1.2, 1.4))
-    around = Surroundings(tower, np.ones(4, dtype=bool))
-    physics = TablePhysics(LiftTable())
-    assert physics.simulate(around.situation(0)) == 0 and len(physics.table) == 0
-    distance = physics.simulate(around.situation(1))
-    assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
     """2,000 boxes of four kinds of loads, of which a part has been unloaded."""

@@ -12,7 +12,7 @@ from unload.env.observation import drift, scaled
 from unload.fast import containers
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
-from unload.physics.situation import Surroundings
+from unload.physics.situation import situation_in
 from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
 
@@ -47,7 +47,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.stack, self.table = stack, shared_table()
         self._physics = TablePhysics(self.table)
         self._containers = containers.allocate(self.num_envs, 0, 0)
-        self._around: dict[int, Surroundings] = {}
 
     def close_extras(self, **kwargs) -> None:
         self._physics.close()
@@ -74,7 +73,6 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
-        self._around.pop(env, None)
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)
@@ -87,7 +85,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env], state.unloaded[env] = count, 0
-        state.sizes[env], state.tolerances[env] = load.container, load.contact_tolerance
+        state.widths[env] = load.container[1]
         self._show_items(env, np.arange(count), load.positions + blur, load)
 
     def _show_items(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
@@ -108,7 +106,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         # A tenth more than needed, so that not every larger load moves all again.
         wanted = [max(have, need + need // 10) for have, need in zip(room, (items, links))]
         self._containers = containers.allocate(self.num_envs, *wanted)
-        self._around.clear()  # which refer to the old arrays
         for before, after in zip(old, self._containers):
             after[tuple(slice(length) for length in before.shape)] = before
 
@@ -125,27 +122,12 @@ class ContainerVectorEnv(PickingVectorEnv):
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             self._physics.table = self.table  # it may have been replaced
+            state = self._containers
+            arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
             distances[unknown] = self._physics.simulate_all(
-                [self._surroundings(int(env)).situation(int(items[env])) for env in unknown]
+                [situation_in(*(array[env] for array in arrays)) for env in unknown]
             )
         return items, distances
-
-    def _surroundings(self, env: int) -> Surroundings:
-        """The situations in a container, made when one is first needed."""
-        if env not in self._around:
-            # The load is built again, because to keep those of all containers makes resets slower.
-            count = np.flatnonzero(self._containers.present[env])[-1] + 1
-            boxes, labels = self._containers.geometry[env, :count], np.zeros(count, np.int64)
-            load = Load(
-                boxes[:, :3],
-                boxes[:, 3:],
-                labels,
-                labels,
-                container=self._containers.sizes[env],
-                contact_tolerance=self._containers.tolerances[env],
-            )
-            self._around[env] = Surroundings(load, self._containers.present[env, :count])
-        return self._around[env]
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0
@@ -165,4 +147,3 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _hold(self, arrays: dict[str, np.ndarray]) -> None:
         self._containers = containers.Containers(**arrays)
-        self._around.clear()

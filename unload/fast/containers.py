@@ -23,8 +23,7 @@ class Containers(NamedTuple):
     """The state of E containers with room for ``capacity`` items and ``links`` contacts each.
 
     Attributes:
-        sizes: (E, 3) float64, inner edges of each container in m.
-        tolerances: (E,) float64, ``Load.contact_tolerance`` in m.
+        widths: (E,) float64, inner width of each container in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
@@ -40,8 +39,7 @@ class Containers(NamedTuple):
         failed: (E, 128) float64, how far such a row moved, in m.
     """
 
-    sizes: np.ndarray
-    tolerances: np.ndarray
+    widths: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -61,8 +59,7 @@ class Containers(NamedTuple):
 def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
-        sizes=np.zeros((num_envs, 3)),
-        tolerances=np.zeros(num_envs),
+        widths=np.zeros(num_envs),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
@@ -130,7 +127,7 @@ def look_up(containers, actions, digests, micrometres):
 
         # Free boxes and those under three others need no table, see TablePhysics.
         starts, links = containers.starts[env], containers.links[env]
-        present, right = containers.present[env], containers.sizes[env, 1]
+        present, right = containers.present[env], containers.widths[env]
         dynamic = find_movers(starts, links, present, items[env], members, HELD_DOWN + 1)
         if dynamic == 1 or dynamic > HELD_DOWN:
             distances[env] = FREE_LIFT if dynamic == 1 else 0.0

@@ -49,7 +49,7 @@ class Pool:
             for number, worker in enumerate(self._workers, 1):
                 worker.stdin.write(pickle.dumps(situations[number::count]))
                 worker.stdin.flush()
-            distances[::count] = [simulate(each) for each in situations[::count]]
+            distances[::count] = [simulate(situation) for situation in situations[::count]]
             for number, worker in enumerate(self._workers, 1):
                 distances[number::count] = pickle.load(worker.stdout)
             return distances
@@ -78,5 +78,5 @@ def serve() -> None:
     with questions, answers, closing(LocalPhysics()) as physics:
         while questions.peek():
             situations = pickle.load(questions)
-            pickle.dump([physics.simulate(each) for each in situations], answers)
+            pickle.dump([physics.simulate(situation) for situation in situations], answers)
             answers.flush()

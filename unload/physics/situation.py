@@ -57,31 +57,46 @@ class Surroundings:
         self.load, self.present = load, present
         self._geometry = np.hstack([load.positions, load.sizes])
         # Copies, which may be written: for arrays that may not be, numba would compile twice.
-        self._contacts = [np.array(each) for each in load.contacts]
+        self._starts, self._links = map(np.array, load.contacts)
 
     def on_top(self, item: int) -> list[int]:
         """The present boxes that rest on ``item``, directly or over others, in index order."""
         members = np.empty(len(self.load), np.int32)
-        count = find_movers(*self._contacts, self.present, item, members, len(members))
+        contacts = self._starts, self._links, self.present
+        count = find_movers(*contacts, item, members, len(members))
         return sorted(members[1:count].tolist())
 
     def situation(self, item: int) -> Situation:
         """Return the situation of ``item``: the boxes that decide its lift."""
-        members = np.empty(len(self.load), np.int32)
-        key = np.empty(key_length(len(members)), np.int32)
-        boxes, right = (*self._contacts, self.present), self.load.container[1]
-        dynamic = find_movers(*boxes, item, members, len(members))
-        key = key[: write_key(*boxes, self._geometry, right, members, dynamic, key)].copy()
+        right = self.load.container[1]
+        contacts = self._starts, self._links, self.present
+        return situation_in(*contacts, self._geometry, right, item)
 
-        # What stands between its head and the boxes, six words each, are the floor and the sides.
-        first = 2 + key[1]
-        sides = (len(key) - first) % 6
-        return Situation(
-            boxes=key[first + sides :].reshape(-1, 6),
-            dynamic=int(key[0]),
-            floor=int(key[2]) if key[1] else None,
-            sides=tuple(key[first : first + sides].tolist()),
-        )
+
+def situation_in(
+    starts: np.ndarray,
+    links: np.ndarray,
+    present: np.ndarray,
+    geometry: np.ndarray,
+    right: float,
+    item: int,
+) -> Situation:
+    """The situation of ``item`` in a container given by arrays, see ``write_key``."""
+    members = np.empty(len(present), np.int32)
+    key = np.empty(key_length(len(present)), np.int32)
+    dynamic = find_movers(starts, links, present, item, members, len(members))
+    words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+    key = key[:words].copy()
+
+    # What stands between its head and the boxes, six words each, are the floor and the sides.
+    first = 2 + key[1]
+    sides = (len(key) - first) % 6
+    return Situation(
+        boxes=key[first + sides :].reshape(-1, 6),
+        dynamic=int(key[0]),
+        floor=int(key[2]) if key[1] else None,
+        sides=tuple(key[first : first + sides].tolist()),
+    )
 
 
 @compiled

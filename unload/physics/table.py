@@ -74,7 +74,7 @@ class LiftTable:
     def __init__(self) -> None:
         self._adding = Lock()
         self.samples: dict[int, Situation] = {}
-        self._hold(np.zeros(0, np.uint64), np.zeros(0, np.int32))
+        self._start_slots(np.zeros(0, np.uint64), np.zeros(0, np.int32))
 
     def __len__(self) -> int:
         return self._count
@@ -100,7 +100,7 @@ class LiftTable:
             self._take_samples({int(digest): situation})
             self._count += 1
             if 2 * self._count > len(digests):
-                self._hold(*self.entries())
+                self._start_slots(*self.entries())
 
     def entries(self) -> tuple[np.ndarray, np.ndarray]:
         """All digests (n,) uint64 in increasing order, and their distances (n,) int32."""
@@ -109,7 +109,7 @@ class LiftTable:
         order = filled[np.argsort(digests[filled])]
         return digests[order], micrometres[order]
 
-    def _hold(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
+    def _start_slots(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
         """Start new arrays with these entries."""
         size = max(_FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
         slots = np.full(size, EMPTY), np.zeros(size, np.int32)
@@ -149,9 +149,9 @@ class LiftTable:
             )
 
         table = cls()
-        table._hold(arrays["digests"], arrays["micrometres"])
-        for each in json.loads(str(arrays["samples"])):
-            situation = Situation(**each | {"boxes": np.array(each["boxes"], np.int32)})
+        table._start_slots(arrays["digests"], arrays["micrometres"])
+        for fields in json.loads(str(arrays["samples"])):
+            situation = Situation(**fields | {"boxes": np.array(fields["boxes"], np.int32)})
             table._take_samples({int(_digest(situation)): situation})
         return table
 
@@ -189,7 +189,7 @@ class LiftTable:
                     both = zip(self.entries(), stored.entries())
                     digests, micrometres = map(np.concatenate, both)
                     digests, first = np.unique(digests, return_index=True)
-                    self._hold(digests, micrometres[first])
+                    self._start_slots(digests, micrometres[first])
                     self._take_samples(stored.samples)
                 if len(self) > len(stored):
                     self.save(path)

@@ -58,19 +58,19 @@ def _folder() -> Path | None:
     for place in (CONFIG.CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
         if not place:
             continue
-        found = Path(place, f"compiled-{_digest(_PACKAGE)}")
+        kept = Path(place, f"compiled-{_digest(_PACKAGE)}")
         try:
-            fresh = not found.exists()
-            found.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=found).close()
+            fresh = not kept.exists()
+            kept.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=kept).close()
         except OSError:
             continue
         if fresh:  # else whoever waits for the compiler does not know why
             _LOGGER.warning(
                 "compiling for this processor, for about ten seconds in all; kept for later in %s",
-                found,
+                kept,
             )
-        return found
+        return kept
     warnings.warn(
         "compiled code cannot be kept, and every process compiles for ten seconds; set "
         "NUMBA_CACHE_DIR to a folder that can be written",
@@ -81,8 +81,8 @@ def _folder() -> Path | None:
 
 def _digest(package: Path) -> str:
     """Digest of ``_SOURCES`` in a folder, and of the versions of Python and the libraries."""
-    found = blake2b(repr(_VERSIONS).encode(), digest_size=8)
+    digest = blake2b(repr(_VERSIONS).encode(), digest_size=8)
     for pattern in _SOURCES:
         for path in sorted(package.glob(pattern)):
-            found.update(path.read_bytes())
-    return found.hexdigest()
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
