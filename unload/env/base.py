@@ -169,6 +169,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
                 which environments; in the others their episodes go on.
         """
         self._check_open()
+        # Gymnasium hands the mask over as an option; the rest of them is the same for all.
         chosen = np.ones(self.num_envs, bool)
         if isinstance(options, dict) and "reset_mask" in options:
             self._check_started()

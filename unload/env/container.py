@@ -97,7 +97,8 @@ class ContainerEnv(PickingEnv):
 
     Attributes:
         visible: (128,) int64, the item in each row of the observation, -1 in rows without.
-        physics: what lifts; its ``load``, and which of its items are ``present``.
+        physics: what lifts; it has the ``load``, and which of its items are ``present``. Another
+            one may be put here before a reset.
 
     Raises:
         TypeError, ValueError: an argument, an action or a load is not as described.
@@ -131,6 +132,10 @@ class ContainerEnv(PickingEnv):
     @property
     def physics(self) -> Physics:
         return self._envs.physics
+
+    @physics.setter
+    def physics(self, physics: Physics) -> None:
+        self._envs.physics = physics
 
     def liftable(self) -> np.ndarray:
         """(128,) bool, which rows of the observation can be unloaded now.

@@ -1,6 +1,7 @@
 """Many containers at once, in arrays (Sec. III-A, Fig. 2)."""
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from unload.fast import containers
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.situation import situation_in
-from unload.physics.table import TablePhysics, shared_table
+from unload.physics.table import LiftTable, TablePhysics, shared_table
 from unload.support import checks
 
 
@@ -44,13 +45,16 @@ class ContainerVectorEnv(PickingVectorEnv):
         checks.one_of("physics", physics, ("table",))
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
-        self.stack, self.table = stack, shared_table()
-        self._physics = TablePhysics(self.table)
+        self.stack, self._physics = stack, TablePhysics()
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
         self._physics.close()
         super().close_extras(**kwargs)
+
+    @cached_property
+    def table(self) -> LiftTable:
+        return shared_table()
 
     @property
     def visible(self) -> np.ndarray:

@@ -203,6 +203,7 @@ def _reduce_items(inputs, items, mask, block):
     side.
     """
     _long_vectors()
+    # Every value is below the first lowest and above the first highest.
     for f in range(_BLOCK):
         block[_LOW + f] = block[_LOW2 + f] = _number(0x7FFFFFFF)
         block[_HIGH + f] = block[_HIGH2 + f] = _number(-0x80000000)

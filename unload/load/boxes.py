@@ -101,6 +101,7 @@ class Load:
             "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
         )
 
+        # Labels serve views and lists; what moves does not depend on them.
         labels = {"packages": self.packages, "walls": self.walls}
         if labels["packages"] is None:
             edges = np.rint(sizes / OVERLAP)

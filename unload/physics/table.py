@@ -136,6 +136,7 @@ class LiftTable:
     @classmethod
     def load(cls, path: str | Path) -> "LiftTable":
         """Read a table that ``save`` wrote; ValueError if damaged or of other physics settings."""
+        # Of a damaged file nothing is taken, nor of one that holds another physics' answers.
         arrays = files.read_arrays(path)
         if set(arrays) != _ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
@@ -185,6 +186,7 @@ class LiftTable:
             with files.locked(f"{path}.lock", wait=True):
                 stored = LiftTable.load(path) if path.exists() else LiftTable()
                 stored.check(path)
+                # Of a lift that both know, the own distance stays.
                 with self._adding:
                     both = zip(self.entries(), stored.entries())
                     digests, micrometres = map(np.concatenate, both)
