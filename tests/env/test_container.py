@@ -14,6 +14,7 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.picture import snapshot
 from unload.load.substacks import build_load
+from unload.physics.local import LocalPhysics
 
 
 @pytest.mark.parametrize("equalize", [False, True])
@@ -57,8 +58,9 @@ def test_positions_are_blurred_and_sunk(full_load):
     assert blur.mean(axis=0) == pytest.approx([0, 0, -0.001], abs=1e-4)
 
 
-def test_the_reward_needs_the_threshold(monkeypatch):
+def test_the_reward_needs_the_threshold_whatever_physics_decides(monkeypatch):
     env = make_env()
+    env.unwrapped.physics = LocalPhysics()
     env.reset(seed=0)
     for distance, reward in ((0.2, 1), (0.1999, -1), (0.46, 1), (0.0, -1)):
         monkeypatch.setattr(env.unwrapped.physics, "lift", lambda item, d=distance: d)
