@@ -21,6 +21,8 @@ def test_on_top_is_transitive_and_skips_removed_boxes(boxes):
     assert tower.on_top(2) == tower.on_top(3) == []
     tower.present[1] = False
     assert tower.on_top(0) == []
+    everything = surroundings(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0)))
+    assert everything.on_top(0) == [1, 2] and everything.situation(0).dynamic == 3
 
 
 def test_a_box_that_bridges_two_rests_on_both(boxes):
