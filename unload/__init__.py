@@ -73,6 +73,6 @@ def __dir__() -> list[str]:
 
 for _id, _entry, _arrays in (
     ("unload/Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
-    ("unload/HighestItem-v0", "highest_item:HighestItemEnv", "vector:HighestItemVectorEnv"),
+    ("unload/HighestItem-v0", "highest_item:HighestItemEnv", "highest_item:HighestItemVectorEnv"),
 ):
     gymnasium.register(_id, f"unload.env.{_entry}", vector_entry_point=f"unload.env.{_arrays}")

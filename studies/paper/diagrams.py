@@ -10,7 +10,17 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 from studies.style import styled
 from unload import task
 from unload.load.picture import package_colour
-from unload.load.substacks import CELL, CELLS_WIDE, COLUMNS, LEFT, MID, PACKAGES, RIGHT, ROWS_HIGH
+from unload.load.substacks import (
+    CELL,
+    CELLS_WIDE,
+    COLUMNS,
+    LEFT,
+    MID,
+    PACKAGES,
+    RIGHT,
+    ROWS_HIGH,
+    build_load,
+)
 
 INK = "#333333"
 PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
@@ -95,10 +105,14 @@ def fig03_substacks() -> Figure:
     bar = across - gap + 0.14
     axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
     axes.text(bar + 0.05, down + 0.25, "0.5 m", va="center")
-    row = (0, 1, 2, 0)
-    lift = -0.12
-    for (column, variants), variant in zip(COLUMNS, row):
-        _draw_substack(axes, variants[variant], column * CELL, lift)
+    # The row as a load places it: the items of its first substack, of its second, and so on.
+    row, lift = (0, 1, 2, 0), -0.12
+    load = build_load(np.array([[row]]))
+    corners = np.rint((load.positions - load.sizes / 2)[:, 1:] / CELL).astype(int)
+    counts = [len(variants[number]) for (_, variants), number in zip(COLUMNS, row)]
+    boxes = np.column_stack([load.packages, corners])
+    for substack in np.split(boxes, np.cumsum(counts)[:-1]):
+        _draw_substack(axes, substack, 0, lift)
     label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
     axes.text(CELLS_WIDE * CELL + 0.08, lift + ROWS_HIGH * CELL / 2, label, va="center")
     axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(lift - 0.02, 4 * down + 0.02))
@@ -229,7 +243,7 @@ def _draw_substack(axes: Axes, boxes, x: float, z: float) -> None:
 
 def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
     """Lines between cells of which one belongs to the substack and the other does not."""
-    inside = np.zeros((COLUMNS[-1][0] + 2, ROWS_HIGH + 2), dtype=bool)
+    inside = np.zeros((CELLS_WIDE + 2, ROWS_HIGH + 2), dtype=bool)
     for package, left, lower in boxes:
         width, height = PACKAGES[package]
         inside[left + 1 : left + width + 1, lower + 1 : lower + height + 1] = True

@@ -125,14 +125,14 @@ def weigh(run: Training, z: float) -> None:
         z: the last entry of W's diagonal; 4 in the paper.
     """
     envs = run.rollout.envs.unwrapped
-    weights, put = task.DISTANCE_WEIGHTS * [1, 1, z / task.DISTANCE_WEIGHTS[2]], envs._put
+    weights, put = task.DISTANCE_WEIGHTS * [1, 1, z / task.DISTANCE_WEIGHTS[2]], envs._put_load
 
     def put_in_order(env: int, load, blur: np.ndarray) -> None:
         put(env, load, blur)
         distances = (task.VIEWPOINT - load.positions - blur) ** 2 @ weights
         order = np.argsort(distances, kind="stable")
         envs._containers.by_distance[env, : len(load)] = order
-        containers.start(envs._containers, env, *envs._features)
+        containers.show_nearest(envs._containers, env, *envs._features)
 
-    envs._put = put_in_order
+    envs._put_load = put_in_order
     run.rollout._see(*envs.reset(seed=run.config.seeds()[0]))

@@ -1,4 +1,4 @@
-"""What the two single environments have in common: settings, and the order of calls."""
+"""What all environments have in common: settings, and the order of calls."""
 
 import copy
 import gc
@@ -17,7 +17,8 @@ from gymnasium.vector import AutoresetMode
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_env
 from unload import ContainerEnv, HighestItemEnv, stack_load
-from unload.env.vector import ContainerVectorEnv, HighestItemVectorEnv
+from unload.env.highest_item import HighestItemVectorEnv
+from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import LiftTable
 
 
@@ -89,7 +90,9 @@ def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
     env.reset(seed=0)
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("unload.env.observation.nearest", Mock(side_effect=KeyboardInterrupt))
+        interrupted = Mock(side_effect=KeyboardInterrupt)
+        patch.setattr("unload.fast.containers.pick", interrupted)
+        patch.setattr("unload.env.highest_item.drift", interrupted)
         env.step(0)
     for call in (lambda: env.step(0), env.action_masks):
         with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
@@ -111,8 +114,8 @@ def clients() -> int:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: ContainerEnv("local", render_mode="rgb_array"),
-        lambda: ContainerEnv("full", max_picks=1),
+        partial(ContainerEnv, "local", render_mode="rgb_array"),
+        partial(ContainerEnv, "full", max_picks=1),
         container,
         ContainerVectorEnv,
     ],
@@ -128,8 +131,7 @@ def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monke
     before = clients()
     gc.disable()
     for closed in (False, False, True):
-        env = make()
-        env.stack = lambda rng: load
+        env = make(stack=lambda rng: load)
         env.reset(seed=0)
         env.step(np.ones(64, int) if make is ContainerVectorEnv else 1)  # the lower box
         if getattr(env, "render_mode", None) == "rgb_array":

@@ -1,4 +1,4 @@
-"""The array environments, against Gymnasium's loop over single ones."""
+"""The array environments, against Gymnasium's loop over plain ones."""
 
 import gymnasium
 import numpy as np
@@ -12,8 +12,6 @@ from hypothesis import strategies as st
 import unload
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_pair
 from tests.load.walls import crossed_bars, own_load
-from unload.env.vector import ContainerVectorEnv
-from unload.physics.table import FREE_LIFT, LiftTable
 
 
 def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -> np.ndarray:
@@ -43,31 +41,19 @@ def play_both(env_id: str, num_envs: int, steps: int, seed: int = 0, **kwargs) -
             begun = array.reset(**given, options=dict(options))
             assert_same(begun, side_by_side.reset(**given, options=options))
             results = begun
+    if env_id == CONTAINER:
+        visible = np.array([env.visible for env in side_by_side.envs])
+        lifts = [list(map(env.lift, env.visible.tolist())) for env in side_by_side.envs]
+        assert (array.unwrapped.visible == visible).all()
+        assert_same(array.liftable(), np.array(lifts) >= unload.task.LIFT_THRESHOLD)
+        masks = [env.info()["action_mask"] for env in side_by_side.envs]
+        assert_same(array.action_masks(), np.array(masks).astype(bool))
     assert_same(array.reset(), side_by_side.reset())
     return np.array(ends)
 
 
 def test_full_containers_for_whole_episodes_and_beyond():
     play_both(CONTAINER, 3, 520, equalize=True)
-
-
-@pytest.mark.parametrize("count", [41, 800])
-def test_what_can_be_seen_and_lifted_is_that_of_the_single_environments(count):
-    array, side_by_side = make_pair(CONTAINER, 3, stack=lambda rng: few_items(rng, count))
-    with pytest.raises(ResetNeeded):
-        array.liftable()
-    observed, _ = array.reset(seed=4)
-    side_by_side.reset(seed=4)
-    for _ in range(40):
-        expected = np.stack([env.unwrapped.liftable() for env in side_by_side.envs])
-        assert_same(array.liftable(), expected)
-        for number, env in enumerate(side_by_side.envs):
-            assert (array.unwrapped.visible[number] == env.unwrapped.visible).all()
-            assert (array.unwrapped.action_masks()[number] == env.unwrapped.action_masks()).all()
-        actions = observed[:, :, 2].argmax(axis=1)
-        observed = array.step(actions)[0]
-        side_by_side.step(actions)
-    assert 0 < expected.sum() < expected.size
 
 
 def test_a_load_may_be_given(rng):
@@ -77,14 +63,6 @@ def test_a_load_may_be_given(rng):
     assert_same(array.reset(**given), side_by_side.reset(**given))
     for _ in range(4):  # beyond the end of the episode, after which the load is drawn by lot
         assert_same(array.step(np.array([0, 3])), side_by_side.step(np.array([0, 3])))
-
-
-def test_a_lift_as_far_as_the_threshold_is_enough(monkeypatch):
-    envs = ContainerVectorEnv(1)
-    envs.reset(seed=0)
-    liftable = envs.liftable()
-    monkeypatch.setattr(unload.task, "LIFT_THRESHOLD", FREE_LIFT)
-    assert_same(envs.liftable(), liftable)
 
 
 def test_fewer_boxes_may_have_more_contacts():
@@ -171,31 +149,6 @@ def test_an_episode_that_is_over_waits_for_its_reset():
         envs.reset(options={"reset_mask": np.ones(3, bool)})
     assert envs.reset(options={"reset_mask": np.array([False, True])})[1]["_action_mask"].tolist()
     envs.step(np.zeros(2, int))
-
-
-def test_unknown_lifts_are_those_of_the_load_that_a_state_has_brought_back():
-    envs, states, free = ContainerVectorEnv(1), [], []
-    for seed in (0, 1):
-        envs.table = LiftTable()
-        load = unload.stack_load(np.random.default_rng(seed), walls=1)
-        envs.reset(options={"load": load})
-        states.append(envs.state())
-        free.append(envs.liftable())
-    for state, liftable in zip(states, free):
-        envs.table = LiftTable()
-        envs.load_state(state)
-        assert_same(envs.liftable(), liftable)
-
-
-def test_unknown_lifts_go_on_when_a_larger_load_has_come_into_another_container(small_load):
-    envs, other = ContainerVectorEnv(2), ContainerVectorEnv(2)
-    envs.table, other.table = LiftTable(), LiftTable()
-    envs.reset(seed=0, options={"load": small_load})
-    envs.liftable()
-    envs.reset(seed=0, options={"reset_mask": np.array([False, True])})
-    other.load_state(envs.state())
-    for row in (*range(40), *range(40)):
-        assert_same(envs.step(np.array([row, 0])), other.step(np.array([row, 0])))
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])

@@ -16,7 +16,7 @@ from unload.fast import fused
 from unload.network.peq import PEQNetwork
 
 BATCH, ITEMS = 300, 128
-FOR_TWO_THREADS = 2 * fused.CHUNK * fused.CHUNKS_PER_THREAD + 5
+FOR_TWO_THREADS = 2 * fused.CHUNK * fused._CHUNKS_PER_THREAD + 5
 
 
 def random_batch(rng, size):
@@ -128,7 +128,7 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
     assert gradients(net, batch).tobytes() == two  # and again
     assert len(submitted) == 1  # no thread where one is asked for
     torch.set_num_threads(2)
-    gradients(net, random_batch(rng, fused.CHUNK * fused.CHUNKS_PER_THREAD))
+    gradients(net, random_batch(rng, fused.CHUNK * fused._CHUNKS_PER_THREAD))
     assert len(submitted) == 1  # and none for a batch that one thread has done as soon
 
 

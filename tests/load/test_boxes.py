@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from tests.load.walls import corners, crossed_bars
 from unload import task
 from unload.load.boxes import (
+    _SMALLEST_EDGE,
     ABOVE,
     BELOW,
     BESIDE,
     CONTACT_TOLERANCE,
-    SMALLEST_EDGE,
     BoxError,
     Load,
-    contacts,
+    _find_contacts,
 )
 
 FIELDS = ("positions", "sizes", "packages", "walls")
@@ -74,7 +74,7 @@ def test_the_box_that_sticks_out_is_named():
     sizes = np.array([[1.0, 1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 3.0, 1.0]])
     with pytest.raises(ValueError, match=r"^box \[2\]: reaches from"):
         Load(positions, sizes)
-    sizes[2] = 1, SMALLEST_EDGE, 1
+    sizes[2] = 1, _SMALLEST_EDGE, 1
     assert len(Load(positions, sizes)) == 3
 
 
@@ -111,7 +111,7 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
     else:
         other_high[axis] = low[first, axis] + reach
         other_low[axis] = max(other_high[axis] - 0.3, 0)
-    if other_high[axis] - other_low[axis] < SMALLEST_EDGE:
+    if other_high[axis] - other_low[axis] < _SMALLEST_EDGE:
         other_low, other_high = low[first], high[first]  # no room beside it: the same place
     low, high = np.vstack([low, other_low]), np.vstack([high, other_high])
     with pytest.raises(ValueError, match=r"boxes .*: overlap by .* m; expected none"):
@@ -121,7 +121,7 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
 def test_boxes_side_by_side_touch_up_to_the_tolerance():
     for gap, beside in ((CONTACT_TOLERANCE, [1]), (1.01 * CONTACT_TOLERANCE, [])):
         low = np.array([[0, 0, 0], [0, 1 + gap, 0]])
-        assert contacts(low, low + 1).of(BESIDE, 0).tolist() == beside
+        assert _find_contacts(low, low + 1).of(BESIDE, 0).tolist() == beside
 
 
 @pytest.mark.parametrize("tolerance", [CONTACT_TOLERANCE, 0.003])
@@ -138,7 +138,7 @@ def test_the_two_that_overlap_are_named_in_their_order():
     low = np.array([[0, 0, 0], [0, 0.5, 0], [0, 2, 0]])
     for order, pair in (([0, 1, 2], [0, 1]), ([1, 2, 0], [0, 2])):
         with pytest.raises(BoxError, match="overlap by 0.4 m") as error:
-            contacts(low[order], low[order] + (1, 1, 0.4))
+            _find_contacts(low[order], low[order] + (1, 1, 0.4))
         assert pickle.loads(pickle.dumps(error.value)).boxes == pair
 
 

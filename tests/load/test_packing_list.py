@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from unload import Load, read_load, stack_load
-from unload.load.boxes import SMALLEST_EDGE
+from unload.load.boxes import _SMALLEST_EDGE
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
 LENGTHS = "length_cm,width_cm,height_cm"
@@ -218,7 +218,7 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
-        ([f"a,0,0,0,1,1,{SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
+        ([f"a,0,0,0,1,1,{_SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 7)], r"row 5 \(id '6'\): reaches from"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], r"row 5 \(id '6'\) and 1 more: reaches"),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with either"),

@@ -7,13 +7,13 @@ from matplotlib.image import imread
 
 from unload import task
 from unload.load.picture import (
+    _FACES,
+    _INSIDES,
+    _LEGEND,
+    _PACKAGE_COLOURS,
     COLOURS,
     CORNERS,
     EYE,
-    FACES,
-    INSIDES,
-    LEGEND,
-    PACKAGE_COLOURS,
     back_to_front,
     package_colour,
     project,
@@ -42,7 +42,7 @@ def test_a_nearer_box_covers_a_farther_one():
     near, far = [(6, 0, 0), (7, 2, 2)], [(4, 0.5, 0.5), (5, 1.5, 1.5)]
     picture = pixels(far[:1], far[1:], [RED])
     alone, width = seen(picture, RED), picture.shape[1]
-    assert (picture[:, : round(LEGEND * width)] == 1).all(), "the legend's place"
+    assert (picture[:, : round(_LEGEND * width)] == 1).all(), "the legend's place"
     assert (picture[:, round(0.97 * width) :] == 1).all(), "a margin"
     for (first, one), (second, other) in permutations([(near, BLUE), (far, RED)]):
         beside = seen(pixels([first[0], second[0]], [first[1], second[1]], [one, other]), RED)
@@ -107,7 +107,7 @@ def test_the_colour_blind_tell_all_meanings_apart(kind):
 
 def test_faces_lie_in_the_sides_of_a_box():
     """Their corners go round."""
-    for corners, _ in (*FACES, *INSIDES):
+    for corners, _ in (*_FACES, *_INSIDES):
         ring = CORNERS[list(corners)]
         assert (np.abs(np.roll(ring, 1, axis=0) - ring).sum(axis=1) == 1).all()
         assert sorted(np.ptp(ring, axis=0)) == [0, 1, 1]
@@ -116,4 +116,4 @@ def test_faces_lie_in_the_sides_of_a_box():
 def test_colours_of_packages_are_their_codes_and_begin_again():
     assert [round(255 * part) for part in package_colour(0)] == [0x1F, 0x3A, 0x5F]
     assert [round(255 * part) for part in package_colour(12)] == [0xF6, 0xE2, 0x7F]
-    assert package_colour(13) == package_colour(0) and len(set(PACKAGE_COLOURS)) == 13
+    assert package_colour(13) == package_colour(0) and len(set(_PACKAGE_COLOURS)) == 13

@@ -11,9 +11,9 @@ from unload.load.substacks import (
     DEPTH,
     PACKAGES,
     ROWS_HIGH,
+    _substacks_that_fit,
     build_load,
     stack_load,
-    substacks_that_fit,
 )
 
 
@@ -60,7 +60,7 @@ def test_a_load_of_exactly_as_many_items_as_allowed_is_kept(monkeypatch, bound):
 )
 def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
     walls, rows, columns = fit
-    assert substacks_that_fit(scale) == fit
+    assert _substacks_that_fit(scale) == fit
     load = stack_load(rng, scale=scale)
     reach = (load.positions + load.sizes / 2).max(axis=0)
     width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 
 from unload import Load, view
 from unload.load.picture import COLOURS, EYE
-from unload.load.view import OTHER_COLOURS, PLOTLY_MIMETYPE, _short
+from unload.load.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE, _short
 
 
 def vertices(trace) -> np.ndarray:
@@ -82,7 +82,7 @@ def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
     shown = {trace.name: items(trace) for trace in figure.data}
     rest = list(range(8, len(small_load)))
     assert shown == {"visible": [0, 1], "tried": [2, 3], "failed": [], **others, "unseen": rest}
-    colours = COLOURS | dict(zip(others, OTHER_COLOURS))
+    colours = COLOURS | dict(zip(others, _OTHER_COLOURS))
     for trace in figure.data:
         assert trace.color == to_hex(colours[trace.name])
 
@@ -108,9 +108,9 @@ def test_pointing_at_a_box_names_it_and_its_edges(small_load):
 
 def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_network(full_load):
     bundle, _ = DisplayFormatter().format(view(full_load, height=300))
-    assert set(bundle) == {"image/png", "text/plain", PLOTLY_MIMETYPE}
+    assert set(bundle) == {"image/png", "text/plain", _PLOTLY_MIMETYPE}
     assert sum(len(json.dumps(content)) for content in bundle.values()) < 1_000_000
-    assert "http" not in json.dumps(bundle[PLOTLY_MIMETYPE]) and bundle[PLOTLY_MIMETYPE]["data"]
+    assert "http" not in json.dumps(bundle[_PLOTLY_MIMETYPE]) and bundle[_PLOTLY_MIMETYPE]["data"]
     picture = base64.b64decode(bundle["image/png"])
     assert picture.startswith(b"\x89PNG")
     assert int.from_bytes(picture[16:20]) == 800  # pixels wide

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES, lifts, make
-from unload.load.boxes import SMALLEST_EDGE, Load
+from unload.load.boxes import _SMALLEST_EDGE, Load
 from unload.load.substacks import build_load
 from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
@@ -39,7 +39,7 @@ def test_free_boxes_of_a_neat_row_do_not_jam(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_smallest_boxes_of_a_load_are_simulated(kind):
     """Physics takes the gap off their edges, of which something must be left."""
-    edge = SMALLEST_EDGE
+    edge = _SMALLEST_EDGE
     positions = [[3.5, 1.2 + edge * column, edge * (row + 0.5)] for column, row in np.ndindex(2, 2)]
     physics = make(kind, Load(positions, np.full((4, 3), edge)))
     assert (np.array(lifts(physics, range(4))) >= 0).all()
@@ -119,7 +119,7 @@ def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
 def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
     physics, fresh = LocalPhysics(), LocalPhysics()
     expected = [fresh.simulate(situation) for situation in situations[:10]]
-    monkeypatch.setattr("unload.physics.local.MOST_BODIES", 3)
+    monkeypatch.setattr("unload.physics.local._MOST_BODIES", 3)
     for situation, distance in zip(situations, expected):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
@@ -129,7 +129,7 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
 def test_the_memory_of_many_lifts_is_flat(monkeypatch):
     """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
     monkeypatch.setattr(World, "pull", lambda world, body: 0.0)
-    monkeypatch.setattr("unload.physics.local.MOST_BODIES", 1_500)
+    monkeypatch.setattr("unload.physics.local._MOST_BODIES", 1_500)
     physics, resident = LocalPhysics(), []
     for number in range(6_001):
         boxes = np.array([(0, 0, 0, 500_000, 400_000, 300_000 + number)] * 2)

@@ -120,7 +120,7 @@ def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
         return [1 + own(each) for each in situations]
 
     monkeypatch.setattr(Pool, "simulate", simulate)
-    monkeypatch.setattr(table, "PATIENCE", 15)
+    monkeypatch.setattr(table, "_PATIENCE", 15)
     alone = [local.simulate(each) for each in hard]
     physics = TablePhysics(LiftTable())
     for first, last in ((0, 6), (6, 12), (12, 15)):  # three are too few to count

@@ -1,7 +1,11 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from unload import task
+from tests.env.plain import on_top, situation
+from tests.load.walls import loads
+from unload import stack_load, task
 from unload.load.boxes import CONTACT_TOLERANCE, Load
 from unload.physics.situation import Surroundings
 
@@ -17,6 +21,8 @@ def test_on_top_is_transitive_and_skips_removed_boxes(boxes):
     assert tower.on_top(2) == tower.on_top(3) == []
     tower.present[1] = False
     assert tower.on_top(0) == []
+    everything = surroundings(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0)))
+    assert everything.on_top(0) == [1, 2] and everything.situation(0).dynamic == 3
 
 
 def test_a_box_that_bridges_two_rests_on_both(boxes):
@@ -74,3 +80,25 @@ def test_equal_situations_have_equal_keys_and_whatever_may_matter_is_in_them(box
     above_the_floor, covered = boxes((1.0, 0.6), (2.0, 0.2)), boxes((1.0, 0.2), (1.0, 0.6))
     for load in (beside, at_the_wall, above_the_floor, covered):
         assert surroundings(load).situation(0).key != alone.key
+
+
+@settings(max_examples=80)
+@given(load=loads(), data=st.data())
+def test_situations_in_random_loads_are_those_of_the_plain_search(load, data):
+    some = data.draw(st.lists(st.booleans(), min_size=len(load), max_size=len(load)))
+    assert_searched_alike(load, np.array(some))
+
+
+def assert_searched_alike(load: Load, present: np.ndarray) -> None:
+    around = Surroundings(load, present)
+    for item in np.flatnonzero(present).tolist():
+        found, plain = around.situation(item), situation(load, present, item)
+        assert around.on_top(item) == on_top(load, present, item)
+        assert (found.floor, found.sides) == (plain.floor, plain.sides)
+        assert found.key == plain.key and found.boxes.tobytes() == plain.boxes.tobytes()
+
+
+@pytest.mark.parametrize("share", [1.0, 0.7, 0.3])
+def test_so_are_those_in_loads_of_the_paper(rng, share):
+    load = stack_load(rng, walls=2)
+    assert_searched_alike(load, rng.random(len(load)) < share)

@@ -21,7 +21,7 @@ from unload.physics.bullet import GAP, SETTINGS, World
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation, Surroundings
 from unload.physics.table import (
-    FEWEST_SLOTS,
+    _FEWEST_SLOTS,
     FREE_LIFT,
     HELD_DOWN,
     LIFTS_FILE,
@@ -66,15 +66,6 @@ def test_a_situation_is_simulated_once(known, monkeypatch):
     with pytest.raises(pytest.fail.Exception):
         fresh.simulate(known[0][0])
     assert len(fresh.table) == 0
-
-
-def test_a_box_under_two_others_is_simulated_and_one_under_three_is_not(boxes):
-    tower = boxes((1.2, 0.2), (1.2, 0.6), (1.2, 1.0), (1.2, 1.4))
-    around = Surroundings(tower, np.ones(4, dtype=bool))
-    physics = TablePhysics(LiftTable())
-    assert physics.simulate(around.situation(0)) == 0 and len(physics.table) == 0
-    distance = physics.simulate(around.situation(1))
-    assert 0 < distance < task.LIFT_THRESHOLD and len(physics.table) == 1
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -141,7 +132,7 @@ def test_a_table_grows_and_forgets_nothing(table):
     assert len(digests) == len(micrometres) == 4096 and len(table) == 2000
     assert all(table.find(free_box(number)) == number / 1000 for number in range(2000))
     # Whoever still reads the first arrays finds in them what they held when they were full.
-    assert len(old[0]) == FEWEST_SLOTS and (old[0] != 0).sum() == FEWEST_SLOTS // 2 + 1
+    assert len(old[0]) == _FEWEST_SLOTS and (old[0] != 0).sum() == _FEWEST_SLOTS // 2 + 1
     assert table.find(free_box(2000)) is None
     table.add(free_box(7), 0.5)  # it is known
     assert len(table) == 2000 and table.find(free_box(7)) == 0.007

@@ -22,7 +22,7 @@ from studies.paper import diagrams
 from studies.play import animation
 from studies.policies.comparison import comparison_msr
 from studies.results import read_table
-from unload.load.view import PLOTLY_MIMETYPE
+from unload.load.view import _PLOTLY_MIMETYPE
 
 SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
 # The cells, by their ids, that draw the other figures from data/, and some whose figures stand in
@@ -131,7 +131,7 @@ def test_figures_and_tables_are_those_that_the_data_give(notebook, monkeypatch):
                 for kind in published.keys() & {"text/plain", "text/html", "text/markdown"}:
                     texts = (RANDOM.sub("", "".join(each[kind])) for each in (found, published))
                     assert len(set(texts)) == 1, name
-                assert found.get(PLOTLY_MIMETYPE) == published.get(PLOTLY_MIMETYPE), name
+                assert found.get(_PLOTLY_MIMETYPE) == published.get(_PLOTLY_MIMETYPE), name
                 if "image/png" in found:
                     stills = (BytesIO(b64decode(each["image/png"])) for each in (found, published))
                     compare(*stills, name)

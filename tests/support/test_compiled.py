@@ -71,8 +71,8 @@ def test_code_is_compiled_once_for_each_value_of_a_constant(copy):
 def test_code_is_kept_in_the_first_of_three_places_that_can_be_written(tmp_path, monkeypatch):
     """And in memory where there is none, as in a folder that another user has made."""
     package, chosen, user = (tmp_path / name for name in ("package", "chosen", "user"))
-    find = compiled.folder.__wrapped__
-    monkeypatch.setattr(compiled, "PACKAGE", package)
+    find = compiled._folder.__wrapped__
+    monkeypatch.setattr(compiled, "_PACKAGE", package)
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(chosen))
     monkeypatch.setenv("XDG_CACHE_HOME", str(user))
     assert find().parent == chosen
@@ -83,26 +83,26 @@ def test_code_is_kept_in_the_first_of_three_places_that_can_be_written(tmp_path,
     monkeypatch.setattr(compiled.tempfile, "TemporaryFile", Mock(side_effect=PermissionError))
     with pytest.warns(UserWarning, match="cannot be kept.* set NUMBA_CACHE_DIR to a folder"):
         assert find() is None
-    monkeypatch.setattr(compiled, "folder", lambda: None)
+    monkeypatch.setattr(compiled, "_folder", lambda: None)
     assert compiled.compiled(lambda number: number + 1)(1) == 2
 
 
 def test_the_digest_follows_sources_and_versions(copy, monkeypatch):
     package = copy / "unload"
-    before = compiled.digest(package)
+    before = compiled._digest(package)
     (package / "__init__.py").write_text("# compiled code reads nothing of this file")
-    assert compiled.digest(package) == before
+    assert compiled._digest(package) == before
     for folder in ("load", "physics", "fast", "support"):
         (package / folder / "new.py").write_text(f"LIMIT = {folder!r}")
-        assert compiled.digest(package) != before
+        assert compiled._digest(package) != before
         (package / folder / "new.py").unlink()
-    for place in range(len(compiled.VERSIONS)):
-        versions = [*compiled.VERSIONS]
+    for place in range(len(compiled._VERSIONS)):
+        versions = [*compiled._VERSIONS]
         versions[place] += "1"
         with monkeypatch.context() as patch:
-            patch.setattr(compiled, "VERSIONS", tuple(versions))
-            assert compiled.digest(package) != before
-    assert compiled.digest(package) == before
+            patch.setattr(compiled, "_VERSIONS", tuple(versions))
+            assert compiled._digest(package) != before
+    assert compiled._digest(package) == before
 
 
 def test_numbas_own_setting_is_the_users_again(monkeypatch):
@@ -112,7 +112,7 @@ def test_numbas_own_setting_is_the_users_again(monkeypatch):
 
 
 def test_all_that_compiled_functions_read_is_among_the_sources():
-    sources = {path for pattern in compiled.SOURCES for path in PACKAGE.glob(pattern)}
+    sources = {path for pattern in compiled._SOURCES for path in PACKAGE.glob(pattern)}
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text()
         assert "njit" not in text or path.name == "compiled.py", f"{path} should use compiled"

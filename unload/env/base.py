@@ -2,7 +2,7 @@
 
 ``gymnasium.make_vec(id, num_envs)`` makes an array of environments. It behaves, bit for bit, as
 Gymnasium's ``SyncVectorEnv`` of the single environments with the same ``autoreset_mode``: same
-seeds, same actions, same observations, rewards, masks and infos.
+seeds, same actions, same observations, rewards, masks and infos. A single one is an array of one.
 
 They are registered without Gymnasium's ``max_episode_steps``, which would wrap them and cut every
 episode there, whatever their own ``max_picks`` is.
@@ -17,18 +17,19 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.spaces import Box, Discrete
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from unload import task
 from unload.env import observation
-from unload.env.equalization import TIES, equalize
+from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE
 from unload.load.boxes import Load, check_stacked
 from unload.support import checks
 
-MOST_ENVS = 2**16  # several GB
+_MOST_ENVS = 2**16  # several GB
 
 
 def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Load]:
@@ -103,60 +104,10 @@ class EpisodeEnv(InOrder, gymnasium.Env):
         return checks.integer("action", action, 0, self.observation_space.shape[0] - 1)
 
 
-class Picking:
-    """What single environments and arrays of them have in common: settings and spaces.
-
-    Attributes:
-        options: names of the options that ``reset`` takes.
-    """
-
-    observation_space: gymnasium.Space
-    action_space: gymnasium.Space
-    options: tuple[str, ...] = ()
-    metadata: dict[str, Any] = {"render_modes": []}
-
-    def __init__(
-        self,
-        equalize: bool = False,
-        ties: str = "noise",
-        max_picks: int = task.MAX_PICKS,
-        position_noise: float = observation.POSITION_NOISE,
-        render_mode: str | None = None,
-    ) -> None:
-        checks.one_of("ties", ties, TIES)
-        checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        self.equalize, self.ties = checks.boolean("equalize", equalize), ties
-        self.max_picks = checks.integer("max_picks", max_picks, 1, sys.maxsize)
-        self.position_noise = checks.real("position_noise", position_noise, 0, MOST_NOISE)
-        self.render_mode = render_mode
-        self.observation_space = gymnasium.spaces.Box(-1, 1, (task.N_VISIBLE, 3), np.float32)
-        self.action_space = gymnasium.spaces.Discrete(task.N_VISIBLE)
-
-
-class PickingEnv(Picking, EpisodeEnv):
-    """Base of environments whose action picks one of the 128 visible items.
-
-    What changes the episode stands in ``AllOrReset``.
-    """
-
-    def close(self) -> None:
-        """Free what the environment holds; may be called again."""
-        self._state = "closed"
-
-    def _features(
-        self, positions: np.ndarray, container: np.ndarray = task.CONTAINER
-    ) -> np.ndarray:
-        """The observation of up to 128 items at ``positions`` (n, 3) in m, nearest first."""
-        seen = np.full((task.N_VISIBLE, 3), task.PADDING, np.float32)
-        seen[: len(positions)] = observation.scaled(positions, container)
-        if not self.equalize:
-            return seen
-        present = np.arange(task.N_VISIBLE) < len(positions)
-        return equalize(seen, self.ties, present=present)
-
-
-class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
+class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
     """Base of environments in which each action picks one of 128 visible items.
+
+    What changes the episodes stands in ``AllOrReset``.
 
     Args:
         num_envs: number of environments.
@@ -165,9 +116,11 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             most of Gymnasium's vector wrappers want it, or ``DISABLED``, by the caller's
             ``reset(options={"reset_mask": mask})``. Gymnasium takes ``vector_kwargs`` only for its
             own arrays: ``make_vec(id, num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)``.
-        **settings: equalize, ties, max_picks and position_noise, as for the single environment.
+        equalize, ties, max_picks, position_noise: as for the single environment.
+        render_mode: None; there are no pictures of arrays.
 
     Attributes:
+        options: names of the options that ``reset`` takes.
         autoreset_mode: TorchRL reads it here, Gymnasium in ``metadata``.
 
     Raises:
@@ -177,20 +130,31 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
+    options: tuple[str, ...] = ()
+
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
         autoreset_mode: AutoresetMode = AutoresetMode.SAME_STEP,
-        **settings,
+        equalize: bool = False,
+        ties: str = "noise",
+        max_picks: int = task.MAX_PICKS,
+        position_noise: float = observation.POSITION_NOISE,
+        render_mode: None = None,
     ) -> None:
-        self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
-        super().__init__(**settings)
-        self.single_observation_space = self.observation_space
-        self.single_action_space = self.action_space
-        self.observation_space = batch_space(self.observation_space, self.num_envs)
-        self.action_space = batch_space(self.action_space, self.num_envs)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         self.autoreset_mode = checks.one_of("autoreset_mode", autoreset_mode, AutoresetMode)
-        self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
+        self.equalize = checks.boolean("equalize", equalize)
+        self.ties = checks.one_of("ties", ties, TIES)
+        self.max_picks = checks.integer("max_picks", max_picks, 1, sys.maxsize)
+        self.position_noise = checks.real("position_noise", position_noise, 0, MOST_NOISE)
+        checks.one_of("render_mode", render_mode, (None,))
+
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.single_observation_space = Box(-1, 1, (task.N_VISIBLE, 3), np.float32)
+        self.single_action_space = Discrete(task.N_VISIBLE)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._rngs: list[np.random.Generator] = []
         self._picks = np.zeros(self.num_envs, np.int64)  # of each episode so far
 
@@ -205,6 +169,7 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
                 which environments; in the others their episodes go on.
         """
         self._check_open()
+        # Gymnasium hands the mask over as an option; the rest of them is the same for all.
         chosen = np.ones(self.num_envs, bool)
         if isinstance(options, dict) and "reset_mask" in options:
             self._check_started()
@@ -226,9 +191,13 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             rng if rng is not None and (one is None or not new) else seeding.np_random(one)[0]
             for one, new, rng in zip(seeds, chosen, self._rngs or [None] * self.num_envs)
         ]
-        self._begin(chosen, rngs, **options)
+        return self._restart(chosen, rngs, options)
+
+    def _restart(self, where: np.ndarray, rngs: list[np.random.Generator], options: dict):
+        """``reset`` some environments, (num_envs,) bool, by the generators of all."""
+        self._begin(where, rngs, **options)
         self._rngs, self._state = rngs, "running"
-        return self._look(), _flagged(self._infos(), chosen)
+        return self._copy_observations(), _flagged(self._infos(), where)
 
     def step(self, actions: np.ndarray):
         """Pick row ``actions[i]``, (num_envs,) int, in environment i.
@@ -238,25 +207,25 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         """
         self._check_started()
         # An episode has ended and the next one has not begun; SAME_STEP leaves none so.
-        began = self._emptied() | (self._picks == self.max_picks)
-        if began.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+        waiting = self._emptied() | (self._picks == self.max_picks)
+        if waiting.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
         highest = task.N_VISIBLE - 1
         actions = checks.integer_array("actions", actions, (self.num_envs,), highest)
 
         with AllOrReset(self):
-            rewards, picked = self._pick(actions, ~began)
+            rewards, picked = self._pick(actions, ~waiting)
             self._picks += 1
-            if began.any():
-                rewards[began] = 0
-                self._begin(began, self._rngs)
+            if waiting.any():
+                rewards[waiting] = 0
+                self._begin(waiting, self._rngs)
             terminations, truncations = self._emptied(), self._picks == self.max_picks
 
             # What the last pick of an episode showed goes aside, as Gymnasium wants it.
             final: dict[str, Any] = {}
-            ended = terminations | truncations
+            ended, began = terminations | truncations, waiting
             if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-                last, began = self._look(), ended
+                last, began = self._copy_observations(), ended
                 observations = np.full(self.num_envs, None)
                 for env in np.flatnonzero(ended):
                     observations[env] = last[env]
@@ -269,7 +238,12 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
             if not began.all():  # a reset has no infos about a pick
                 infos |= _flagged(picked, ~began)
-        return self._look(), rewards, terminations, truncations, infos | final
+        return self._copy_observations(), rewards, terminations, truncations, infos | final
+
+    def action_masks(self) -> np.ndarray:
+        """(num_envs, 128) bool, False for rows without a box or failed since the last success."""
+        self._check_started()
+        return self._infos()["action_mask"].astype(bool)
 
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of the arrays that ``load_state`` needs to go on from here."""
@@ -296,7 +270,7 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
             self._picks = rest.pop("picks")
             self._hold(rest)
         self._state = "running"
-        return self._look(), _flagged(self._infos(), np.ones(self.num_envs, bool))
+        return self._copy_observations(), _flagged(self._infos(), np.ones(self.num_envs, bool))
 
     def _begin(self, where: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
         """Begin an episode in some environments, (num_envs,) bool, by the generators of all."""
@@ -330,7 +304,7 @@ class PickingVectorEnv(Picking, InOrder, gymnasium.vector.VectorEnv):
         """(num_envs,) bool, True where the last item has been unloaded."""
 
     @abstractmethod
-    def _look(self) -> np.ndarray:
+    def _copy_observations(self) -> np.ndarray:
         """The observations as a fresh array, (num_envs, 128, 3) float32."""
 
     @abstractmethod
@@ -353,3 +327,56 @@ def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.nd
         for values in infos.values():
             values[~where] = 0
     return infos | {f"_{name}": where for name in infos}
+
+
+class PickingEnv(EpisodeEnv):
+    """A single environment: an array of one, without its first axis.
+
+    Args:
+        envs: the array, which leaves the next reset to its caller.
+        render_mode: one of ``metadata["render_modes"]``, or None.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}
+
+    def __init__(self, envs: PickingVectorEnv, render_mode: str | None) -> None:
+        checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
+        self.render_mode, self.max_picks, self._envs = render_mode, envs.max_picks, envs
+        self.observation_space = envs.single_observation_space
+        self.action_space = envs.single_action_space
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Begin an episode; a container takes ``options={"load": load}``, the load to use."""
+        self._check_open()
+        options = check_options(options, self._envs.options)
+        super().reset(seed=seed)
+        everywhere = np.ones(1, bool)
+        observations, infos = self._envs._restart(everywhere, [self.np_random], options)
+        return observations[0], _first(infos)
+
+    def step(self, action: int):
+        """Pick row ``action`` of the observation."""
+        self._check_running()
+        row = np.array([self._row(action)])
+        observations, rewards, terminations, truncations, infos = self._envs.step(row)
+        terminated, truncated = bool(terminations[0]), bool(truncations[0])
+        if terminated or truncated:
+            self._envs._state = "finished"
+        return observations[0], float(rewards[0]), terminated, truncated, _first(infos)
+
+    def action_masks(self) -> np.ndarray:
+        """(128,) bool, False for rows without a box or failed since the last successful pick."""
+        return self._envs.action_masks()[0]
+
+    def close(self) -> None:
+        """Free what the environment holds; may be called again."""
+        self._envs.close()
+
+    @property
+    def _state(self) -> str:  # type: ignore[override]
+        return self._envs._state
+
+
+def _first(infos: dict[str, np.ndarray]) -> dict[str, Any]:
+    """The infos of the first environment, without Gymnasium's flags."""
+    return {name: values[0] for name, values in infos.items() if not name.startswith("_")}

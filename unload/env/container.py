@@ -1,14 +1,16 @@
 """The container as a Gymnasium environment (Sec. III-A to III-D)."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from unload import task
-from unload.env import observation
-from unload.env.base import AllOrReset, PickingEnv, check_options, stacked
+from unload.env.base import PickingEnv
 from unload.env.observation import POSITION_NOISE
-from unload.load.boxes import Load, check_stack
+from unload.env.vector import ContainerVectorEnv
+from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
@@ -95,6 +97,8 @@ class ContainerEnv(PickingEnv):
 
     Attributes:
         visible: (128,) int64, the item in each row of the observation, -1 in rows without.
+        physics: what lifts; it has the ``load``, and which of its items are ``present``. Another
+            one may be put here before a reset.
 
     Raises:
         TypeError, ValueError: an argument, an action or a load is not as described.
@@ -104,7 +108,7 @@ class ContainerEnv(PickingEnv):
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 4}
-    options = ("load",)
+    _envs: "_OneContainer"
 
     def __init__(
         self,
@@ -117,57 +121,21 @@ class ContainerEnv(PickingEnv):
         stack: Callable[[np.random.Generator], Load] = stack_load,
         render_mode: str | None = None,
     ) -> None:
-        super().__init__(equalize, ties, max_picks, position_noise, render_mode)
-        check_stack(stack)
-        self.stack = stack
-        self.physics = _make_physics(physics, after_pick)
+        settings = {"equalize": equalize, "ties": ties, "max_picks": max_picks}
+        settings |= {"position_noise": position_noise, "stack": stack}
+        super().__init__(_OneContainer(_make_physics(physics, after_pick), settings), render_mode)
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None):
-        """Fill the container anew; ``options={"load": load}`` gives the load to use."""
-        self._check_open()
-        options = check_options(options, self.options)
-        super().reset(seed=seed)
-        with AllOrReset(self):
-            load = options.get("load") or stacked(self.stack, self.np_random)
-            self._blur = observation.drift(len(load), self.position_noise, self.np_random)
-            self.physics.reset(load)
-            self._failed = np.zeros(len(load), dtype=bool)
-            self._picks = self._unloaded = 0
-            self._state = "running"
-            self._look()
-            return self._observation.copy(), self._info()
+    @property
+    def visible(self) -> np.ndarray:
+        return self._envs.visible[0].astype(np.int64)
 
-    def step(self, action: int):
-        """Pick the item in row ``action`` of the observation."""
-        self._check_running()
-        # A row without a box is a failed pick that asks no physics.
-        item = int(self.visible[self._row(action)])
-        distance = self.physics.lift(item) if item >= 0 else 0.0
-        success = distance >= task.LIFT_THRESHOLD
+    @property
+    def physics(self) -> Physics:
+        return self._envs.physics
 
-        # A lift that succeeds makes all failed rows worth another try.
-        with AllOrReset(self):
-            self._picks += 1
-            if success:
-                self.physics.remove(item)
-                self._unloaded += 1
-                self._failed[:] = False
-            elif item >= 0:
-                self._failed[item] = True
-            if success or not self.physics.exact:
-                self._look()
-
-            terminated = self._unloaded == len(self.physics.load)
-            truncated = self._picks == self.max_picks
-            if terminated or truncated:
-                self._state = "finished"
-        info = self._info() | {"item": np.int64(item), "distance": np.float64(distance)}
-        return self._observation.copy(), 1.0 if success else -1.0, terminated, truncated, info
-
-    def action_masks(self) -> np.ndarray:
-        """(128,) bool, False for rows without a box or failed since the last successful pick."""
-        self._check_started()
-        return (self.visible >= 0) & ~self._failed[self.visible]
+    @physics.setter
+    def physics(self, physics: Physics) -> None:
+        self._envs.physics = physics
 
     def liftable(self) -> np.ndarray:
         """(128,) bool, which rows of the observation can be unloaded now.
@@ -178,8 +146,12 @@ class ContainerEnv(PickingEnv):
         self._check_started()
         if not self.physics.exact:
             raise ValueError("after_pick lets lifts move other boxes; expected 'restore'")
-        lifts = [self.physics.lift(item) if item >= 0 else 0.0 for item in self.visible.tolist()]
-        return np.array(lifts) >= task.LIFT_THRESHOLD
+        return self._envs.liftable()[0]
+
+    def observed_positions(self) -> np.ndarray:
+        """(n, 3) float64, where all items of the load are seen to be, in m."""
+        self._check_started()
+        return self._envs.observed_positions()
 
     def render(self) -> np.ndarray | None:
         """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
@@ -190,32 +162,50 @@ class ContainerEnv(PickingEnv):
 
         return snapshot(self.physics.load, self.physics.present, self.physics.positions())
 
-    def close(self) -> None:
+
+class _OneContainer(ContainerVectorEnv):
+    """An array of one container, whose lifts its own ``physics`` decides."""
+
+    def __init__(self, physics: Physics, settings: dict[str, Any]) -> None:
+        super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)
+        self.physics = physics
+
+    def close_extras(self, **kwargs) -> None:
         self.physics.close()
-        super().close()
+        super().close_extras(**kwargs)
 
     def observed_positions(self) -> np.ndarray:
-        """(n, 3) float64, where all items of the load are seen to be, in m."""
-        self._check_started()
-        positions = self.physics.positions()
-        return positions + self._blur if self.physics.exact else positions
+        return self.physics.positions() + self._blur
 
-    def _look(self) -> None:
-        """Update which items are visible, and the observation of them."""
-        present = np.flatnonzero(self.physics.present)
-        positions = self.observed_positions()[present]
-        container = self.physics.load.container
-        rows = observation.nearest(positions, container=container)
-        self.visible = np.full(task.N_VISIBLE, -1)
-        self.visible[: len(rows)] = present[rows]
-        self._observation = self._features(positions[rows], container)
+    def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
+        self.physics.reset(load)
+        self._failed = np.zeros(len(load), bool)
+        self._blur = blur if self.physics.exact else np.zeros_like(blur)
+        super()._put_load(env, load, self._blur)
 
-    def _info(self) -> dict:
-        return {
-            "action_mask": self.action_masks().astype(np.int8),
-            "item_mask": (self.visible >= 0).astype(np.int8),
-            "unloaded": np.int64(self._unloaded),
-        }
+    def _pick(
+        self, actions: np.ndarray, playing: np.ndarray
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        rewards, picked = super()._pick(actions, playing)
+        item = int(picked["item"][0])
+        if rewards[0] > 0:
+            self.physics.remove(item)
+            self._failed[:] = False
+        elif item >= 0:
+            self._failed[item] = True
+
+        # A lift may have moved other boxes. Then all are seen anew; what has failed stays so.
+        if not self.physics.exact:
+            present, visible = np.flatnonzero(self.physics.present), self._containers.visible[0]
+            self._show_items(0, present, self.observed_positions(), self.physics.load)
+            self._containers.masks[0] &= ~self._failed[visible]
+        return rewards, picked
+
+    def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        item = int(self._containers.visible[0, actions[0]])
+        # A row without a box is a failed pick that asks no physics.
+        distance = self.physics.lift(item) if item >= 0 else 0.0
+        return np.array([item]), np.array([distance])
 
 
 def _make_physics(name: str, after_pick: str) -> Physics:

@@ -1,23 +1,75 @@
 """The hyperparameter-tuning environment: choose the highest item (Sec. IV-A)."""
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from unload import task
 from unload.env import observation
-from unload.env.base import AllOrReset, PickingEnv, check_options
+from unload.env.base import PickingEnv, PickingVectorEnv
+from unload.env.equalization import equalize
+from unload.env.observation import drift, scaled
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 
-HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
+_HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
 # Every place that an item of a load can take: the walls of variant 0, 1 and 2 together.
 GRID = np.concatenate(
     [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
 )
 
 
-def highest_places(places: np.ndarray) -> np.ndarray:
+def _highest_places(places: np.ndarray) -> np.ndarray:
     """(..., items) bool, True where no other of the (..., items, 3) places in m is higher."""
     heights = places[..., 2]
-    return heights > heights.max(axis=-1, keepdims=True) - HEIGHT_TOLERANCE
+    return heights > heights.max(axis=-1, keepdims=True) - _HEIGHT_TOLERANCE
+
+
+class HighestItemVectorEnv(PickingVectorEnv):
+    """``unload/HighestItem-v0``, many at once. See ``HighestItemEnv``."""
+
+    def __init__(self, num_envs: int = task.NUM_ENVS, **settings) -> None:
+        super().__init__(num_envs, **settings)
+        self._observations = np.zeros(self.observation_space.shape, np.float32)
+        self._highest = np.zeros((self.num_envs, task.N_VISIBLE), bool)
+
+    def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
+        # Each environment draws from a generator of its own.
+        shape = len(rngs), task.N_VISIBLE
+        places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
+        for number, rng in enumerate(rngs):
+            places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
+            offsets[number] = drift(task.N_VISIBLE, self.position_noise, rng)
+
+        # The rest is done for all environments at once.
+        positions = (places + offsets).reshape(-1, 3)
+        order = observation.distance(positions).reshape(shape).argsort(axis=1, kind="stable")
+        rows = order[:, :, np.newaxis]
+        seen = np.take_along_axis(scaled(positions).reshape(*shape, 3), rows, axis=1)
+        self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
+        self._highest[envs] = np.take_along_axis(_highest_places(places), order, axis=1)
+
+    def _pick(
+        self, actions: np.ndarray, playing: np.ndarray
+    ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        rewards = np.where(self._highest[np.arange(self.num_envs), actions], 1.0, -1.0)
+        envs = np.flatnonzero(playing)
+        self._fill(envs, [self._rngs[env] for env in envs])
+        return rewards, {}
+
+    def _emptied(self) -> np.ndarray:
+        return np.zeros(self.num_envs, bool)  # there are always 128 items
+
+    def _copy_observations(self) -> np.ndarray:
+        return self._observations.copy()
+
+    def _infos(self) -> dict[str, np.ndarray]:
+        shape = (self.num_envs, task.N_VISIBLE)
+        return {name: np.ones(shape, np.int8) for name in ("action_mask", "item_mask")}
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        return {"observations": self._observations, "highest": self._highest}
+
+    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
+        self._observations, self._highest = arrays["observations"], arrays["highest"]
 
 
 class HighestItemEnv(PickingEnv):
@@ -52,41 +104,10 @@ class HighestItemEnv(PickingEnv):
     Arguments and errors are as for ``ContainerEnv``, but there is nothing to draw.
     """
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None):
-        """Draw the first items. There are no options."""
-        self._check_open()
-        check_options(options, self.options)
-        super().reset(seed=seed)
-        with AllOrReset(self):
-            self._picks, self._state = 0, "running"
-            return self._draw(), self._info()
-
-    def step(self, action: int):
-        """Choose row ``action`` of the observation."""
-        self._check_running()
-        reward = 1.0 if self._highest[self._row(action)] else -1.0
-        with AllOrReset(self):
-            self._picks += 1
-            truncated = self._picks == self.max_picks
-            if truncated:
-                self._state = "finished"
-            return self._draw(), reward, False, truncated, self._info()
-
-    def action_masks(self) -> np.ndarray:
-        """(128,) bool, all True."""
-        self._check_started()
-        return np.ones(task.N_VISIBLE, dtype=bool)
+    def __init__(self, *, render_mode: str | None = None, **settings) -> None:
+        mode = AutoresetMode.DISABLED
+        super().__init__(HighestItemVectorEnv(1, autoreset_mode=mode, **settings), render_mode)
 
     def render(self) -> None:
         """None: there is nothing to draw."""
         self._check_started()
-
-    def _draw(self) -> np.ndarray:
-        places = GRID[self.np_random.integers(len(GRID), size=task.N_VISIBLE)]
-        positions = places + observation.drift(task.N_VISIBLE, self.position_noise, self.np_random)
-        rows = observation.nearest(positions)
-        self._highest = highest_places(places)[rows]
-        return self._features(positions[rows])
-
-    def _info(self) -> dict:
-        return {name: np.ones(task.N_VISIBLE, np.int8) for name in ("action_mask", "item_mask")}

@@ -8,14 +8,13 @@ can lie.
 import numpy as np
 
 from unload import task
-from unload.support import checks
 
 # Drift of the boxes of a settled full simulation, measured in notebook 02: how far they
 # spread around the places they were put at, and how far they sink on average (m).
 POSITION_NOISE = 0.0005
 SINK = 0.001
 MOST_NOISE = 10.0  # m, more than the container is long
-VIEWPOINT = task.VIEWPOINT / task.CONTAINER  # as a share of the container
+_VIEWPOINT = task.VIEWPOINT / task.CONTAINER  # as a share of the container
 
 
 def distance(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
@@ -27,8 +26,7 @@ def distance(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> n
     Returns:
         (n,) float64: m, y not counting and z counting double.
     """
-    positions = checks.finite_array("positions", positions, (None, 3))
-    offset = container * VIEWPOINT - positions
+    offset = container * _VIEWPOINT - positions
     return np.sqrt(offset**2 @ task.DISTANCE_WEIGHTS)
 
 
@@ -45,7 +43,6 @@ def nearest(
         (min(count, n),) int64, indices of the nearest items, nearest first. Of items at the
         same distance the one with the smaller index comes first.
     """
-    checks.integer("count", count, 1)
     return np.argsort(distance(positions, container), kind="stable")[:count]
 
 

@@ -1,9 +1,8 @@
 """Many containers in arrays: what a pick does in each of them, compiled.
 
-A container of ``unload.env`` looks at all its boxes at each pick. But in a neat load no
-box moves, so the order of the boxes by distance is settled when the load is: the 128
-nearest are the first 128 that are left, and a box that is unloaded makes room for the next
-one in that order, as long as there is one. Here a pick touches these 128 at most.
+In a neat load no box moves, so the order of the boxes by distance is settled when the load is:
+the 128 nearest are the first 128 that are left, and a box that is unloaded makes room for the
+next one in that order, as long as there is one. So a pick touches these 128 at most.
 """
 
 from typing import NamedTuple
@@ -12,12 +11,11 @@ import numpy as np
 
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
-from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
-from unload.physics.situation import RESOLUTION
-from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, absorb, slot_of
+from unload.physics.situation import find_movers, key_length, write_key
+from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, digest_of, slot_of
 from unload.support.compiled import compiled
 
-N_VISIBLE = task.N_VISIBLE
+_N_VISIBLE = task.N_VISIBLE
 UNKNOWN = -1.0  # in place of a distance that is not in the table
 
 
@@ -25,8 +23,7 @@ class Containers(NamedTuple):
     """The state of E containers with room for ``capacity`` items and ``links`` contacts each.
 
     Attributes:
-        sizes: (E, 3) float64, inner edges of each container in m.
-        tolerances: (E,) float64, ``Load.contact_tolerance`` in m.
+        widths: (E,) float64, inner width of each container in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
@@ -42,8 +39,7 @@ class Containers(NamedTuple):
         failed: (E, 128) float64, how far such a row moved, in m.
     """
 
-    sizes: np.ndarray
-    tolerances: np.ndarray
+    widths: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -63,8 +59,7 @@ class Containers(NamedTuple):
 def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
-        sizes=np.zeros((num_envs, 3)),
-        tolerances=np.zeros(num_envs),
+        widths=np.zeros(num_envs),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
@@ -73,33 +68,33 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
         unloaded=np.zeros(num_envs, np.int64),
         seen=np.zeros((num_envs, capacity, 3), np.float32),
         by_distance=np.zeros((num_envs, capacity), np.int32),
-        visible=np.zeros((num_envs, N_VISIBLE), np.int32),
-        values=np.zeros((num_envs, 3, N_VISIBLE), np.float32),
-        ranks=np.zeros((num_envs, 3, N_VISIBLE), np.int32),
-        observations=np.zeros((num_envs, N_VISIBLE, 3), np.float32),
-        masks=np.ones((num_envs, N_VISIBLE), np.int8),
-        failed=np.zeros((num_envs, N_VISIBLE)),
+        visible=np.zeros((num_envs, _N_VISIBLE), np.int32),
+        values=np.zeros((num_envs, 3, _N_VISIBLE), np.float32),
+        ranks=np.zeros((num_envs, 3, _N_VISIBLE), np.int32),
+        observations=np.zeros((num_envs, _N_VISIBLE, 3), np.float32),
+        masks=np.ones((num_envs, _N_VISIBLE), np.int8),
+        failed=np.zeros((num_envs, _N_VISIBLE)),
     )
 
 
 @compiled
-def start(containers, env, equalize, average, tolerance):
-    """Set up all that depends on the geometry, contacts and order of a fresh load."""
-    rows = min(containers.left[env], N_VISIBLE)
+def show_nearest(containers, env, equalize, average, tolerance):
+    """Show the nearest items of a container, by ``by_distance`` behind those unloaded."""
+    first = containers.unloaded[env]
+    rows = min(containers.left[env], _N_VISIBLE)
     for row in range(rows):
-        item = containers.by_distance[env, row]
+        item = containers.by_distance[env, first + row]
         containers.visible[env, row] = item
         for axis in range(3):
             containers.values[env, axis, row] = containers.seen[env, item, axis]
     containers.visible[env, rows:] = -1
-    containers.unloaded[env] = 0
     for axis in range(3):
         rank(containers.values[env, axis, :rows], containers.ranks[env, axis, :rows])
-    show(containers, env, rows, equalize, average, tolerance)
+    _show(containers, env, rows, equalize, average, tolerance)
 
 
 @compiled
-def show(containers, env, rows, equalize, average, tolerance):
+def _show(containers, env, rows, equalize, average, tolerance):
     """Write the observation and the mask of a container that has changed."""
     containers.masks[env, :rows] = 1
     containers.masks[env, rows:] = 0
@@ -116,7 +111,8 @@ def look_up(containers, actions, digests, micrometres):
     Where the row is padded, the item is -1 and moves by 0.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
-    members = np.empty(containers.present.shape[1], np.int32)
+    capacity = containers.present.shape[1]
+    members, key = np.empty(capacity, np.int32), np.empty(key_length(capacity), np.int32)
     for env in range(len(actions)):
         row = actions[env]
         items[env] = containers.visible[env, row]
@@ -130,12 +126,16 @@ def look_up(containers, actions, digests, micrometres):
             continue
 
         # Free boxes and those under three others need no table, see TablePhysics.
-        dynamic = movers(containers, env, items[env], members)
+        starts, links = containers.starts[env], containers.links[env]
+        present, right = containers.present[env], containers.widths[env]
+        dynamic = find_movers(starts, links, present, items[env], members, HELD_DOWN + 1)
         if dynamic == 1 or dynamic > HELD_DOWN:
             distances[env] = FREE_LIFT if dynamic == 1 else 0.0
             continue
 
-        digest = situation_digest(containers, env, members, dynamic)
+        geometry = containers.geometry[env]
+        words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+        digest = digest_of(key[:words])
         slot = slot_of(digests, digest)
         known = digests[slot] != EMPTY
         distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
@@ -160,14 +160,14 @@ def pick(containers, actions, distances, equalize, average, tolerance):
         containers.present[env, visible[row]] = False
         containers.left[env] -= 1
         containers.unloaded[env] += 1
-        rows = min(containers.left[env], N_VISIBLE)
-        for i in range(row, N_VISIBLE - 1):
+        rows = min(containers.left[env], _N_VISIBLE)
+        for i in range(row, _N_VISIBLE - 1):
             visible[i] = visible[i + 1]
 
         # The last row goes to the nearest item that has not been seen yet, if there is one.
-        if rows == N_VISIBLE:
-            item = containers.by_distance[env, containers.unloaded[env] + N_VISIBLE - 1]
-            visible[N_VISIBLE - 1] = item
+        if rows == _N_VISIBLE:
+            item = containers.by_distance[env, containers.unloaded[env] + _N_VISIBLE - 1]
+            visible[_N_VISIBLE - 1] = item
             for axis in range(3):
                 replace(
                     containers.values[env, axis], containers.ranks[env, axis], row,
@@ -180,96 +180,5 @@ def pick(containers, actions, distances, equalize, average, tolerance):
                 remove(values[: rows + 1], ranks[: rows + 1], row)
 
         # After a success no row counts as failed.
-        show(containers, env, rows, equalize, average, tolerance)
+        _show(containers, env, rows, equalize, average, tolerance)
     return rewards
-
-
-@compiled
-def movers(containers, env, item, members):
-    """How many boxes a lift moves: the item and all on top of it, at most ``HELD_DOWN + 1``.
-
-    They are written to the start of ``members``, (capacity,) int32.
-    """
-    starts, links = containers.starts[env], containers.links[env]
-    members[0], dynamic, done = item, 1, 0
-    while done < dynamic:
-        box = members[done]
-        done += 1
-        for link in range(starts[ABOVE, box], starts[ABOVE, box + 1]):
-            if containers.present[env, links[link]] and not _holds(members, dynamic, links[link]):
-                members[dynamic] = links[link]
-                dynamic += 1
-                if dynamic > HELD_DOWN:
-                    return dynamic
-    return dynamic
-
-
-@compiled
-def situation_digest(containers, env, members, dynamic):
-    """The digest of ``Surroundings.situation``.
-
-    ``members`` begins with the ``dynamic`` boxes that ``movers`` found; the rest is overwritten.
-    """
-    starts, links = containers.starts[env], containers.links[env]
-    present, geometry, item = containers.present[env], containers.geometry[env], members[0]
-    # The key's order: the item, what rests on it, and what these touch besides, each sorted.
-    for end in range(1, dynamic):  # sorts them; numba's sort takes a second more to compile
-        _insert(members, 1, end, members[end])
-    count = dynamic
-    for mover in range(dynamic):
-        box = members[mover]
-        for kind in (BELOW, BESIDE):
-            for link in range(starts[kind, box], starts[kind, box + 1]):
-                if present[links[link]] and not _holds(members, count, links[link]):
-                    count = _insert(members, dynamic, count, links[link])
-
-    # The floor and the side walls count where a box that can move touches them.
-    on_floor = geometry[item, 2] - geometry[item, 5] / 2 <= CONTACT_TOLERANCE
-    lowest, highest = np.inf, -np.inf
-    for mover in range(dynamic):
-        y, width = geometry[members[mover], 1], geometry[members[mover], 4]
-        lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
-    right = containers.sizes[env, 1]
-    at_left, at_right = lowest <= CONTACT_TOLERANCE, highest >= right - CONTACT_TOLERANCE
-
-    # Word for word as digest_of reads Situation.key, without writing the key down.
-    digest = np.uint64(2 + on_floor + at_left + at_right + 6 * count)  # words of the key
-    digest = absorb(digest, np.int32(dynamic))
-    digest = absorb(digest, np.int32(on_floor))
-    if on_floor:
-        digest = absorb(digest, _micrometres(-geometry[item, 2]))
-    if at_left:
-        digest = absorb(digest, _micrometres(-geometry[item, 1]))
-    if at_right:
-        digest = absorb(digest, _micrometres(right - geometry[item, 1]))
-    for number in range(count):
-        for axis in range(3):
-            offset = geometry[members[number], axis] - geometry[item, axis]
-            digest = absorb(digest, _micrometres(offset))
-        for edge in range(3, 6):
-            digest = absorb(digest, _micrometres(geometry[members[number], edge]))
-    return max(digest, np.uint64(1))
-
-
-@compiled
-def _micrometres(length):
-    return np.int32(np.rint(length / RESOLUTION))
-
-
-@compiled
-def _holds(members, end, box):
-    for i in range(end):
-        if members[i] == box:
-            return True
-    return False
-
-
-@compiled
-def _insert(members, first, end, box):
-    """Put a box into its place among the sorted ``members[first:end]``; the new end."""
-    place = end
-    while place > first and members[place - 1] > box:
-        members[place] = members[place - 1]
-        place -= 1
-    members[place] = box
-    return end + 1

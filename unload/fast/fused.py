@@ -31,10 +31,10 @@ from unload.fast.kernel import CHUNK, add_chunks, best_items
 from unload.network.peq import PEQNetwork
 from unload.support import checks
 
-CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
+_CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
 
 
-class Weights(NamedTuple):
+class _Weights(NamedTuple):
     """The weights of a ``PEQNetwork``, float32, in its own memory: who changes one changes both.
 
     Attributes:
@@ -55,14 +55,14 @@ def applies(network: torch.nn.Module) -> TypeGuard[PEQNetwork]:
     )
 
 
-def weights_of(network: PEQNetwork) -> Weights:
+def weights_of(network: PEQNetwork) -> _Weights:
     """The weights of a network for which ``applies`` holds."""
     weight, bias, score, score_bias = (p.detach().numpy() for p in _parameters(network))
-    return Weights(weight, bias, score.reshape(4, -1), score_bias)
+    return _Weights(weight, bias, score.reshape(4, -1), score_bias)
 
 
 def start_gradients(
-    weights: Weights,
+    weights: _Weights,
     observations: np.ndarray,
     actions: np.ndarray,
     targets: np.ndarray,
@@ -106,7 +106,7 @@ def start_gradients(
     work = (np.zeros(1, np.int64), *batch, np.float32(beta), *weights, partial)
 
     # The caller's own thread takes part when it calls finish, and the others begin now.
-    threads = min(torch.get_num_threads(), len(partial) // CHUNKS_PER_THREAD)
+    threads = min(torch.get_num_threads(), len(partial) // _CHUNKS_PER_THREAD)
     others = [_helpers(os.getpid()).submit(add_chunks, *work) for _ in range(1, threads)]
 
     def finish() -> np.ndarray:
@@ -131,7 +131,7 @@ def _helpers(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor()
 
 
-def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def best_actions(weights: _Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """The allowed action of the highest value.
 
     The global features add the same to every item's score and tanh keeps the order, so
@@ -168,6 +168,6 @@ def _check(observations: np.ndarray) -> tuple[int, int]:
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.Tensor, ...]:
-    """Parameters in the order of ``Weights``; ``network.parameters()`` takes ten times as long."""
+    """Parameters in the order of ``_Weights``; ``network.parameters()`` takes ten times as long."""
     extractor, scorer = network.extractor, network.scorer
     return extractor.weight, extractor.bias, scorer.weight, scorer.bias

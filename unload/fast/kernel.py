@@ -1,6 +1,6 @@
 """The compiled loops of ``fused``.
 
-Features are handled in blocks of ``BLOCK``, whose numbers lie in one flat array; samples in
+Features are handled in blocks of ``_BLOCK``, whose numbers lie in one flat array; samples in
 chunks of ``CHUNK``, which several threads share.
 """
 
@@ -12,27 +12,36 @@ from numba.extending import intrinsic
 from unload.support.compiled import compiled
 
 CHUNK = 32  # samples whose gradients are summed in single precision
-BLOCK = 64  # features handled together: loops of constant length become vector instructions
-LANES = 16  # features in the longest vector: few enough to keep their sums in registers
+_BLOCK = 64  # features handled together: loops of constant length become vector instructions
+_LANES = 16  # features in the longest vector: few enough to keep their sums in registers
 
-# What is kept of BLOCK features: rows of BLOCK numbers in one flat array, and where they start.
-ROWS = 42
-STARTS = range(0, ROWS * BLOCK, BLOCK)
-WX, WY, WZ, BIAS = STARTS[:4]  # of the extractor
-LOW, LOW2, HIGH, HIGH2 = STARTS[4:8]  # keys of the two lowest and the two highest values
-MEAN, OWN, LOWEST, HIGHEST = STARTS[8:24:4]  # the four inputs each
-SLACK = STARTS[24]  # values closer than this may be in the wrong order
-SCORE = STARTS[25]  # 4 rows: the scorer's weights of the own, minimum, maximum, mean feature
-FEATURE = STARTS[29]  # 4 rows: these features
-PARTS = STARTS[33]  # of the value before tanh
-GRADIENT = STARTS[34]  # 8 rows: of the extractor's weights and bias, of the scorer's weights
+# What is kept of _BLOCK features: rows of _BLOCK numbers in one flat array. Each name is where its
+# first row starts. What has four rows has one for each of x, y, z and the constant 1, or one for
+# each kind of feature: the chosen item's own, the minimum, the maximum, the mean.
+_X, _Y, _Z, _CONSTANT = 0, _BLOCK, 2 * _BLOCK, 3 * _BLOCK
+_WX, _WY, _WZ, _BIAS = _X, _Y, _Z, _CONSTANT  # the extractor's weights
+_LOW = _BIAS + _BLOCK  # the key of the lowest value,
+_LOW2 = _LOW + _BLOCK  # and of the lowest but one
+_HIGH = _LOW2 + _BLOCK  # the same of the highest values
+_HIGH2 = _HIGH + _BLOCK
+_MEAN = _HIGH2 + _BLOCK  # 4 rows: the inputs of the mean,
+_OWN = _MEAN + 4 * _BLOCK  # 4 rows: of the chosen item,
+_LOWEST = _OWN + 4 * _BLOCK  # 4 rows: of the lowest item,
+_HIGHEST = _LOWEST + 4 * _BLOCK  # 4 rows: and of the highest
+_SLACK = _HIGHEST + 4 * _BLOCK  # values closer than this may be in the wrong order
+_SCORE = _SLACK + _BLOCK  # 4 rows: the scorer's weights, by kind
+_FEATURE = _SCORE + 4 * _BLOCK  # 4 rows: the features, by kind
+_PART = _FEATURE + 4 * _BLOCK  # what they add to the value before tanh
+_GRADIENT = _PART + _BLOCK  # 4 rows: of the extractor's weights and bias,
+_SCORE_GRADIENT = _GRADIENT + 4 * _BLOCK  # 4 rows: and of the scorer's weights
+_SIZE = _SCORE_GRADIENT + 4 * _BLOCK  # of all this
 
-FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
-ZERO, ONE = np.float32(0), np.float32(1)
+_FRACTION = 0x7FFFFF  # the bits of a float32 after its sign and exponent
+_ZERO, _ONE = np.float32(0), np.float32(1)
 
 
 @intrinsic
-def fma(typing_context, a, b, c):
+def _fma(typing_context, a, b, c):
     """a·b + c, rounded once.
 
     Left to itself, the compiler decides anew in each program where to round once and where
@@ -46,7 +55,7 @@ def fma(typing_context, a, b, c):
 
 
 @intrinsic
-def next_number(typing_context, counter):
+def _next_number(typing_context, counter):
     """Return ``counter``, (1,) int64, and raise it by one, in a single step for all threads."""
 
     def build(context, builder, signature, arguments):
@@ -57,7 +66,7 @@ def next_number(typing_context, counter):
 
 
 @intrinsic
-def long_vectors(typing_context):
+def _long_vectors(typing_context):
     """Compile the calling function for the longest vectors, and as if no two of its arrays overlap.
 
     By itself the compiler takes half of AVX-512's length, because the first processors that had
@@ -98,7 +107,7 @@ def add_chunks(
 
     # Each thread takes the next chunk until none is left.
     blocks = _blocks(weight, bias, score)
-    chunk = next_number(counter)
+    chunk = _next_number(counter)
     while chunk < len(partial):
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
         picked, wanted = actions[chosen], targets[chosen]  # asks the memory for all at once
@@ -131,33 +140,34 @@ def add_chunks(
 
         # From blocks to the order of the weights.
         for f in range(n):
-            block, place = blocks[f // BLOCK], f % BLOCK
+            block, place = blocks[f // _BLOCK], f % _BLOCK
             for axis in range(3):
-                partial[chunk, 3 * f + axis] = block[GRADIENT + axis * BLOCK + place]
-            for row in range(3, 8):
-                partial[chunk, row * n + f] = block[GRADIENT + row * BLOCK + place]
+                partial[chunk, 3 * f + axis] = block[_GRADIENT + axis * _BLOCK + place]
+            partial[chunk, 3 * n + f] = block[_GRADIENT + _CONSTANT + place]
+            for kind in range(4):
+                partial[chunk, (4 + kind) * n + f] = block[_SCORE_GRADIENT + kind * _BLOCK + place]
         partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
-        chunk = next_number(counter)
+        chunk = _next_number(counter)
 
 
 @compiled
 def _blocks(weight, bias, score):
-    """The weights in blocks of ``BLOCK`` features.
+    """The weights in blocks of ``_BLOCK`` features.
 
     Where there are no more features, a bias of -1 keeps the ReLU closed.
     """
-    count = -(-len(bias) // BLOCK)
-    memory = np.zeros(count * ROWS * BLOCK + 16, np.float32)
+    count = -(-len(bias) // _BLOCK)
+    memory = np.zeros(count * _SIZE + 16, np.float32)
     start = (-memory.ctypes.data // 4) % 16  # of a cache line, which a vector fills
-    blocks = memory[start : start + count * ROWS * BLOCK].reshape(count, ROWS * BLOCK)
-    blocks[:, BIAS:LOW] = -1
+    blocks = memory[start : start + count * _SIZE].reshape(count, _SIZE)
+    blocks[:, _BIAS : _BIAS + _BLOCK] = -1
     for f in range(len(bias)):
-        block, place = blocks[f // BLOCK], f % BLOCK
+        block, place = blocks[f // _BLOCK], f % _BLOCK
         for axis in range(3):
-            block[WX + axis * BLOCK + place] = weight[f, axis]
-        block[BIAS + place] = bias[f]
+            block[_WX + axis * _BLOCK + place] = weight[f, axis]
+        block[_BIAS + place] = bias[f]
         for kind in range(4):
-            block[SCORE + kind * BLOCK + place] = score[kind, f]
+            block[_SCORE + kind * _BLOCK + place] = score[kind, f]
     return blocks
 
 
@@ -178,46 +188,47 @@ def _largest(samples, rows):
 
 @compiled
 def _start_chunk(largest, precision, block):
-    block[GRADIENT:] = 0
-    for f in range(BLOCK):
-        scale = abs(block[WX + f]) + abs(block[WY + f]) + abs(block[WZ + f])
-        scale = scale * largest + abs(block[BIAS + f])  # no value is larger
-        block[SLACK + f] = scale * precision + np.float32(1e-30)
+    block[_GRADIENT:] = 0
+    for f in range(_BLOCK):
+        scale = abs(block[_WX + f]) + abs(block[_WY + f]) + abs(block[_WZ + f])
+        scale = scale * largest + abs(block[_BIAS + f])  # no value is larger
+        block[_SLACK + f] = scale * precision + np.float32(1e-30)
 
 
 @compiled
 def _reduce_items(inputs, items, mask, block):
     """Read all items: sums of the active ones, keys of the two lowest and the two highest.
 
-    Most of the time is spent here. There are no branches, so that ``LANES`` features go side by
+    Most of the time is spent here. There are no branches, so that ``_LANES`` features go side by
     side.
     """
-    long_vectors()
-    for f in range(BLOCK):
-        block[LOW + f] = block[LOW2 + f] = _number(0x7FFFFFFF)
-        block[HIGH + f] = block[HIGH2 + f] = _number(-0x80000000)
+    _long_vectors()
+    # Every value is below the first lowest and above the first highest.
+    for f in range(_BLOCK):
+        block[_LOW + f] = block[_LOW2 + f] = _number(0x7FFFFFFF)
+        block[_HIGH + f] = block[_HIGH2 + f] = _number(-0x80000000)
         for axis in range(4):
-            block[MEAN + axis * BLOCK + f] = ZERO
-    for first in range(0, BLOCK, LANES):
+            block[_MEAN + axis * _BLOCK + f] = _ZERO
+    for first in range(0, _BLOCK, _LANES):
         for i in range(items):
             x, y, z = inputs[3 * i], inputs[3 * i + 1], inputs[3 * i + 2]
-            for f in range(first, first + LANES):
+            for f in range(first, first + _LANES):
                 value = _value(
-                    block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f], x, y, z
+                    block[_WX + f], block[_WY + f], block[_WZ + f], block[_BIAS + f], x, y, z
                 )
                 active = _active(value)
-                block[MEAN + f] = fma(active, x, block[MEAN + f])
-                block[MEAN + BLOCK + f] = fma(active, y, block[MEAN + BLOCK + f])
-                block[MEAN + 2 * BLOCK + f] = fma(active, z, block[MEAN + 2 * BLOCK + f])
-                block[MEAN + 3 * BLOCK + f] += active
+                block[_MEAN + _X + f] = _fma(active, x, block[_MEAN + _X + f])
+                block[_MEAN + _Y + f] = _fma(active, y, block[_MEAN + _Y + f])
+                block[_MEAN + _Z + f] = _fma(active, z, block[_MEAN + _Z + f])
+                block[_MEAN + _CONSTANT + f] += active
 
                 # The runner-up is the key, or what it has beaten, or the one so far.
                 key = _key(value, np.int32(i), mask)
-                low, high = _bits(block[LOW + f]), _bits(block[HIGH + f])
-                low2 = min(_bits(block[LOW2 + f]), max(low, key))
-                high2 = max(_bits(block[HIGH2 + f]), min(high, key))
-                block[LOW + f], block[LOW2 + f] = _number(min(low, key)), _number(low2)
-                block[HIGH + f], block[HIGH2 + f] = _number(max(high, key)), _number(high2)
+                low, high = _bits(block[_LOW + f]), _bits(block[_HIGH + f])
+                low2 = min(_bits(block[_LOW2 + f]), max(low, key))
+                high2 = max(_bits(block[_HIGH2 + f]), min(high, key))
+                block[_LOW + f], block[_LOW2 + f] = _number(min(low, key)), _number(low2)
+                block[_HIGH + f], block[_HIGH2 + f] = _number(max(high, key)), _number(high2)
 
 
 @compiled(forceinline=True)
@@ -235,12 +246,12 @@ def _number(bits):
 @compiled(forceinline=True)
 def _value(a, b, c, d, x, y, z):
     """A feature before the ReLU."""
-    return fma(a, x, fma(b, y, fma(c, z, d)))
+    return _fma(a, x, _fma(b, y, _fma(c, z, d)))
 
 
 @compiled(forceinline=True)
 def _active(value):
-    return ONE if value > ZERO else ZERO
+    return _ONE if value > _ZERO else _ZERO
 
 
 @compiled(forceinline=True)
@@ -257,51 +268,51 @@ def _key(value, item, mask):
 @compiled
 def _find_extremes(x, items, mask, block):
     """The inputs of the lowest and of the highest item for the block's features."""
-    long_vectors()
+    _long_vectors()
     unsure = 0
-    for f in range(BLOCK):
-        low, high = block[LOW + f], block[HIGH + f]
-        _put(_inputs(x, low, mask), low > ZERO, LOWEST + f, block)
-        _put(_inputs(x, high, mask), high > ZERO, HIGHEST + f, block)
+    for f in range(_BLOCK):
+        low, high = block[_LOW + f], block[_HIGH + f]
+        _set_inputs(_inputs(x, low, mask), low > _ZERO, _LOWEST + f, block)
+        _set_inputs(_inputs(x, high, mask), high > _ZERO, _HIGHEST + f, block)
         unsure += not (_lowest_is_sure(f, block) & _highest_is_sure(f, block))
     if unsure:  # rare, so that the loop above need not branch
-        for f in range(BLOCK):
+        for f in range(_BLOCK):
             if not _lowest_is_sure(f, block):
-                _decide(x, items, -1.0, f, LOWEST + f, block)
+                _decide(x, items, -1.0, f, _LOWEST + f, block)
             if not _highest_is_sure(f, block):
-                _decide(x, items, 1.0, f, HIGHEST + f, block)
+                _decide(x, items, 1.0, f, _HIGHEST + f, block)
 
 
 @compiled(forceinline=True)
 def _inputs(x, key, mask):
     """The inputs of the item whose number is in the key."""
     # Unsigned: so it is not counted from the end. Of few bits: so one instruction fetches more.
-    place = 3 * np.uint64(_bits(key) & mask & FRACTION)
+    place = 3 * np.uint64(_bits(key) & mask & _FRACTION)
     return x[place], x[place + np.uint64(1)], x[place + np.uint64(2)]
 
 
 @compiled(forceinline=True)
 def _lowest_is_sure(f, block):
     """Some item is negative, or the lowest is positive and clearly below all others."""
-    low, low2, slack = block[LOW + f], block[LOW2 + f], block[SLACK + f]
+    low, low2, slack = block[_LOW + f], block[_LOW2 + f], block[_SLACK + f]
     return (low < -slack) | ((low > slack) & (low2 - low > slack))
 
 
 @compiled(forceinline=True)
 def _highest_is_sure(f, block):
     """All items are negative, or the highest is positive and clearly above all others."""
-    low, high, slack = block[LOW + f], block[HIGH + f], block[SLACK + f]
-    negative = (high < ZERO) & (low < -slack)
-    return negative | ((high > slack) & (high - block[HIGH2 + f] > slack))
+    low, high, slack = block[_LOW + f], block[_HIGH + f], block[_SLACK + f]
+    negative = (high < _ZERO) & (low < -slack)
+    return negative | ((high > slack) & (high - block[_HIGH2 + f] > slack))
 
 
 @compiled(forceinline=True)
-def _put(inputs, active, place, block):
+def _set_inputs(inputs, active, place, block):
     """Set four inputs; zeros if the ReLU is closed."""
-    block[place] = inputs[0] if active else ZERO
-    block[place + BLOCK] = inputs[1] if active else ZERO
-    block[place + 2 * BLOCK] = inputs[2] if active else ZERO
-    block[place + 3 * BLOCK] = ONE if active else ZERO
+    block[place + _X] = inputs[0] if active else _ZERO
+    block[place + _Y] = inputs[1] if active else _ZERO
+    block[place + _Z] = inputs[2] if active else _ZERO
+    block[place + _CONSTANT] = _ONE if active else _ZERO
 
 
 @compiled
@@ -310,7 +321,7 @@ def _decide(x, items, sign, f, place, block):
 
     The mean of those that tie.
     """
-    a, b, c, d = block[WX + f], block[WY + f], block[WZ + f], block[BIAS + f]
+    a, b, c, d = block[_WX + f], block[_WY + f], block[_WZ + f], block[_BIAS + f]
     best, count, px, py, pz = -np.inf, 1, 0.0, 0.0, 0.0
     for i in range(items):
         value = sign * (np.float64(a) * x[3 * i] + np.float64(b) * x[3 * i + 1])
@@ -320,65 +331,65 @@ def _decide(x, items, sign, f, place, block):
         elif value == best:
             count, px, py, pz = count + 1, px + x[3 * i], py + x[3 * i + 1], pz + x[3 * i + 2]
     mean = np.float32(px / count), np.float32(py / count), np.float32(pz / count)
-    _put(mean, sign * best > 0, place, block)
+    _set_inputs(mean, sign * best > 0, place, block)
 
 
 @compiled
 def _forward(inputs, item, items, block):
     """Set the inputs of the chosen item, and all features; their part of the value before tanh."""
-    long_vectors()
+    _long_vectors()
     x, y, z = inputs[3 * item], inputs[3 * item + 1], inputs[3 * item + 2]
-    share = ONE / np.float32(items)
+    share = _ONE / np.float32(items)
     # Inputs of the chosen item; and of the mean, whose sums become means.
-    for f in range(BLOCK):
-        own = np.float64(block[WX + f]) * x + np.float64(block[WY + f]) * y
-        own += np.float64(block[WZ + f]) * z + block[BIAS + f]
-        _put((x, y, z), own > 0, OWN + f, block)
-        block[MEAN + f] *= share
-        block[MEAN + BLOCK + f] *= share
-        block[MEAN + 2 * BLOCK + f] *= share
-        block[MEAN + 3 * BLOCK + f] *= share
+    for f in range(_BLOCK):
+        own = np.float64(block[_WX + f]) * x + np.float64(block[_WY + f]) * y
+        own += np.float64(block[_WZ + f]) * z + block[_BIAS + f]
+        _set_inputs((x, y, z), own > 0, _OWN + f, block)
+        block[_MEAN + _X + f] *= share
+        block[_MEAN + _Y + f] *= share
+        block[_MEAN + _Z + f] *= share
+        block[_MEAN + _CONSTANT + f] *= share
 
     # All four features, and what each adds to the value.
-    for f in range(BLOCK):
-        part = _feature(OWN, 0, f, block) + _feature(LOWEST, 1, f, block)
-        block[PARTS + f] = part + (_feature(HIGHEST, 2, f, block) + _feature(MEAN, 3, f, block))
-    half = BLOCK // 2
+    for f in range(_BLOCK):
+        part = _feature(_OWN, 0, f, block) + _feature(_LOWEST, 1, f, block)
+        block[_PART + f] = part + (_feature(_HIGHEST, 2, f, block) + _feature(_MEAN, 3, f, block))
+    half = _BLOCK // 2
     while half:  # in an order that needs few steps one after the other
         for f in range(half):
-            block[PARTS + f] += block[PARTS + half + f]
+            block[_PART + f] += block[_PART + half + f]
         half //= 2
-    return block[PARTS]
+    return block[_PART]
 
 
 @compiled(forceinline=True)
 def _feature(inputs, kind, f, block):
     """Set one feature, weights · inputs; its part of the value before tanh."""
     place = inputs + f
-    feature = block[BIAS + f] * block[place + 3 * BLOCK]
-    feature = fma(block[WZ + f], block[place + 2 * BLOCK], feature)
-    feature = fma(block[WY + f], block[place + BLOCK], feature)
-    feature = fma(block[WX + f], block[place], feature)
-    block[FEATURE + kind * BLOCK + f] = feature
-    return block[SCORE + kind * BLOCK + f] * feature
+    feature = block[_BIAS + f] * block[place + _CONSTANT]
+    feature = _fma(block[_WZ + f], block[place + _Z], feature)
+    feature = _fma(block[_WY + f], block[place + _Y], feature)
+    feature = _fma(block[_WX + f], block[place + _X], feature)
+    block[_FEATURE + kind * _BLOCK + f] = feature
+    return block[_SCORE + kind * _BLOCK + f] * feature
 
 
 @compiled
 def _backward(slope, block):
     """Add one sample's gradients; ``slope`` is the loss's by the value before tanh."""
-    long_vectors()
-    for f in range(BLOCK):
-        own, low = slope * block[SCORE + f], slope * block[SCORE + BLOCK + f]
-        high, mean = slope * block[SCORE + 2 * BLOCK + f], slope * block[SCORE + 3 * BLOCK + f]
+    _long_vectors()
+    for f in range(_BLOCK):
+        own, low = slope * block[_SCORE + f], slope * block[_SCORE + _BLOCK + f]
+        high, mean = slope * block[_SCORE + 2 * _BLOCK + f], slope * block[_SCORE + 3 * _BLOCK + f]
         for axis in range(4):
-            row = axis * BLOCK + f
-            gradient = fma(own, block[OWN + row], block[GRADIENT + row])
-            gradient = fma(low, block[LOWEST + row], gradient)
-            gradient = fma(high, block[HIGHEST + row], gradient)
-            block[GRADIENT + row] = fma(mean, block[MEAN + row], gradient)
+            row = axis * _BLOCK + f
+            gradient = _fma(own, block[_OWN + row], block[_GRADIENT + row])
+            gradient = _fma(low, block[_LOWEST + row], gradient)
+            gradient = _fma(high, block[_HIGHEST + row], gradient)
+            block[_GRADIENT + row] = _fma(mean, block[_MEAN + row], gradient)
         for kind in range(4):
-            row = GRADIENT + (4 + kind) * BLOCK + f
-            block[row] = fma(slope, block[FEATURE + kind * BLOCK + f], block[row])
+            row = _SCORE_GRADIENT + kind * _BLOCK + f
+            block[row] = _fma(slope, block[_FEATURE + kind * _BLOCK + f], block[row])
 
 
 @compiled
@@ -400,7 +411,7 @@ def best_items(observations, allowed, weight, bias, score, actions):
             a, b, c, d, s = weight[f, 0], weight[f, 1], weight[f, 2], bias[f], score[f]
             for i in range(len(scores)):
                 value = _value(a, b, c, d, x[0, i], x[1, i], x[2, i])
-                scores[i] = fma(s, ZERO if value < ZERO else value, scores[i])
+                scores[i] = _fma(s, _ZERO if value < _ZERO else value, scores[i])
 
         best = -np.inf
         for i in range(len(scores)):

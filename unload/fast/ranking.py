@@ -14,10 +14,10 @@ from unload.support.compiled import compiled
 
 # The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
 # odd. An item that is alone gets 0.
-LEVELS = np.zeros((task.N_VISIBLE + 1, 2 * task.N_VISIBLE - 1), np.float32)
+_LEVELS = np.zeros((task.N_VISIBLE + 1, 2 * task.N_VISIBLE - 1), np.float32)
 for _items in range(2, task.N_VISIBLE + 1):
     _last = _items - 1
-    LEVELS[_items, : 2 * _last + 1] = (np.arange(2 * _last + 1) - _last) / _last
+    _LEVELS[_items, : 2 * _last + 1] = (np.arange(2 * _last + 1) - _last) / _last
 
 
 @compiled
@@ -56,7 +56,7 @@ def remove(values, ranks, row):
 
 
 @compiled
-def twice_shared_ranks(values, ranks, tolerance, twice):
+def _twice_shared_ranks(values, ranks, tolerance, twice):
     """Fill ``twice`` by twice the mean rank of each run of sorted values in ``tolerance``."""
     order = np.empty(len(values), np.int32)
     for i in range(len(values)):
@@ -81,7 +81,7 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
         observation: (rows, axes) float32, filled.
         items: how many of the rows, the first ones, hold an item.
     """
-    twice, levels = np.empty(items, np.int32), LEVELS[items]
+    twice, levels = np.empty(items, np.int32), _LEVELS[items]
     observation[items:] = task.PADDING
 
     # A tie is a run of neighbours on one axis, so each axis is equalized by itself.
@@ -91,7 +91,7 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
                 observation[i, axis] = values[axis, i]
             continue
         if average:
-            twice_shared_ranks(values[axis, :items], ranks[axis, :items], tolerance, twice)
+            _twice_shared_ranks(values[axis, :items], ranks[axis, :items], tolerance, twice)
         else:
             for i in range(items):
                 twice[i] = 2 * ranks[axis, i]

@@ -16,7 +16,7 @@ from unload.support import checks
 from unload.support.compiled import compiled
 
 # Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
-SMALLEST_EDGE = 0.002
+_SMALLEST_EDGE = 0.002
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 LARGEST_TOLERANCE = 0.1  # m
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
@@ -101,6 +101,7 @@ class Load:
             "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
         )
 
+        # Labels serve views and lists; what moves does not depend on them.
         labels = {"packages": self.packages, "walls": self.walls}
         if labels["packages"] is None:
             edges = np.rint(sizes / OVERLAP)
@@ -121,17 +122,17 @@ class Load:
             if (repeated := np.flatnonzero(times[which] > 1)).size:
                 raise BoxError(repeated, "the same id; expected one for each box")
 
-        # Where there are no thin boxes and none outside, contacts finds those that overlap.
-        thin = np.flatnonzero(sizes.min(axis=1) < SMALLEST_EDGE)
+        # Where there are no thin boxes and none outside, _find_contacts finds those that overlap.
+        thin = np.flatnonzero(sizes.min(axis=1) < _SMALLEST_EDGE)
         if thin.size:
-            raise BoxError(thin, f"edges of {sizes[thin[0]]} m; expected >= {SMALLEST_EDGE} m")
+            raise BoxError(thin, f"edges of {sizes[thin[0]]} m; expected >= {_SMALLEST_EDGE} m")
         beyond = (low < -OVERLAP) | (high > container + OVERLAP)
         outside = np.flatnonzero(beyond.any(axis=1))
         if outside.size:
             place = f"from {low[outside[0]]} to {high[outside[0]]} m"
             inside = f"inside the container, [0 0 0] to {container} m"
             raise BoxError(outside, f"reaches {place}; expected it {inside}")
-        touching = contacts(low, high, tolerance)
+        touching = _find_contacts(low, high, tolerance)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
         fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
@@ -222,7 +223,9 @@ def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return groups
 
 
-def contacts(low: np.ndarray, high: np.ndarray, tolerance: float = CONTACT_TOLERANCE) -> Contacts:
+def _find_contacts(
+    low: np.ndarray, high: np.ndarray, tolerance: float = CONTACT_TOLERANCE
+) -> Contacts:
     """Find which boxes stand on each other, and which stand side by side; BoxError if two overlap.
 
     Boxes touch only where they share a stretch of depth, and of height or width. Between one and

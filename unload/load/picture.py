@@ -32,7 +32,7 @@ COLOURS: dict[str, tuple[float, float, float]] = {
     "cannot move": (0.74, 0.74, 0.72),
 }
 # Packages 0–12: large packages dark, small ones light.
-PACKAGE_COLOURS = (
+_PACKAGE_COLOURS = (
     "#1f3a5f", "#2e6f95", "#5fa8d3", "#264d3b", "#3f8f63", "#7a3b69", "#c05299",
     "#e07a5f", "#b5838d", "#f2b880", "#8d6a9f", "#d4a373", "#f6e27f",
 )  # fmt: skip
@@ -43,21 +43,21 @@ EYE = np.array([11.6, -2.9, 4.4])  # m
 TARGET = np.array([4.4, 1.1, 0.9])  # m
 CORNERS = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 # The faces whose outer sides point along x, against y and along z: corners, and brightness.
-FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
+_FACES = (((4, 6, 7, 5), 0.88), ((0, 4, 5, 1), 0.72), ((1, 5, 7, 3), 1.0))
 # The insides of the container that are seen: corners, and brightness of the grey.
-INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
+_INSIDES = (((0, 4, 6, 2), 0.91), ((0, 2, 3, 1), 0.94), ((2, 6, 7, 3), 0.87))
 # All faces, and their twelve triangles, whose corners go round as seen from outside.
-RINGS = [face for face, _ in FACES] + [face[::-1] for face, _ in INSIDES]
-TRIANGLES = np.array([(a, b, c, a, c, d) for a, b, c, d in RINGS]).reshape(12, 3)
-EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
-WIDTH = 8.0  # inches, at 100 pixels each
-LEGEND = 0.15  # share of the width at the left
-FILE_COLOURS = 128  # of a still picture
+_RINGS = [face for face, _ in _FACES] + [face[::-1] for face, _ in _INSIDES]
+TRIANGLES = np.array([(a, b, c, a, c, d) for a, b, c, d in _RINGS]).reshape(12, 3)
+_EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
+_WIDTH = 8.0  # inches, at 100 pixels each
+_LEGEND = 0.15  # share of the width at the left
+_FILE_COLOURS = 128  # of a still picture
 
 
 def package_colour(package: int) -> tuple[float, float, float]:
     """RGB in [0, 1] of a package; numbers above 12 start again from 0."""
-    return to_rgb(PACKAGE_COLOURS[package % len(PACKAGE_COLOURS)])
+    return to_rgb(_PACKAGE_COLOURS[package % len(_PACKAGE_COLOURS)])
 
 
 def snapshot(load: Load, present: np.ndarray, positions: np.ndarray) -> np.ndarray:
@@ -89,12 +89,12 @@ def still(
         height: of the picture in inches.
         container: of the load.
     """
-    figure = _drawn(low, high, colours, (WIDTH, height), LEGEND, container)
+    figure = _drawn(low, high, colours, (_WIDTH, height), _LEGEND, container)
     handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
     figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
     file = io.BytesIO()
     # Few colours take a quarter of the bytes.
-    Image.fromarray(pixels(figure)).quantize(FILE_COLOURS).save(file, "PNG", optimize=True)
+    Image.fromarray(pixels(figure)).quantize(_FILE_COLOURS).save(file, "PNG", optimize=True)
     return file.getvalue()
 
 
@@ -124,19 +124,19 @@ def draw(
     """
     # The container's insides lie behind all boxes.
     frame = project(CORNERS * container, container)
-    for face, brightness in INSIDES:
+    for face, brightness in _INSIDES:
         axes.fill(*frame[list(face)].T, color=str(brightness), zorder=0)
 
     # Of each box only three faces are seen, because of where the eye is.
     seen = project(low[:, None] + CORNERS * (high - low)[:, None], container)
-    polygons = np.stack([seen[:, list(face)] for face, _ in FACES], axis=1).reshape(-1, 4, 2)
-    shades = np.array([shade for _, shade in FACES])[:, None] * colours[:, None]
+    polygons = np.stack([seen[:, list(face)] for face, _ in _FACES], axis=1).reshape(-1, 4, 2)
+    shades = np.array([shade for _, shade in _FACES])[:, None] * colours[:, None]
     # In one array, which Matplotlib takes faster than a list.
     axes.add_collection(
         PolyCollection(
             polygons,  # type: ignore[arg-type]
             facecolors=shades.reshape(-1, 3),
-            edgecolors=EDGE * shades.reshape(-1, 3),
+            edgecolors=_EDGE * shades.reshape(-1, 3),
             linewidths=0.5,
         )
     )

@@ -2,8 +2,8 @@
 
 Sec. III-A and Fig. 3 of the paper. The figure is drawn on a grid whose cell is 0.3 of
 its units; all numbers below count cells, so that every substack is exact. Neighbouring
-substacks interlock like the steps of a stair: the columns start at 0, 6, 16 and 26
-cells and together fill 36 cells of width, which we take to be the container's 2.5 m.
+substacks interlock like the steps of a stair, and the four of a row together fill 36 cells
+of width, which we take to be the container's 2.5 m.
 
 Boxes of another scale are not in the paper: they show how a policy fares elsewhere.
 """
@@ -50,9 +50,16 @@ RIGHT = (
     ((2, 0, 6), (6, 4, 7), (6, 7, 7), (10, 4, 4), (1, 4, 0)),
     ((1, 0, 6), (2, 6, 6), (3, 4, 0)),
 )  # fmt: skip
-# One row of a wall, from left to right: (left edge in cells, variants of the substack).
-COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
-LEFT_CELLS, OTHER_CELLS = 6, 10  # width of a left substack, and of each other one
+_LEFT_CELLS, _OTHER_CELLS = 6, 10  # width of a left substack, and of each other one
+
+
+def _columns(count: int) -> list[tuple[int, tuple]]:
+    """One row of a wall, from left to right: (left edge in cells, variants of the substack)."""
+    edges = [0, *(_LEFT_CELLS + _OTHER_CELLS * number for number in range(count - 1))]
+    return list(zip(edges, (LEFT, *[MID] * (count - 2), RIGHT)))
+
+
+COLUMNS = _columns(4)
 
 
 @cache
@@ -62,20 +69,19 @@ def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
     (columns, 3) int64, the number of items of each variant; and (columns, 3, m, 3) int64, each
     item's package, left edge in the row and lower edge, filled up with zeros.
     """
-    substacks = (LEFT, *[MID] * (columns - 2), RIGHT)
-    counts = np.array([[len(variant) for variant in variants] for variants in substacks])
+    substacks = _columns(columns)
+    counts = np.array([[len(variant) for variant in variants] for _, variants in substacks])
     cells = np.zeros((*counts.shape, counts.max(), 3), np.int64)
-    for column, variants in enumerate(substacks):
-        left = 0 if column == 0 else LEFT_CELLS + OTHER_CELLS * (column - 1)
+    for column, (left, variants) in enumerate(substacks):
         for number, variant in enumerate(variants):
             cells[column, number, : len(variant)] = np.array(variant) + (0, left, 0)
     return counts, cells
 
 
-def substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
+def _substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
     """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
     cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # the width; the height
-    columns = 1 + int((cells - LEFT_CELLS) / OTHER_CELLS)
+    columns = 1 + int((cells - _LEFT_CELLS) / _OTHER_CELLS)
     return round(WALLS / scale), int(cells / ROWS_HIGH), columns
 
 
@@ -95,7 +101,7 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
-    columns = substacks_that_fit(scale)[2]
+    columns = _substacks_that_fit(scale)[2]
     variants = checks.integer_array("variants", variants, (None, None, columns), 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
@@ -127,7 +133,7 @@ def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float 
         TypeError, ValueError: an argument is not as described.
     """
     checks.generator("rng", rng)
-    most, rows, columns = substacks_that_fit(scale)
+    most, rows, columns = _substacks_that_fit(scale)
     walls = most if walls is None else checks.integer("walls", walls, 1, 100)
     while True:
         load = build_load(rng.integers(3, size=(walls, rows, columns)), scale)

@@ -16,12 +16,12 @@ from unload.load.boxes import Load, check_load
 from unload.support import checks
 
 # Of groups whose names are not in COLOURS, in the order in which they are given.
-OTHER_COLOURS = ((0.58, 0.40, 0.74), (0.90, 0.62, 0.00), (0.55, 0.34, 0.16), (0.0, 0.0, 0.0))
-FIRST_PICKS = 10  # that a view of an order shows
-PICK_COLOURS = colormaps["viridis"](np.linspace(0, 1, FIRST_PICKS))[:, :3].tolist()
-PLOTLY_MIMETYPE = "application/vnd.plotly.v1+json"
-UNITS_LONG = 2.8  # how long a container is in plotly's unit of length in our views
-LABEL = (
+_OTHER_COLOURS = ((0.58, 0.40, 0.74), (0.90, 0.62, 0.00), (0.55, 0.34, 0.16), (0.0, 0.0, 0.0))
+_FIRST_PICKS = 10  # that a view of an order shows
+_PICK_COLOURS = colormaps["viridis"](np.linspace(0, 1, _FIRST_PICKS))[:, :3].tolist()
+_PLOTLY_MIMETYPE = "application/vnd.plotly.v1+json"
+_UNITS_LONG = 2.8  # how long a container is in plotly's unit of length in our views
+_LABEL = (
     "item %{customdata[0]}, package %{customdata[1]}<br>"
     "%{customdata[2]} × %{customdata[3]} × %{customdata[4]} mm<extra>%{fullData.name}</extra>"
 )
@@ -43,7 +43,7 @@ class View(go.Figure):
     _repr_html_ = None  # plotly's own method would load a script from the network
 
     def _repr_mimebundle_(self, include=None, exclude=None, **kwargs) -> dict:
-        bundle = {PLOTLY_MIMETYPE: json.loads(self.to_json()), "text/plain": "View"}
+        bundle = {_PLOTLY_MIMETYPE: json.loads(self.to_json()), "text/plain": "View"}
         if self.picture is not None:
             bundle["image/png"] = base64.b64encode(self.picture()).decode()
         return bundle
@@ -84,14 +84,14 @@ def view(
     height = checks.integer("height", height, 50, 5000)
 
     # Packages and picks are groups, too, in colours of their own.
-    colours: Sequence = OTHER_COLOURS
+    colours: Sequence = _OTHER_COLOURS
     rest = "unseen"
     if order is not None:
         if groups is not None:
             raise ValueError("groups and order are given; expected one of them")
-        first = checks.integer_array("order", order, (None,), count - 1)[:FIRST_PICKS]
+        first = checks.integer_array("order", order, (None,), count - 1)[:_FIRST_PICKS]
         groups = {f"pick {k + 1}": first[k : k + 1] for k in range(len(first))}
-        colours, rest = PICK_COLOURS, "picked later"
+        colours, rest = _PICK_COLOURS, "picked later"
     elif groups is None:
         packages = np.unique(load.packages[present]).tolist()
         groups = {f"package {p}": np.flatnonzero(load.packages == p) for p in packages}
@@ -153,7 +153,7 @@ def mesh(
         color=to_hex(colour),
         showlegend=legend,
         customdata=_short(np.repeat(labels, len(picture.CORNERS), axis=0)),
-        hovertemplate=LABEL,
+        hovertemplate=_LABEL,
         flatshading=True,
         lighting={"ambient": 0.75, "diffuse": 0.5},
     )
@@ -171,7 +171,7 @@ def layout(height: int, container: np.ndarray = task.CONTAINER) -> go.Layout:
     """
     # plotly measures the camera from the middle of the scene.
     places = {"eye": picture.EYE, "center": picture.TARGET}
-    unit, scale = container[0] / UNITS_LONG, container / task.CONTAINER
+    unit, scale = container[0] / _UNITS_LONG, container / task.CONTAINER
     camera = {name: (place * scale - container / 2) / unit for name, place in places.items()}
     scene = {
         f"{axis}axis": {"title": {"text": f"{axis} (m)"}, "range": [0, length], "nticks": 8}

@@ -9,7 +9,7 @@ from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
 from unload.physics.situation import RESOLUTION
 from unload.support import checks
 
-DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
+_DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
 
 class FullPhysics(Physics):
@@ -37,7 +37,7 @@ class FullPhysics(Physics):
             ((length / 2, -0.5, height / 2), (length + 2, 1, height)),  # side walls
             ((length / 2, width + 0.5, height / 2), (length + 2, 1, height)),
             ((-0.5, width / 2, height / 2), (1, width + 2, height)),  # rear wall
-            ((0, 0, DEPOT - 0.5), (2000, 2000, 1)),
+            ((0, 0, _DEPOT - 0.5), (2000, 2000, 1)),
         ):
             self._add_box(position, size, 0)
         sizes = self._slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION)
@@ -63,7 +63,7 @@ class FullPhysics(Physics):
         """Move a body to a place of its own in the depot."""
         row, column = divmod(body, 100)
         length, width, height = self._container
-        place = ((length + 1) * row, (width + 0.5) * column, DEPOT + height / 2)
+        place = ((length + 1) * row, (width + 0.5) * column, _DEPOT + height / 2)
         self._world.place(body, place)
 
     def settle(self, seconds: float) -> None:

@@ -8,7 +8,7 @@ from unload.physics.base import Physics
 from unload.physics.bullet import World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
-MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
+_MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
 
 
 class LocalPhysics(Physics):
@@ -28,7 +28,7 @@ class LocalPhysics(Physics):
         self._check_open()
         if self._world is None:
             self._world = World()
-        elif self._world.bodies > MOST_BODIES:
+        elif self._world.bodies > _MOST_BODIES:
             self._world.clear()
 
         world = self._world

@@ -14,17 +14,17 @@ from unload.support.compiled import CONFIG
 
 # Not those of ``multiprocessing``, which would run the script that the user has started once more.
 # Ctrl-C is for the process that asks.
-COMMAND = (
+_COMMAND = (
     "from signal import *; signal(SIGINT, SIG_IGN); from unload.physics.pool import serve; serve()"
 )
-MOST = 8  # each takes 100 MB, and a step has few new lifts
+_MOST = 8  # each takes 100 MB, and a step has few new lifts
 
 
 class Pool:
     """Processes that are started when they are first asked: one for each core, with this one.
 
     These are as many as numba takes threads, which the environment's ``NUMBA_NUM_THREADS`` sets,
-    but at most ``MOST``. They end with the pool, or with this process, however that ends.
+    but at most ``_MOST``. They end with the pool, or with this process, however that ends.
     """
 
     def __init__(self) -> None:
@@ -35,11 +35,11 @@ class Pool:
         self, situations: list[Situation], simulate: Callable[[Situation], float]
     ) -> list[float]:
         """Return how far each chosen box moves, in m; ``simulate`` is for this process's share."""
-        count, distances = min(CONFIG.NUMBA_NUM_THREADS, MOST), [0.0] * len(situations)
+        count, distances = min(CONFIG.NUMBA_NUM_THREADS, _MOST), [0.0] * len(situations)
         try:
             while len(self._workers) < count - 1:
                 process = subprocess.Popen(
-                    [sys.executable, "-c", COMMAND],
+                    [sys.executable, "-c", _COMMAND],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
@@ -49,7 +49,7 @@ class Pool:
             for number, worker in enumerate(self._workers, 1):
                 worker.stdin.write(pickle.dumps(situations[number::count]))
                 worker.stdin.flush()
-            distances[::count] = [simulate(each) for each in situations[::count]]
+            distances[::count] = [simulate(situation) for situation in situations[::count]]
             for number, worker in enumerate(self._workers, 1):
                 distances[number::count] = pickle.load(worker.stdout)
             return distances
@@ -78,5 +78,5 @@ def serve() -> None:
     with questions, answers, closing(LocalPhysics()) as physics:
         while questions.peek():
             situations = pickle.load(questions)
-            pickle.dump([physics.simulate(each) for each in situations], answers)
+            pickle.dump([physics.simulate(situation) for situation in situations], answers)
             answers.flush()

@@ -2,7 +2,7 @@
 
 A box is held down by what rests on it, directly or over others. It may rub against its
 neighbours in the same wall, and it can tip aside only what its surroundings let fall.
-All else in the container is left out.
+All else in the container is left out. The search is compiled, for ``unload.fast`` as well.
 """
 
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load
+from unload.support.compiled import compiled
 
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 
@@ -55,47 +56,150 @@ class Surroundings:
     def __init__(self, load: Load, present: np.ndarray) -> None:
         self.load, self.present = load, present
         self._geometry = np.hstack([load.positions, load.sizes])
-        self._low = load.positions - load.sizes / 2
-        self._high = load.positions + load.sizes / 2
+        # Copies, which may be written: for arrays that may not be, numba would compile twice.
+        self._starts, self._links = map(np.array, load.contacts)
 
     def on_top(self, item: int) -> list[int]:
         """The present boxes that rest on ``item``, directly or over others, in index order."""
-        found, frontier = set(), [item]
-        while frontier:
-            for box in self.load.contacts.of(ABOVE, frontier.pop()).tolist():
-                if self.present[box] and box not in found:
-                    found.add(box)
-                    frontier.append(box)
-        return sorted(found)
+        members = np.empty(len(self.load), np.int32)
+        contacts = self._starts, self._links, self.present
+        count = find_movers(*contacts, item, members, len(members))
+        return sorted(members[1:count].tolist())
 
     def situation(self, item: int) -> Situation:
         """Return the situation of ``item``: the boxes that decide its lift."""
-        # What can move, and what that stands on or may rub against; the rest has no influence.
-        dynamic = [item, *self.on_top(item)]
-        static = {
-            box
-            for mover in dynamic
-            for kind in (BELOW, BESIDE)
-            for box in self.load.contacts.of(kind, mover).tolist()
-            if self.present[box]
-        }
-
-        members = [*dynamic, *sorted(static.difference(dynamic))]
-        boxes = self._geometry[members]
-        centre = boxes[0, :3].copy()
-        boxes[:, :3] -= centre  # before rounding: equal situations are equal wherever they are
-
-        # The floor matters to the chosen box alone, a side wall to each box that moves.
-        floor = -centre[2] if self._low[item, 2] <= CONTACT_TOLERANCE else None
-        sides = []
-        if self._low[dynamic, 1].min() <= CONTACT_TOLERANCE:
-            sides.append(-centre[1])
         right = self.load.container[1]
-        if self._high[dynamic, 1].max() >= right - CONTACT_TOLERANCE:
-            sides.append(right - centre[1])
-        return Situation(
-            boxes=np.rint(boxes / RESOLUTION).astype(np.int32),
-            dynamic=len(dynamic),
-            floor=None if floor is None else round(floor / RESOLUTION),
-            sides=tuple(round(side / RESOLUTION) for side in sides),
-        )
+        contacts = self._starts, self._links, self.present
+        return situation_in(*contacts, self._geometry, right, item)
+
+
+def situation_in(
+    starts: np.ndarray,
+    links: np.ndarray,
+    present: np.ndarray,
+    geometry: np.ndarray,
+    right: float,
+    item: int,
+) -> Situation:
+    """The situation of ``item`` in a container given by arrays, see ``write_key``."""
+    members = np.empty(len(present), np.int32)
+    key = np.empty(key_length(len(present)), np.int32)
+    dynamic = find_movers(starts, links, present, item, members, len(members))
+    words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+    key = key[:words].copy()
+
+    # What stands between its head and the boxes, six words each, are the floor and the sides.
+    first = 2 + key[1]
+    sides = (len(key) - first) % 6
+    return Situation(
+        boxes=key[first + sides :].reshape(-1, 6),
+        dynamic=int(key[0]),
+        floor=int(key[2]) if key[1] else None,
+        sides=tuple(key[first : first + sides].tolist()),
+    )
+
+
+@compiled
+def key_length(boxes):
+    """The greatest number of words in the key of a situation of so many boxes."""
+    return 5 + 6 * boxes
+
+
+@compiled
+def find_movers(starts, links, present, item, members, most):
+    """How many boxes a lift moves: the item and all on top of it, at most ``most``.
+
+    Args:
+        starts, links: see ``Contacts``.
+        present: (n,) bool, the boxes that are there.
+        item: its number.
+        members: (n,) int32; the boxes found are written to its start, the item first.
+        most: after so many the search ends.
+    """
+    members[0], dynamic, done = item, 1, 0
+    while done < dynamic:
+        box = members[done]
+        done += 1
+        for link in range(starts[ABOVE, box], starts[ABOVE, box + 1]):
+            if present[links[link]] and not _holds(members, dynamic, links[link]):
+                members[dynamic] = links[link]
+                dynamic += 1
+                if dynamic >= most:
+                    return dynamic
+    return dynamic
+
+
+@compiled
+def write_key(starts, links, present, geometry, right, members, dynamic, key):
+    """Write the words of ``Situation.key``; return how many there are.
+
+    Args:
+        starts, links, present: as for ``find_movers``.
+        geometry: (n, 6) float64, centre and edge lengths of each box in m.
+        right: y of the right side wall in m.
+        members: (n,) int32, begins with the ``dynamic`` boxes of ``find_movers``, which are
+            sorted here; what they touch besides is written behind them.
+        dynamic: their number.
+        key: int32, written; ``key_length`` says how much room it needs.
+    """
+    item = members[0]
+    for end in range(1, dynamic):  # numba's own sort takes a second more to compile
+        _insert(members, 1, end, members[end])
+
+    # What the moving boxes stand on or may rub against; the rest has no influence.
+    count = dynamic
+    for mover in range(dynamic):
+        box = members[mover]
+        for kind in (BELOW, BESIDE):
+            for link in range(starts[kind, box], starts[kind, box + 1]):
+                if present[links[link]] and not _holds(members, count, links[link]):
+                    count = _insert(members, dynamic, count, links[link])
+
+    # The floor matters to the chosen box alone, a side wall to each box that moves.
+    lowest, highest = np.inf, -np.inf
+    for mover in range(dynamic):
+        y, width = geometry[members[mover], 1], geometry[members[mover], 4]
+        lowest, highest = min(lowest, y - width / 2), max(highest, y + width / 2)
+    x, y, z = geometry[item, 0], geometry[item, 1], geometry[item, 2]
+    key[0], key[1], words = dynamic, 0, 2
+    if z - geometry[item, 5] / 2 <= CONTACT_TOLERANCE:
+        key[1], key[2], words = 1, _micrometres(-z), 3
+    if lowest <= CONTACT_TOLERANCE:
+        key[words] = _micrometres(-y)
+        words += 1
+    if highest >= right - CONTACT_TOLERANCE:
+        key[words] = _micrometres(right - y)
+        words += 1
+
+    # Relative to the item before rounding: equal situations are equal wherever they are.
+    for number in range(count):
+        box = members[number]
+        for axis, origin in enumerate((x, y, z)):
+            key[words + axis] = _micrometres(geometry[box, axis] - origin)
+            key[words + 3 + axis] = _micrometres(geometry[box, 3 + axis])
+        words += 6
+    return words
+
+
+@compiled
+def _micrometres(length):
+    return np.int32(np.rint(length / RESOLUTION))
+
+
+@compiled
+def _holds(members, end, box):
+    for i in range(end):
+        if members[i] == box:
+            return True
+    return False
+
+
+@compiled
+def _insert(members, first, end, box):
+    """Put a box into its place among the sorted ``members[first:end]``; the new end."""
+    place = end
+    while place > first and members[place - 1] > box:
+        members[place] = members[place - 1]
+        place -= 1
+    members[place] = box
+    return end + 1

@@ -26,17 +26,17 @@ from unload.physics.situation import Situation
 from unload.support import files
 from unload.support.compiled import compiled
 
-LOGGER = logging.getLogger(__name__)
+_LOGGER = logging.getLogger(__name__)
 HELD_DOWN = 3  # boxes on top that no lift moves
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
-FEWEST_SLOTS = 1024
-ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
-SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
-CLOSE = 1e-5  # m, other processors may round otherwise
-FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
-FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
-PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
+_FEWEST_SLOTS = 1024
+_ARRAYS = {"digests", "micrometres", "settings", "samples", "digest"}  # of a file
+_SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
+_CLOSE = 1e-5  # m, other processors may round otherwise
+_FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
+_FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
+_PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
 
 
 def _free_lift() -> float:
@@ -74,7 +74,7 @@ class LiftTable:
     def __init__(self) -> None:
         self._adding = Lock()
         self.samples: dict[int, Situation] = {}
-        self._hold(np.zeros(0, np.uint64), np.zeros(0, np.int32))
+        self._start_slots(np.zeros(0, np.uint64), np.zeros(0, np.int32))
 
     def __len__(self) -> int:
         return self._count
@@ -100,7 +100,7 @@ class LiftTable:
             self._take_samples({int(digest): situation})
             self._count += 1
             if 2 * self._count > len(digests):
-                self._hold(*self.entries())
+                self._start_slots(*self.entries())
 
     def entries(self) -> tuple[np.ndarray, np.ndarray]:
         """All digests (n,) uint64 in increasing order, and their distances (n,) int32."""
@@ -109,16 +109,16 @@ class LiftTable:
         order = filled[np.argsort(digests[filled])]
         return digests[order], micrometres[order]
 
-    def _hold(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
+    def _start_slots(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
         """Start new arrays with these entries."""
-        size = max(FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
+        size = max(_FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
         slots = np.full(size, EMPTY), np.zeros(size, np.int32)
         _fill(*slots, digests, micrometres)
         self.slots, self._count = slots, len(digests)
 
     def _take_samples(self, samples: dict[int, Situation]) -> None:
         """Keep the lowest ones, which do not depend on the order in which they came."""
-        self.samples = dict(sorted((self.samples | samples).items())[:SAMPLES])
+        self.samples = dict(sorted((self.samples | samples).items())[:_SAMPLES])
 
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
@@ -136,8 +136,9 @@ class LiftTable:
     @classmethod
     def load(cls, path: str | Path) -> "LiftTable":
         """Read a table that ``save`` wrote; ValueError if damaged or of other physics settings."""
+        # Of a damaged file nothing is taken, nor of one that holds another physics' answers.
         arrays = files.read_arrays(path)
-        if set(arrays) != ARRAYS:
+        if set(arrays) != _ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
         if not np.array_equal(arrays.pop("digest"), _digest_of_file(arrays)):
             raise ValueError(f"{path} was changed or damaged: its digest is another")
@@ -149,9 +150,9 @@ class LiftTable:
             )
 
         table = cls()
-        table._hold(arrays["digests"], arrays["micrometres"])
-        for each in json.loads(str(arrays["samples"])):
-            situation = Situation(**each | {"boxes": np.array(each["boxes"], np.int32)})
+        table._start_slots(arrays["digests"], arrays["micrometres"])
+        for fields in json.loads(str(arrays["samples"])):
+            situation = Situation(**fields | {"boxes": np.array(fields["boxes"], np.int32)})
             table._take_samples({int(_digest(situation)): situation})
         return table
 
@@ -160,7 +161,7 @@ class LiftTable:
         with closing(LocalPhysics()) as local, suppress(ModuleNotFoundError):
             for situation in self.samples.values():
                 known, distance = self.find(situation), local.simulate(situation)
-                if known is None or abs(known - distance) > CLOSE:
+                if known is None or abs(known - distance) > _CLOSE:
                     raise ValueError(
                         f"{path} says that a box moves by {known} m, PyBullet that it "
                         f"moves by {distance} m. Remove it to fill a new one"
@@ -185,18 +186,19 @@ class LiftTable:
             with files.locked(f"{path}.lock", wait=True):
                 stored = LiftTable.load(path) if path.exists() else LiftTable()
                 stored.check(path)
+                # Of a lift that both know, the own distance stays.
                 with self._adding:
                     both = zip(self.entries(), stored.entries())
                     digests, micrometres = map(np.concatenate, both)
                     digests, first = np.unique(digests, return_index=True)
-                    self._hold(digests, micrometres[first])
+                    self._start_slots(digests, micrometres[first])
                     self._take_samples(stored.samples)
                 if len(self) > len(stored):
                     self.save(path)
         except OSError as error:
-            if error.errno not in FULL:
+            if error.errno not in _FULL:
                 raise
-            LOGGER.warning("lifts are kept in memory only: %s", error)
+            _LOGGER.warning("lifts are kept in memory only: %s", error)
 
 
 class TablePhysics(LocalPhysics):
@@ -234,9 +236,9 @@ class TablePhysics(LocalPhysics):
 
         Where such lists keep coming, other processes share the lifts.
         """
-        if len(situations) >= FEWEST_SHARED:
+        if len(situations) >= _FEWEST_SHARED:
             self._waited += len(situations)
-            if self._waited > PATIENCE:
+            if self._waited > _PATIENCE:
                 shared = self._pool.simulate(situations, super().simulate)
                 for situation, distance in zip(situations, shared):
                     self.table.add(situation, distance)
@@ -264,7 +266,7 @@ def _digest_of_file(arrays: dict[str, np.ndarray]) -> np.ndarray:
 
 
 @compiled
-def absorb(digest, word):
+def _absorb(digest, word):
     """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
     digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
     return digest ^ (digest >> np.uint64(29))
@@ -275,7 +277,7 @@ def digest_of(words):
     """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
     digest = np.uint64(len(words))
     for word in words:
-        digest = absorb(digest, word)
+        digest = _absorb(digest, word)
     return max(digest, np.uint64(1))
 
 

@@ -11,9 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 # Of an array: None on an axis admits any length, None alone any shape.
-Shape = tuple[int | None, ...] | None
-Option = TypeVar("Option")
-LARGEST = np.iinfo(np.int64).max
+_Shape = tuple[int | None, ...] | None
+_Option = TypeVar("_Option")
+_LARGEST = np.iinfo(np.int64).max
 
 
 def instance(name: str, value: object, kind: Any, expected: str) -> Any:
@@ -23,7 +23,7 @@ def instance(name: str, value: object, kind: Any, expected: str) -> Any:
     return value
 
 
-def one_of(name: str, value: object, options: Iterable[Option]) -> Option:
+def one_of(name: str, value: object, options: Iterable[_Option]) -> _Option:
     """Return the one of ``options`` that ``value`` is; raise ValueError if it is none."""
     options = list(options)
     single = isinstance(value, Hashable) and getattr(value, "shape", ()) == ()  # no array or tensor
@@ -46,7 +46,7 @@ def integer(name: str, value: object, low: int, high: int | None = None) -> int:
     wanted = f"expected an integer >= {low}" + ("" if high is None else f" and <= {high}")
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} is {value!r}; {wanted}")
-    if not low <= int(value) <= (LARGEST if high is None else high):
+    if not low <= int(value) <= (_LARGEST if high is None else high):
         raise ValueError(f"{name} is {value!r}; {wanted}")
     return int(value)
 
@@ -96,7 +96,7 @@ def entries(name: str, value: object, required: Iterable[str]) -> None:
         raise ValueError(f"{name} has no {', '.join(missing)}; expected {', '.join(required)}")
 
 
-def shaped(name: str, value: Any, shape: Shape, dtype: Any = None) -> None:
+def shaped(name: str, value: Any, shape: _Shape, dtype: Any = None) -> None:
     """Check an array or tensor: raise TypeError for another dtype, ValueError for another shape."""
     if dtype is not None and getattr(value, "dtype", None) != dtype:
         found = f"a {type(value).__name__} of dtype {getattr(value, 'dtype', None)}"
@@ -111,7 +111,7 @@ def shaped(name: str, value: Any, shape: Shape, dtype: Any = None) -> None:
         raise ValueError(f"{name} has shape {has}; expected {wanted}")
 
 
-def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
+def finite_array(name: str, value: object, shape: _Shape) -> np.ndarray:
     """Return ``value`` as a float64 array; raise unless it is finite and has ``shape``."""
     array = _array(name, value, shape, "fiu", "real numbers")
     array = array.astype(np.float64)
@@ -121,7 +121,7 @@ def finite_array(name: str, value: object, shape: Shape) -> np.ndarray:
     return array
 
 
-def integer_array(name: str, value: object, shape: Shape, high: int | None = None) -> np.ndarray:
+def integer_array(name: str, value: object, shape: _Shape, high: int | None = None) -> np.ndarray:
     """Return ``value`` as an int64 array; raise unless it holds integers and has ``shape``.
 
     If ``high`` is given, they must lie in [0, high].
@@ -132,7 +132,7 @@ def integer_array(name: str, value: object, shape: Shape, high: int | None = Non
     return array
 
 
-def flag_array(name: str, value: object, shape: Shape) -> np.ndarray:
+def flag_array(name: str, value: object, shape: _Shape) -> np.ndarray:
     """Return ``value`` as a bool array; raise unless it holds 0 and 1 only, and has ``shape``."""
     array = _array(name, value, shape, "biuf", "bool, or 0 and 1")
     wrong = array[(array != 0) & (array != 1)]
@@ -141,7 +141,7 @@ def flag_array(name: str, value: object, shape: Shape) -> np.ndarray:
     return array.astype(bool)
 
 
-def _array(name: str, value: object, shape: Shape, kinds: str, expected: str) -> np.ndarray:
+def _array(name: str, value: object, shape: _Shape, kinds: str, expected: str) -> np.ndarray:
     """``value`` as an array of one of the NumPy dtype ``kinds``; an empty one has any dtype."""
     try:
         array = np.asarray(value)

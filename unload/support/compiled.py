@@ -21,15 +21,15 @@ import numba
 import numpy as np
 
 CONFIG: Any = numba.config  # whose names type checkers do not see
-LOGGER = logging.getLogger(__name__)
-PACKAGE = Path(__file__).resolve().parents[1]
+_LOGGER = logging.getLogger(__name__)
+_PACKAGE = Path(__file__).resolve().parents[1]
 # All that compiled functions are defined in, or take constants from.
-SOURCES = ("task.py", "support/*.py", "load/*.py", "physics/*.py", "fast/*.py")
-VERSIONS = sys.version, numba.__version__, llvmlite.__version__, np.__version__
+_SOURCES = ("task.py", "support/*.py", "load/*.py", "physics/*.py", "fast/*.py")
+_VERSIONS = sys.version, numba.__version__, llvmlite.__version__, np.__version__
 
 
 def compiled(function: Callable | None = None, **options) -> Callable:
-    """``numba.njit`` of a function in one of ``SOURCES``, with a cache that follows all of them.
+    """``numba.njit`` of a function in one of ``_SOURCES``, with a cache that follows all of them.
 
     ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. A fresh installation
     compiles for ten seconds, each function at its first call, which is logged when the folder is
@@ -37,7 +37,7 @@ def compiled(function: Callable | None = None, **options) -> Callable:
     """
     if function is None:
         return partial(compiled, **options)
-    place = folder()
+    place = _folder()
     if place is None:
         return numba.njit(**options)(function)
     # numba reads this setting when it is told to cache a function; it is the user's again after.
@@ -49,28 +49,28 @@ def compiled(function: Callable | None = None, **options) -> Callable:
 
 
 @cache
-def folder() -> Path | None:
+def _folder() -> Path | None:
     """Where compiled code is kept: the first of three places that can be written, None if none can.
 
     They are ``NUMBA_CACHE_DIR`` if it is set, the package's ``__pycache__``, and the user's cache.
     """
     user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for place in (CONFIG.CACHE_DIR, PACKAGE / "__pycache__", Path(user, "unload")):
+    for place in (CONFIG.CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
         if not place:
             continue
-        found = Path(place, f"compiled-{digest(PACKAGE)}")
+        kept = Path(place, f"compiled-{_digest(_PACKAGE)}")
         try:
-            fresh = not found.exists()
-            found.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=found).close()
+            fresh = not kept.exists()
+            kept.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=kept).close()
         except OSError:
             continue
         if fresh:  # else whoever waits for the compiler does not know why
-            LOGGER.warning(
+            _LOGGER.warning(
                 "compiling for this processor, for about ten seconds in all; kept for later in %s",
-                found,
+                kept,
             )
-        return found
+        return kept
     warnings.warn(
         "compiled code cannot be kept, and every process compiles for ten seconds; set "
         "NUMBA_CACHE_DIR to a folder that can be written",
@@ -79,10 +79,10 @@ def folder() -> Path | None:
     return None
 
 
-def digest(package: Path) -> str:
-    """Digest of ``SOURCES`` in a folder, and of the versions of Python and the libraries."""
-    found = blake2b(repr(VERSIONS).encode(), digest_size=8)
-    for pattern in SOURCES:
+def _digest(package: Path) -> str:
+    """Digest of ``_SOURCES`` in a folder, and of the versions of Python and the libraries."""
+    digest = blake2b(repr(_VERSIONS).encode(), digest_size=8)
+    for pattern in _SOURCES:
         for path in sorted(package.glob(pattern)):
-            found.update(path.read_bytes())
-    return found.hexdigest()
+            digest.update(path.read_bytes())
+    return digest.hexdigest()

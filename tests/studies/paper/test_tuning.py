@@ -10,7 +10,7 @@ from studies.paper import tuning
 from studies.paper.tuning import tuning_grid
 from studies.results import read_table
 from unload import task
-from unload.env.vector import HighestItemVectorEnv
+from unload.env.highest_item import HighestItemVectorEnv
 
 
 def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch):
