@@ -1,6 +1,7 @@
 """Fixtures that several test modules share: random numbers, loads, their boxes, and folders."""
 
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import matplotlib
@@ -19,6 +20,13 @@ torch.set_num_threads(1)
 # The same examples every time, however slow the machine is, and none kept from run to run.
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip, where PyBullet is missing, the tests that are about it."""
+    for item in items if find_spec("pybullet") is None else ():
+        if item.get_closest_marker("pybullet"):
+            item.add_marker(pytest.mark.skip(reason="PyBullet is not installed"))
 
 
 @pytest.fixture(autouse=True)

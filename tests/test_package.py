@@ -23,6 +23,7 @@ LIBRARIES = {
     "gymnasium": ("__init__.py", "env/", "agent/"),
     "llvmlite": ("fast/kernel.py", "support/compiled.py"),
     "matplotlib": ("load/",),
+    "mujoco": ("physics/mujoco.py",),
     "numba": ("fast/kernel.py", "support/compiled.py"),
     "numpy": ("",),
     "pandas": ("load/packing_list.py", "agent/"),

@@ -303,7 +303,7 @@ def test_a_table_of_lies_is_refused(tmp_path, known):
     files.write_arrays(path, arrays | {"micrometres": lies})
     check_refused(path, "lifts.npz was changed or damaged")
     changed(path, micrometres=lies)
-    check_refused(path, "lifts.npz says that a box moves by 0.4 m, PyBullet that it")
+    check_refused(path, "lifts.npz says that a box moves by 0.4 m; simulated by pybullet it moves")
 
 
 def test_without_pybullet_a_table_is_taken_as_it_is(tmp_path, monkeypatch, table):

@@ -39,11 +39,12 @@ def _pybullet() -> Any:
     with _quiet_stderr():
         try:
             import pybullet
-        except ModuleNotFoundError as error:
+        except ModuleNotFoundError:
             raise ModuleNotFoundError(
-                "a lift that no table knows, a whole container or a heap has to be simulated; "
-                "expected PyBullet: pip install pybullet (ready-made for Python 3.11 and lower)"
-            ) from error
+                "PyBullet is not installed, which simulates whole containers and heaps: take Python "
+                "3.11 on Linux x86-64 (pip install pybullet); elsewhere MuJoCo simulates lifts "
+                "(pip install mujoco-core), for physics='local' and 'table'"
+            ) from None
     return pybullet
 
 

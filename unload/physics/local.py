@@ -1,14 +1,38 @@
 """Lifts of a box in its situation: nothing else in the container is simulated."""
 
+from functools import cache
+from importlib.util import find_spec
+
 import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
+from unload.physics import mujoco
 from unload.physics.base import Physics
-from unload.physics.bullet import World, slim
+from unload.physics.bullet import SETTINGS, World, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
+from unload.support import checks
 
+ENGINES = ("pybullet", "mujoco")  # that simulate lifts, the reference first
 MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
+
+
+@cache
+def default_engine() -> str:
+    """PyBullet where it is installed, or where neither is: its lifts ship. Else MuJoCo."""
+    return next((name for name in ENGINES if find_spec(name)), ENGINES[0])
+
+
+def engine_of(name: str | None) -> str:
+    """The engine of this name, the default one for None; ValueError if there is none."""
+    name = default_engine() if name is None else name
+    checks.one_of("engine", name, ENGINES)
+    return name
+
+
+def settings_of(engine: str) -> dict:
+    """The name of an engine with its version, and all else that a lift depends on but boxes."""
+    return SETTINGS if engine == ENGINES[0] else mujoco.settings()
 
 
 class LocalPhysics(Physics):
@@ -18,7 +42,14 @@ class LocalPhysics(Physics):
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
     A failed lift has no effect on the container (Sec. III-D). ``surroundings`` holds the
     situations of the load's items.
+
+    Args:
+        engine: ``"pybullet"`` or ``"mujoco"``; PyBullet where it is installed if None.
     """
+
+    def __init__(self, engine: str | None = None) -> None:
+        super().__init__()
+        self.engine = engine_of(engine)
 
     def simulate(self, situation: Situation) -> float:
         """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
@@ -26,6 +57,8 @@ class LocalPhysics(Physics):
         What was lifted before makes no difference, not in one bit.
         """
         self._check_open()
+        if self.engine == "mujoco":
+            return round(mujoco.lift(situation), 6)
         if self._world is None:
             self._world = World()
         elif self._world.bodies > MOST_BODIES:
