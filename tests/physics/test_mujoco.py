@@ -10,8 +10,8 @@ import unload
 from tests.physics.kinds import ONE_BOX, TWO_BOXES, make
 from unload import task
 from unload.env.vector import ContainerVectorEnv
-from unload.physics import bullet, local, mujoco
-from unload.physics.local import LocalPhysics, default_engine
+from unload.physics import bullet, mujoco
+from unload.physics.local import LocalPhysics
 from unload.physics.pool import Pool
 from unload.physics.situation import Situation
 from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, shared_table
@@ -21,7 +21,7 @@ from unload.support import files
 @pytest.fixture
 def no_pybullet(monkeypatch):
     """PyBullet as if it were not installed, and no lifts known but those that ship."""
-    caches = default_engine, shared_table, bullet._pybullet
+    caches = bullet.engine_of, shared_table, bullet._pybullet
     monkeypatch.setitem(sys.modules, "pybullet", None)
     for each in caches:
         each.cache_clear()
@@ -82,7 +82,9 @@ def test_a_warning_is_an_error(monkeypatch, tmp_path, hard):
 
 @pytest.mark.parametrize("kind", [LocalPhysics, LiftTable])
 def test_unknown_engines_are_refused(kind):
-    with pytest.raises(ValueError, match="engine is 'havok'; expected one of 'pybullet', 'mujoco'"):
+    with pytest.raises(
+        ValueError, match="engine is 'havok'; expected one of None, 'pybullet', 'mujoco'"
+    ):
         kind("havok")
 
 
@@ -134,14 +136,14 @@ def test_the_lifts_that_ship_are_never_written_as_its_own(no_pybullet, hard, tmp
     assert len(LiftTable.load(tmp_path / "saved.npz")) == 1
 
 
-@pytest.mark.parametrize("engine", local.ENGINES)
+@pytest.mark.parametrize("engine", bullet.ENGINES)
 def test_a_file_of_one_engine_is_refused_by_the_other(hard, tmp_path, engine):
     path = tmp_path / "lifts.npz"
     table = LiftTable(engine)
     table.add(hard[0], 0.1)
     table.save(path)
     before = files.digest(path)
-    (other,) = {*local.ENGINES} - {engine}
+    (other,) = {*bullet.ENGINES} - {engine}
     refused = rf'of another physics, {{"{engine}": .*; expected {{"{other}": .*Remove it'
     with pytest.raises(ValueError, match=refused):
         LiftTable(other).exchange(path)

@@ -1,37 +1,19 @@
 """Lifts of a box in its situation: nothing else in the container is simulated."""
 
-from functools import cache
-from importlib.util import find_spec
-
 import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
 from unload.physics import mujoco
 from unload.physics.base import Physics
-from unload.physics.bullet import SETTINGS, World, slim
+from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
-from unload.support import checks
 
-ENGINES = ("pybullet", "mujoco")  # that simulate lifts, the reference first
 MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
 
 
-@cache
-def default_engine() -> str:
-    """PyBullet where it is installed, or where neither is: its lifts ship. Else MuJoCo."""
-    return next((name for name in ENGINES if find_spec(name)), ENGINES[0])
-
-
-def engine_of(name: str | None) -> str:
-    """The engine of this name, the default one for None; ValueError if there is none."""
-    name = default_engine() if name is None else name
-    checks.one_of("engine", name, ENGINES)
-    return name
-
-
-def settings_of(engine: str) -> dict:
-    """The name of an engine with its version, and all else that a lift depends on but boxes."""
+def settings_of_lifts(engine: str) -> dict:
+    """An engine with its version, and all else but the boxes that its lifts depend on."""
     return SETTINGS if engine == ENGINES[0] else mujoco.settings()
 
 

@@ -5,9 +5,6 @@ otherwise. Where this decides a lift, near the threshold, the two may differ: li
 never kept in one file.
 """
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
 from unload import task
@@ -18,18 +15,12 @@ STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes t
 THICK, WIDE = 0.5, 4.5  # m, half of the floor and the side walls across, and along them
 
 
-@cache
-def _mujoco() -> Any:
-    """MuJoCo, imported when it is first needed."""
-    import mujoco
-
-    return mujoco
-
-
 def settings() -> dict:
     """All that a lift's outcome depends on besides the boxes, as ``bullet.SETTINGS``."""
-    shared = {name: value for name, value in SETTINGS.items() if name != "pybullet"}
-    return {"mujoco": _mujoco().__version__} | shared | {"time_step": STEP}
+    import mujoco  # here, because it is optional
+
+    own = {"mujoco": mujoco.__version__} | SETTINGS | {"time_step": STEP}
+    return {name: value for name, value in own.items() if name != "pybullet"}
 
 
 def lift(situation: Situation) -> float:
@@ -38,7 +29,8 @@ def lift(situation: Situation) -> float:
     Raises:
         FloatingPointError: MuJoCo gives a warning, for instance because a box flies off.
     """
-    mujoco = _mujoco()
+    import mujoco
+
     model = mujoco.MjModel.from_xml_string(_described(situation))
     # Bullet takes a share of the velocity in each second, whatever moves.
     inertia = np.hstack([np.repeat(model.body_mass[1:, None], 3, axis=1), model.body_inertia[1:]])
@@ -66,13 +58,12 @@ def _described(situation: Situation) -> str:
         else:
             parts.append(f'<geom type="box" {place} {size}/>')
 
-    planes = []  # centre and half the edges of the floor and the side walls
     if situation.floor is not None:
-        planes.append(((0, 0, situation.floor * RESOLUTION - THICK), (WIDE, WIDE, THICK)))
+        at = _text("pos", (0, 0, situation.floor * RESOLUTION - THICK))
+        parts.append(f'<geom type="box" {at} {_text("size", (WIDE, WIDE, THICK))}/>')
     for side in situation.sides:
-        outwards = np.sign(side) * THICK
-        planes.append(((0, side * RESOLUTION + outwards, 0), (WIDE, THICK, WIDE)))
-    parts += [f'<geom type="box" {_text("pos", at)} {_text("size", half)}/>' for at, half in planes]
+        at = _text("pos", (0, side * RESOLUTION + np.sign(side) * THICK, 0))
+        parts.append(f'<geom type="box" {at} {_text("size", (WIDE, THICK, WIDE))}/>')
 
     # MuJoCo takes the larger friction of two bodies, Bullet their product.
     return f"""<mujoco>

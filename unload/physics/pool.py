@@ -14,7 +14,10 @@ from unload.support.compiled import CONFIG
 
 # Not those of ``multiprocessing``, which would run the script that the user has started once more.
 # Ctrl-C is for the process that asks.
-COMMAND = "from signal import *; signal(SIGINT, SIG_IGN); from unload.physics.pool import serve; serve({})"
+COMMAND = (
+    "from signal import *; signal(SIGINT, SIG_IGN); "
+    "from unload.physics.pool import serve; serve({!r})"
+)
 MOST = 8  # each takes 100 MB, and a step has few new lifts
 
 
@@ -27,7 +30,7 @@ class Pool:
     """
 
     def __init__(self, engine: str | None = None) -> None:
-        self._command = COMMAND.format(repr(engine))
+        self._command = COMMAND.format(engine)
         self._workers: list[subprocess.Popen] = []
         self.close = weakref.finalize(self, _end, self._workers)
 

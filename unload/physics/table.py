@@ -19,8 +19,8 @@ from threading import Lock
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, TIME_STEP
-from unload.physics.local import ENGINES, LocalPhysics, default_engine, engine_of, settings_of
+from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
+from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.pool import Pool
 from unload.physics.situation import Situation
 from unload.support import files
@@ -145,7 +145,7 @@ class LiftTable:
         arrays = {
             "digests": digests,
             "micrometres": micrometres,
-            "settings": np.array(json.dumps(settings_of(self.engine))),
+            "settings": np.array(json.dumps(settings_of_lifts(self.engine))),
             "samples": np.array(json.dumps(samples, default=np.ndarray.tolist)),
         }
         # A link to a file that several runs share stays one.
@@ -160,7 +160,7 @@ class LiftTable:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
         if not np.array_equal(arrays.pop("digest"), _digest_of_file(arrays)):
             raise ValueError(f"{path} was changed or damaged: its digest is another")
-        settings, wanted = str(arrays["settings"]), json.dumps(settings_of(table.engine))
+        settings, wanted = str(arrays["settings"]), json.dumps(settings_of_lifts(table.engine))
         if settings != wanted:
             raise ValueError(
                 f"{path} is of another physics, {settings}; expected {wanted}. "
@@ -174,7 +174,7 @@ class LiftTable:
         return table
 
     def check(self, path: str | Path) -> None:
-        """Simulate the samples of ``path`` again, if this is possible; ValueError if they differ."""
+        """Simulate the samples of ``path`` again, where one can; ValueError if they differ."""
         with closing(LocalPhysics(self.engine)) as local, suppress(ModuleNotFoundError):
             for situation in self.samples.values():
                 known, distance = self.find(situation), local.simulate(situation)
@@ -271,8 +271,8 @@ class TablePhysics(LocalPhysics):
 def shared_table() -> LiftTable:
     """The lifts known to this process: PyBullet's in ``LIFTS_FILE``, and all made since."""
     table = LiftTable.load(LIFTS_FILE, ENGINES[0]) if LIFTS_FILE.exists() else LiftTable()
-    if table.engine != default_engine():  # which takes these answers for its own
-        table.engine, table.foreign, table.samples = default_engine(), table.entries()[0], {}
+    if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
+        table.engine, table.foreign, table.samples = engine_of(), table.entries()[0], {}
     return table
 
 
