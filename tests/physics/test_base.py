@@ -136,6 +136,6 @@ def test_the_memory_of_many_lifts_is_flat(monkeypatch):
         boxes[:, 2] = 350_000 * np.arange(2)
         physics.simulate(Situation(boxes, 1, -200_000, ()))
         if number % 1_500 == 0:
-            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
             resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
     assert max(resident[2:]) - resident[1] < 5, "MiB"
