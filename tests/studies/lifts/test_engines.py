@@ -1,0 +1,80 @@
+"""The two engines compared: their decisions, and the MSRs that follow from them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies.lifts import agreement, engines
+from studies.results import read_provenance, read_table
+from studies.statistics import share_interval
+from unload import policies, task
+from unload.physics.bullet import ENGINES
+from unload.physics.local import LocalPhysics, settings_of_lifts
+from unload.physics.table import LiftTable
+
+
+def test_decisions_are_counted_by_what_lies_on_top():
+    columns = ["situation", "on_top", *ENGINES]
+    rows = [(0, 0, 0.46, 0.45), (1, 1, 0.1, 0.3), (2, 1, 0.0, 0.1), (3, 5, 0.0, 0.0), (4, 3, 0, 0)]
+    table = engines.decided(pd.DataFrame(rows, columns=columns))
+    assert table[["situations", "differ"]].T.to_dict("list") == {
+        "0": [1, 0], "1": [2, 1], "≥ 3": [2, 0], "all": [5, 1]
+    }  # fmt: skip
+    for _, row in table.iterrows():
+        assert (row["low"], row["high"]) == share_interval(int(row["differ"]), row["situations"])
+    assert (
+        table.loc["0", "apart, mean"] == pytest.approx(0.01) == table.loc["all", "apart, largest"]
+    )
+    assert table.loc["1", "apart, mean":].isna().all(), "of none both engines lift"
+
+
+def test_each_engine_gives_its_own_answers(own_data, monkeypatch):
+    """MuJoCo never takes PyBullet's, and its own are kept for the next process."""
+    monkeypatch.setattr(engines, "LIFTS", own_data / "mujoco.npz")
+    lifts = {0.46: "pybullet", 0.1: "mujoco"}
+    monkeypatch.setattr(
+        LocalPhysics, "simulate", lambda self, each: {v: k for k, v in lifts.items()}[self.engine]
+    )
+    monkeypatch.setattr(engines, "shared_table", lambda: table)
+    monkeypatch.setattr(LiftTable, "check", lambda *_: None)
+    engines.answers_of.cache_clear()
+    table = LiftTable("pybullet")
+    rates = engines.both_rates(policies.random, {"episodes": 2, "seed": 0, "mask": False})
+    engines.answers_of.cache_clear()
+    assert rates["pybullet"] > rates["mujoco"] and rates["differ"] == rates["containers"] == 2
+    kept = LiftTable.load(own_data / "mujoco.npz", "mujoco")
+    assert len(kept) > 50 and set(kept.entries()[1]) == {100_000}
+
+
+def test_committed_decisions_are_those_of_the_lifts():
+    """Of all situations of the other comparison; a few are asked again."""
+    table = engines.read_engines()
+    known = agreement.read_agreement().drop_duplicates("situation").reset_index()
+    assert list(table) == ["situation", "on_top", *ENGINES]
+    assert (table[["situation", "on_top"]] == known[["situation", "on_top"]]).all(axis=None)
+    assert np.allclose(table["pybullet"], known["local"], atol=1e-6)
+    settings = read_provenance(engines.NAME)["settings"]
+    assert settings["mujoco"] == settings_of_lifts("mujoco")
+    lifted = table[[*ENGINES]] >= task.LIFT_THRESHOLD
+    apart = lifted["pybullet"] != lifted["mujoco"]
+    assert apart.mean() < 0.005 and (abs(table.loc[apart, "pybullet"] - 0.2) < 0.02).all()
+
+
+def test_committed_lifts_of_the_second_engine_can_be_computed_again(monkeypatch):
+    monkeypatch.setattr(engines, "LIFT_COUNT", 60)
+    table, physics = engines.read_engines().set_index("situation"), LocalPhysics("mujoco")
+    for number, situation in engines.situations():
+        assert physics.simulate(situation) == pytest.approx(table.loc[number, "mujoco"], abs=1e-4)
+
+
+def test_committed_rates_are_those_of_the_published_policies():
+    table = engines.read_msr()
+    cases = [case for case, _ in engines.played()]
+    assert table[["policy", "mask", "condition"]].to_dict("records") == cases
+    names = ["policy", "mask", "condition"]
+    published = read_table("policies/comparison").groupby(names)["success_rate"].mean()
+    both = table.merge(published.reset_index(), on=names)
+    assert len(both) == len(published) > 60
+    assert np.allclose(both["pybullet"], both["success_rate"], atol=1e-5)
+    equal = table["pybullet"] == table["mujoco"]
+    assert (equal | (table["differ"] > 0)).all() and (table["differ"] <= table["containers"]).all()
