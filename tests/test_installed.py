@@ -82,10 +82,10 @@ def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_pa
     assert shipped.items() <= before.items() and sum(map(len, shipped.values())) < 500_000
     work = tmp_path / "work"
     work.mkdir()
-    example, mark, _ = (ROOT / "README.md").read_text().partition("# With PyBullet:\n")
+    example, mark, _ = (ROOT / "README.md").read_text().partition("# With PyBullet or MuJoCo:\n")
     names = f"FOLDER = {str(installed)!r}\nEXAMPLE = {example.partition('```python')[2]!r}"
     printed = run(names + WITHOUT_ENGINES, work, installed)
-    assert mark and printed.startswith("136 True\n") and "pip install pybullet" in printed
+    assert mark and printed.startswith("136 True\n") and "pip install mujoco-core" in printed
     assert contents(installed) == before
     assert [path.name for path in work.iterdir()] == ["run"]
 
