@@ -109,6 +109,7 @@ def clients() -> int:
     return sum(pybullet.isConnected(number) for number in range(1024))
 
 
+@pytest.mark.pybullet
 @pytest.mark.parametrize(
     "make",
     [

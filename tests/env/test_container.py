@@ -102,6 +102,7 @@ def test_truncation_after_max_picks():
     assert [env.step(0)[2:4] for _ in range(3)][-1] == (True, True), "the last item, too"
 
 
+@pytest.mark.pybullet
 def test_drifting_boxes_are_seen_where_they_are():
     """Few enough to be quick, because each of them is simulated."""
     settings = {"physics": "full", "after_pick": "keep", "render_mode": "rgb_array"}
@@ -172,7 +173,11 @@ def test_a_row_without_an_item_is_a_failed_pick_that_changes_nothing():
 
 @pytest.mark.parametrize(
     "kwargs",
-    [{"physics": "local"}, {"physics": "full"}, {"physics": "full", "after_pick": "keep"}],
+    [
+        {"physics": "local"},
+        pytest.param({"physics": "full"}, marks=pytest.mark.pybullet),
+        pytest.param({"physics": "full", "after_pick": "keep"}, marks=pytest.mark.pybullet),
+    ],
     ids=str,
 )
 def test_every_physics_goes_to_the_last_item(kwargs):
