@@ -2,18 +2,13 @@
 
     python tests/wheels.py
 
-asks pip, for each system and each Python, which wheel it would take for each line. A line without
-one is left out there, and ``holes`` finds it.
+asks for them anew. ``holes`` finds the lines that have none for a system and a Python.
 """
 
-import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = Path(__file__).with_name("wheels.txt")
@@ -25,14 +20,6 @@ SYSTEMS = {
     "Linux ARM": ("linux", "aarch64", r"(many)?linux(_2_1\d|_2_2[0-8]|2014)_aarch64"),
     "macOS ARM": ("darwin", "arm64", r"macosx_(10|11|12|13|14)_\d+_(arm64|universal2)"),
     "Windows": ("win32", "AMD64", r"win_amd64"),
-}
-PIP_PLATFORMS = {
-    "Linux x86-64": [f"manylinux_2_{minor}_x86_64" for minor in range(5, 29)]
-    + [f"manylinux{name}_x86_64" for name in (1, 2010, 2014)],
-    "Linux ARM": [f"manylinux_2_{minor}_aarch64" for minor in range(17, 29)]
-    + ["manylinux2014_aarch64"],
-    "macOS ARM": ["macosx_14_0_arm64"],
-    "Windows": ["win_amd64"],
 }
 
 
@@ -80,37 +67,26 @@ def holes() -> Iterator[tuple[str, str, int]]:
             yield name, system, minor
 
 
-def ask(system: str, minor: int) -> set[str]:
-    """The wheels that pip would take."""
-    found = set()
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--dry-run", "--no-deps"]
-    pip += ["--ignore-installed", "--only-binary=:all:", f"--python-version=3.{minor}"]
-    pip += [f"--platform={name}" for name in PIP_PLATFORMS[system]]
-    wanted = [
-        f"{name}=={version}"
-        for name, (version, marker) in lines().items()
-        if is_wanted(marker, system, minor)
+def listed(name: str, version: str) -> list[str]:
+    """The wheels of a version that fit a system and a Python of ours, as the registry has them."""
+    # Of pip itself, which knows where to ask; its commands list versions, but no files.
+    from pip._internal.index import collector
+    from pip._internal.models.index import PyPI
+    from pip._internal.network.session import PipSession
+
+    page = collector._get_simple_response(f"{PyPI.simple_url}/{name}/", PipSession(retries=3))
+    content = collector._make_index_content(page, cache_link_parsing=False)
+    start = f"{name.replace('-', '_')}-{version}-".lower()
+    wheels = {link.filename for link in collector.parse_links(content)}
+    return [
+        wheel
+        for wheel in sorted(wheels)
+        if wheel.lower().startswith(start)
+        and wheel.endswith(".whl")
+        and any(fits(wheel, *place) for place in product(SYSTEMS, PYTHONS))
     ]
-    with TemporaryDirectory() as folder:
-        report = Path(folder) / "report.json"
-        more = [f"--target={folder}", f"--report={report}"]
-        for group in (wanted, *([each] for each in wanted)):  # one by one if one has none
-            done = subprocess.run([*pip, *more, *group], capture_output=True)
-            if not done.returncode:
-                entries = json.loads(report.read_text(encoding="utf-8"))["install"]
-                urls = (entry["download_info"]["url"] for entry in entries)
-                # A build of its own, such as +cpu, stands for the ordinary one.
-                found |= {re.sub(r"(%2B|\+)\w+", "", url.rpartition("/")[2]) for url in urls}
-                if group is wanted:
-                    break
-    return found
 
 
 if __name__ == "__main__":
-    wheels: set[str] = set()
-    for system, minor in product(SYSTEMS, PYTHONS):
-        wheels |= ask(system, minor)
-        print(system, minor, len(wheels), flush=True)
-    LIST.write_text(
-        "".join(f"{wheel}\n" for wheel in sorted(wheels)), encoding="utf-8", newline="\n"
-    )
+    found = [wheel for name, (version, _) in lines().items() for wheel in listed(name, version)]
+    LIST.write_text("".join(f"{wheel}\n" for wheel in found), encoding="utf-8", newline="\n")
