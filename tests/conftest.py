@@ -1,5 +1,8 @@
 """Fixtures that several test modules share: random numbers, loads, their boxes, and folders."""
 
+import os
+import shutil
+import signal
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,11 +25,26 @@ settings.register_profile("repeatable", derandomize=True, deadline=None, databas
 settings.load_profile("repeatable")
 
 
+# What some systems lack that some tests need.
+AVAILABLE = {
+    "/proc": os.path.exists("/proc/self/statm"),
+    "SIGKILL": hasattr(signal, "SIGKILL"),
+    "SIGPIPE": hasattr(signal, "SIGPIPE"),
+    "fcntl": find_spec("fcntl") is not None,
+    "fork": hasattr(os, "fork"),
+    "make": shutil.which("make") is not None,
+    "symlinks": os.name == "posix",
+}
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip, where PyBullet is missing, the tests that are about it."""
-    for item in items if find_spec("pybullet") is None else ():
-        if item.get_closest_marker("pybullet"):
+    """Skip tests of what is missing here: PyBullet, or something of the system."""
+    for item in items:
+        if find_spec("pybullet") is None and item.get_closest_marker("pybullet"):
             item.add_marker(pytest.mark.skip(reason="PyBullet is not installed"))
+        for marker in item.iter_markers("needs"):
+            if not AVAILABLE[marker.args[0]]:
+                item.add_marker(pytest.mark.skip(reason=f"this system has no {marker.args[0]}"))
 
 
 @pytest.fixture(autouse=True)

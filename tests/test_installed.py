@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -51,7 +52,8 @@ def run(code: str, folder: Path, path: Path) -> str:
 def installed(tmp_path) -> Path:
     """A folder outside the checkout with nothing but the package, built as ``make dist`` does."""
     for name in ("unload", "studies", "pyproject.toml", "README.md", "LICENSE", "Makefile"):
-        subprocess.run(["cp", "-r", ROOT / name, tmp_path], check=True)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tmp_path / name)
     # The environment is the one that runs this, and need not be made.
     make = ["make", "--silent", f"BIN={Path(sys.executable).parent}", "PYTHON=:"]
     subprocess.run([*make, "dist"], cwd=tmp_path, check=True)
@@ -70,6 +72,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
+@pytest.mark.needs("make")
 def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_path):
     """Without engines all works but what is simulated, the README's example up to its mark, too.
 

@@ -57,6 +57,7 @@ def test_every_field_is_an_option_that_is_explained(monkeypatch, capsys):
         assert text in told[0]
 
 
+@pytest.mark.needs("SIGPIPE")
 def test_help_and_version_take_no_time(tmp_path):
     """A script entry point calls ``command``; nothing is compiled, and little is imported.
 

@@ -18,6 +18,7 @@ from unload.support import files
 OWN = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz")
 
 
+@pytest.mark.needs("fork")
 def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
     """From its last checkpoint, in another process."""
     config = TrainConfig(**CONTAINER | {"max_picks": 200, "gamma": 0.9})

@@ -129,6 +129,7 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
 
 
 @pytest.mark.pybullet
+@pytest.mark.needs("/proc")
 def test_the_memory_of_many_lifts_is_flat(monkeypatch):
     """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
     monkeypatch.setattr(World, "pull", lambda world, body: 0.0)

@@ -180,6 +180,7 @@ def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
         ]
 
 
+@pytest.mark.needs("fork")
 def test_the_package_can_be_imported_where_windows_lacks_something():
     script = """if True:
         import errno, importlib, json, os, pathlib, pkgutil, signal, sys
@@ -206,7 +207,9 @@ def test_the_package_can_be_imported_where_windows_lacks_something():
             exec("".join(first["source"]), {})
         print("unload.agent.training" in sys.modules)
     """
-    environment = os.environ | {"MPLBACKEND": "Agg"}
+    # Text that names no encoding is ASCII then.
+    locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    environment = os.environ | locale | {"MPLBACKEND": "Agg"}
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, env=environment
     )
@@ -241,6 +244,7 @@ def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
 
 @pytest.mark.parametrize("name", ["lock", "owner"])
 @pytest.mark.parametrize("link", [os.symlink, os.link])
+@pytest.mark.needs("symlinks")
 def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     (tmp_path / "run").mkdir()
     (tmp_path / "notes").write_text("precious")
@@ -252,6 +256,7 @@ def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     assert (tmp_path / "notes").read_text() == "precious"
 
 
+@pytest.mark.needs("fcntl")
 def test_without_locks_of_the_file_system_nothing_is_locked(tmp_path, monkeypatch):
     """A file in their place would outlast a killed process."""
     missing = OSError(errno.ENOSYS, "it has no locks")
@@ -261,6 +266,7 @@ def test_without_locks_of_the_file_system_nothing_is_locked(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("refused", [False, True])
+@pytest.mark.needs("/proc")
 def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
     synced, fsync, opened = [], os.fsync, os.listdir("/proc/self/fd")
 
