@@ -8,6 +8,7 @@ from studies.lifts import agreement, engines
 from studies.results import read_provenance, read_table
 from studies.statistics import share_interval
 from unload import policies, task
+from unload.agent.evaluation import evaluate
 from unload.physics.bullet import ENGINES
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.table import LiftTable
@@ -28,22 +29,27 @@ def test_decisions_are_counted_by_what_lies_on_top():
     assert table.loc["1", "apart, mean":].isna().all(), "of none both engines lift"
 
 
-def test_each_engine_gives_its_own_answers(own_data, monkeypatch):
-    """MuJoCo never takes PyBullet's, and its own are kept for the next process."""
+def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):
+    """PyBullet's answers, which ship, are never taken; MuJoCo's are kept for the next process."""
     monkeypatch.setattr(engines, "LIFTS", own_data / "mujoco.npz")
-    lifts = {0.46: "pybullet", 0.1: "mujoco"}
-    monkeypatch.setattr(
-        LocalPhysics, "simulate", lambda self, each: {v: k for k, v in lifts.items()}[self.engine]
-    )
-    monkeypatch.setattr(engines, "shared_table", lambda: table)
     monkeypatch.setattr(LiftTable, "check", lambda *_: None)
-    engines.answers_of.cache_clear()
-    table = LiftTable("pybullet")
-    rates = engines.both_rates(policies.random, {"episodes": 2, "seed": 0, "mask": False})
-    engines.answers_of.cache_clear()
-    assert rates["pybullet"] > rates["mujoco"] and rates["differ"] == rates["containers"] == 2
-    kept = LiftTable.load(own_data / "mujoco.npz", "mujoco")
-    assert len(kept) > 50 and set(kept.entries()[1]) == {100_000}
+    asked = []
+
+    def simulate(physics: LocalPhysics, situation) -> float:
+        asked.append(physics.engine)
+        return 0.1
+
+    monkeypatch.setattr(LocalPhysics, "simulate", simulate)
+    arguments = {"episodes": 2, "seed": 0, "mask": False, "max_picks": 60}
+    first = evaluate(policies.random, **arguments)["success_rate"].to_numpy()
+    assert not asked
+    second = engines.second_rates(policies.random, arguments)
+    kept, count = LiftTable.load(own_data / "mujoco.npz", "mujoco"), len(asked)
+    assert {*asked} == {"mujoco"} and 0 < len(kept) <= count
+    assert engines.second_rates(policies.random, arguments) == second and len(asked) == count
+    row = engines.compared_rates(first, np.array(second))
+    assert row["containers"] == 2 and row["mujoco"] <= row["pybullet"]
+    assert engines.compared_rates(first, first - 0.01)["differ"] == 2
 
 
 def test_committed_decisions_are_those_of_the_lifts():
