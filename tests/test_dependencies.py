@@ -20,6 +20,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 LOWEST = dict(library.split(">=") for library in PROJECT["dependencies"])  # versions by name
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"make", "notebooks", "studies", "tests", "unload"}
+WITH_PYTHON = {"pip"}
 # Extras for one command each, pinned in pyproject.toml.
 ON_DEMAND = ("book", "browser")
 # Named, but imported by no statement, and what for.
@@ -79,7 +80,7 @@ def distributions(folder: str) -> set[str]:
             elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
                 names.add(node.args[0].value.split(".")[0])
     beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
-    names -= sys.stdlib_module_names | OWN | (beside - DISTRIBUTIONS.keys())
+    names -= sys.stdlib_module_names | OWN | WITH_PYTHON | (beside - DISTRIBUTIONS.keys())
     return {normal(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or not installed
 
 

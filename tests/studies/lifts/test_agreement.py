@@ -136,6 +136,7 @@ def test_the_table_is_filled_by_policies_that_pick_at_random_to_various_degrees(
         assert same.mean() == pytest.approx(1 - share * 127 / 128, abs=0.03)
 
 
+@pytest.mark.pybullet
 def test_lift_data_depends_on_the_command_alone(own_data, monkeypatch):
     shipped = read_provenance(LIFTS_FILE.with_suffix(""))["settings"]
     planned = [lifts.EPISODES, lifts.RANDOM_SHARE * lifts.EPISODES, lifts.SEED]

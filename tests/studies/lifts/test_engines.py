@@ -66,6 +66,7 @@ def test_committed_decisions_are_those_of_the_lifts():
     assert apart.mean() < 0.005 and (abs(table.loc[apart, "pybullet"] - 0.2) < 0.02).all()
 
 
+@pytest.mark.pybullet
 def test_committed_lifts_of_the_second_engine_can_be_computed_again(monkeypatch):
     monkeypatch.setattr(engines, "LIFT_COUNT", 60)
     table, physics = engines.read_engines().set_index("situation"), LocalPhysics("mujoco")
