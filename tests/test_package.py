@@ -187,7 +187,8 @@ def careless(source: str) -> list[str]:
         name = ast.unparse(call.func).rpartition(".")[2]
         given = {keyword.arg for keyword in call.keywords}
         binary = re.search(r"open\(.*, '[a-z]*b", ast.unparse(call))
-        text = name in ("read_text", "write_text") or (ast.unparse(call.func) == "open")
+        method = isinstance(call.func, ast.Attribute) and name in ("read_text", "write_text")
+        text = method or ast.unparse(call.func) == "open"
         if text and not binary and "encoding" not in given:
             found.append(ast.unparse(call))
         if name == "to_csv" and "lineterminator" not in given:

@@ -37,7 +37,9 @@ def engines_data(n_jobs: int = -1) -> None:
     """Ask both engines: ``lifts/engines.csv`` and ``lifts/engines_msr.csv``."""
     lifts = measured(compare_lifts)
     settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
-    publish(NAME, {"engines": lifts.value}, f"{COMMAND} engines", settings, [lifts], "%.6f")
+    publish(
+        NAME, {"engines": lifts.value}, f"{COMMAND} engines", settings, [lifts], float_format="%.6f"
+    )
 
     cases = list(played())
     asked = [({"engines": settings, **case}, arguments) for case, arguments in cases]
