@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from studies import paths
 from studies.lifts import agreement, engines
 from studies.results import read_provenance, read_table
 from studies.statistics import share_interval
@@ -63,7 +64,8 @@ def test_committed_decisions_are_those_of_the_lifts():
     assert settings["mujoco"] == settings_of_lifts("mujoco")
     lifted = table[[*ENGINES]] >= task.LIFT_THRESHOLD
     apart = lifted["pybullet"] != lifted["mujoco"]
-    assert apart.mean() < 0.005 and (abs(table.loc[apart, "pybullet"] - 0.2) < 0.02).all()
+    readme = (paths.ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"decided none of {len(table):,} situations otherwise" in readme and not apart.any()
 
 
 @pytest.mark.pybullet
