@@ -36,20 +36,28 @@ APPLIED = {"episodes": 50, "seed": 1000}
 def engines_data(n_jobs: int = -1) -> None:
     """Ask both engines: ``lifts/engines.csv`` and ``lifts/engines_msr.csv``."""
     lifts = measured(compare_lifts)
-    settings = {engine: settings_of_lifts(engine) for engine in ENGINES}
-    publish(
-        NAME, {"engines": lifts.value}, f"{COMMAND} engines", settings, [lifts], float_format="%.6f"
-    )
+    command, tables = f"{COMMAND} engines", {"engines": lifts.value}
+    publish(NAME, tables, command, engine_settings(), [lifts], float_format="%.6f")
+    msr_data(n_jobs)
 
-    cases = list(played())
+
+def msr_data(n_jobs: int) -> None:
+    """Let all policies play with the answers of the second engine."""
+    cases, settings = list(played()), engine_settings()
     asked = [({"engines": settings, **case}, arguments) for case, arguments in cases]
     answers = keep_all("engines", second_rates, asked, n_jobs)
     rows = [
         case | compared_rates(first_rates(case, *arguments), np.array(answer.value))
         for (case, arguments), answer in zip(cases, answers)
     ]
+    settings |= {"loads": LOADS, "seed": SEED, "notebook 12": APPLIED}
     tables = {"engines_msr": pd.DataFrame(rows)}
-    publish(MSR_NAME, tables, f"{COMMAND} engines", settings | {"applied": APPLIED}, answers)
+    publish(MSR_NAME, tables, f"{COMMAND} engines", settings, answers)
+
+
+def engine_settings() -> dict[str, dict]:
+    """What lifts depend on, by engine."""
+    return {engine: settings_of_lifts(engine) for engine in ENGINES}
 
 
 def situations() -> Iterator[tuple[int, Situation]]:
