@@ -46,7 +46,7 @@ def key(notebook: Path) -> str:
 
 def reduced_parameters(notebook: Path) -> dict:
     """The values of reduced.toml for a notebook; none if it is not listed."""
-    return tomllib.loads((HERE / "reduced.toml").read_text()).get(key(notebook), {})
+    return tomllib.loads((HERE / "reduced.toml").read_text(encoding="utf-8")).get(key(notebook), {})
 
 
 def measured(notebook: Path) -> dict[str, float]:
@@ -142,7 +142,7 @@ def main() -> int:
             print(error, file=sys.stderr)
             return 1
         if options.in_place:  # only now, so that a run that is stopped leaves it as it was
-            files.write_text(path, (BUILD / label).read_text())
+            files.write_text(path, (BUILD / label).read_text(encoding="utf-8"))
         print(f"{time.monotonic() - start:.0f} s", flush=True)
     return 0
 

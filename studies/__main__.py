@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from studies.falls import laboratory, long
 from studies.heap import table
-from studies.lifts import agreement, lift_table
+from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, robustness, variants
 from studies.results import COMMAND, JOBS
@@ -35,6 +35,7 @@ def policies(n_jobs: int) -> None:
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
+    "engines": ("lifts and MSRs by a second engine", engines.engines_data, JOBS),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),

@@ -59,5 +59,5 @@ def _curves(network: str) -> str:
         with TemporaryDirectory() as folder:
             curve = train(config, folder, progress=False, change=change).curve
         columns = ["picks", "success_rate", "deadlocked", "loss"]
-        text += curve[columns].to_csv(index=False, float_format="%.3g")
+        text += curve[columns].to_csv(index=False, float_format="%.3g", lineterminator="\n")
     return text

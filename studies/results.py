@@ -8,7 +8,6 @@ versions, machine and time.
 import json
 import os
 import platform
-import resource
 import subprocess
 import sys
 import time
@@ -29,9 +28,10 @@ from tqdm import tqdm
 
 from studies import paths
 from unload.agent.identity import identity
+from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-PACKAGES = ("gymnasium", "joblib", "mujoco", "numba", "numpy", "pandas", "pybullet", "torch")
+PACKAGES = ("gymnasium", "joblib", "mujoco-core", "numba", "numpy", "pandas", "pybullet", "torch")
 COMMAND = "python -m studies"
 # The command-line option of every experiment that uses several processes.
 JOBS = {
@@ -156,7 +156,9 @@ def publish(
 def write_table(name: str | Path, table: pd.DataFrame, float_format: str = "%.6g") -> None:
     """Write ``data/<name>.csv``, without the table's index, in one atomic step."""
     path = paths.DATA / f"{name}.csv"
-    files.write_text(path, table.to_csv(index=False, float_format=float_format))
+    files.write_text(
+        path, table.to_csv(index=False, float_format=float_format, lineterminator="\n")
+    )
 
 
 def read_table(name: str | Path) -> pd.DataFrame:
@@ -190,19 +192,20 @@ def run_record(seconds: float) -> dict:
     """Record of the process that has computed a result, in so many seconds of wall time.
 
     Returns:
-        ``wall_time_s``, ``peak_memory_mib`` of the process so far, ``revision`` of the code,
-        ``versions`` of the packages, ``python`` and ``machine``.
+        ``wall_time_s``, ``peak_memory_mib`` of the process so far, None on Windows, ``revision`` of
+        the code, ``versions`` of the packages, ``engine`` that decides lifts, ``python`` and
+        ``machine``.
     """
     versions = {}
     for package in PACKAGES:
         with suppress(PackageNotFoundError):  # not all of them need be installed
             versions[package] = version(package)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB, but on macOS bytes
     return {
         "wall_time_s": round(seconds, 1),
-        "peak_memory_mib": peak // (2**20 if sys.platform == "darwin" else 2**10),
+        "peak_memory_mib": _peak_memory(),
         "revision": revision(),
         "versions": versions,
+        "engine": engine_of(),
         "python": platform.python_version(),
         "machine": f"{platform.system()} {platform.machine()}, {_cpu()}, {os.cpu_count()} cores",
     }
@@ -214,14 +217,15 @@ def joined(records: Iterable[dict]) -> dict:
     Their number, the sum of their wall times, the highest peak of memory; and of the rest the
     one value that all share, or the list of those that occur.
     """
-    records, rest = list(records), {}
-    for name in ("revision", "versions", "python", "machine"):
+    # Records that were kept while there was one engine do not name it.
+    records, rest = [{"engine": ENGINES[0]} | record for record in records], {}
+    for name in ("revision", "versions", "engine", "python", "machine"):
         values = list({str(record[name]): record[name] for record in records}.values())
         rest[name] = values[0] if len(values) == 1 else values
     return {
         "runs": len(records),
         "wall_time_s": round(sum(record["wall_time_s"] for record in records), 1),
-        "peak_memory_mib": max(record["peak_memory_mib"] for record in records),
+        "peak_memory_mib": max(filter(None, (r["peak_memory_mib"] for r in records)), default=None),
         **rest,
     }
 
@@ -248,9 +252,19 @@ def revision() -> str:
     return commit + ("+" if changed else "")
 
 
+def _peak_memory() -> int | None:
+    """The peak memory of this process in MiB, None on Windows."""
+    try:
+        import resource
+    except ModuleNotFoundError:
+        return None
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB, but on macOS bytes
+    return peak // (2**20 if sys.platform == "darwin" else 2**10)
+
+
 def _cpu() -> str:
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         return next(line.split(": ", 1)[1] for line in lines if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or "unknown processor"

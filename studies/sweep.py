@@ -117,14 +117,14 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if RunFolder(folder).finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
-        with open(log_path, "a") as log, one_thread():
+        with open(log_path, "a", encoding="utf-8") as log, one_thread():
             train(config, folder, log, callback=stop_if_alone, change=change)
         if not (folder / "record.json").exists():
             record = run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)
         return name, ""
     except Exception as error:  # whatever it was, the other runs go on
-        with suppress(OSError), open(folder / "log.txt", "a") as log:
+        with suppress(OSError), open(folder / "log.txt", "a", encoding="utf-8") as log:
             traceback.print_exc(file=log)
         return name, f"{type(error).__name__}: {error}"
     finally:

@@ -1,6 +1,10 @@
 """Fixtures that several test modules share: random numbers, loads, their boxes, and folders."""
 
+import os
+import shutil
+import signal
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import matplotlib
@@ -19,6 +23,28 @@ torch.set_num_threads(1)
 # The same examples every time, however slow the machine is, and none kept from run to run.
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+
+# What some systems lack that some tests need.
+AVAILABLE = {
+    "/proc": os.path.exists("/proc/self/statm"),
+    "SIGKILL": hasattr(signal, "SIGKILL"),
+    "SIGPIPE": hasattr(signal, "SIGPIPE"),
+    "fcntl": find_spec("fcntl") is not None,
+    "fork": hasattr(os, "fork"),
+    "make": shutil.which("make") is not None,
+    "symlinks": os.name == "posix",
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip tests of what is missing here: PyBullet, or something of the system."""
+    for item in items:
+        if find_spec("pybullet") is None and item.get_closest_marker("pybullet"):
+            item.add_marker(pytest.mark.skip(reason="PyBullet is not installed"))
+        for marker in item.iter_markers("needs"):
+            if not AVAILABLE[marker.args[0]]:
+                item.add_marker(pytest.mark.skip(reason=f"this system has no {marker.args[0]}"))
 
 
 @pytest.fixture(autouse=True)

@@ -2,6 +2,7 @@
 
 import ast
 import json
+import platform
 import re
 import sys
 import tomllib
@@ -10,15 +11,18 @@ from functools import cache
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
+import pytest
+
+from tests import wheels
+
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 LOWEST = dict(library.split(">=") for library in PROJECT["dependencies"])  # versions by name
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
-OWN = {"notebooks", "studies", "tests", "unload"}
+OWN = {"make", "notebooks", "studies", "tests", "unload"}
+WITH_PYTHON = {"pip"}
 # Extras for one command each, pinned in pyproject.toml.
 ON_DEMAND = ("book", "browser")
-# Imported by tests that are skipped where they are not installed.
-SKIPPED = {"mujoco"}
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
@@ -38,8 +42,18 @@ def normal(name: str) -> str:
 
 def pinned() -> dict[str, str]:
     """Versions by name, as environment.txt gives them."""
-    lines = (ROOT / "environment.txt").read_text().splitlines()
-    return dict(line.split("==") for line in lines if line and not line.startswith("#"))
+    return {name: version for name, (version, _) in wheels.lines().items()}
+
+
+def wanted_here() -> set[str]:
+    """The names whose markers hold on this system and Python."""
+    here = next(
+        name
+        for name, (system, machine, _) in wheels.SYSTEMS.items()
+        if (system, machine) == (sys.platform, platform.machine())
+    )
+    found = wheels.lines().items()
+    return {n for n, (_, marker) in found if wheels.is_wanted(marker, here, sys.version_info[1])}
 
 
 def sources(folder: str) -> Iterator[str]:
@@ -66,7 +80,7 @@ def distributions(folder: str) -> set[str]:
             elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
                 names.add(node.args[0].value.split(".")[0])
     beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
-    names -= sys.stdlib_module_names | OWN | (beside - DISTRIBUTIONS.keys())
+    names -= sys.stdlib_module_names | OWN | WITH_PYTHON | (beside - DISTRIBUTIONS.keys())
     return {normal(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or not installed
 
 
@@ -80,9 +94,51 @@ def test_each_library_is_named_once_and_pinned():
     extras = dict(PROJECT["optional-dependencies"])
     for extra in ON_DEMAND:
         assert all("==" in library for library in extras.pop(extra)), f"{extra} is not pinned"
+    engines = [line.partition("; ") for line in extras.pop("physics")]
     named = [*LOWEST, *(name for extra in extras.values() for name in extra)]
     assert all(name == normal(name) for name in named), "extras are names only"
     assert sorted(named) == sorted(pinned())
+    # The reference where environment.txt has it, the other one elsewhere.
+    assert [name for name, *_ in engines] == extras["mujoco"] + extras["pybullet"]
+    there = engines[1][2].replace("'", '"')
+    assert there == wheels.lines()["pybullet"][1]
+    opposite = there.replace("==", "!=").replace("<", ">=").replace(" and ", " or ")
+    assert engines[0][2].replace("'", '"') == opposite
+
+
+def test_each_line_has_a_wheel_for_each_system_and_python():
+    assert not [*wheels.holes()]
+
+
+def test_a_line_without_a_wheel_is_found(monkeypatch):
+    """PyBullet has one for one system and Python only, and a version that is new has none yet."""
+    there = wheels.lines()
+    version, marker = there["pybullet"]
+    fuller = there | {"pybullet": (version, ""), "numpy": ("99.0", "")}
+    monkeypatch.setattr(wheels, "lines", lambda: fuller)
+    found = [*wheels.holes()]
+    assert len(found) == 2 * len(wheels.SYSTEMS) * len(wheels.PYTHONS) - 1
+    assert ("pybullet", "Linux x86-64", 11) not in found and ("numpy", "Windows", 13) in found
+
+
+@pytest.mark.parametrize(
+    ("wheel", "fitting"),
+    [
+        ("x-1-py3-none-any.whl", 16),
+        ("x-1-cp312-cp312-win_amd64.whl", 1),
+        ("x-1-cp312-abi3-macosx_11_0_arm64.whl", 3),
+        ("x-1-cp311-cp311-macosx_15_0_arm64.whl", 0),  # a later macOS
+        ("x-1-cp311-cp311-macosx_10_9_universal2.whl", 1),
+        ("x-1-cp311-cp311-macosx_11_0_x86_64.whl", 0),
+        ("x-1-cp314-cp314t-win_amd64.whl", 0),  # without a global lock
+        ("x-1-cp314-cp314-manylinux_2_27_aarch64.manylinux_2_28_aarch64.whl", 1),
+        ("x-1-cp314-cp314-manylinux_2_34_x86_64.whl", 0),  # a later glibc
+        ("x-1-py3-none-musllinux_1_1_x86_64.whl", 0),
+    ],
+)
+def test_which_wheels_fit(wheel, fitting):
+    fits = [wheels.fits(wheel, system, m) for system in wheels.SYSTEMS for m in wheels.PYTHONS]
+    assert sum(fits) == fitting
 
 
 def test_what_is_pinned_is_not_below_the_lowest_version():
@@ -93,15 +149,14 @@ def test_what_is_pinned_is_not_below_the_lowest_version():
 
 def test_what_is_installed_is_what_is_pinned():
     """PyTorch's version may have a suffix that names its build, such as +cpu."""
-    assert {name: version(name).split("+")[0] for name in pinned()} == pinned()
+    found = {name: version(name).split("+")[0] for name in wanted_here()}
+    assert found == {name: each for name, each in pinned().items() if name in found}
 
 
 def test_what_is_imported_is_named():
     extras = PROJECT["optional-dependencies"]
-    assert distributions("unload") == set(LOWEST) | {*extras["pybullet"]}
+    assert distributions("unload") == set(LOWEST) | {*extras["pybullet"], *extras["mujoco"]}
     others = distributions("studies") - on_demand()
     assert set(extras["studies"]) <= others
     others |= (distributions("tests") | distributions("notebooks")) - on_demand()
-    assert SKIPPED <= others
-    others -= SKIPPED
     assert distributions("unload") | others | set(RUN_ONLY) == set(pinned())

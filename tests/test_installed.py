@@ -1,7 +1,8 @@
-"""The package as one installs it: whole, quick to import, and without PyBullet where it may be."""
+"""The package as one installs it: whole, quick to import, and without an engine where it may be."""
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -14,16 +15,11 @@ from unload.support import files
 
 ROOT = Path(__file__).resolve().parents[1]
 
-# Makes PyBullet's import fail as if it were not installed, and then uses the rest.
-WITHOUT_PYBULLET = """
+# Makes the engines' import fail as if they were not installed, and then uses the rest.
+WITHOUT_ENGINES = """
 import sys
 
-class Blocked:
-    def find_spec(self, name, path=None, target=None):
-        if name == "pybullet":
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-sys.meta_path.insert(0, Blocked())
+sys.modules["pybullet"] = sys.modules["mujoco"] = None
 
 import unload
 from unload.physics.table import LIFTS_FILE, shared_table
@@ -56,9 +52,10 @@ def run(code: str, folder: Path, path: Path) -> str:
 def installed(tmp_path) -> Path:
     """A folder outside the checkout with nothing but the package, built as ``make dist`` does."""
     for name in ("unload", "studies", "pyproject.toml", "README.md", "LICENSE", "Makefile"):
-        subprocess.run(["cp", "-r", ROOT / name, tmp_path], check=True)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tmp_path / name)
     # The environment is the one that runs this, and need not be made.
-    make = ["make", "--silent", f"BIN={Path(sys.executable).parent}", "--old-file=.venv/ready"]
+    make = ["make", "--silent", f"BIN={Path(sys.executable).parent}", "PYTHON=:"]
     subprocess.run([*make, "dist"], cwd=tmp_path, check=True)
     (wheel,) = (tmp_path / "build/dist").glob("*.whl")
     target = tmp_path / "installed"
@@ -75,8 +72,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
+@pytest.mark.needs("make")
 def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_path):
-    """Without PyBullet all works but what is simulated, the README's example up to its mark, too.
+    """Without engines all works but what is simulated, the README's example up to its mark, too.
 
     What is computed lies where one works.
     """
@@ -87,10 +85,10 @@ def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_pa
     assert shipped.items() <= before.items() and sum(map(len, shipped.values())) < 500_000
     work = tmp_path / "work"
     work.mkdir()
-    example, mark, _ = (ROOT / "README.md").read_text().partition("# With PyBullet:\n")
+    example, mark, _ = (ROOT / "README.md").read_text().partition("# With PyBullet or MuJoCo:\n")
     names = f"FOLDER = {str(installed)!r}\nEXAMPLE = {example.partition('```python')[2]!r}"
-    printed = run(names + WITHOUT_PYBULLET, work, installed)
-    assert mark and printed.startswith("136 True\n") and "pip install pybullet" in printed
+    printed = run(names + WITHOUT_ENGINES, work, installed)
+    assert mark and printed.startswith("136 True\n") and "pip install mujoco-core" in printed
     assert contents(installed) == before
     assert [path.name for path in work.iterdir()] == ["run"]
 

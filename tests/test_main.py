@@ -13,6 +13,7 @@ from studies import paths
 from tests.agent.runs import CONTAINER, at_step, content, few_walls, interrupt
 from unload import TrainConfig, train
 from unload.__main__ import main
+from unload.physics.bullet import engine_of
 from unload.task import VERSION
 
 OPTIONS = [
@@ -56,6 +57,7 @@ def test_every_field_is_an_option_that_is_explained(monkeypatch, capsys):
         assert text in told[0]
 
 
+@pytest.mark.needs("SIGPIPE")
 def test_help_and_version_take_no_time(tmp_path):
     """A script entry point calls ``command``; nothing is compiled, and little is imported.
 
@@ -82,7 +84,7 @@ def test_help_and_version_take_no_time(tmp_path):
     )  # fmt: skip
     assert done.stderr.splitlines() == ["0 SIG_DFL", "0 SIG_DFL", "0 SIG_DFL torch"]
     assert not list(tmp_path.iterdir())
-    assert done.stdout.startswith(f"unload {VERSION}\n")
+    assert done.stdout.startswith(f"unload {VERSION}, lifts by {engine_of()}\n")
     for text in ("x_min", "size_z", "weight", "in m", "--units", "rear wall", "entrance"):
         assert text in done.stdout
 

@@ -123,7 +123,7 @@ def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(
     before, result = path.read_text(), run.nbformat.v4.new_notebook(metadata={"title": "run"})
 
     def execute(source: str, output: str, **settings) -> None:
-        Path(output).write_text("")  # as papermill does first of all
+        Path(output).write_text("", encoding="utf-8")  # as papermill does first of all
         if stopped:
             raise KeyboardInterrupt
         run.nbformat.write(result, output)

@@ -23,6 +23,7 @@ LIBRARIES = {
     "gymnasium": ("__init__.py", "env/", "agent/"),
     "llvmlite": ("fast/kernel.py", "support/compiled.py"),
     "matplotlib": ("load/",),
+    "mujoco": ("physics/mujoco.py",),
     "numba": ("fast/kernel.py", "support/compiled.py"),
     "numpy": ("",),
     "pandas": ("load/packing_list.py", "agent/"),
@@ -61,7 +62,7 @@ MODULES = {
 def imported(path: Path) -> list[str]:
     """Full names of what a file imports: modules, and what it takes from modules."""
     names = []
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -84,7 +85,7 @@ def libraries(path: Path) -> set[str]:
 
 def has_code(path: Path) -> bool:
     """Whether a file defines more than constants."""
-    kinds = {type(node) for node in ast.walk(ast.parse(path.read_text()))}
+    kinds = {type(node) for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))}
     return bool(kinds & {ast.FunctionDef, ast.ClassDef})
 
 
@@ -175,6 +176,34 @@ def test_each_library_is_imported_in_its_places_only():
             assert allowed, f"{place} imports {library}; expected in {LIBRARIES[library]}"
             used |= {(library, start) for start in allowed}
     assert used == {(library, start) for library, starts in LIBRARIES.items() for start in starts}
+
+
+def careless(source: str) -> list[str]:
+    """Calls that read or write text as the system has it: in its encoding, with its line ends."""
+    found = []
+    for call in ast.walk(ast.parse(source)):
+        if not isinstance(call, ast.Call) or ast.unparse(call.func).startswith("files."):
+            continue
+        name = ast.unparse(call.func).rpartition(".")[2]
+        given = {keyword.arg for keyword in call.keywords}
+        binary = re.search(r"open\(.*, '[a-z]*b", ast.unparse(call))
+        method = isinstance(call.func, ast.Attribute) and name in ("read_text", "write_text")
+        text = method or ast.unparse(call.func) == "open"
+        if text and not binary and "encoding" not in given:
+            found.append(ast.unparse(call))
+        if name == "to_csv" and "lineterminator" not in given:
+            found.append(ast.unparse(call))
+    return found
+
+
+def test_text_is_the_same_on_every_system():
+    """Ruff's rule for encodings sees few of these calls."""
+    folders = (*PACKAGES, "notebooks")
+    paths = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    assert not [call for path in paths for call in careless(path.read_text(encoding="utf-8"))]
+    wrong = "open(x, 'a'); x.read_text(); files.write_text(x, y); t.to_csv(x, encoding='utf-8')"
+    right = "open(x, 'rb'); x.read_text(encoding='utf-8'); t.to_csv(lineterminator='\\n')"
+    assert len(careless(wrong)) == 3 and not careless(right)
 
 
 def test_each_module_of_the_package_has_its_test_file():

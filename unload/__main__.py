@@ -48,7 +48,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 def print_order(arguments: list[str]) -> None:
     """Print the order of picks for a packing list."""
-    from unload.support.files import SHIPPED  # nothing else, because help should take no time
+    # Little else, because help should take no time.
+    from unload.physics.bullet import engine_of
+    from unload.support.files import SHIPPED
 
     parser = _parser("unload", DESCRIPTION)
     shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("policies/*.safetensors")))
@@ -66,7 +68,8 @@ def print_order(arguments: list[str]) -> None:
     parser.add_argument("--ignore", action="append", default=[], metavar="COLUMN", help=text)
     text = "what a column of another name means, such as Tiefe=size_x; may be repeated"
     parser.add_argument("--column", action="append", default=[], metavar="NAME=MEANING", help=text)
-    parser.add_argument("--version", action="version", version=f"unload {VERSION}")
+    version = f"unload {VERSION}, lifts by {engine_of()}"
+    parser.add_argument("--version", action="version", version=version)
     options = vars(parser.parse_args(arguments))
 
     from unload.agent.order import picking_order
@@ -79,8 +82,8 @@ def print_order(arguments: list[str]) -> None:
         order = picking_order(load, policy)
         order["distance"] = order["distance"].map("{:.6f}".format)
         order = order.apply(lambda column: column.map(_as_text)).rename(columns=_as_text)
-        order.to_csv(output, index=False)
-    except (ImportError, OSError, ValueError) as error:  # ImportError: of PyBullet
+        order.to_csv(output, index=False, lineterminator="\n")
+    except (ImportError, OSError, ValueError) as error:  # ImportError: of an engine
         parser.exit(1, f"{error}\n")
     failed, behind = (~order["unloaded"]).sum(), order["behind"].mean()
     print(f"{len(order)} picks, {failed} failed, {behind:.0%} behind other boxes", file=sys.stderr)
@@ -101,7 +104,7 @@ def train_by(arguments: list[str]) -> None:
     parser = _parser("unload train", TRAIN_DESCRIPTION)
     parser.add_argument("--run-dir", required=True, help="folder of the run")
     parser.add_argument("--stack", type=_named, help="module:function that makes the loads")
-    parser.add_argument("--lifts", help="file of lifts that PyBullet has computed")
+    parser.add_argument("--lifts", help="file of lifts that have been computed")
     explained = _explained(TrainConfig)
     for field in fields(TrainConfig):
         kind: dict = {"type": type(field.default)}

@@ -37,7 +37,7 @@ def problems(site: Path) -> list[str]:
     """
     site = site.resolve()
     files = [path for path in sorted(site.rglob("*.html")) if path.parent != site / "_static"]
-    pages = {path: Page(path.read_text()) for path in files}
+    pages = {path: Page(path.read_text(encoding="utf-8")) for path in files}
     if not pages:
         raise FileNotFoundError(f"{site} holds no page; expected a built site")
     found = []
@@ -64,7 +64,7 @@ def undescribed(site: Path, names: list[str]) -> list[str]:
 
     The page's source names them all; what it shows of them comes from their docstrings.
     """
-    ids = Page((site / REFERENCE).read_text()).ids
+    ids = Page((site / REFERENCE).read_text(encoding="utf-8")).ids
     shown = {part for each in ids if each.startswith("unload.") for part in each.split(".")}
     return [f"{REFERENCE}: nothing about {name}" for name in names if name not in shown]
 

@@ -119,4 +119,4 @@ def add_files(app, error) -> None:
     shutil.copy(script, static)
     first = app.builder.get_target_uri(app.config.root_doc)
     redirect = f'<meta http-equiv="refresh" content="0; url={first}"><a href="{first}">unload</a>\n'
-    (Path(app.outdir) / "index.html").write_text(redirect)
+    (Path(app.outdir) / "index.html").write_text(redirect, encoding="utf-8")

@@ -1,5 +1,5 @@
 """Lifts: does the table answer as the physics does that it stands for?
 
-Read ``lift_table`` (known lifts) and ``agreement`` (the same lifts asked of the table, of PyBullet
-around the box, and of PyBullet with all boxes).
+Read ``lift_table`` (known lifts), ``agreement`` (the same lifts asked of the table, of PyBullet
+around the box, and of PyBullet with all boxes) and ``engines`` (of PyBullet and of MuJoCo).
 """

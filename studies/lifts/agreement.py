@@ -27,7 +27,7 @@ from unload.agent import policies
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.substacks import WALLS
-from unload.physics.bullet import SETTINGS
+from unload.physics.bullet import ENGINES, SETTINGS
 from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import HELD_DOWN, LIFTS_FILE
@@ -160,7 +160,7 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
         The states, of each the load and (n,) bool, which items are left; and the columns of
         ``read_agreement`` without those of ``full`` but with ``state``, an index into the states.
     """
-    local, states, rows, names = LocalPhysics(), [], [], list(UNLOADED_BY)
+    local, states, rows, names = LocalPhysics(ENGINES[0]), [], [], list(UNLOADED_BY)
     numbers: dict[bytes, int] = {}  # of situations
     rng = np.random.default_rng([seed, 2])
     while len(rows) < lifts:

@@ -21,7 +21,7 @@ from studies import paths
 from studies.results import COMMAND, kept, publish
 from unload import task
 from unload.agent import policies
-from unload.physics.bullet import SETTINGS
+from unload.physics.bullet import ENGINES, SETTINGS
 from unload.physics.table import LIFTS_FILE, LiftTable
 
 EPISODES, SEED = 12, 0  # of 64 containers, for each policy
@@ -39,7 +39,7 @@ def lift_data() -> None:
     path = folder / f"{EPISODES}_episodes_seed_{SEED}.npz"
     question = settings | {"physics": SETTINGS}
     filled = kept(folder, question, partial(_fill, path))
-    table = LiftTable.load(path)
+    table = LiftTable.load(path, ENGINES[0])
     table.save(LIFTS_FILE)
     settings["lifts"] = len(table)
     publish(LIFTS_FILE.with_suffix(""), {}, f"{COMMAND} lifts", settings, [filled])
@@ -49,7 +49,7 @@ def _fill(path: Path) -> None:
     """Fill an empty table by playing, and save it."""
     rng = np.random.default_rng(SEED)
     envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS).unwrapped
-    envs.table = LiftTable()
+    envs.table = LiftTable(ENGINES[0])  # the reference, wherever this runs
     jobs = list(product(range(EPISODES), _filling_policies(rng)))
     for _, policy in tqdm(jobs, unit="episode", ncols=100, file=sys.stdout):
         observations, infos = envs.reset(seed=int(rng.integers(2**31)))

@@ -104,7 +104,9 @@ def export_tuning() -> None:
         values = curves.loc[curves["seed"] == run, column]
         files.write_text(
             paths.DATA / f"dummy_sim_{fe}_hist_equal" / name,
-            values.to_csv(index=False, header=False, na_rep="nan", float_format="%.6g"),
+            values.to_csv(
+                index=False, header=False, na_rep="nan", float_format="%.6g", lineterminator="\n"
+            ),
         )
 
 

@@ -72,7 +72,7 @@ def _content(name: str) -> str:
     if name.startswith("notebook:"):
         (path,) = (paths.ROOT / "notebooks").glob(f"{name.removeprefix('notebook:')}.ipynb")
         return path.relative_to(paths.ROOT).as_posix()
-    text = (FOLDER / name).read_text().strip()
+    text = (FOLDER / name).read_text(encoding="utf-8").strip()
     comments = r"^ *//.*\n|^ */\*\*[\s\S]*?\*/\n"
     return re.sub(rf"^import .*\n|^export |{comments}", "", text, flags=re.MULTILINE)
 

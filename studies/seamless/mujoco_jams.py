@@ -1,6 +1,6 @@
-"""The fresh seamless walls of ``jams`` in a second engine, MuJoCo, which is no requirement.
+"""The fresh seamless walls of ``jams`` in a second engine, MuJoCo.
 
-    pip install mujoco && python -m studies.seamless.mujoco_jams
+    python -m studies.seamless.mujoco_jams
 
 MuJoCo's contacts are soft, and the friction of a contact is the larger one of both bodies.
 """
@@ -53,7 +53,7 @@ def _text(numbers) -> str:
 
 def distances(case: Case) -> list[float]:
     """How far each visible free box is lifted, in m; the whole state is restored after each."""
-    import mujoco  # only here, because it is no requirement
+    import mujoco  # only here, because it is optional
 
     model = mujoco.MjModel.from_xml_string(model_of(case))
     data = mujoco.MjData(model)

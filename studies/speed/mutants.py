@@ -155,7 +155,9 @@ def main() -> None:
             table = measure(room, options.sample, options.seed, trees)
             print(f"{room}: {(table['killed_by'] == '').sum()} of {len(table)} survive", flush=True)
             old = pd.read_csv(PATH, keep_default_na=False)
-            pd.concat([old[old["room"] != room], table]).to_csv(PATH, index=False)
+            pd.concat([old[old["room"] != room], table]).to_csv(
+                PATH, index=False, lineterminator="\n"
+            )
 
 
 if __name__ == "__main__":

@@ -12,12 +12,15 @@ import pytest
 
 from tests.agent.runs import CONTAINER, assert_same, few_walls, interrupt_run, kill_run, metres
 from unload import TrainConfig, stack_load, train
+from unload.agent import checkpoint
 from unload.agent.checkpoint import RunFolder
+from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
 OWN = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz")
 
 
+@pytest.mark.needs("fork")
 def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
     """From its last checkpoint, in another process."""
     config = TrainConfig(**CONTAINER | {"max_picks": 200, "gamma": 0.9})
@@ -33,6 +36,20 @@ def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
 def test_a_run_that_ends_soon_writes_no_checkpoint(tmp_path, monkeypatch):
     monkeypatch.setattr(RunFolder, "save", lambda *_: pytest.fail("it was written"))
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
+
+
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch, finished):
+    """Its name stands in the run's settings and on the card, unless it is the reference."""
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path, progress=False) if finished else interrupt_run(config, tmp_path, 3)
+    (other,) = {*ENGINES} - {engine_of()}
+    monkeypatch.setattr(checkpoint, "engine_of", lambda: other)
+    with pytest.raises(ValueError, match=r"engine \(.* not .*\)"):
+        train(config, tmp_path, progress=False)
+    assert checkpoint.settings_of(config, None, None).get("engine", ENGINES[0]) == other
+    heights = replace(config, env="unload/HighestItem-v0")
+    assert "engine" not in checkpoint.settings_of(heights, None, None), "nothing is lifted there"
 
 
 @pytest.mark.parametrize("finished", [True, False])

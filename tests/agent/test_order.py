@@ -19,6 +19,7 @@ from unload.task import LIFT_THRESHOLD
 STUBBORN = iter([127] * 999)
 
 
+@pytest.mark.pybullet
 @pytest.mark.parametrize("policy", ["reachable", "recommended", "random", policies.highest])
 def test_every_pick_is_what_pybullet_says(policy):
     load = read_load()

@@ -152,7 +152,7 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "MSR=" in shown.out and "loss=" in shown.out and "pick/s" in shown.out
     assert shown.err == "" and max(map(len, shown.out.splitlines())) <= 100
-    with open(tmp_path / "log.txt", "w") as log:
+    with open(tmp_path / "log.txt", "w", encoding="utf-8") as log:
         train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
     assert "200/200" in (tmp_path / "log.txt").read_text()
     runs.interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)

@@ -304,7 +304,7 @@ def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
         *(f"--port={port}", "--ServerApp.port_retries=0", f"--IdentityProvider.token={token}"),
         *(f"--ServerApp.root_dir={notebooks}", "--LabApp.expose_app_in_browser=True"),
     ]
-    with open(home / "jupyterlab.log", "w") as log:
+    with open(home / "jupyterlab.log", "w", encoding="utf-8") as log:
         server = subprocess.Popen(command, stdout=log, stderr=log, env=env)
         try:
             if not wait_until(lambda: answers(f"{place}/api/status?token={token}"), START_LIMIT):

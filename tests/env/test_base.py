@@ -10,7 +10,6 @@ from unittest.mock import Mock
 
 import gymnasium
 import numpy as np
-import pybullet
 import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
@@ -108,9 +107,12 @@ def test_a_copy_that_would_share_the_simulator_is_refused(again):
 
 
 def clients() -> int:
+    import pybullet
+
     return sum(pybullet.isConnected(number) for number in range(1024))
 
 
+@pytest.mark.pybullet
 @pytest.mark.parametrize(
     "make",
     [

@@ -68,6 +68,7 @@ def test_the_reward_needs_the_threshold_whatever_physics_decides(monkeypatch):
         assert env.unwrapped.liftable().tolist() == [reward == 1] * 128
 
 
+@pytest.mark.pybullet
 def test_drifting_boxes_are_seen_where_they_are():
     """And what has failed stays so. Few enough to be quick, because each of them is simulated."""
     settings = {"physics": "full", "after_pick": "keep", "render_mode": "rgb_array"}
@@ -96,7 +97,11 @@ def test_drifting_boxes_are_seen_where_they_are():
 
 @pytest.mark.parametrize(
     "kwargs",
-    [{"physics": "local"}, {"physics": "full"}, {"physics": "full", "after_pick": "keep"}],
+    [
+        {"physics": "local"},
+        pytest.param({"physics": "full"}, marks=pytest.mark.pybullet),
+        pytest.param({"physics": "full", "after_pick": "keep"}, marks=pytest.mark.pybullet),
+    ],
     ids=str,
 )
 def test_every_physics_goes_to_the_last_item(kwargs):

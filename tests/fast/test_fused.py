@@ -140,6 +140,7 @@ def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
     assert np.array_equal(finish(), gradients(net, batch))
 
 
+@pytest.mark.needs("fork")
 def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
     net, batch = peq(8), random_batch(rng, FOR_TWO_THREADS)
     here = gradients(net, batch)[-1]

@@ -1,5 +1,7 @@
 """The three physics, the appendix's distances, and lifts one after the other."""
 
+import pytest
+
 from unload.load.boxes import Load
 from unload.physics.base import Physics
 from unload.physics.full import FullPhysics
@@ -7,6 +9,8 @@ from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
 KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
+# The same as parameters of tests.
+EACH = [pytest.param("full", marks=pytest.mark.pybullet), "local", "table"]
 ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg
 
 

@@ -7,7 +7,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from tests.physics.kinds import KINDS, ONE_BOX, TWO_BOXES, lifts, make
+from tests.physics.kinds import EACH, KINDS, ONE_BOX, TWO_BOXES, lifts, make
 from unload.load.boxes import _SMALLEST_EDGE, Load
 from unload.load.substacks import build_load
 from unload.physics.bullet import World
@@ -15,7 +15,7 @@ from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_one_box_and_two_stacked_ones_move_as_far_as_the_appendix_says(boxes, kind):
     physics = make(kind, boxes((1.2, 0.2), (1.2, 0.6)))
     assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.002)
@@ -26,7 +26,7 @@ def test_one_box_and_two_stacked_ones_move_as_far_as_the_appendix_says(boxes, ki
     assert physics.lift(0) == pytest.approx(ONE_BOX, rel=0.02)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_free_boxes_of_a_neat_row_do_not_jam(kind):
     """They would, mostly, if the boxes had no gap between them."""
     load = build_load([[[0, 1, 1, 0]]])
@@ -36,7 +36,7 @@ def test_free_boxes_of_a_neat_row_do_not_jam(kind):
     assert lifts(physics, free[:8]) == pytest.approx([ONE_BOX] * 8, rel=0.02)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_the_smallest_boxes_of_a_load_are_simulated(kind):
     """Physics takes the gap off their edges, of which something must be left."""
     edge = _SMALLEST_EDGE
@@ -45,7 +45,7 @@ def test_the_smallest_boxes_of_a_load_are_simulated(kind):
     assert (np.array(lifts(physics, range(4))) >= 0).all()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 @pytest.mark.parametrize("call", ["lift", "remove"])
 @pytest.mark.parametrize(
     ("item", "error", "message"),
@@ -63,7 +63,7 @@ def test_bad_items_are_refused(boxes, kind, call, item, error, message):
     assert physics.present.tolist() == [True, False]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_calls_out_of_order_are_refused(boxes, kind):
     physics, load = KINDS[kind](), boxes((1.2, 0.2))
     calls = [lambda: physics.lift(0), lambda: physics.remove(0), physics.positions]
@@ -82,7 +82,7 @@ def test_calls_out_of_order_are_refused(boxes, kind):
             call()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_an_interrupted_reset_needs_another_one(boxes, kind, monkeypatch):
     physics, load = make(kind, boxes((1.2, 0.2))), boxes((1.2, 0.2), (1.2, 0.6))
     interrupted = Mock(side_effect=KeyboardInterrupt)
@@ -107,6 +107,7 @@ def test_a_lift_has_no_effect(small_load, kind):
     assert (physics.positions() == small_load.positions).all() and physics.present.all()
 
 
+@pytest.mark.pybullet
 def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
     interrupted, fresh = LocalPhysics(), LocalPhysics()
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
@@ -116,6 +117,7 @@ def test_an_interrupted_lift_leaves_nothing_in_the_way(situations, monkeypatch):
         assert interrupted.simulate(situation) == fresh.simulate(situation)
 
 
+@pytest.mark.pybullet
 def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
     physics, fresh = LocalPhysics(), LocalPhysics()
     expected = [fresh.simulate(situation) for situation in situations[:10]]
@@ -126,6 +128,8 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
     assert fresh._world.bodies > 30
 
 
+@pytest.mark.pybullet
+@pytest.mark.needs("/proc")
 def test_the_memory_of_many_lifts_is_flat(monkeypatch):
     """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
     monkeypatch.setattr(World, "pull", lambda world, body: 0.0)
@@ -136,6 +140,6 @@ def test_the_memory_of_many_lifts_is_flat(monkeypatch):
         boxes[:, 2] = 350_000 * np.arange(2)
         physics.simulate(Situation(boxes, 1, -200_000, ()))
         if number % 1_500 == 0:
-            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
             resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
     assert max(resident[2:]) - resident[1] < 5, "MiB"

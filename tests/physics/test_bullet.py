@@ -8,6 +8,8 @@ from tests.physics.kinds import ONE_BOX
 from unload import task
 from unload.physics.bullet import TIME_STEP, World
 
+pytestmark = pytest.mark.pybullet
+
 
 @pytest.fixture(params=[True, False], ids=["maximal", "multibody"])
 def make_world(request):

@@ -8,6 +8,8 @@ from unload import Load, task
 from unload.load.substacks import build_load
 from unload.physics.bullet import World
 
+pytestmark = pytest.mark.pybullet
+
 # Two boxes side by side, one across both, and the lift of a support: it fails, and tilts
 # the box above. The lift of the upper box succeeds.
 BRIDGE = ((1.0, 0.2), (1.4, 0.2), (1.2, 0.6))

@@ -63,6 +63,7 @@ def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
     assert pool.simulate(hard[5:], local.simulate) == [local.simulate(each) for each in hard[5:]]
 
 
+@pytest.mark.needs("SIGKILL")
 def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
     alone = pool.simulate(hard, local.simulate)
     for worker in pool._workers:
@@ -75,6 +76,7 @@ def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
     assert pool.simulate(hard, local.simulate) == alone
 
 
+@pytest.mark.needs("SIGKILL")
 def test_they_end_with_the_pool_or_its_physics():
     pool, physics = Pool(), TablePhysics(LiftTable())
     for each in (pool, physics._pool):
@@ -86,6 +88,7 @@ def test_they_end_with_the_pool_or_its_physics():
     assert [worker.returncode for worker in workers] == [-signal.SIGKILL] * 4
 
 
+@pytest.mark.needs("/proc")
 def test_they_end_with_a_process_that_is_killed():
     script = (
         "import os; from unload.physics.pool import Pool; pool = Pool(); pool.simulate([], None); "

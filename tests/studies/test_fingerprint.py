@@ -1,5 +1,9 @@
 """Results that rest on training are of today's training."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 import torch
 
@@ -7,13 +11,14 @@ from studies import fingerprint, paths
 from studies.fingerprint import short_runs, training_fingerprint
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork, TrainConfig
+from unload.agent.training import INSTRUCTIONS
 from unload.network.variants import NETWORKS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
 NOT_TRAINED = {
-    "benchmarks", "heap", "lift_agreement", "obs_hist_equal", "policies", "seamless/jam_episodes",
-    "seamless/jams", "seamless/mujoco_jams",
+    "benchmarks", "heap", "lift_agreement", "lifts", "obs_hist_equal", "policies",
+    "seamless/jam_episodes", "seamless/jams", "seamless/mujoco_jams",
 }  # fmt: skip
 
 
@@ -31,6 +36,34 @@ def test_data_is_of_todays_training():
     differing = {name for name, same in of_today.items() if not same}
     assert of_today
     assert not differing, "made by code that trained otherwise: make it again"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    torch.backends.cpu.get_cpu_capability() not in INSTRUCTIONS,
+    reason="this processor has neither AVX2 nor AVX-512",
+)
+def test_on_a_processor_without_these_instructions_the_fingerprint_is_the_same():
+    """Where weights start otherwise, as on ARM, and a run says so."""
+    script = """if True:
+        import torch
+        from studies.fingerprint import short_runs, training_fingerprint
+        from unload.network.peq import PEQNetwork
+
+        network = PEQNetwork(64, torch.Generator().manual_seed(0))
+        print(training_fingerprint())
+        print(*(weight.item().hex() for weight in network.extractor.weight.flatten()))
+    """
+    answers = []
+    for instructions in ("default", "avx2"):
+        environment = os.environ | {"ATEN_CPU_CAPABILITY": instructions}
+        command = [sys.executable, "-c", script]
+        done = subprocess.run(
+            command, capture_output=True, text=True, cwd=paths.ROOT, env=environment, check=True
+        )
+        assert ("PyTorch uses DEFAULT instructions" in done.stderr) == (instructions == "default")
+        answers.append(done.stdout.splitlines())
+    assert answers[0][0] == answers[1][0] and answers[0][1] != answers[1][1]
 
 
 def scaled_weights(factor: float):

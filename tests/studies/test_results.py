@@ -1,8 +1,8 @@
 """Results: kept, published, read back; and the records of where they come from."""
 
 import os
-import resource
 import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
@@ -30,6 +30,7 @@ from studies.results import (
 )
 from studies.seamless.training import SEAMLESS
 from unload import TrainConfig
+from unload.physics.bullet import engine_of
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, SEAMLESS, *GRIDS.values())}
 
@@ -112,13 +113,22 @@ def test_a_table_is_read_and_of_a_missing_one_is_said_where_its_command_stands(o
     assert read_table("t").shape == (1, 3)
 
 
-def test_records_are_joined():
+def test_records_are_joined(monkeypatch):
     first = results.run_record(9.96)
-    assert {"numba", "joblib", "torch", "pybullet", "numpy"} <= set(first["versions"])
+    assert {"numba", "joblib", "torch", "mujoco-core", "numpy"} <= set(first["versions"])
+    assert first["engine"] == engine_of()
     assert str(os.cpu_count()) in first["machine"] and first["wall_time_s"] == 10.0
+    resource = pytest.importorskip("resource")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
     assert first["peak_memory_mib"] == pytest.approx(peak, rel=0.1)
     assert len(first["revision"].rstrip("+")) == 12 or first["revision"] == "unknown"
+    monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
+    assert results.run_record(1.0)["peak_memory_mib"] is None
+    nowhere = first | {"peak_memory_mib": None}
+    assert results.joined([nowhere, first])["peak_memory_mib"] == first["peak_memory_mib"]
+    assert results.joined([nowhere])["peak_memory_mib"] is None
+    kept_before = {name: value for name, value in first.items() if name != "engine"}
+    assert results.joined([kept_before])["engine"] == "pybullet"
     second = first | {"wall_time_s": 20.54, "peak_memory_mib": 10**6, "revision": "another"}
     together = results.joined([first, second, first])
     assert together["runs"] == 3

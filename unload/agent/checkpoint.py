@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from unload.agent.config import TrainConfig
+from unload.agent.config import ENVS, TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.identity import identity, unchanged
 from unload.network.variants import make_network
+from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
 FORMAT = 7  # of the checkpoints
@@ -38,9 +39,14 @@ class TrainResult(NamedTuple):
 
 
 def settings_of(config: TrainConfig, stack: Callable | None, change: Callable) -> dict:
-    """What a run is: its configuration, and the identity of its change and stack, None without."""
+    """What a run is: its configuration, and the identity of its change and stack, None without.
+
+    Also the engine, where lifts are decided by another one than PyBullet.
+    """
     change = None if change is unchanged else identity(change)
-    return config.plain() | {"change": change, "stack": stack and identity(stack)}
+    own = {"change": change, "stack": stack and identity(stack)}
+    other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env == ENVS[0] else {}
+    return config.plain() | own | other
 
 
 class RunFolder:
@@ -96,7 +102,7 @@ class RunFolder:
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
-        files.write_text(self._curve, run.curve.table().to_csv(index=False))
+        files.write_text(self._curve, run.curve.table().to_csv(index=False, lineterminator="\n"))
 
     def restore(self, run) -> None:
         """Let a ``Training`` go on from the checkpoint, if there is one."""

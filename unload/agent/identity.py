@@ -85,7 +85,7 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
     elif isinstance(value, np.ndarray):
         content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
     elif _is_table(value):
-        content = value.to_csv().encode()
+        content = value.to_csv(lineterminator="\n").encode()
     elif callable(value) and hasattr(value, "__dict__"):
         content = json.dumps(identity([type(value), vars(value)], within)).encode()
     elif is_dataclass(value):

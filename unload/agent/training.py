@@ -254,7 +254,7 @@ def train(
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
         stack: makes the loads, as in ``ContainerEnv``; the paper's if None. What it makes must
             depend on its generator alone; otherwise a resumed run would differ.
-        lifts: file in which the lifts that PyBullet has computed are kept, because loads whose
+        lifts: file in which the lifts that the engine has computed are kept, because loads whose
             boxes have other sizes need many of them. Read at the start if it exists, and filled
             up with each checkpoint and when the run ends, for whatever reason; runs, one after
             the other or side by side, may share it. It changes the speed of a run and nothing

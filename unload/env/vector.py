@@ -125,7 +125,9 @@ class ContainerVectorEnv(PickingVectorEnv):
         items, distances = containers.look_up(self._containers, actions, *self.table.slots)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
-            self._physics.table = self.table  # it may have been replaced
+            if self._physics.table is not self.table:  # it has been replaced
+                self._physics.close()
+                self._physics = TablePhysics(self.table)
             state = self._containers
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
             distances[unknown] = self._physics.simulate_all(

@@ -1,4 +1,4 @@
-"""The interface of the three physics, which lift items with PyBullet.
+"""The interface of the three physics, which lift items with PyBullet or MuJoCo.
 
 All have ``reset(load)``, ``lift(item)``, ``remove(item)``, ``positions()`` and ``close()``.
 ``lift`` returns how far the item moved; it is unloaded if that is at least

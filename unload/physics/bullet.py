@@ -10,11 +10,22 @@ from collections.abc import Sequence
 from contextlib import contextmanager
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from unload import task
+from unload.support import checks
+
+ENGINES = ("pybullet", "mujoco")  # that can simulate lifts, the reference first
+
+
+@cache
+def engine_of(name: str | None = None) -> str:
+    """Return the name of an engine; without one PyBullet, unless only MuJoCo is installed."""
+    checks.one_of("engine", name, (None, *ENGINES))
+    return name or next((each for each in ENGINES if find_spec(each)), ENGINES[0])
 
 
 @contextmanager
@@ -39,11 +50,12 @@ def _pybullet() -> Any:
     with _quiet_stderr():
         try:
             import pybullet
-        except ModuleNotFoundError as error:
+        except ModuleNotFoundError:
             raise ModuleNotFoundError(
-                "a lift that no table knows, a whole container or a heap has to be simulated; "
-                "expected PyBullet: pip install pybullet (ready-made for Python 3.11 and lower)"
-            ) from error
+                "PyBullet, which simulates whole containers and heaps, is not installed: take "
+                "Python 3.11 on Linux x86-64 (pip install pybullet); elsewhere MuJoCo simulates "
+                "lifts (pip install mujoco-core), for physics='local' and 'table'"
+            ) from None
     return pybullet
 
 

@@ -4,11 +4,17 @@ import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
+from unload.physics import mujoco
 from unload.physics.base import Physics
-from unload.physics.bullet import World, slim
+from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
 _MOST_BODIES = 10_000  # made in a world, before what PyBullet keeps of them is cleared away
+
+
+def settings_of_lifts(engine: str) -> dict:
+    """An engine with its version, and all else but the boxes that its lifts depend on."""
+    return SETTINGS if engine == ENGINES[0] else mujoco.settings()
 
 
 class LocalPhysics(Physics):
@@ -18,7 +24,14 @@ class LocalPhysics(Physics):
     neighbours in the wall, the floor and the side walls are fixed; the rest is left out.
     A failed lift has no effect on the container (Sec. III-D). ``surroundings`` holds the
     situations of the load's items.
+
+    Args:
+        engine: ``"pybullet"`` or ``"mujoco"``; PyBullet where it is installed if None.
     """
+
+    def __init__(self, engine: str | None = None) -> None:
+        super().__init__()
+        self.engine = engine_of(engine)
 
     def simulate(self, situation: Situation) -> float:
         """Pull the chosen box of a situation; return how far it moved, in m, to the micrometre.
@@ -26,6 +39,8 @@ class LocalPhysics(Physics):
         What was lifted before makes no difference, not in one bit.
         """
         self._check_open()
+        if self.engine == "mujoco":
+            return round(mujoco.lift(situation), 6)
         if self._world is None:
             self._world = World()
         elif self._world.bodies > _MOST_BODIES:

@@ -15,7 +15,8 @@ from unload.support.compiled import CONFIG
 # Not those of ``multiprocessing``, which would run the script that the user has started once more.
 # Ctrl-C is for the process that asks.
 _COMMAND = (
-    "from signal import *; signal(SIGINT, SIG_IGN); from unload.physics.pool import serve; serve()"
+    "from signal import *; signal(SIGINT, SIG_IGN); "
+    "from unload.physics.pool import serve; serve({!r})"
 )
 _MOST = 8  # each takes 100 MB, and a step has few new lifts
 
@@ -25,9 +26,11 @@ class Pool:
 
     These are as many as numba takes threads, which the environment's ``NUMBA_NUM_THREADS`` sets,
     but at most ``_MOST``. They end with the pool, or with this process, however that ends.
+    ``engine`` simulates, see ``LocalPhysics``.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, engine: str | None = None) -> None:
+        self._command = _COMMAND.format(engine)
         self._workers: list[subprocess.Popen] = []
         self.close = weakref.finalize(self, _end, self._workers)
 
@@ -39,7 +42,7 @@ class Pool:
         try:
             while len(self._workers) < count - 1:
                 process = subprocess.Popen(
-                    [sys.executable, "-c", _COMMAND],
+                    [sys.executable, "-c", self._command],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
@@ -68,14 +71,14 @@ def _end(workers: list[subprocess.Popen]) -> None:
             pass
 
 
-def serve() -> None:
+def serve(engine: str | None = None) -> None:
     """Simulate the situations that come in lists on stdin, and answer on stdout, until it ends.
 
-    What PyBullet has to say goes to stderr.
+    What the engine has to say goes to stderr.
     """
     questions, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    with questions, answers, closing(LocalPhysics()) as physics:
+    with questions, answers, closing(LocalPhysics(engine)) as physics:
         while questions.peek():
             situations = pickle.load(questions)
             pickle.dump([physics.simulate(situation) for situation in situations], answers)

@@ -19,8 +19,8 @@ from threading import Lock
 import numpy as np
 
 from unload import task
-from unload.physics.bullet import DAMPING, SETTINGS, TIME_STEP
-from unload.physics.local import LocalPhysics
+from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
+from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.pool import Pool
 from unload.physics.situation import Situation
 from unload.support import files
@@ -65,14 +65,20 @@ class LiftTable:
     is written before the digest that leads to it, and arrays that are too small are replaced, both
     at once, so that whoever still reads the old ones misses a new entry at most.
 
+    Args:
+        engine: whose lifts it holds, see ``LocalPhysics``.
+
     Attributes:
         slots: digests, (n,) uint64, 0 in free slots, and their distances in micrometres,
             (n,) int32. n is a power of two, and at least half of the slots are free.
         samples: of the situations that were added, those of the lowest digests, by digest.
+        foreign: digests of another engine's lifts, which are answers here and never written.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, engine: str | None = None) -> None:
+        self.engine = engine_of(engine)
         self._adding = Lock()
+        self.foreign = np.zeros(0, np.uint64)
         self.samples: dict[int, Situation] = {}
         self._start_slots(np.zeros(0, np.uint64), np.zeros(0, np.int32))
 
@@ -109,6 +115,12 @@ class LiftTable:
         order = filled[np.argsort(digests[filled])]
         return digests[order], micrometres[order]
 
+    def own(self) -> tuple[np.ndarray, np.ndarray]:
+        """The entries without the foreign ones."""
+        digests, micrometres = self.entries()
+        kept = ~np.isin(digests, self.foreign)
+        return digests[kept], micrometres[kept]
+
     def _start_slots(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
         """Start new arrays with these entries."""
         size = max(_FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
@@ -116,40 +128,46 @@ class LiftTable:
         _fill(*slots, digests, micrometres)
         self.slots, self._count = slots, len(digests)
 
+    def _take_in(self, entries: tuple[np.ndarray, np.ndarray]) -> None:
+        """Add entries; a situation that is known keeps its own."""
+        digests, micrometres = map(np.concatenate, zip(self.entries(), entries))
+        digests, first = np.unique(digests, return_index=True)
+        self._start_slots(digests, micrometres[first])
+
     def _take_samples(self, samples: dict[int, Situation]) -> None:
         """Keep the lowest ones, which do not depend on the order in which they came."""
         self.samples = dict(sorted((self.samples | samples).items())[:_SAMPLES])
 
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
-        digests, micrometres = self.entries()
+        digests, micrometres = self.own()
         samples = [asdict(situation) for situation in self.samples.values()]
         arrays = {
             "digests": digests,
             "micrometres": micrometres,
-            "settings": np.array(json.dumps(SETTINGS)),
+            "settings": np.array(json.dumps(settings_of_lifts(self.engine))),
             "samples": np.array(json.dumps(samples, default=np.ndarray.tolist)),
         }
         # A link to a file that several runs share stays one.
         files.write_arrays(Path(path).resolve(), arrays | {"digest": _digest_of_file(arrays)})
 
     @classmethod
-    def load(cls, path: str | Path) -> "LiftTable":
+    def load(cls, path: str | Path, engine: str | None = None) -> "LiftTable":
         """Read a table that ``save`` wrote; ValueError if damaged or of other physics settings."""
         # Of a damaged file nothing is taken, nor of one that holds another physics' answers.
+        table = cls(engine)
         arrays = files.read_arrays(path)
         if set(arrays) != _ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
         if not np.array_equal(arrays.pop("digest"), _digest_of_file(arrays)):
             raise ValueError(f"{path} was changed or damaged: its digest is another")
-        settings = str(arrays["settings"])
-        if settings != json.dumps(SETTINGS):
+        settings, wanted = str(arrays["settings"]), json.dumps(settings_of_lifts(table.engine))
+        if settings != wanted:
             raise ValueError(
-                f"{path} is of another physics, {settings}; expected {json.dumps(SETTINGS)}. "
+                f"{path} is of another physics, {settings}; expected {wanted}. "
                 "Remove it to fill a new one"
             )
 
-        table = cls()
         table._start_slots(arrays["digests"], arrays["micrometres"])
         for fields in json.loads(str(arrays["samples"])):
             situation = Situation(**fields | {"boxes": np.array(fields["boxes"], np.int32)})
@@ -157,14 +175,14 @@ class LiftTable:
         return table
 
     def check(self, path: str | Path) -> None:
-        """Simulate the samples of ``path`` again, where PyBullet is; ValueError if they differ."""
-        with closing(LocalPhysics()) as local, suppress(ModuleNotFoundError):
+        """Simulate the samples of ``path`` again, where one can; ValueError if they differ."""
+        with closing(LocalPhysics(self.engine)) as local, suppress(ModuleNotFoundError):
             for situation in self.samples.values():
                 known, distance = self.find(situation), local.simulate(situation)
                 if known is None or abs(known - distance) > _CLOSE:
                     raise ValueError(
-                        f"{path} says that a box moves by {known} m, PyBullet that it "
-                        f"moves by {distance} m. Remove it to fill a new one"
+                        f"{path} says that a box moves by {known} m; simulated by "
+                        f"{self.engine} it moves by {distance} m. Remove it to fill a new one"
                     )
 
     def exchange(self, path: str | Path) -> None:
@@ -184,17 +202,18 @@ class LiftTable:
             raise ValueError(f"{path} is no name of a lift table; expected one that ends in .npz")
         try:
             with files.locked(f"{path}.lock", wait=True):
-                stored = LiftTable.load(path) if path.exists() else LiftTable()
+                stored = LiftTable(self.engine)
+                if path.exists():
+                    stored = LiftTable.load(path, self.engine)
                 stored.check(path)
-                # Of a lift that both know, the own distance stays.
+                count = len(stored)
                 with self._adding:
-                    both = zip(self.entries(), stored.entries())
-                    digests, micrometres = map(np.concatenate, both)
-                    digests, first = np.unique(digests, return_index=True)
-                    self._start_slots(digests, micrometres[first])
+                    stored._take_in(self.own())
+                    stored._take_samples(self.samples)
+                    self._take_in(stored.entries())
                     self._take_samples(stored.samples)
-                if len(self) > len(stored):
-                    self.save(path)
+                if len(stored) > count:
+                    stored.save(path)
         except OSError as error:
             if error.errno not in _FULL:
                 raise
@@ -204,19 +223,19 @@ class LiftTable:
 class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
-    A box with nothing on top moves by ``FREE_LIFT``, as in a simulation. One with three or more
+    A box with nothing on top moves by ``FREE_LIFT``, as PyBullet says. One with three or more
     others on it is held down, without a simulation: such situations hardly ever repeat, and of
     those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
 
     Args:
-        table: filled as situations are met. Share one among environments to share their
-            experience; one of its own if None.
+        table: filled by its engine as situations are met. Share one among environments to share
+            their experience; one of its own if None.
     """
 
     def __init__(self, table: LiftTable | None = None) -> None:
-        super().__init__()
         self.table = LiftTable() if table is None else table
-        self._pool, self._waited = Pool(), 0  # and the lifts that might have been shared
+        super().__init__(self.table.engine)
+        self._pool, self._waited = Pool(self.engine), 0  # and the lifts that might have been shared
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
@@ -251,8 +270,11 @@ class TablePhysics(LocalPhysics):
 
 @cache
 def shared_table() -> LiftTable:
-    """The lifts known to this process: those of ``LIFTS_FILE``, and all made since."""
-    return LiftTable.load(LIFTS_FILE) if LIFTS_FILE.exists() else LiftTable()
+    """The lifts known to this process: PyBullet's in ``LIFTS_FILE``, and all made since."""
+    table = LiftTable.load(LIFTS_FILE, ENGINES[0]) if LIFTS_FILE.exists() else LiftTable()
+    if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
+        table.engine, table.foreign, table.samples = engine_of(), table.entries()[0], {}
+    return table
 
 
 def _digest(situation: Situation) -> np.uint64:

@@ -8,6 +8,8 @@ import json
 import logging
 import os
 import socket
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -22,6 +24,7 @@ from filelock import FileLock, Timeout
 
 LOGGER = logging.getLogger(__name__)
 PATIENCE = 5.0  # s
+HELD = 1.0  # s for which a spreadsheet or a virus scanner may hold a file open
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 
 
@@ -40,7 +43,7 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
             write(file)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(partial, path)
+        _replace(partial, path)
         with suppress(OSError):  # some file systems refuse it; the file itself is on disk
             _sync(path.parent)
     except OSError as error:
@@ -48,6 +51,18 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
         raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
+
+
+def _replace(partial: Path, path: Path) -> None:
+    """Rename a file; for a while again on Windows, which refuses where a reader holds the old."""
+    until = time.monotonic() + HELD
+    while True:
+        try:
+            return os.replace(partial, path)
+        except PermissionError:
+            if sys.platform != "win32" or time.monotonic() > until:
+                raise
+            time.sleep(0.02)
 
 
 def _sync(folder: Path) -> None:
@@ -153,7 +168,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         # Others hold such a lock for moments; who does so for longer may have been stopped.
         lock.acquire(timeout=PATIENCE if wait else 0)
     except Timeout:
-        holder = owner.read_text().strip() if owner.exists() else "another process"
+        holder = owner.read_text(encoding="utf-8").strip() if owner.exists() else "another process"
         if not wait:
             reason = f"{folder} is in use by {holder}; wait, or take another folder"
             raise RuntimeError(reason) from None

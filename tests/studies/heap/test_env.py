@@ -12,6 +12,8 @@ from studies.heap.policies import Oracle, Picks, linear
 from studies.heap.rake import Rake
 from unload import task
 
+pytestmark = pytest.mark.pybullet
+
 
 @pytest.mark.filterwarnings("ignore:.*render modes")
 def test_gymnasium_finds_nothing_wrong(make_heap_env, pile, cubes):

@@ -11,6 +11,8 @@ from studies.results import unpacked
 from unload import task
 from unload.agent.identity import identity
 
+pytestmark = pytest.mark.pybullet
+
 
 @pytest.mark.parametrize(
     ("places", "unloaded"),

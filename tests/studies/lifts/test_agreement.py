@@ -49,6 +49,7 @@ def test_a_fresh_lift_is_in_the_boxes_left_in_the_walls_around(full_load):
         assert len(left) == (present & np.isin(full_load.walls, kept)).sum()
 
 
+@pytest.mark.pybullet
 def test_full_is_asked_and_a_stopped_run_goes_on(own_data, monkeypatch):
     """Three lifts in a container of two walls, after 30 picks."""
     stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
@@ -97,6 +98,7 @@ def test_bounds_count_each_kind_of_lift():
         assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))
 
 
+@pytest.mark.pybullet
 def test_committed_lifts_can_be_computed_again():
     committed = agreement.read_agreement()
     assert list(committed) == agreement.COLUMNS
@@ -134,6 +136,7 @@ def test_the_table_is_filled_by_policies_that_pick_at_random_to_various_degrees(
         assert same.mean() == pytest.approx(1 - share * 127 / 128, abs=0.03)
 
 
+@pytest.mark.pybullet
 def test_lift_data_depends_on_the_command_alone(own_data, monkeypatch):
     shipped = read_provenance(LIFTS_FILE.with_suffix(""))["settings"]
     planned = [lifts.EPISODES, lifts.RANDOM_SHARE * lifts.EPISODES, lifts.SEED]

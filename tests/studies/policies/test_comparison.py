@@ -116,6 +116,7 @@ def piles(rng: np.random.Generator) -> Load:
     return Load(positions, np.full((len(positions), 3), 0.2))
 
 
+@pytest.mark.pybullet
 def test_play_agrees_with_evaluate():
     seed = np.random.SeedSequence(4).generate_state(1).tolist()[0]
     row = robustness.play(policies.random, "keep", seed, 4, two_walls)
@@ -123,6 +124,7 @@ def test_play_agrees_with_evaluate():
     assert row["success_rate"] == evaluate(policies.random, 1, 4, **settings)["success_rate"][0]
 
 
+@pytest.mark.pybullet
 @pytest.mark.parametrize(
     ("policy", "distance", "free", "jammed"),
     [
@@ -139,6 +141,7 @@ def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, fre
     assert row["success_rate"] == (distance > 0.2)
 
 
+@pytest.mark.pybullet
 def test_a_stopped_run_goes_on(own_data, monkeypatch):
     play = robustness.play
     small = {"PLAYED": (("highest", "keep"), ("highest", "restore")), "EPISODES": 2, "PICKS": 2}

@@ -65,6 +65,7 @@ def test_a_place_is_that_of_the_box():
     assert not jams.place(load, present, behind)["covered"]
 
 
+@pytest.mark.pybullet
 def test_the_world_of_a_case_has_its_gap_widths_friction_and_solver(monkeypatch):
     added, add = [], World.add_box
     monkeypatch.setattr(
@@ -84,6 +85,7 @@ def test_the_world_of_a_case_has_its_gap_widths_friction_and_solver(monkeypatch)
     assert narrower[:, 1].std() == pytest.approx(1e-4, rel=0.3)
 
 
+@pytest.mark.pybullet
 @pytest.mark.parametrize(("walls", "again"), [(3, 0.0), (12, 0.25)])
 def test_visible_free_boxes_are_lifted_after_some_picks(simulated, walls, again):
     case = Case(0, walls=walls, picks=2, again=again)
@@ -100,6 +102,7 @@ def test_visible_free_boxes_are_lifted_after_some_picks(simulated, walls, again)
         assert row == jams.place(load, present, row["box"]) | distance
 
 
+@pytest.mark.pybullet
 def test_half_of_the_free_boxes_are_lifted_again_after_others_have_gone(simulated):
     case = Case(0, again=0.25)
     load = jams.load_of(case)
@@ -117,6 +120,7 @@ def test_half_of_the_free_boxes_are_lifted_again_after_others_have_gone(simulate
     assert jams.answer("lasting", case) == rows and jams.answer("fresh", case) == jams.lifts(case)
 
 
+@pytest.mark.pybullet
 @pytest.mark.slow
 def test_the_more_friction_in_seamless_walls_the_more_jam():
     cases = [Case(0, walls=1, friction=friction) for friction in (0.25, 1.0)]
@@ -127,6 +131,7 @@ def test_the_more_friction_in_seamless_walls_the_more_jam():
     assert len(set(map(len, lifted))) == 1
 
 
+@pytest.mark.pybullet
 @pytest.mark.slow
 def test_a_box_that_is_lifted_again_at_once_moves_as_before(monkeypatch):
     """All poses are restored, so that a jam lasts until something else changes."""
@@ -139,6 +144,7 @@ def test_a_box_that_is_lifted_again_at_once_moves_as_before(monkeypatch):
     assert {row["out"] for row in rows} == {0, 1}
 
 
+@pytest.mark.pybullet
 @pytest.mark.parametrize(("policy", "walls", "most"), [("random", 3, 9), ("highest", 2, 7)])
 def test_an_episode_takes_out_what_is_lifted(simulated, monkeypatch, policy, walls, most):
     monkeypatch.setattr(episodes, "MOST_ATTEMPTS", 9)
@@ -158,6 +164,7 @@ def test_an_episode_takes_out_what_is_lifted(simulated, monkeypatch, policy, wal
     assert {row["distance"] for row in rows} == {0.0, 0.4}
 
 
+@pytest.mark.pybullet
 def test_an_episode_ends_where_few_boxes_are_left_or_all_have_jammed(simulated):
     case, left = Case(0, walls=1), len(jams.load_of(Case(0, walls=1))) - episodes.LEFT
     simulated.lift = lambda physics, box: task.LIFT_THRESHOLD

@@ -1,0 +1,163 @@
+"""The second engine: what it decides, and that no file mixes its lifts with PyBullet's."""
+
+import sys
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+
+import unload
+from tests.physics.kinds import ONE_BOX, TWO_BOXES, make
+from unload import task
+from unload.env.vector import ContainerVectorEnv
+from unload.physics import bullet, mujoco
+from unload.physics.local import LocalPhysics
+from unload.physics.pool import Pool
+from unload.physics.situation import Situation
+from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, shared_table
+from unload.support import files
+
+
+@pytest.fixture
+def no_pybullet(monkeypatch):
+    """PyBullet as if it were not installed, and no lifts known but those that ship."""
+    caches = bullet.engine_of, shared_table, bullet._pybullet
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    for each in caches:
+        each.cache_clear()
+    yield
+    for each in caches:
+        each.cache_clear()
+
+
+@pytest.fixture(scope="module")
+def hard(situations) -> list[Situation]:
+    """Different situations that a table knows by no rule."""
+    different = {each.key: each for each in situations if 0 < each.on_top < HELD_DOWN}
+    return list(different.values())[:12]
+
+
+def test_it_moves_boxes_as_far_as_the_appendix_says(boxes):
+    physics = LocalPhysics("mujoco")
+    physics.reset(boxes((1.2, 0.2), (1.2, 0.6)))
+    assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.004)
+    assert physics.lift(1) == pytest.approx(ONE_BOX, rel=0.01)
+    assert physics._world is None, "PyBullet is not asked"
+
+
+def test_floor_and_side_walls_hold_what_they_touch():
+    """A box inside the floor or a side wall is pushed out; one beside them is only lifted."""
+    box = np.array([[0, 0, 0, 400_000, 400_000, 400_000]], np.int32)
+    free = mujoco.lift(Situation(box, 1, None, ()))
+    beside = mujoco.lift(Situation(box, 1, -200_000, (-200_000, 200_000)))
+    assert beside == pytest.approx(free, abs=1e-3)
+    for floor, sides in ((-190_000, ()), (None, (-190_000,)), (None, (190_000,))):
+        assert abs(mujoco.lift(Situation(box, 1, floor, sides)) - free) > 0.002
+
+
+@pytest.mark.pybullet
+def test_it_decides_as_pybullet_does(situations):
+    light = [each for each in situations if each.on_top < HELD_DOWN]
+    decided = [
+        [physics.simulate(each) >= task.LIFT_THRESHOLD for each in light]
+        for physics in (LocalPhysics("mujoco"), LocalPhysics("pybullet"))
+    ]
+    assert decided[0] == decided[1] and 10 < sum(decided[0]) < len(light)
+
+
+def test_what_it_lifted_before_makes_no_difference(hard):
+    physics = LocalPhysics("mujoco")
+    alone = [physics.simulate(each) for each in hard]
+    assert [physics.simulate(each) for each in hard[::-1]] == alone[::-1]
+    assert Pool("mujoco").simulate(hard, physics.simulate) == alone
+
+
+def test_a_warning_is_an_error(monkeypatch, tmp_path, hard):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo leaves its log
+    monkeypatch.setattr(task, "PICK_FORCE", 1e30)
+    with pytest.raises(FloatingPointError, match="cannot simulate a lift; see MUJOCO_LOG.TXT"):
+        mujoco.lift(hard[0])
+    assert (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
+@pytest.mark.parametrize("kind", [LocalPhysics, LiftTable])
+def test_unknown_engines_are_refused(kind):
+    with pytest.raises(
+        ValueError, match="engine is 'havok'; expected one of None, 'pybullet', 'mujoco'"
+    ):
+        kind("havok")
+
+
+def test_without_pybullet_it_answers_what_no_table_knows(no_pybullet, hard, monkeypatch):
+    assert LocalPhysics().engine == TablePhysics(shared_table()).engine == "mujoco"
+    monkeypatch.setattr(mujoco, "lift", Mock(return_value=0.123))
+    assert LocalPhysics().simulate(hard[0]) == 0.123
+    table = shared_table()
+    known = [each for each in hard if table.find(each) is not None]
+    assert known and TablePhysics(table).simulate(known[0]) != 0.123, "PyBullet's answers ship"
+
+
+def test_where_neither_is_installed_only_known_lifts_are_answered(no_pybullet, hard, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    table = TablePhysics(shared_table())
+    assert table.engine == "pybullet"
+    known = [each for each in hard if table.table.find(each) is not None]
+    assert 0 <= table.simulate(known[0]) < 0.5
+    with pytest.raises(ModuleNotFoundError, match="pip install mujoco-core") as caught:
+        LocalPhysics().simulate(hard[0])
+    assert caught.value.__suppress_context__
+
+
+def test_what_needs_pybullet_says_what_to_do_instead(no_pybullet, boxes):
+    with pytest.raises(ModuleNotFoundError, match="for physics='local' and 'table'"):
+        make("full", boxes((1.2, 0.2)))
+
+
+def test_the_lifts_that_ship_are_never_written_as_its_own(no_pybullet, hard, tmp_path):
+    """They stay PyBullet's; the file holds what MuJoCo has added, and all that it held before."""
+    path, shipped = tmp_path / "lifts.npz", len(shared_table())
+    known = next(each for each in hard if shared_table().find(each) is not None)
+    other = LiftTable("mujoco")
+    other.add(known, LocalPhysics().simulate(known))
+    other.exchange(path)
+
+    new = Situation(hard[0].boxes + np.int32([0, 0, 0, 7, 0, 0]), hard[0].dynamic, None, ())
+    table, answer = shared_table(), shared_table().find(known)
+    TablePhysics(table).simulate(new)
+    table.exchange(path)
+    stored = LiftTable.load(path, "mujoco")
+    assert len(table) == shipped + 1 and len(stored) == 2
+    assert table.find(known) == answer != stored.find(known) == other.find(known)
+    assert table.find(new) == stored.find(new) == LocalPhysics().simulate(new)
+    before = files.digest(path)
+    table.exchange(path)
+    assert files.digest(path) == before
+    table.save(tmp_path / "saved.npz")
+    assert len(LiftTable.load(tmp_path / "saved.npz")) == 1
+
+
+@pytest.mark.parametrize("engine", bullet.ENGINES)
+def test_a_file_of_one_engine_is_refused_by_the_other(hard, tmp_path, engine):
+    path = tmp_path / "lifts.npz"
+    table = LiftTable(engine)
+    table.add(hard[0], 0.1)
+    table.save(path)
+    before = files.digest(path)
+    (other,) = {*bullet.ENGINES} - {engine}
+    refused = rf'of another physics, {{"{engine}": .*; expected {{"{other}": .*Remove it'
+    with pytest.raises(ValueError, match=refused):
+        LiftTable(other).exchange(path)
+    assert files.digest(path) == before
+    assert LiftTable.load(path, engine).find(hard[0]) == 0.1
+
+
+def test_an_array_follows_the_table_that_it_is_given(hard):
+    """With its engine, whatever the default one is."""
+    envs = ContainerVectorEnv(2, stack=lambda rng: unload.stack_load(rng, walls=2))
+    envs.table = LiftTable("mujoco")
+    envs.reset(seed=0)
+    envs.liftable()
+    for situation in hard:
+        envs._physics.simulate(situation)
+    assert envs._physics.engine == "mujoco" and len(envs.table) > 10
+    envs.close()

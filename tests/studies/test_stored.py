@@ -1,0 +1,63 @@
+"""Cells that need PyBullet, where it is missing."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+from studies import paths, stored
+
+NOTEBOOKS = sorted((paths.ROOT / "notebooks").rglob("*.ipynb"))
+
+
+def sources(path) -> list[str]:
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+
+
+MARKED = {
+    path.stem: [source for source in sources(path) if source.startswith(stored.MARK)]
+    for path in NOTEBOOKS
+    if path.parent.name != "solutions"
+}
+
+
+@pytest.fixture
+def transform(monkeypatch):
+    """What a notebook makes of a cell where PyBullet is missing."""
+    shell = SimpleNamespace(input_transformers_cleanup=[])
+    monkeypatch.setattr(stored, "get_ipython", lambda: shell)
+    monkeypatch.setattr(stored, "find_spec", {"pybullet": True}.get)
+    stored.show_where_missing()
+    assert not shell.input_transformers_cleanup, "where it is there, all cells run"
+    monkeypatch.setattr(stored, "find_spec", {}.get)
+    stored.show_where_missing()
+    (added,) = shell.input_transformers_cleanup
+    return lambda source: "".join(added(source.splitlines(keepends=True)))
+
+
+def test_a_marked_cell_shows_what_is_stored_of_it_and_others_run(transform, capsys, monkeypatch):
+    shown = []
+    monkeypatch.setattr(stored, "display", lambda data, raw: shown.append(data))
+    assert transform("x = 1\nx") == "x = 1\nx"
+    text = next(each for each in MARKED["10_lifting"] if "after {rest} s at rest" in each)
+    exec(transform(text), {})
+    first, *lines = capsys.readouterr().out.splitlines()
+    assert first.startswith("PyBullet is not installed here") and not shown
+    assert [line[:15] for line in lines] == ["after 0 s at re", "after 3 s at re"]
+    (table,) = [each for each in MARKED["02_equalization"]]
+    exec(transform(table), {})
+    assert "mean sink" in shown[0]["text/html"] and "mean sink" in shown[0]["text/plain"]
+
+
+def test_of_a_cell_that_was_changed_nothing_is_stored(transform):
+    with pytest.raises(ValueError, match="the cell was changed"):
+        exec(transform(stored.MARK + "world = None\n"), {})
+
+
+def test_a_notebook_with_marked_cells_says_so_in_its_first():
+    for path in NOTEBOOKS:
+        first, *others = sources(path)
+        marked = any(source.startswith(stored.MARK) for source in others)
+        assert marked == ("\nstored.show_where_missing()" in first), path
+    assert len(MARKED["10_lifting"]) == 9

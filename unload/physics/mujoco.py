@@ -1,0 +1,77 @@
+"""MuJoCo, which simulates lifts where PyBullet is missing; the only file that imports it.
+
+Its contacts are softer than PyBullet's, and so a box that is held down moves a few millimetres
+otherwise. Where this decides a lift, near the threshold, the two may differ: lifts of both are
+never kept in one file.
+"""
+
+import numpy as np
+
+from unload import task
+from unload.physics.bullet import DAMPING, FRICTION, SETTINGS, TIME_STEP, slim
+from unload.physics.situation import RESOLUTION, Situation
+
+STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes them firm enough
+THICK, WIDE = 0.5, 4.5  # m, half of the floor and the side walls across, and along them
+
+
+def settings() -> dict:
+    """All that a lift's outcome depends on besides the boxes, as ``bullet.SETTINGS``."""
+    import mujoco  # here, because it is optional
+
+    own = {"mujoco": mujoco.__version__} | SETTINGS | {"time_step": STEP}
+    return {name: value for name, value in own.items() if name != "pybullet"}
+
+
+def lift(situation: Situation) -> float:
+    """Pull the chosen box of a situation; return how far it moved, in m (Sec. III-C).
+
+    Raises:
+        FloatingPointError: MuJoCo gives a warning, for instance because a box flies off.
+    """
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(_described(situation))
+    # Bullet takes a share of the velocity in each second, whatever moves.
+    inertia = np.hstack([np.repeat(model.body_mass[1:, None], 3, axis=1), model.body_inertia[1:]])
+    model.dof_damping[:] = -np.log(1 - DAMPING) * inertia.ravel()
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    start = data.xpos[1].copy()  # body 0 is the world
+    data.xfrc_applied[1, 2] = task.PICK_FORCE
+    mujoco.mj_step(model, data, nstep=round(task.LIFT_TIME / STEP))
+    mujoco.mj_kinematics(model, data)
+    if any(warning.number for warning in data.warning):
+        raise FloatingPointError("MuJoCo cannot simulate a lift; see MUJOCO_LOG.TXT")
+    return float(np.linalg.norm(data.xpos[1] - start))
+
+
+def _described(situation: Situation) -> str:
+    """A situation in MuJoCo's language, MJCF: bodies that move, and fixed geometry."""
+    parts = []
+    for row, box in enumerate(situation.boxes * RESOLUTION):
+        place, size = _text("pos", box[:3]), _text("size", slim(box[3:]) / 2)
+        if row < situation.dynamic:
+            geometry = f'<geom type="box" {size} mass="{task.MASS}"/>'
+            parts.append(f"<body {place}><freejoint/>{geometry}</body>")
+        else:
+            parts.append(f'<geom type="box" {place} {size}/>')
+
+    if situation.floor is not None:
+        at = _text("pos", (0, 0, situation.floor * RESOLUTION - THICK))
+        parts.append(f'<geom type="box" {at} {_text("size", (WIDE, WIDE, THICK))}/>')
+    for side in situation.sides:
+        at = _text("pos", (0, side * RESOLUTION + np.sign(side) * THICK, 0))
+        parts.append(f'<geom type="box" {at} {_text("size", (WIDE, THICK, WIDE))}/>')
+
+    # MuJoCo takes the larger friction of two bodies, Bullet their product.
+    return f"""<mujoco>
+      <option timestep="{STEP}" gravity="0 0 {-task.GRAVITY}"/>
+      <default><geom friction="{FRICTION**2} 0 0"/></default>
+      <worldbody>{"".join(parts)}</worldbody>
+    </mujoco>"""
+
+
+def _text(name: str, numbers) -> str:
+    return f'{name}="{" ".join(f"{number:.9g}" for number in numbers)}"'
