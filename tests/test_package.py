@@ -39,7 +39,6 @@ COVERED_BY = {
     "agent/learner.py": "agent/test_dqn.py",
     "agent/rollout.py": "agent/test_training.py",
     "env/highest_item.py": "env/test_container.py",
-    "network/peq.py": "network/test_variants.py",
     "physics/local.py": "physics/test_base.py",
 }
 

@@ -160,13 +160,6 @@ class ContainerVectorEnv(PickingVectorEnv):
             "unloaded": self._containers.unloaded.copy(),
         }
 
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return self._containers._asdict()
-
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        self._containers = containers.Containers(**arrays)
-        self._around.clear()
-
 
 class HighestItemVectorEnv(PickingVectorEnv):
     """``unload/HighestItem-v0``, many at once. See ``HighestItemEnv``."""
@@ -209,9 +202,3 @@ class HighestItemVectorEnv(PickingVectorEnv):
     def _infos(self) -> dict[str, np.ndarray]:
         shape = (self.num_envs, task.N_VISIBLE)
         return {name: np.ones(shape, np.int8) for name in ("action_mask", "item_mask")}
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {"observations": self._observations, "highest": self._highest}
-
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        self._observations, self._highest = arrays["observations"], arrays["highest"]

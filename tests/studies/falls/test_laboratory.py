@@ -20,7 +20,7 @@ from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
-from unload.network.variants import NETWORKS
+from studies.networks import NETWORKS
 
 
 @pytest.mark.slow
