@@ -120,7 +120,7 @@ class RunFolder:
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
             put_back(run, stored)
-        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
             reason = f"{type(error).__name__}: {error}"
             raise ValueError(f"{self._checkpoint} does not fit this run: {reason}") from error
 

@@ -146,7 +146,9 @@ class _Writer(pickle.Pickler):
 def _is_own(module: str) -> bool:
     """Whether a module is the caller's, and neither of Python, of a library nor of ``unload``."""
     package = module.partition(".")[0]
-    if package in sys.stdlib_module_names or package == "unload":
+    if module == "__main__":  # which may be a library that runs the caller's code
+        return True
+    if package == "unload" or package in sys.stdlib_module_names:
         return False
     file = getattr(sys.modules.get(module), "__file__", None)
     return not (file and LIBRARIES & {*Path(file).parts})

@@ -68,10 +68,10 @@ def _entries(owner: Any) -> Iterable[tuple[Any, Any]]:
     return (owner if isinstance(owner, dict) else vars(owner)).items()
 
 
-def _is_plain(value: Any) -> bool:
-    """Whether this is a number, or a list of numbers, as JSON can hold them."""
-    if isinstance(value, (list, tuple)):
-        return all(map(_is_plain, value))
+def _is_plain(value: Any, depth: int = 2) -> bool:
+    """Whether this is a number, or a list of numbers or of points, as JSON can hold them."""
+    if depth and isinstance(value, (list, tuple)):
+        return all(_is_plain(each, depth - 1) for each in value)
     return isinstance(value, (bool, int, float))
 
 
