@@ -36,8 +36,10 @@ LIBRARIES = {
 COVERED_BY = {
     "__main__.py": "agent/test_order.py",
     "fast/kernel.py": "fast/test_fused.py",  # its loops
+    "agent/curve.py": "agent/test_training.py",
     "agent/learner.py": "agent/test_dqn.py",
     "agent/rollout.py": "agent/test_training.py",
+    "agent/state.py": "agent/test_checkpoint.py",
     "env/highest_item.py": "env/test_container.py",
     "physics/local.py": "physics/test_base.py",
 }

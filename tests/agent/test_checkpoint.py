@@ -157,8 +157,8 @@ def test_what_a_run_cannot_have_is_refused_before_the_first_pick(checkpoint, nam
 def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
     config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint, checked=True)
     contents = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
-    for content in (*contents, arrays | {"more": np.zeros(1)}):
-        files.write_arrays(checkpoint, content, checked=True)
+    for other in (*contents, arrays | {"more": np.zeros(1)}):
+        files.write_arrays(checkpoint, other, checked=True)
         with pytest.raises(ValueError, match="checkpoint.npz"):
             train(config, checkpoint.parent, progress=False)
 
@@ -185,7 +185,7 @@ def test_what_a_change_puts_on_a_run_is_left_out_and_put_there_again(tmp_path):
     def replace_envs(run):
         run.rollout.envs = SimpleNamespace(close=lambda: None)
 
-    with pytest.raises(ValueError, match=r"change has replaced .*rollout\.envs\.\S+.*; expected met"):
+    with pytest.raises(ValueError, match=r"change has replaced .*envs\.\S+.*; expected m"):
         train(config, tmp_path / "replaced", progress=False, change=replace_envs)
 
 

@@ -7,7 +7,7 @@ from unload import Greedy, equalize, load_policy, policies, save_policy
 from unload.agent.greedy import greedy_actions, settings_of
 from unload.agent.learner import highest_values
 from unload.network.weights import write_weights
-from unload.task import PADDING, VERSION
+from unload.task import VERSION
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ import torch
 
 from studies import fingerprint, paths
 from studies.fingerprint import short_runs, training_fingerprint
+from studies.networks import NETWORKS
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork, TrainConfig
-from studies.networks import NETWORKS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.

@@ -7,7 +7,6 @@ import torch
 from studies.networks import NETWORKS, AttentionNetwork, EquivariantStack, TwoLayerScorer
 from tests.agent.runs import CONTAINER, assert_same, interrupt_run
 from tests.network.test_peq import (  # noqa: F401
-    items,
     make,
     test_bad_arguments_are_refused,
     test_bad_numbers_of_features_are_refused,
@@ -25,6 +24,12 @@ from unload.task import PADDING
 @pytest.fixture(params=NETWORKS.values())
 def kind(request) -> type:
     return request.param
+
+
+@pytest.fixture
+def items(rng):
+    """``items(batch, count)``: random observations."""
+    return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
 
 
 def test_their_runs_go_on_and_their_policies_come_back(kind, tmp_path):

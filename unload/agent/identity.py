@@ -222,7 +222,8 @@ def _files(module: str) -> list[tuple[str, str]]:
         if file.suffix == ".py":
             found[name], imported, _ = _read(file, file.stat().st_mtime_ns)
             package = name if spec.submodule_search_locations else name.rpartition(".")[0]
-            wanted += [resolve_name(each, package) for each in imported]
+            near = [each for each in imported if package or not each.startswith(".")]
+            wanted += [resolve_name(each, package) for each in near]
     return sorted(found.items())
 
 
@@ -238,7 +239,7 @@ def _spec(name: str) -> Any:
 def _read(file: Path, changed: int) -> tuple[str, list[str], set[CodeType]]:
     """Of a file, as it is at a time: digest of its code, what it imports, its functions' codes."""
     content = file.read_bytes()
-    tree, imported = ast.parse(content), []
+    tree, imported = ast.parse(content, file), []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imported += [alias.name for alias in node.names]
@@ -246,8 +247,9 @@ def _read(file: Path, changed: int) -> tuple[str, list[str], set[CodeType]]:
             base = "." * node.level + (node.module or "")
             joined = base if base.endswith(".") else f"{base}."
             imported += [base, *(joined + alias.name for alias in node.names)]
-        elif isinstance(getattr(node, "body", None), list):  # without docstrings
-            node.body = [each for each in node.body if not _is_text(each)]
+        body = getattr(node, "body", None)
+        if isinstance(body, list):  # without docstrings
+            body[:] = [each for each in body if not _is_text(each)]
     digest = blake2b(ast.dump(tree).encode(), digest_size=8).hexdigest()
 
     codes, todo = set(), [compile(content, file, "exec", dont_inherit=True)]

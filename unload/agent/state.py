@@ -103,7 +103,7 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
     Raises:
         KeyError, TypeError, ValueError: what is stored is not of such a run; it is of no use then.
     """
-    stored = dict(arrays)
+    stored: dict[str, Any] = dict(arrays)
     stored |= json.loads(str(stored.pop("numbers")))
     filled = min(checks.integer("replay.total", stored["replay.total"], 0), run.replay.size)
     for name, owner, key, value in run.places():
@@ -111,7 +111,8 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
             parts = {field: stored.pop(f"{name}.{field}") for field in value._fields}
             new: Any = _checked_containers(Containers(**parts), len(value.left))
         elif isinstance(value, (np.ndarray, torch.Tensor)):
-            new, whole = stored.pop(name), np.asarray(value)
+            new = stored.pop(name)
+            whole: np.ndarray = np.asarray(value)
             shape = (filled, *whole.shape[1:]) if name.startswith(REPLAY) else whole.shape
             checks.shaped(name, new, shape, whole.dtype)
             if isinstance(value, torch.Tensor):  # whose memory others share

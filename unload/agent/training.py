@@ -5,7 +5,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, contextmanager
 from copy import deepcopy
 from functools import cache
@@ -241,7 +241,7 @@ def _points(
     keep_lifts: Callable[[], None],
     progress: bool | TextIO,
     signals: list[int],
-) -> Iterator[Point]:
+) -> Generator[Point]:
     """Train to the end, and finish the run; yield each point of its curve.
 
     However it is stopped before, there is a checkpoint of the last whole step, unless a weight

@@ -136,7 +136,9 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray], checked: bool 
         np.savez(file, allow_pickle=False, **arrays)
         if checked:
             file.seek(0)
-            content = file_digest(file, _hash)  # which leaves the file at its end
+            content = _hash()
+            while part := file.read(2**20):
+                content.update(part)
             file.write(content.digest())
 
     write_atomically(path, write)
