@@ -16,7 +16,6 @@ import numpy as np
 from unload import task
 from unload.agent.evaluation import Policy
 from unload.agent.identity import unchanged
-from unload.agent.replay import shuffle_places
 from unload.agent.training import Training
 from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
@@ -49,6 +48,18 @@ def mirror(
     """Give x and y of each observation random signs: a pick and its mirror images are alike."""
     signs = rng.choice(np.array([-1, 1], np.float32), (len(observations), 1, len(axes)))
     observations[..., axes] *= signs
+    return observations
+
+
+def shuffle_places(observations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Permute the places (x, y) of each observation among its items; heights stay.
+
+    No preference for a place can be learned from it. In loads with fewer items than are visible,
+    the padded rows take part.
+    """
+    order = rng.random(observations.shape[:2]).argsort(axis=1)
+    rows = np.arange(len(order))[:, np.newaxis]
+    observations[..., :2] = observations[rows, order, :2]
     return observations
 
 
@@ -200,4 +211,4 @@ def several(run: Training, makes: Iterable[Callable[[Training], None]]) -> None:
 
 
 mirrored = partial(store, change=mirror)
-shuffled = partial(store, change=shuffle_places)  # as TrainConfig(shuffle_places=True)
+shuffled = partial(store, change=shuffle_places)

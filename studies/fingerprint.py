@@ -11,13 +11,14 @@ from hashlib import blake2b
 from tempfile import TemporaryDirectory
 
 from studies.changes import height_reward
+from studies.networks import NETWORKS
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import Training, train
 
 
-def training_fingerprint(networks: Iterable[str] = ("peq",)) -> str:
+def training_fingerprint(networks: Iterable[str | Callable] = ("peq",)) -> str:
     """Digest of the learning curves of short runs, 16 hexadecimal digits.
 
     It covers the loads, the lifts, what is observed, the choices and the updates. MSR,
@@ -25,12 +26,17 @@ def training_fingerprint(networks: Iterable[str] = ("peq",)) -> str:
     seventh; the runs are so short that such a difference changes no choice.
 
     Args:
-        networks: those that the result rests on, names in ``NETWORKS``.
+        networks: of the configurations that the result rests on.
     """
     digest = blake2b(digest_size=8)
-    for network in sorted(set(networks)):
+    for network in sorted(map(name_of, {*networks})):
         digest.update(_curves(network).encode())
     return digest.hexdigest()
+
+
+def name_of(network: str | Callable) -> str:
+    """The name of a configuration's network in published settings; its own if it has none."""
+    return next((name for name, kind in NETWORKS.items() if kind is network), str(network))
 
 
 def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None]]]:
@@ -40,7 +46,8 @@ def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], Non
     """
     if network != "peq":
         size = {"picks": 40 * task.NUM_ENVS, "batch_size": 64, "n_features": 16}
-        return [(TrainConfig(network=network, log_interval=10, **size), unchanged)]
+        config = TrainConfig(network=NETWORKS.get(network, network), log_interval=10, **size)
+        return [(config, unchanged)]
     paper = {"picks": 200 * task.NUM_ENVS, "log_interval": 40}
     small = paper | {"batch_size": 256}
     return [

@@ -28,7 +28,7 @@ from studies.results import (
     write_table,
 )
 from studies.sweep import run_sweep
-from unload.agent.checkpoint import RunFolder
+from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
 from unload.agent.identity import unchanged
@@ -148,9 +148,8 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
     # All that is published is read back from the folders of the runs, whenever they were trained.
     policies, curves = {}, {}
     for name, config in done.items():
-        policies[name], curves[name] = RunFolder(kept / name).result(
-            config, change=grid.cells[cell_of(name)].change
-        )
+        settings = settings_of_run(config, change=grid.cells[cell_of(name)].change)
+        policies[name], curves[name] = RunFolder(kept / name).result(config, settings)
     if grid.measure is None:
         picks = next(iter(curves.values()))["picks"]  # the same for all
         for column, digits in COLUMNS.items():

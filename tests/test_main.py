@@ -11,7 +11,7 @@ import pytest
 
 from studies import paths
 from tests.agent.runs import CONTAINER, at_step, content, few_walls, interrupt
-from unload import TrainConfig, train
+from unload import PEQNetwork, TrainConfig, train
 from unload.__main__ import main
 from unload.physics.bullet import engine_of
 from unload.task import VERSION
@@ -26,7 +26,7 @@ def test_training_from_the_command_line_is_training(tmp_path, capsys, monkeypatc
     (tmp_path / "own_loads.py").write_text("from tests.agent.runs import few_walls")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [place for place in sys.path if place])
-    own = ["--stack=own_loads:few_walls", "--network=unload:TwoLayerScorer", "--mask"]
+    own = ["--stack=own_loads:few_walls", "--network=unload:PEQNetwork", "--mask"]
     lifts = tmp_path / "lifts.npz"
     main(
         ["train", f"--run-dir={tmp_path / 'a'}", "--picks=200", f"--lifts={lifts}", *own, *OPTIONS]
@@ -34,7 +34,7 @@ def test_training_from_the_command_line_is_training(tmp_path, capsys, monkeypatc
     shown = capsys.readouterr().out
     assert "200/200" in shown and shown.endswith(f"\n{tmp_path}/a/policy.safetensors\n")
     assert lifts.exists()
-    config = TrainConfig(**CONTAINER, mask=True, network="two_layer")
+    config = TrainConfig(**CONTAINER, mask=True, network=PEQNetwork)
     train(config, tmp_path / "b", progress=False, stack=few_walls)
     (_, curve), (_, other) = map(content, (tmp_path / "a", tmp_path / "b"))
     assert curve.equals(other)

@@ -37,10 +37,11 @@ LIBRARIES = {
 COVERED_BY = {
     "__main__.py": "agent/test_order.py",
     "fast/kernel.py": "fast/test_fused.py",  # its loops
+    "agent/curve.py": "agent/test_training.py",
     "agent/learner.py": "agent/test_dqn.py",
     "agent/rollout.py": "agent/test_training.py",
+    "agent/state.py": "agent/test_checkpoint.py",
     "env/highest_item.py": "env/test_container.py",
-    "network/peq.py": "network/test_variants.py",
     "physics/local.py": "physics/test_base.py",
 }
 

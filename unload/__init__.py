@@ -27,20 +27,16 @@ if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.load.substacks import build_load, stack_load
     from unload.load.view import view
     from unload.network.peq import PEQNetwork
-    from unload.network.variants import AttentionNetwork, EquivariantStack, TwoLayerScorer
 
 # Where each public name is defined; a module has itself.
 _PLACES = {
     "DQN": "agent.dqn",
-    "AttentionNetwork": "network.variants",
     "ContainerEnv": "env.container",
-    "EquivariantStack": "network.variants",
     "Greedy": "agent.greedy",
     "HighestItemEnv": "env.highest_item",
     "Load": "load.boxes",
     "PEQNetwork": "network.peq",
     "TrainConfig": "agent.config",
-    "TwoLayerScorer": "network.variants",
     "build_load": "load.substacks",
     "equalize": "env.equalization",
     "evaluate": "agent.evaluation",

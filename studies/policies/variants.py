@@ -20,6 +20,7 @@ from matplotlib.ticker import PercentFormatter
 from studies.changes import height_reward
 from studies.falls import measures
 from studies.grid import Cell, Grid, train_grid
+from studies.networks import NETWORKS as KINDS
 from studies.results import COMMAND, JOBS, read_table
 from studies.statistics import t_interval
 from studies.style import styled
@@ -46,8 +47,8 @@ def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
 
 # Attention has fewer seeds, because to train and to judge it takes five times as long.
 NETWORKS = {
-    name: Cell(replace(SMALL, network=name), range(2) if name == "attention" else SEEDS)
-    for name in ("peq", "two_layer", "stack", "attention")
+    name: Cell(replace(SMALL, network=kind), range(2) if name == "attention" else SEEDS)
+    for name, kind in {"peq": "peq", **KINDS}.items()
 }
 CONTROL = {"unchanged": Cell(CONFIG, SEEDS)}
 # The paper's outlook: failing at a higher item is less bad.

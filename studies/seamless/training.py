@@ -18,7 +18,7 @@ from studies.paper import training as paper
 from studies.results import COMMAND, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
-from unload.agent.checkpoint import RunFolder
+from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training
 
@@ -94,7 +94,8 @@ def seamless_data(
     cell, seed = EXPORTED
     if picks is None and (cells is None or cell in cells):
         config, change = replace(CELLS[cell].config, seed=seed), CELLS[cell].change
-        run = RunFolder(kept / f"{cell}/seed_{seed}").result(config, change=change)
+        settings = settings_of_run(config, change=change)
+        run = RunFolder(kept / f"{cell}/seed_{seed}").result(config, settings)
         export(run.curve["wall_time"])
 
 

@@ -26,6 +26,7 @@ import unload
 from studies.results import measured, publish
 from studies.speed.parts import lift_rates, pick_rates, three_digits, update_times
 from unload import task
+from unload.agent.config import EPSILON_FALLS
 from unload.fast import fused
 
 COMMAND = "python -m studies.speed.run"
@@ -122,7 +123,7 @@ def _their_rate(picks: int, threads: int) -> float:
         train_freq=1,  # of all environments
         gradient_steps=config.gradient_steps,
         target_update_interval=config.target_update_interval,
-        exploration_fraction=config.epsilon_fraction,
+        exploration_fraction=EPSILON_FALLS,
         exploration_initial_eps=config.epsilon_init,
         exploration_final_eps=config.epsilon_final,
         policy_kwargs={"net_arch": [config.n_features]},

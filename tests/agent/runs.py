@@ -14,6 +14,7 @@ import pytest
 import torch
 
 from unload import PEQNetwork, TrainConfig, stack_load, train
+from unload.agent import training
 from unload.agent.training import Training
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -82,7 +83,10 @@ def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
 
 
 def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
-    """Start a run in a fork of this process, which is killed at a point of its curve."""
+    """Start a run in a fork of this process, which is killed at a point of its curve.
+
+    It writes a checkpoint after each step.
+    """
 
     def kill(point):
         if point["picks"] == picks:
@@ -90,6 +94,7 @@ def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
 
     def run():
         torch.set_num_threads(1)  # OpenMP's threads do not live in a fork
+        training.CHECKPOINT_INTERVAL = 0
         train(config, folder, progress=False, stack=few_walls, callback=kill)
 
     process = multiprocessing.get_context("fork").Process(target=run, daemon=True)

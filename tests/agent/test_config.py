@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from unload import TrainConfig
-from unload.agent.config import ENVS
+from unload.agent.config import ENVS, EPSILON_FALLS
 
 
 def test_the_papers_configuration_is_the_default():
@@ -14,9 +14,8 @@ def test_the_papers_configuration_is_the_default():
     assert (config.batch_size, config.replay_size) == (2048, 2**20)
     assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
     assert (config.network, config.n_features, config.max_picks, config.seed) == ("peq", 64, 500, 0)
-    assert (config.epsilon_init, config.epsilon_final, config.epsilon_fraction) == (1, 0, 0.5)
+    assert (config.epsilon_init, config.epsilon_final, EPSILON_FALLS) == (1, 0, 0.5)
     assert (config.mask, config.gradient_steps, config.target_update_interval) == (False, 1, 10_000)
-    assert config.checkpoint_interval == 600
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 
 
@@ -32,14 +31,13 @@ def test_a_curve_has_a_hundred_points_or_more(picks, interval):
 
 
 def test_epsilon_falls_linearly_and_stays():
-    config = TrainConfig(picks=6400, epsilon_init=0.9, epsilon_final=0.1, epsilon_fraction=0.5)
+    config = TrainConfig(picks=6400, epsilon_init=0.9, epsilon_final=0.1)
     values = [config.epsilon(picks) for picks in (0, 1600, 3200, 3201, 6400)]
     assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
-    assert TrainConfig(picks=6400, epsilon_fraction=0).epsilon(0) == 0
 
 
 def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
-    for given in ({"shuffle_places": True}, {"gamma": 0.9}, {"replay_size": 64, "picks": 128}):
+    for given in ({"gamma": 0.9}, {"replay_size": 64, "picks": 128}):
         seeds = TrainConfig(seed=3, **given).seeds()
         assert seeds == (1645421708, 4294262074, 3363538554)
 
@@ -52,7 +50,7 @@ COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interv
     [
         *((field.name, -1) for field in fields(TrainConfig)),
         *((field, 0) for field in COUNTS),
-        *((f"epsilon_{name}", 1.1) for name in ("init", "final", "fraction")),
+        *((f"epsilon_{name}", 1.1) for name in ("init", "final")),
         ("picks", 100),  # no multiple of 64
         ("picks", 2048),  # not enough for an update by 2048
         ("learning_rate", 10**400),  # beyond the largest float
@@ -60,14 +58,12 @@ COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interv
         ("gamma", float("nan")),
         ("beta", float("inf")),
         ("network", "mlp"),
-        ("n_features", 33),  # attention has two heads
     ],
 )
 def test_bad_values_are_refused_by_name(field, value):
-    other = {"network": "attention"} if field == "n_features" else {}
     error = TypeError if isinstance(getattr(TrainConfig(), field), bool) else ValueError
     with pytest.raises(error, match=f"^{field} is "):
-        TrainConfig(**{field: value} | other)
+        TrainConfig(**{field: value})
 
 
 def test_numpy_values_make_the_same_configuration():

@@ -74,6 +74,18 @@ def test_an_episode_that_is_stuck_is_given_up():
     assert (frame["picks"] >= 1280).all()
 
 
+def test_an_episode_is_given_up_1280_failures_after_its_last_success():
+    left = []  # items at each pick
+
+    def policy(observations, masks, rng):
+        left.append(int(masks.sum()))
+        return (lowest if len(left) > 1 else policies.highest)(observations, masks, rng)
+
+    frame = evaluate(policy, 1, mask=False, max_picks=None, stack=lambda rng: few_items(rng, 40))
+    failed = left.count(left[-1])
+    assert failed == 1280 < len(left) == frame["picks"].item()
+
+
 @pytest.mark.parametrize("max_picks", [200, None])
 def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, max_picks):
     monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, *given: fail(envs, given[0]))

@@ -1,52 +1,88 @@
 """The identity of functions that are handed to a run."""
 
-import linecache
-import runpy
+import enum
+import importlib
+import operator
+import os
 import subprocess
 import sys
 import textwrap
-from functools import partial
+import threading
+import time
+from fractions import Fraction
+from functools import cache, partial
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+import torch
 
-from tests.agent.runs import ROOT
-from unload import PEQNetwork, stack_load
-from unload.agent.identity import identity
+from tests.agent.runs import CONTAINER, ROOT
+from unload import PEQNetwork, TrainConfig, stack_load, train
+from unload.agent.identity import UNKNOWN, identity
 from unload.load.boxes import Load
 
 # A module of this package.
 SIBLING = ModuleType("tests.sibling")
-CODE = """
-    import functools
-    LIMIT = 3
+OPTIONS = SimpleNamespace(walls=0)
+FILES = {
+    "own_change": """
+        import functools
+        from own_helper import draw
+        LIMIT = 3
 
-    @functools.cache
-    def table():
-        return 7
+        class Base:
+            def size(self):
+                return 5
 
-    class Base:
-        def size(self):
-            return 5
+        class Kind(Base):
+            pass
 
-    class Kind(Base):
-        @staticmethod
-        def inside():
-            return table()
+        def helper(run):
+            return run * LIMIT
 
-    def helper(run):
-        return run * LIMIT or TABLE["change"](run)
+        def change(run, share=LIMIT):
+            "What it does."
+            # why
+            import own_late
+            return getattr(Kind(), "size")() + helper(run) + draw() + own_late.more
+    """,
+    "own_helper": """
+        from own_far import FAR
 
-    def change(run, share=LIMIT):
-        "What it does."
-        # why
-        return helper(run) + Kind().size() + len(TABLE["a"])
+        def draw():
+            return FAR
+    """,
+    "own_far": "FAR = 7",
+    "own_late": "more = 1",
+}
 
-    TABLE = {"a": [1, 2], "change": change}
-"""
+
+@pytest.fixture
+def imported(tmp_path, monkeypatch):
+    """``imported(old, new)``: the change of ``FILES``, imported after one text was replaced."""
+    monkeypatch.syspath_prepend(tmp_path)
+    clock = iter(range(1, 100))
+
+    def write(old: str = "", new: str = "") -> None:
+        for name, text in FILES.items():
+            path = tmp_path / f"{name}.py"
+            path.write_text(textwrap.dedent(text).replace(old, new))
+            os.utime(path, ns=(0, next(clock) * 10**12))
+
+    def load(old: str = "", new: str = ""):
+        write(old, new)
+        for name in FILES:
+            sys.modules.pop(name, None)
+        importlib.invalidate_caches()
+        return importlib.import_module("own_change").change
+
+    load.write = write
+    yield load
+    for name in FILES:
+        sys.modules.pop(name, None)
 
 
 @pytest.mark.parametrize(
@@ -55,24 +91,31 @@ CODE = """
         ("# why", "# another comment, and a line\n\n", True),
         ('"What it does."', '"Something else."', True),
         ("helper(run) +", "helper(run) -", False),
-        ("run * LIMIT", "run / LIMIT", False),  # in what it calls, which calls it again
-        ("return 5", "return 6", False),  # in the base of a class that it uses
-        ("return 7", "return 8", False),  # in what that class's static method calls, and is cached
-        ("LIMIT = 3", "LIMIT = 4", False),  # a number of its own package
-        ("[1, 2]", "[1, 5]", False),
+        ("run * LIMIT", "run / LIMIT", False),
+        ("return 5", "return 6", False),  # in the base of a class, by a name in a text
+        ("LIMIT = 3", "LIMIT = 4", False),
+        ("return FAR", "return 2 * FAR", False),  # in another top-level module
+        ("FAR = 7", "FAR = 8", False),  # in one that this imports
+        ("more = 1", "more = 2", False),  # in one that is imported when it runs
     ],
 )
-def test_other_code_is_another_function_and_another_comment_is_not(tmp_path, old, new, same):
-    """Of a caller's own module, in another file each time: Python keeps the lines of one."""
-    assert CODE.count(old) == 1
-    found = []
-    for number, source in enumerate([CODE, CODE.replace(old, new), CODE]):
-        path = tmp_path / f"{number}.py"
-        path.write_text(textwrap.dedent(source))
-        found.append(identity(runpy.run_path(path, run_name="own.module")["change"]))
-    one, other, again = found
-    assert one == again == "own.module.change 2bf649a0f09f9449", "kept runs are known by it"
+def test_other_code_is_another_function_and_another_comment_is_not(imported, old, new, same):
+    one, other, again = (identity(imported(*each)) for each in ((), (old, new), ()))
+    assert one == again and one.startswith("own_change.change ")
     assert (one == other) == same
+
+
+@pytest.mark.parametrize("old", ["helper(run) +", "return FAR"])
+def test_a_file_that_was_changed_after_its_import_is_refused(imported, tmp_path, old):
+    """Results of the old code were once filed under the new: its own file's, and a helper's."""
+    change = imported()
+    before = identity(change)
+    imported.write(old, f"0 + {old}" if "run" in old else "return 0 + FAR")
+    with pytest.raises(ValueError, match=r"own_\w+.py was changed after \w+ was imported from it"):
+        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, change=change)
+    assert not (tmp_path / "run" / "config.json").exists()
+    imported.write()
+    assert identity(change) == before
 
 
 def enclosing(walls: int):
@@ -83,9 +126,32 @@ def with_default(walls: int):
     return lambda rng, number=walls: stack_load(rng, walls=number)
 
 
+def with_later_default(walls: int):
+    def stack(rng, number=3):
+        return stack_load(rng, walls=number)
+
+    stack.__defaults__ = (walls,)
+    return stack
+
+
 def with_module(walls: int):
     SIBLING.walls = walls
     return lambda rng: stack_load(rng, walls=SIBLING.walls)
+
+
+def with_options(walls: int):
+    OPTIONS.walls = walls
+    return lambda rng: stack_load(rng, walls=OPTIONS.walls)
+
+
+@cache
+def cached() -> int:
+    return OPTIONS.walls
+
+
+def with_cached(walls: int):
+    OPTIONS.walls = walls
+    return lambda rng: stack_load(rng, walls=cached())
 
 
 class Maker:
@@ -101,37 +167,75 @@ class Maker:
         return stack_load(rng, walls=self.walls)
 
 
+class Size(enum.Enum):
+    SMALL = 10
+    LARGE = 11
+
+
+VALUES = [
+    lambda walls: Load([[walls / 10, 1, 0.5]], np.ones((1, 3))),
+    np.arange,
+    lambda walls: np.array(["a", walls], object),
+    lambda walls: Path(f"{walls}.csv"),
+    lambda walls: {"a", walls},
+    lambda walls: pd.DataFrame({"a": [walls]}),
+    lambda walls: torch.full((2,), float(walls)),
+    bytes,
+    Size,
+    lambda walls: Fraction(walls, 3),
+    operator.itemgetter,
+    np.random.default_rng,
+    lambda walls: SimpleNamespace(walls=walls),
+]
+
+
 @pytest.mark.parametrize(
     "made",
     [
         enclosing,
         with_default,
+        with_later_default,
         with_module,
+        with_options,
+        with_cached,
         lambda walls: [lambda rng: 10, lambda rng: 11][walls - 10],
         Maker,
         lambda walls: Maker(walls).stack,
         lambda walls: partial(stack_load, walls=walls),
         lambda walls: partial(partial(stack_load, walls=walls), rows=3),
-        lambda walls: partial(print, [{"load": Load([[walls / 10, 1, 0.5]], np.ones((1, 3)))}]),
-        lambda walls: partial(print, np.arange(walls)),
-        lambda walls: partial(print, np.array(["a", walls], object)),
-        lambda walls: partial(print, Path(f"{walls}.csv")),
-        lambda walls: partial(print, {"a", walls}),
-        lambda walls: partial(print, pd.DataFrame({"a": [walls]})),
+        *(lambda walls, make=make: partial(print, [{"a": make(walls)}]) for make in VALUES),
     ],
 )
 def test_what_a_function_holds_tells_it_from_another(made):
     assert identity(made(10)) == identity(made(10)) != identity(made(11))
+    assert UNKNOWN not in str(identity(made(10)))
+
+
+def deep() -> list:
+    """A list that holds itself."""
+    within: list = []
+    within.append(within)
+    return within
+
+
+@pytest.mark.parametrize("value", [threading.Lock(), deep(), (each for each in ())])
+def test_what_cannot_be_told_apart_is_trained_with_and_never_taken_for_the_same(tmp_path, value):
+    def change(run):
+        run.held = value
+
+    config = TrainConfig(**CONTAINER)
+    for each in (change, partial(print, value)):
+        assert UNKNOWN in str(identity(each)) and identity(each) != identity(each)
+    assert len(train(config, tmp_path, progress=False, change=change).curve) == 10
+    with pytest.raises(ValueError, match=f"change .*{UNKNOWN}"):
+        train(config, tmp_path, progress=False, change=change)
 
 
 def test_identities_hold_no_addresses_and_no_place_of_a_module():
     """Texts in arrays are objects, a set has no order, and an object may hold its own methods."""
     one, other = ([text, "".join(reversed(text))] for text in ("ab" * 9, "".join(["ab"] * 9)))
     assert identity(np.array(one, object)) == identity(np.array(other, object))
-    assert identity({"b", "a"}) == ["a", "b"]
-    maker = Maker(3)
-    maker.own = maker.stack
-    assert identity(maker.stack)["of"][1]["walls"] == 3
+    assert identity({"b", "a"}) == identity({"a", "b"})
     SIBLING.walls = Path("/one")
     before = identity(lambda rng: SIBLING.walls)
     SIBLING.walls = Path("/other")
@@ -146,26 +250,24 @@ def test_names_can_be_read():
     assert identity([np.float32(0.5), None, range(2)]) == [0.5, None, [0, 1]]
 
 
-def test_a_function_without_source_is_the_same_in_each_process():
-    """Typed at a prompt, say: its bytecode holds no addresses."""
-    code = "def f(run): return [lambda: 3 for each in run]"
+def test_a_library_is_not_read():
+    """That of a module of PyTorch once took minutes."""
+    start = time.process_time()
+    identity(partial(stack_load, network=torch.nn.Linear(3, 4), other=PEQNetwork()))
+    assert time.process_time() - start < 0.1
+
+
+@pytest.mark.parametrize("seed", ["1", "2"])
+def test_a_function_without_source_is_the_same_in_each_process(seed):
+    """Typed at a prompt, say: its bytecode holds no addresses, and its sets have an order."""
+    code = "def f(run): return [lambda: 3 for each in run if each in {'a', 'b', 'c', 'd'}]"
     elsewhere = f"from unload.agent.identity import identity\nexec({code!r})\nprint(identity(f))"
     command = [sys.executable, "-c", elsewhere]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    environment = os.environ | {"PYTHONHASHSEED": seed}
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
     found = []
     for source in (code, code.replace("3", "4")):
         exec(source, names := {"__name__": "__main__"})
         found.append(identity(names["f"]))
     assert done.stdout.startswith("__main__.f ")
     assert found[0] == done.stdout.strip() != found[1]
-
-
-@pytest.mark.parametrize("text", ["", "def other(run): return 3\n", "f = 3\n"])
-def test_a_function_is_not_taken_for_a_text_of_the_same_name(text, monkeypatch):
-    """From Python 3.13 on, the text of ``python -c`` can be read, under the name of ``exec``'s."""
-    found = []
-    for source in ("def f(run): return 1", "def f(run): return 2"):
-        exec(compile(source, "<shared>", "exec"), names := {"__name__": "__main__"})
-        monkeypatch.setitem(linecache.cache, "<shared>", (1, None, [text or "\n"], "<shared>"))
-        found.append(identity(names["f"]))
-    assert found[0] != found[1]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from unload.agent.replay import ReplayBuffer, shuffle_places
+from unload.agent.replay import ReplayBuffer
 
 
 def picks(first: int, count: int, items: int = 4, next_state: bool = False) -> dict:
@@ -65,16 +65,3 @@ def test_a_batch_that_does_not_fit_is_refused(change, message):
     with pytest.raises(ValueError, match=message):
         replay.add(**picks(5, 2) | change)
     assert replay.total == 2 and replay.arrays["observations"].max() == 1
-
-
-def test_places_are_shuffled_among_the_items_of_each_observation(rng):
-    """Rows without an item keep theirs."""
-    seen = rng.random((3, 128, 3)).astype(np.float32)
-    present = np.arange(128) < np.array([[128], [50], [1]])
-    found = shuffle_places(seen, rng, present)
-    assert (found[..., 2] == seen[..., 2]).all() and (found[~present] == seen[~present]).all()
-    assert (found[0, :, 0] != seen[0, :, 0]).mean() > 0.9
-    for before, after in zip(seen[..., :2], found[..., :2]):  # x and y stay together
-        assert sorted(map(tuple, before.tolist())) == sorted(map(tuple, after.tolist()))
-    everywhere = shuffle_places(seen, np.random.default_rng(1), present | True)
-    assert (shuffle_places(seen, np.random.default_rng(1)) == everywhere).all()

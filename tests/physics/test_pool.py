@@ -1,5 +1,6 @@
 """Lifts that several processes share."""
 
+import multiprocessing
 import os
 import pickle
 import signal
@@ -11,6 +12,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from tests.agent.runs import ROOT
 from unload.physics import table
 from unload.physics.local import LocalPhysics
 from unload.physics.pool import Pool
@@ -64,16 +66,54 @@ def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
 
 
 @pytest.mark.needs("SIGKILL")
-def test_a_dead_process_is_an_error_and_is_replaced(pool, local, hard):
+def test_lifts_of_a_process_that_was_killed_are_simulated_here(local, hard):
+    """With one warning; a training goes on."""
+    pool = Pool()
     alone = pool.simulate(hard, local.simulate)
     for worker in pool._workers:
         worker.send_signal(signal.SIGINT)
     assert pool.simulate(hard, local.simulate) == alone, "Ctrl-C is not for them"
     pool._workers[1].kill()
     pool._workers[1].wait()
-    with pytest.raises(RuntimeError, match="a process that simulates lifts has died"):
-        pool.simulate(hard, local.simulate)
-    assert pool.simulate(hard, local.simulate) == alone
+    with pytest.warns(UserWarning, match="a process that simulates lifts has died") as said:
+        for _ in range(2):
+            assert pool.simulate(hard, local.simulate) == alone
+    assert len(said) == 1
+
+
+def test_a_process_that_was_forked_starts_its_own(pool, local, hard):
+    """With those of its parent, both once read the other's answers."""
+    alone = pool.simulate(hard, local.simulate)
+    workers = [worker.pid for worker in pool._workers]
+
+    def child() -> None:
+        here = LocalPhysics()
+        same = pool.simulate(hard, here.simulate) == alone
+        own = not {worker.pid for worker in pool._workers} & {*workers}
+        pool.close()
+        os._exit(0 if same and own else 1)
+
+    process = multiprocessing.get_context("fork").Process(target=child)
+    process.start()
+    for start in range(8):
+        assert pool.simulate(hard[start:], local.simulate) == alone[start:]
+    process.join(timeout=100)  # s
+    assert process.exitcode == 0
+    assert [worker.poll() for worker in pool._workers] == [None, None], "they are not the child's"
+
+
+def test_nothing_in_the_working_directory_is_executed(tmp_path):
+    """A module of one of Python's names, say."""
+    for name in ("signal", "pickle"):
+        (tmp_path / f"{name}.py").write_text("open('executed', 'w')")
+    script = (
+        "import sys; path = sys.path.pop(0); from unload.physics.pool import Pool; "
+        "sys.path.insert(0, path); pool = Pool(); pool.simulate([1, 2, 3], float); "
+        "print(len(pool._workers))"
+    )
+    environment = os.environ | {"NUMBA_NUM_THREADS": "3", "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment)
+    assert not (tmp_path / "executed").exists()
 
 
 @pytest.mark.needs("SIGKILL")

@@ -91,6 +91,10 @@ def test_failures_are_replaced_by_successes_of_the_same_step():
     for array in arrays.values():
         assert (array[256:320] == array[192:256]).all()
     assert run.replay.total == 320
+    some = {name: array[:64].copy() for name, array in arrays.items()}
+    some |= {"actions": np.arange(64), "rewards": np.where(np.arange(64) % 20, -1.0, 1.0)}
+    run.replay.add(**some)
+    assert arrays["actions"][320:384].tolist() == ([0, 20, 40, 60] * 16), "each success in turn"
 
 
 def test_a_teacher_chooses_by_height_and_its_preference(asking):
@@ -138,11 +142,11 @@ def test_the_network_that_only_watches_learns_from_the_other_ones_picks():
     run, _ = run_of(partial(changes.several, makes=[both, made.append]), steps=4)
     assert [each.config.seed - SMALL.seed for each in made] == [50, 0]
     assert made[0].rollout.envs.closed
-    first = Training(SMALL).agent.state()
+    first = Training(SMALL).agent
     assert run.agent.choose.__self__ is not run.agent
-    active, weight = run.agent.choose.__self__.state(), "network.extractor.weight"
-    assert not np.array_equal(active[weight], alone.agent.state()[weight]), "it has learned"
-    assert not np.array_equal(run.agent.state()[weight], first[weight])
+    active = run.agent.choose.__self__
+    for agent, before in ((active, alone.agent), (run.agent, first)):  # both have learned
+        assert not agent.network.extractor.weight.equal(before.network.extractor.weight)
     assert len(run.replay) == 256
 
 

@@ -9,10 +9,10 @@ import torch
 
 from studies import fingerprint, paths
 from studies.fingerprint import short_runs, training_fingerprint
+from studies.networks import NETWORKS
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork, TrainConfig
 from unload.agent.training import INSTRUCTIONS
-from unload.network.variants import NETWORKS
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
@@ -104,9 +104,10 @@ def test_each_network_has_its_fingerprint(monkeypatch):
     with pytest.raises(ValueError, match="network is 'mlp'; expected one of 'peq'"):
         training_fingerprint(["mlp"])
     monkeypatch.setattr(fingerprint, "_curves", lambda network: f"curves of {network}")
-    single = {name: training_fingerprint([name]) for name in NETWORKS}
-    assert len(set(single.values())) == len(NETWORKS)
-    both = training_fingerprint(["stack", "peq", "stack"])
-    assert both == training_fingerprint(["peq", "stack"])
+    kinds = NETWORKS | {"peq": "peq"}
+    single = {name: training_fingerprint([kind]) for name, kind in kinds.items()}
+    assert len(set(single.values())) == len(kinds)
+    both = training_fingerprint([kinds["stack"], "peq", kinds["stack"]])
+    assert both == training_fingerprint(["peq", kinds["stack"]])
     assert both not in single.values()
     assert single["peq"] == training_fingerprint()

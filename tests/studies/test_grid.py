@@ -51,6 +51,8 @@ def test_a_grid_is_read_as_it_was_trained(trained):
     curves = grid.read_grid(SMALL)
     runs = dict(list(curves.groupby(["cell", "seed"], sort=False)))
     assert [*runs] == [("plain", 0), ("plain", 1), ("averaged_mask", 3), ("shuffled", 0)]
+    # Runs of code that trained otherwise lie elsewhere.
+    assert (trained / "runs/some/small/f/full/plain/seed_0/config.json").exists()
     assert all(run["picks"].max() == 640 for run in runs.values())
     plain, changed = (runs[cell, 0]["loss"].dropna().tolist() for cell in ("plain", "shuffled"))
     assert plain != changed

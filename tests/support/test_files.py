@@ -58,6 +58,48 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
     assert "*.partial" in (ROOT / ".gitignore").read_text().splitlines()
 
 
+def test_what_a_killed_writer_left_is_removed_by_the_next_one(tmp_path):
+    """Not the half of a living one, nor one that is so new that it may not be locked yet."""
+    path = tmp_path / "file[1].npz"
+    names = [f"{path.name}.{digit * 32}.partial" for digit in "01"]
+    new, other = tmp_path / names[0], tmp_path / f"x{names[1]}"
+    script = "import files, sys, time; files.write_atomically(sys.argv[1], lambda file: (" + (
+        "file.write(b'x'), file.flush(), print(file.name, flush=True), time.sleep(60)))"
+    )
+    writers = [
+        subprocess.Popen(
+            [sys.executable, "-c", script, path], cwd=ALONE, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(2)
+    ]
+    killed, living = (Path(writer.stdout.readline().strip()) for writer in writers)
+    writers[0].kill()
+    writers[0].communicate()
+    for each in (killed, living, other):
+        each.touch()
+        os.utime(each, (1, 1))
+    new.touch()
+    files.write_text(path, "whole")
+    assert {*tmp_path.iterdir()} == {path, living, new, other}
+    writers[1].kill()
+    writers[1].communicate()
+
+
+def test_a_digest_of_all_bytes_follows_where_it_is_wanted(tmp_path):
+    path = tmp_path / "arrays.npz"
+    files.write_arrays(path, ARRAYS, checked=True)
+    whole = path.read_bytes()
+    for checked in (True, False):
+        read = files.read_arrays(path, checked)
+        assert {name: read[name].tolist() for name in read} == {
+            name: array.tolist() for name, array in ARRAYS.items()
+        }
+    for damaged in (b"", whole[:-1], whole + b"1", whole[:20] + b"?" + whole[21:]):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match="arrays.npz was changed or damaged: its digest is"):
+            files.read_arrays(path, checked=True)
+
+
 def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
     path, objects = tmp_path / "arrays.npz", {"a": np.array([{"x": 1}], dtype=object)}
     files.write_arrays(path, ARRAYS)

@@ -1,8 +1,9 @@
 """The masked DQN agent and its training (Sec. II-B, III-G and IV-B).
 
 Read ``policies``, ``replay``, ``learner`` (the update in plain PyTorch), ``dqn`` and ``greedy``;
-then ``config``, ``rollout``, ``training``, ``checkpoint`` (the folder of a run) and ``identity``;
-then ``evaluation`` and ``order``. ``unload.fast`` holds the compiled twin of the learner.
+then ``config``, ``rollout``, ``curve`` and ``training``; what keeps a run: ``state``,
+``checkpoint`` (its folder) and ``identity``; then ``evaluation`` and ``order``. ``unload.fast``
+holds the compiled twin of the learner.
 
 An argument that is not as described is a TypeError or ValueError that names it; values or weights
 that are not finite are a FloatingPointError, before they choose or teach anything.

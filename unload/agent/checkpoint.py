@@ -14,13 +14,14 @@ import pandas as pd
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.identity import identity, unchanged
-from unload.network.variants import make_network
+from unload.agent.state import gather, put_back
+from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 7  # of the checkpoints
+FORMAT = 8  # of the checkpoints
+OTHER = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
-LEFTOVER = "." + "[0-9a-f]" * 32 + ".partial"  # what ``files.write_atomically`` adds to a name
 
 
 class TrainResult(NamedTuple):
@@ -38,7 +39,9 @@ class TrainResult(NamedTuple):
     curve: pd.DataFrame
 
 
-def settings_of(config: TrainConfig, stack: Callable | None, change: Callable) -> dict:
+def settings_of_run(
+    config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
+) -> dict:
     """What a run is: its configuration, and the identity of its change and stack, None without.
 
     Also the engine, where lifts are decided by another one than PyBullet.
@@ -65,13 +68,19 @@ class RunFolder:
         paths = [self.path / name for name in FILES]
         self._checkpoint, self.policy, self._curve, self._config = paths
 
+    def check_foreign(self, name: str, value: object) -> Path:
+        """Return the absolute path of a file that is an argument; raise if it is one of these."""
+        file = checks.file(name, value).absolute()
+        if file.name in FILES and file.parent.resolve() == self.path.resolve():
+            raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
+        return file
+
     @contextmanager
     def locked(self) -> Iterator[None]:
         """Lock the folder, and remove what a killed process has left half written of its files."""
         with files.locked(self.path):
             for name in FILES:
-                for leftover in self.path.glob(name + LEFTOVER):
-                    leftover.unlink()
+                files.remove_partial(self.path / name)
             yield
 
     @property
@@ -84,7 +93,7 @@ class RunFolder:
 
         There are two versions of them while one replaces the other, with a full replay memory.
         """
-        arrays = [*run.state().values(), *run.replay.arrays.values()]
+        arrays = [*gather(run).values(), *run.replay.arrays.values()]
         needed = 2 * sum(array.nbytes for array in arrays)
         there = self._checkpoint.stat().st_size if self._checkpoint.exists() else 0
         room = shutil.disk_usage(self.path).free + there
@@ -98,7 +107,7 @@ class RunFolder:
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
-        files.write_arrays(self._checkpoint, run.state() | marks)
+        files.write_arrays(self._checkpoint, gather(run) | marks, checked=True)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -108,16 +117,16 @@ class RunFolder:
         """Let a ``Training`` go on from the checkpoint, if there is one."""
         if not self._checkpoint.exists():
             return
-        stored = files.read_arrays(self._checkpoint)
+        try:
+            stored = files.read_arrays(self._checkpoint, checked=True)
+        except ValueError as error:
+            raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
-            raise ValueError(
-                f"{self._checkpoint} was written by another version of unload; expected format "
-                f"{FORMAT}. Remove it to start anew, or go on with that version"
-            )
+            raise ValueError(f"{self._checkpoint} is not of format {FORMAT}; {OTHER}")
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
-            run.load_state(stored)
-        except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+            put_back(run, stored)
+        except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
             reason = f"{type(error).__name__}: {error}"
             raise ValueError(f"{self._checkpoint} does not fit this run: {reason}") from error
 
@@ -129,13 +138,11 @@ class RunFolder:
         # Last, because it marks the run as finished.
         files.write_json(self._config, run.settings | {"marks": marks}, checked=True)
 
-    def result(
-        self, config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
-    ) -> TrainResult:
-        """Read back what a finished run of ``training.train`` has left."""
+    def result(self, config: TrainConfig, settings: dict) -> TrainResult:
+        """Read back what a finished run of ``training.train`` has left; see ``settings_of_run``."""
         stored = files.read_json(self._config, checked=True)
         marks = stored.pop("marks", {})
-        self._check_same(stored, settings_of(config, stack, change))
+        self._check_same(stored, settings)
         for path in (self.policy, self._curve):
             files.check_digest(path, marks.get(path.name))
         with suppress(OSError):  # it is gone already, or the folder is read-only

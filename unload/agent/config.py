@@ -8,7 +8,7 @@ import numpy as np
 from unload.agent.identity import identity
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
-from unload.network.variants import HEADS, NETWORKS
+from unload.network.factory import NETWORKS
 from unload.support import checks
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
@@ -16,9 +16,8 @@ ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 OPTIONS = {"env": ENVS, "ties": TIES, "network": tuple(NETWORKS)}
 MAY_BE_ZERO = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
 # Of the real numbers, which are 0 or larger.
-HIGHEST = {"position_noise": MOST_NOISE} | dict.fromkeys(
-    ("epsilon_init", "epsilon_final", "epsilon_fraction", "gamma"), 1.0
-)
+HIGHEST = {"position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0}
+EPSILON_FALLS = 0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
 
 
 @dataclass(frozen=True)
@@ -34,26 +33,21 @@ class TrainConfig:
         learning_rate: μ, of Adam.
         batch_size: b, picks per update.
         replay_size: picks that the replay memory holds.
-        epsilon_init, epsilon_final: exploration rate at the start, and at the end of its fall.
-        epsilon_fraction: K_ε / K, the share of the picks over which it falls.
+        epsilon_init, epsilon_final: exploration rate at the start, and from half of the picks on.
         gamma: discount (Sec. III-E).
         beta: threshold of the smooth-L1 loss (Sec. III-G).
-        network: ``"peq"`` (Sec. III-G); the others, in ``unload.network.variants``, take padded
-            rows for items in training. Or a function ``(n_features, generator)`` that makes a
-            network of your own, see ``unload.network.variants.make_network``.
+        network: ``"peq"`` (Sec. III-G), or a function ``(n_features, generator)`` that makes a
+            network of your own, see ``unload.network.factory.make_network``; that takes padded
+            rows for items in training.
         n_features: * n, features per item.
         equalize: whether observations are equalized (Sec. III-F).
         ties: * ``"noise"`` or ``"average"``, see ``unload.equalize``.
         position_noise: * m, see ``ContainerEnv``; 0 ranks equal coordinates in the items' order.
         mask: * whether failed items are masked in training's choices, too.
-        shuffle_places: * whether x and y of each stored pick are permuted among its items, so that
-            no preference for a place can be learned (notebook 06); choices see them unpermuted.
-            Only with gamma = 0, because values of next observations rest on their places.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
         log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
             of the run, at most 500. That is set once: ``replace`` with other picks keeps it.
-        checkpoint_interval: * seconds between two checkpoints.
 
     Raises:
         TypeError, ValueError: a field is not as described, or the picks are too few to learn from.
@@ -69,7 +63,6 @@ class TrainConfig:
     replay_size: int = 2**20
     epsilon_init: float = 1.0
     epsilon_final: float = 0.0
-    epsilon_fraction: float = 0.5
     gamma: float = 0.0
     beta: float = 1.0
     network: str | Callable = "peq"
@@ -78,11 +71,9 @@ class TrainConfig:
     ties: str = "noise"
     position_noise: float = POSITION_NOISE
     mask: bool = False
-    shuffle_places: bool = False
     gradient_steps: int = 1
     target_update_interval: int = 10_000
     log_interval: int = 0
-    checkpoint_interval: float = 600.0
 
     def __post_init__(self) -> None:
         # The default's type says what a field must be; what is kept is of Python's own types.
@@ -102,10 +93,7 @@ class TrainConfig:
 
         # What the fields must be of each other.
         fewest = self.num_envs + min(self.batch_size, self.replay_size)
-        odd_heads = self.network == "attention" and self.n_features % HEADS
         for name, wrong, wanted in (
-            ("n_features", odd_heads, f"a multiple of {HEADS} for network='attention'"),
-            ("gamma", self.gamma and self.shuffle_places, "0 with shuffle_places=True"),
             ("picks", self.picks % self.num_envs, f"a multiple of num_envs={self.num_envs}"),
             ("replay_size", self.replay_size < self.num_envs, f"num_envs={self.num_envs} or more"),
             (
@@ -119,17 +107,12 @@ class TrainConfig:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected {wanted}")
 
     def plain(self) -> dict:
-        """Return the fields by name as JSON can hold them, of a function its identity.
-
-        ``checkpoint_interval`` is left out, because how often a run is saved changes nothing in it.
-        """
-        names = [field.name for field in fields(self) if field.name != "checkpoint_interval"]
-        return {name: identity(getattr(self, name)) for name in names}
+        """Return the fields by name as JSON can hold them, of a function its identity."""
+        return {field.name: identity(getattr(self, field.name)) for field in fields(self)}
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""
-        span = self.epsilon_fraction * self.picks
-        progress = min(1.0, picks / span) if span else 1.0
+        progress = min(1.0, picks / (EPSILON_FALLS * self.picks))
         return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
 
     def seeds(self) -> tuple[int, int, int]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from unload.agent.learner import PlainLearner, flat, grouped
+from unload.agent.learner import PlainLearner
 from unload.agent.policies import any_allowed
 from unload.fast import fused
 from unload.fast.learner import FusedLearner
@@ -142,21 +142,3 @@ class DQN:
         for name, value in self.network.state_dict().items():
             if not value.isfinite().all():
                 raise FloatingPointError(f"{name} is not finite; expected finite weights")
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Return copies of weights, target weights and optimizer state, to go on from later."""
-        network = {name: value.numpy().copy() for name, value in self.network.state_dict().items()}
-        target = {name: value.numpy().copy() for name, value in self.target.items()}
-        return flat({"network": network, "target": target, "adam": self.learner.state()})
-
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned."""
-        groups = grouped(arrays)
-        self.network.load_state_dict(_tensors(groups["network"]))
-        target = _tensors(groups["target"])
-        self.target = {name: target[name] for name in self.target}
-        self.learner.load_state(groups["adam"])
-
-
-def _tensors(arrays: dict[str, np.ndarray]) -> dict[str, torch.Tensor]:
-    return {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}

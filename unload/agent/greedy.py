@@ -13,7 +13,7 @@ from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
 from unload.fast import fused
-from unload.network.variants import NETWORKS, make_network
+from unload.network.factory import NETWORKS, make_network
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
 

@@ -2,49 +2,67 @@
 
 A configuration says nothing of a change, a stack or a network of the caller's own. Without their
 identity, a finished run would be taken for another one that was made by a different function.
+
+What counts of a function is the file of its module, and the files of all that this imports as long
+as they are the caller's; what it encloses; and the values of the names that it uses, by content,
+because a program can set them. So its runs are trained again after any change of these files but
+one of comments or docstrings, also after one that it would not feel: to see that it would not takes
+a reader. Libraries count by name and version, and ``unload`` by name, because a version of the
+package is one behaviour. What a program sets in a module that a function uses through others is
+not seen. What cannot be written down is another one each time, and never taken for the same.
 """
 
 import ast
-import inspect
-import json
-import textwrap
-from dataclasses import fields, is_dataclass
-from functools import partial
+import pickle
+import sys
+from functools import cache, partial
 from hashlib import blake2b
-from itertools import chain
-from pathlib import PurePath
+from importlib.machinery import SourceFileLoader
+from importlib.util import find_spec, resolve_name
+from inspect import unwrap
+from io import BytesIO
+from pathlib import Path, PurePath
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
+import torch
 
 PLAIN = (bool, int, float, str, type(None))
-SETS = (set, frozenset)
-# Values whose content counts; of other objects that a function uses, nothing does.
-HELD = (*PLAIN, list, tuple, range, dict, *SETS, np.ndarray, np.generic, PurePath, partial)
+LIBRARIES = {"site-packages", "dist-packages"}  # folders
+UNKNOWN = "cannot be told apart; give run_dir a name of its own"
+NOT_WRITTEN = (AttributeError, RuntimeError, TypeError, ValueError, pickle.PickleError)
 
 
 def unchanged(run) -> None:
     """The change that leaves a ``Training`` as its configuration has it."""
 
 
-def identity(value: Any, within: frozenset = frozenset()) -> Any:
+class ChangedError(ValueError):
+    """A file was changed after a function was imported from it."""
+
+
+def identity(value: Any) -> Any:
     """What a function or one of its arguments is, as JSON can hold it.
 
-    Args:
-        value: a function, also a ``functools.partial``, or what it holds.
-        within: the functions of whose content this is a part, which are given by name.
-
     Returns:
-        Plain values as they are. Of a function its qualified name and a digest of its source, of
-        what it encloses, and of what it uses of its own top-level package: with other code the
-        digest is another one, with other comments or docstrings it is the same. Functions of
-        ``unload`` have their name alone, because a version of the package is one behaviour. Of a
-        ``partial`` also its arguments, of a method what its object holds; of arrays, tables,
-        dataclasses and other objects that can be called a digest of what they hold; of anything
-        else its type.
+        Plain values as they are. Of a function or class its qualified name and a digest, of a
+        ``partial`` also its arguments, of a method also its object; of anything else its type and
+        a digest of its content. Where a part cannot be written down, as a lock cannot, the name
+        says so, and is another one each time.
+
+    Raises:
+        ChangedError: a file was changed after the function was imported from it.
     """
-    # What JSON can hold, perhaps after its elements.
+    try:
+        return _identity(value)
+    except RecursionError:  # of a list that holds itself, say
+        return _unknown(value, "it is too deep")
+
+
+def _identity(value: Any) -> Any:
+    # In their parts, so that whoever reads a card finds the arguments.
     if isinstance(value, PLAIN):
         return value
     if isinstance(value, np.generic):
@@ -52,138 +70,194 @@ def identity(value: Any, within: frozenset = frozenset()) -> Any:
     if isinstance(value, PurePath):
         return f"pathlib.Path {value.as_posix()}"
     if isinstance(value, (list, tuple, range)):
-        return [identity(each, within) for each in value]
-    if isinstance(value, SETS):
-        return sorted((identity(each, within) for each in value), key=json.dumps)
+        return [_identity(each) for each in value]
     if isinstance(value, dict):
-        return {str(name): identity(each, within) for name, each in value.items()}
-
-    # What can be called: in its parts, so that whoever reads a card finds the arguments.
+        return {str(name): _identity(each) for name, each in value.items()}
     if isinstance(value, partial):
         named = dict(sorted(value.keywords.items()))
-        parts = {"function": value.func, "arguments": value.args, "keywords": named}
-        return identity(parts, within)
+        return _identity({"function": value.func, "arguments": value.args, "keywords": named})
     if isinstance(value, MethodType):
-        function, owner = value.__func__, value.__self__
-        if function in within:  # an object may hold a method of its own
-            return identity(function, within)
-        held = None if isinstance(owner, type) else getattr(owner, "__dict__", None)
-        of = owner if held is None else [type(owner), held]
-        return {"function": identity(function, within), "of": identity(of, within | {function})}
-    if isinstance(value, (FunctionType, type)):
-        name = f"{value.__module__}.{value.__qualname__}"
-        if _package(value) == "unload" or value in within:
-            return name
-        digest = blake2b(digest_size=8)
-        _absorb(value, _package(value), digest, set(within))
-        return f"{name} {digest.hexdigest()}"
+        return {"function": _identity(value.__func__), "of": _identity(value.__self__)}
 
-    # Other objects, of which a digest tells one content from another.
-    name = f"{type(value).__module__}.{type(value).__qualname__}"
-    if isinstance(value, np.ndarray) and value.dtype.hasobject:  # whose bytes are addresses
-        content = json.dumps(identity([value.shape, value.ravel().tolist()], within)).encode()
-    elif isinstance(value, np.ndarray):
-        content = f"{value.dtype} {value.shape}".encode() + value.tobytes()
-    elif _is_table(value):
-        content = value.to_csv(lineterminator="\n").encode()
-    elif callable(value) and hasattr(value, "__dict__"):
-        content = json.dumps(identity([type(value), vars(value)], within)).encode()
-    elif is_dataclass(value):
-        parts = {each.name: getattr(value, each.name) for each in fields(value)}
-        content = json.dumps(identity(parts, within)).encode()
-    else:
-        return name
-    return f"{name} {blake2b(content, digest_size=8).hexdigest()}"
-
-
-def _is_table(value: Any) -> bool:
-    """Whether this is one of pandas, which need not be imported to tell."""
-    return hasattr(value, "to_csv")
-
-
-def _package(value: Any) -> str:
-    return (value.__module__ or "").partition(".")[0]
-
-
-def _absorb(value: Any, package: str, digest, seen: set) -> None:
-    """Add to a digest a function or class, and what it uses of its own package."""
-    if value in seen:  # functions may call each other
-        return
-    seen.add(value)
-    digest.update(f"{value.__module__}.{value.__qualname__}\n".encode())
-    if isinstance(value, type):  # its own source is not to be had where it stands in a notebook
-        used = list(value.__bases__)
-        for name, each in vars(value).items():
-            if isinstance(each, FunctionType) or not name.startswith("__"):
-                used.append(getattr(each, "__func__", getattr(each, "fget", each)))
-    else:
-        tree = _tree(value)
-        source = _bytecode(value.__code__) if tree is None else ast.unparse(tree)
-        digest.update(f"{source}\n".encode())
-        used = _used(value, tree)
-    for each in used:
-        if not isinstance(each, FunctionType):  # a cached one, whose cache encloses it
-            each = inspect.unwrap(each) if callable(each) else each
-        if isinstance(each, (FunctionType, type)):
-            if _package(each) == package:
-                _absorb(each, package, digest, seen)
-        elif isinstance(each, HELD) or is_dataclass(each) or _is_table(each):
-            digest.update(json.dumps(identity(each, frozenset(seen))).encode())
-
-
-def _used(function: FunctionType, tree: Any) -> list[Any]:
-    """What a function encloses, its defaults, and the values that it names.
-
-    Of modules of its package, these are the values that it may take from them.
-    """
-    used = [cell.cell_contents for cell in function.__closure__ or ()]
-    defaults = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
-    if tree is not None:  # a default that is written out stands in the source already
-        written = [*tree.args.defaults, *filter(None, tree.args.kw_defaults)]
-        defaults = [
-            value for value, node in zip(defaults, written, strict=True) if not _literal(node)
-        ]
-    used += defaults
-    names = _names(function.__code__)
-    held = [function.__globals__[name] for name in names if name in function.__globals__]
-    for module in [each for each in held if isinstance(each, ModuleType)]:
-        if module.__name__.partition(".")[0] == _package(function):
-            held += [vars(module)[name] for name in names if name in vars(module)]
-    # Paths of modules are left out, because they say where a checkout lies.
-    return used + [each for each in held if not isinstance(each, PurePath)]
-
-
-def _literal(node: ast.AST) -> bool:
+    # With a digest of all else.
+    if isinstance(value, (FunctionType, type)) and not _is_own(value.__module__):
+        return _name(value)
     try:
-        ast.literal_eval(node)
-    except ValueError:
+        return f"{_name(value)} {blake2b(_written(value), digest_size=8).hexdigest()}"
+    except ChangedError:
+        raise
+    except NOT_WRITTEN as error:
+        return _unknown(value, error)
+
+
+def _name(value: Any) -> str:
+    named = value if isinstance(value, (FunctionType, type)) else type(value)
+    return f"{named.__module__}.{named.__qualname__}"
+
+
+def _unknown(value: Any, reason: object) -> str:
+    return f"{_name(value)} {UNKNOWN} ({reason}) {uuid4().hex}"
+
+
+def _written(value: Any) -> bytes:
+    stream = BytesIO()
+    _Writer(stream).dump(value)
+    return stream.getvalue()
+
+
+class _Writer(pickle.Pickler):
+    """Writes a value down, for its digest alone: nothing is ever read back."""
+
+    def __init__(self, stream: BytesIO) -> None:
+        super().__init__(stream, protocol=4)
+        self.fast = True  # equal parts are written alike, whether or not they are one object
+        self._seen: set = set()
+
+    def persistent_id(self, value: Any) -> Any:
+        """What is written in place of a value; its parts are written by this writer, too."""
+        if isinstance(value, (set, frozenset)):
+            return sorted(map(_written, value))
+        if isinstance(value, torch.Tensor):  # which would tell where it lies
+            array = value.detach().cpu().numpy()
+            return f"{array.dtype} {array.shape}", array.tobytes()
+        if hasattr(value, "__wrapped__") and not isinstance(value, (FunctionType, type)):
+            value = unwrap(value)  # of a cached or compiled function
+        if not isinstance(value, (FunctionType, ModuleType, type)):
+            return None
+
+        # Functions and classes may use each other in a circle.
+        module = value.__name__ if isinstance(value, ModuleType) else value.__module__
+        name = f"{module}.{getattr(value, '__qualname__', '')}"
+        if not _is_own(module):
+            package = sys.modules.get(module.partition(".")[0])
+            return f"{name} {getattr(package, '__version__', '')}"
+        if value in self._seen:
+            return name
+        self._seen.add(value)
+        if isinstance(value, ModuleType):
+            used = []
+        elif isinstance(value, type):
+            used = [*value.__bases__, *_members(value)]
+        else:
+            used = [_code_of(value), *_used(value)]
+        return name, _files(module), used
+
+
+def _is_own(module: str) -> bool:
+    """Whether a module is the caller's, and neither of Python, of a library nor of ``unload``."""
+    package = module.partition(".")[0]
+    if module == "__main__":  # which may be a library that runs the caller's code
+        return True
+    if package == "unload" or package in sys.stdlib_module_names:
         return False
-    return True
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return not (file and LIBRARIES & {*Path(file).parts})
+
+
+def _members(kind: type) -> list[Any]:
+    """The functions of a class, and the values that it holds."""
+    return [
+        getattr(each, "__func__", getattr(each, "fget", each))
+        for name, each in vars(kind).items()
+        if isinstance(each, FunctionType) or not name.startswith(("__", "_abc_"))
+    ]
+
+
+def _code_of(function: FunctionType) -> str:
+    """The code of a function, "" if its file says it; an error if the file says another."""
+    code, loader = function.__code__, function.__globals__.get("__loader__")
+    file = Path(code.co_filename)
+    named = type(loader) is SourceFileLoader and function.__module__ != "__main__"
+    if not named or not file.is_file():  # typed at a prompt or in a notebook, or made by ``exec``
+        return _bytecode(code)
+    if code not in _read(file, file.stat().st_mtime_ns)[2]:
+        raise ChangedError(
+            f"{file} was changed after {function.__qualname__} was imported from it; expected the "
+            "same file. Start Python again"
+        )
+    return ""
+
+
+def _bytecode(code: CodeType) -> str:
+    constants = []
+    for each in code.co_consts:
+        if isinstance(each, frozenset):  # whose order is another one in each process
+            each = sorted(map(repr, each))
+        constants.append(_bytecode(each) if isinstance(each, CodeType) else repr(each))
+    return f"{code.co_code!r} {code.co_names} {constants}"
+
+
+def _used(function: FunctionType) -> list[Any]:
+    """What a function encloses, its defaults, and the values of the names that it uses."""
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    names = _names(function.__code__)
+    used = [function.__globals__[name] for name in names if name in function.__globals__]
+    for module in [each for each in used if isinstance(each, ModuleType)]:
+        if _is_own(module.__name__):
+            used += [vars(module)[name] for name in names if name in vars(module)]
+    # Paths of modules are left out, because they say where a checkout lies.
+    values = [each for each in used if not isinstance(each, PurePath)]
+    return [*cells, function.__defaults__, function.__kwdefaults__, *values]
 
 
 def _names(code: CodeType) -> list[str]:
     """The names in a function's code, in their order, those of functions within it included."""
     within = [_names(each) for each in code.co_consts if isinstance(each, CodeType)]
-    return [*code.co_names, *chain.from_iterable(within)]
+    return [*code.co_names, *sum(within, [])]
 
 
-def _tree(function: FunctionType) -> ast.AST | None:
-    """The syntax of a function without docstrings; None where there is no source."""
+def _files(module: str) -> list[tuple[str, str]]:
+    """Digests of the files of a module and of all that it imports, as long as they are own."""
+    found: dict[str, str] = {}
+    asked, wanted = set(), [module]
+    while wanted:
+        name = wanted.pop()
+        if name in asked or name == "__main__" or not _is_own(name):
+            continue
+        asked.add(name)
+        spec = _spec(name)
+        if spec is None or not spec.has_location or LIBRARIES & {*Path(spec.origin).parts}:
+            continue
+        file = Path(spec.origin)
+        if file.suffix == ".py":
+            found[name], imported, _ = _read(file, file.stat().st_mtime_ns)
+            package = name if spec.submodule_search_locations else name.rpartition(".")[0]
+            near = [each for each in imported if package or not each.startswith(".")]
+            wanted += [resolve_name(each, package) for each in near]
+    return sorted(found.items())
+
+
+def _spec(name: str) -> Any:
+    """The place of a module, loaded or not; None of what is none."""
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function.__code__)))
-    except (OSError, TypeError, SyntaxError):  # typed at a prompt, or a part of a statement
+        return getattr(sys.modules.get(name), "__spec__", None) or find_spec(name)
+    except (ImportError, ValueError):
         return None
-    if function.__name__ == "<lambda>":
-        found = [node for node in ast.walk(tree) if isinstance(node, ast.Lambda)]
-        return found[0] if len(found) == 1 else None
+
+
+@cache
+def _read(file: Path, changed: int) -> tuple[str, list[str], set[CodeType]]:
+    """Of a file, as it is at a time: digest of its code, what it imports, its functions' codes."""
+    content = file.read_bytes()
+    tree, imported = ast.parse(content, file), []
     for node in ast.walk(tree):
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and ast.get_docstring(node):
-            node.body = node.body[1:] or [ast.Pass()]
-    # What ``exec`` has made may share the name of its file with another text.
-    names = [node.name for node in tree.body if isinstance(node, ast.FunctionDef)]
-    return tree.body[0] if names == [function.__code__.co_name] else None
+        if isinstance(node, ast.Import):
+            imported += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = "." * node.level + (node.module or "")
+            joined = base if base.endswith(".") else f"{base}."
+            imported += [base, *(joined + alias.name for alias in node.names)]
+        body = getattr(node, "body", None)
+        if isinstance(body, list):  # without docstrings
+            body[:] = [each for each in body if not _is_text(each)]
+    digest = blake2b(ast.dump(tree).encode(), digest_size=8).hexdigest()
+
+    codes, todo = set(), [compile(content, file, "exec", dont_inherit=True)]
+    while todo:
+        codes.add(code := todo.pop())
+        todo += [each for each in code.co_consts if isinstance(each, CodeType)]
+    return digest, imported, codes
 
 
-def _bytecode(code: CodeType) -> str:
-    constants = [_bytecode(c) if isinstance(c, CodeType) else repr(c) for c in code.co_consts]
-    return f"{code.co_code!r} {code.co_names} {constants}"
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)

@@ -4,16 +4,13 @@ This is the version to read first. ``unload.fast.learner`` does the same for the
 network on a CPU, a few hundred times faster; a test holds the two equal.
 """
 
-from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from typing import Any, TypeVar
 
 import numpy as np
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-Each = TypeVar("Each")
 # Rows of a batch per backward pass, because what a pass stores then stays in the cache.
 ROWS_PER_PASS = 64
 
@@ -30,6 +27,21 @@ class PlainLearner:
     def __init__(self, network: torch.nn.Module, learning_rate: float, beta: float) -> None:
         self.network, self.beta = network, beta
         self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
+        self._start_moments(learning_rate)
+
+    @torch.no_grad()
+    def _start_moments(self, learning_rate: float) -> None:
+        """Let Adam have its moments before the first step: by one that changes nothing."""
+        for weight in self.network.parameters():
+            weight.grad = torch.zeros_like(weight)
+        try:
+            self.optimizer.step()
+        except RuntimeError as error:  # its step is too long for the weights' precision
+            wanted = "expected one that PyTorch's Adam can take"
+            raise ValueError(f"learning_rate is {learning_rate}; {wanted} ({error})") from error
+        for moments in self.optimizer.state.values():
+            moments["step"].zero_()
+        self.optimizer.zero_grad()
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         """Return the allowed action of the highest value, (batch,) int64."""
@@ -66,33 +78,6 @@ class PlainLearner:
             raise FloatingPointError(f"the loss is {total}; expected a finite number")
         self.optimizer.step()
         return total
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Return copies of Adam's moments, by parameter number and name."""
-        moments = self.optimizer.state_dict()["state"]
-        return {name: value.numpy().copy() for name, value in flat(moments).items()}
-
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned."""
-        moments = {
-            int(number): {key: torch.from_numpy(np.array(array)) for key, array in each.items()}
-            for number, each in grouped(arrays).items()
-        }
-        self.optimizer.load_state_dict({**self.optimizer.state_dict(), "state": moments})
-
-
-def flat(groups: Mapping[Any, Mapping[str, Each]]) -> dict[str, Each]:
-    """What stands in groups, by ``<group>.<name>``, as a file of arrays holds it."""
-    return {f"{group}.{name}": each for group in groups for name, each in groups[group].items()}
-
-
-def grouped(arrays: Mapping[str, Each]) -> dict[str, dict[str, Each]]:
-    """The groups of ``flat``, by name; one that is missing is empty."""
-    groups: dict[str, dict[str, Each]] = defaultdict(dict)
-    for name, array in arrays.items():
-        group, _, rest = name.partition(".")
-        groups[group][rest] = array
-    return groups
 
 
 @torch.no_grad()

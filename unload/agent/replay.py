@@ -7,24 +7,6 @@ from unload.agent.config import TrainConfig
 from unload.support import checks
 
 
-def shuffle_places(
-    observations: np.ndarray, rng: np.random.Generator, present: np.ndarray | None = None
-) -> np.ndarray:
-    """Permute the places (x, y) of each observation (batch, items, 3) among its items.
-
-    Heights stay. ``present`` (batch, items) bool, all if None, says which rows, the first ones,
-    hold an item; the others stay, too.
-    """
-    keys = rng.random(observations.shape[:2])
-    if present is not None:
-        # Rows without an item stay behind the others, in their order.
-        keys = np.where(present, keys, 1 + np.arange(keys.shape[1]))
-    order = keys.argsort(axis=1)
-    shuffled = observations.copy()
-    shuffled[..., :2] = observations[np.arange(len(order))[:, np.newaxis], order, :2]
-    return shuffled
-
-
 class ReplayBuffer:
     """The last ``size`` picks, in arrays.
 
@@ -82,20 +64,6 @@ class ReplayBuffer:
         for name, array in self.arrays.items():
             array[slots] = batch[name]
         self.total += count
-
-    def state(self) -> dict[str, np.ndarray]:
-        """Return what ``load_state`` needs to go on from here: views of the slots in use."""
-        filled = {name: array[: len(self)] for name, array in self.arrays.items()}
-        return filled | {"total": np.array(self.total)}
-
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        """Go on from what ``state`` returned; arrays that are full are kept, not copied."""
-        self.total = int(arrays["total"])
-        for name, array in self.arrays.items():
-            if len(self) == self.size:
-                self.arrays[name] = arrays[name]
-            else:
-                array[: len(self)] = arrays[name]
 
     def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
         """Draw slots of picks that were added, uniformly, with replacement, (batch_size,) int64."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from unload.agent.config import TrainConfig
 from unload.agent.policies import choosable
-from unload.agent.replay import shuffle_places
 
 
 class Rollout:
@@ -71,13 +70,9 @@ class Rollout:
             What a ``ReplayBuffer`` holds of the picks, with the environment's ``rewards``; and
             how far each item was lifted, (num_envs,) float64 in m, NaN in a task without lifts.
         """
-        stored = self.observations
-        if self._config.shuffle_places:
-            # By the pick's number, so that a resumed run draws the same permutation.
-            rng = np.random.default_rng((self._config.seed, self.picks))
-            stored = shuffle_places(stored, rng, self._present)
+        seen = self.observations
         following, rewards, terminations, truncations, infos = self.envs.step(actions)
-        picks = {"observations": stored, "actions": actions, "rewards": rewards}
+        picks = {"observations": seen, "actions": actions, "rewards": rewards}
 
         # Where an episode has ended, what its last pick has led to stands apart from the reset's.
         ended, last = terminations | truncations, infos.get("final_info", {})
@@ -97,11 +92,6 @@ class Rollout:
         self.steps += 1
         self._see(following, infos)
         return picks, distances
-
-    def resume(self, steps: int, arrays: dict[str, np.ndarray]) -> None:
-        """Go on after so many steps, where the environments' ``state`` was ``arrays``."""
-        self.steps = steps
-        self._see(*self.envs.load_state(arrays))
 
     def close(self) -> None:
         """Free the environments."""

@@ -8,7 +8,6 @@ They are registered without Gymnasium's ``max_episode_steps``, which would wrap 
 episode there, whatever their own ``max_picks`` is.
 """
 
-import json
 import sys
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
@@ -125,7 +124,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
 
     Raises:
         TypeError, ValueError: an argument, a seed or actions are not as described.
-        gymnasium.error.ResetNeeded: ``step`` or ``state`` before ``reset``, or after a call
+        gymnasium.error.ResetNeeded: ``step`` before ``reset``, or after a call
             that raised an error half-way; ``step`` where an episode has ended, if ``DISABLED``.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
@@ -245,33 +244,6 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         self._check_started()
         return self._infos()["action_mask"].astype(bool)
 
-    def state(self) -> dict[str, np.ndarray]:
-        """Return copies of the arrays that ``load_state`` needs to go on from here."""
-        self._check_started()
-        generators = np.array([json.dumps(rng.bit_generator.state) for rng in self._rngs])
-        arrays = {name: array.copy() for name, array in self._arrays().items()}
-        return arrays | {"generators": generators, "picks": self._picks.copy()}
-
-    def load_state(self, arrays: dict[str, np.ndarray]):
-        """Go on from what ``state`` returned, here or elsewhere; the arrays are kept, not copied.
-
-        Returns:
-            Observations and infos, as ``reset`` does.
-
-        Raises:
-            KeyError, TypeError, ValueError: ``arrays`` are something else.
-        """
-        self._check_open()
-        with AllOrReset(self):
-            rest = dict(arrays)
-            self._rngs = [np.random.default_rng() for _ in range(self.num_envs)]
-            for rng, state in zip(self._rngs, rest.pop("generators"), strict=True):
-                rng.bit_generator.state = json.loads(str(state))
-            self._picks = rest.pop("picks")
-            self._hold(rest)
-        self._state = "running"
-        return self._copy_observations(), _flagged(self._infos(), np.ones(self.num_envs, bool))
-
     def _begin(self, where: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
         """Begin an episode in some environments, (num_envs,) bool, by the generators of all."""
         with AllOrReset(self):
@@ -310,14 +282,6 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
     @abstractmethod
     def _infos(self) -> dict[str, np.ndarray]:
         """The infos of ``reset`` and ``step``, without Gymnasium's flags."""
-
-    @abstractmethod
-    def _arrays(self) -> dict[str, np.ndarray]:
-        """What a subclass holds of its episodes, by name."""
-
-    @abstractmethod
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        """Replace what ``_arrays`` returns."""
 
 
 def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.ndarray]:

@@ -65,12 +65,6 @@ class HighestItemVectorEnv(PickingVectorEnv):
         shape = (self.num_envs, task.N_VISIBLE)
         return {name: np.ones(shape, np.int8) for name in ("action_mask", "item_mask")}
 
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return {"observations": self._observations, "highest": self._highest}
-
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        self._observations, self._highest = arrays["observations"], arrays["highest"]
-
 
 class HighestItemEnv(PickingEnv):
     """Choose the item with the highest z among random ones on the grid of a load.

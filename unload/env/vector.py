@@ -147,9 +147,3 @@ class ContainerVectorEnv(PickingVectorEnv):
             "item_mask": (self._containers.visible >= 0).view(np.int8),
             "unloaded": self._containers.unloaded.copy(),
         }
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        return self._containers._asdict()
-
-    def _hold(self, arrays: dict[str, np.ndarray]) -> None:
-        self._containers = containers.Containers(**arrays)

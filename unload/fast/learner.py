@@ -52,13 +52,6 @@ class FusedLearner:
         corrections = [1 - beta**self.steps for beta in _BETAS]
         _step(self._rows, gradients, self.moments, self.learning_rate, *corrections)
 
-    def state(self) -> dict[str, np.ndarray]:
-        return {"steps": np.array(self.steps), "moments": self.moments.copy()}
-
-    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
-        self.steps = int(arrays["steps"])
-        self.moments[:] = arrays["moments"]
-
 
 @compiled
 def _step(weights, gradients, moments, learning_rate, correction, correction2):

@@ -1,4 +1,5 @@
-"""Networks that give one value per item: the paper's, and more expressive ones.
+"""The network that gives one value per item, and what makes, keeps and reads networks.
 
-Read ``peq`` (Fig. 7), then ``variants``; ``weights`` is their file.
+Read ``peq`` (Fig. 7), then ``factory``, which makes one of a configuration; ``weights`` is their
+file.
 """

@@ -22,15 +22,11 @@ class ScoringNetwork(nn.Module):
     def reset_parameters(self, generator: torch.Generator | None = None) -> None:
         """Draw the weights and biases from U(±1/√inputs), as ``nn.Linear`` does."""
         for module in self.modules():
-            if isinstance(module, nn.Linear):
-                weights = (module.weight, module.bias)
-            elif isinstance(module, nn.MultiheadAttention):
-                weights = (module.in_proj_weight, module.in_proj_bias)
-            else:  # layer normalizations begin as ones and zeros: there is nothing to draw
-                continue
-            bound = weights[0].shape[1] ** -0.5
-            for weight in weights:
-                nn.init.uniform_(weight, -bound, bound, generator=generator)
+            weights = list(module.parameters(recurse=False))
+            if weights and weights[0].ndim == 2:  # normalizations begin as ones and zeros
+                bound = weights[0].shape[1] ** -0.5
+                for weight in weights:
+                    nn.init.uniform_(weight, -bound, bound, generator=generator)
 
     def forward(
         self, observations: torch.Tensor, present: torch.Tensor | None = None

@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+import warnings
 import weakref
 from collections.abc import Callable
 from contextlib import closing, suppress
@@ -13,9 +14,10 @@ from unload.physics.situation import Situation
 from unload.support.compiled import CONFIG
 
 # Not those of ``multiprocessing``, which would run the script that the user has started once more.
-# Ctrl-C is for the process that asks.
+# Ctrl-C is for the process that asks. Modules are found where this process finds them, but none in
+# the working directory before Python's own.
 _COMMAND = (
-    "from signal import *; signal(SIGINT, SIG_IGN); "
+    "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); sys.path[:] = sys.argv[1:]; "
     "from unload.physics.pool import serve; serve({!r})"
 )
 _MOST = 8  # each takes 100 MB, and a step has few new lifts
@@ -25,27 +27,37 @@ class Pool:
     """Processes that are started when they are first asked: one for each core, with this one.
 
     These are as many as numba takes threads, which the environment's ``NUMBA_NUM_THREADS`` sets,
-    but at most ``_MOST``. They end with the pool, or with this process, however that ends.
-    ``engine`` simulates, see ``LocalPhysics``.
+    but at most ``_MOST``. They end with the pool, or with this process, however that ends. A
+    process that was forked starts its own. Where one was killed, for want of memory, say, the pool
+    warns, and this process does without from then on. ``engine`` simulates, see ``LocalPhysics``.
     """
 
     def __init__(self, engine: str | None = None) -> None:
         self._command = _COMMAND.format(engine)
+        self._alone = False
+        self._own_workers()
+
+    def _own_workers(self) -> None:
+        self._process = os.getpid()
         self._workers: list[subprocess.Popen] = []
-        self.close = weakref.finalize(self, _end, self._workers)
+        self.close = weakref.finalize(self, _end, self._workers, self._process)
 
     def simulate(
         self, situations: list[Situation], simulate: Callable[[Situation], float]
     ) -> list[float]:
         """Return how far each chosen box moves, in m; ``simulate`` is for this process's share."""
-        count, distances = min(CONFIG.NUMBA_NUM_THREADS, _MOST), [0.0] * len(situations)
+        if self._process != os.getpid():  # those of the process that was forked are not ours
+            self.close()
+            self._own_workers()
+        count = 1 if self._alone else min(CONFIG.NUMBA_NUM_THREADS, _MOST)
+        distances = [0.0] * len(situations)
         try:
             while len(self._workers) < count - 1:
+                paths = [*filter(None, sys.path), os.getcwd()]
                 process = subprocess.Popen(
-                    [sys.executable, "-c", self._command],
+                    [sys.executable, "-I", "-c", self._command, *paths],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
-                    env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
                 )
                 self._workers.append(process)
             # Dealt one by one, because those of one container may take longer than others.
@@ -56,16 +68,24 @@ class Pool:
             for number, worker in enumerate(self._workers, 1):
                 distances[number::count] = pickle.load(worker.stdout)
             return distances
-        except BaseException as error:
-            _end(self._workers)  # an answer that nobody has read would be taken for the next one
-            if isinstance(error, (EOFError, OSError)):
-                raise RuntimeError("a process that simulates lifts has died") from error
+        except (EOFError, OSError, pickle.UnpicklingError):
+            self._alone = True
+            _end(self._workers, self._process)
+            warnings.warn("a process that simulates lifts has died; this one does it", stacklevel=2)
+            return [simulate(each) for each in situations]
+        except BaseException:
+            # An answer that nobody has read would be taken for the next one.
+            _end(self._workers, self._process)
             raise
 
 
-def _end(workers: list[subprocess.Popen]) -> None:
+def _end(workers: list[subprocess.Popen], owner: int) -> None:
+    """End processes; a fork of their owner only forgets them."""
     while workers:
         worker = workers.pop()
+        if os.getpid() != owner:
+            worker.returncode = 0
+            continue
         worker.kill()
         with suppress(BrokenPipeError), worker:
             pass

@@ -57,9 +57,9 @@ def path(name: str, value: object) -> Path:
 
 
 def file(name: str, value: object) -> Path:
-    """Return ``value`` as the Path of a file, which may be missing, but no folder and not empty."""
+    """Return ``value`` as the Path of a file, which may be missing, but no folder or pipe."""
     named = path(name, value)
-    if named.is_dir():  # as the empty path is: the working directory
+    if named.exists() and not named.is_file():  # the empty path is the working directory
         raise ValueError(f"{name} is {str(value)!r}; expected the name of a file")
     return named
 

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
+from glob import escape
 from hashlib import blake2b, file_digest
 from importlib import resources
 from pathlib import Path
@@ -22,9 +23,15 @@ from uuid import uuid4
 import numpy as np
 from filelock import FileLock, Timeout
 
+try:
+    import fcntl
+except ImportError:  # on Windows, which lets nobody remove a file that is open
+    fcntl = None  # type: ignore[assignment]
+
 LOGGER = logging.getLogger(__name__)
 PATIENCE = 5.0  # s
 HELD = 1.0  # s for which a spreadsheet or a virus scanner may hold a file open
+FRESH = 1.0  # s, a file that is younger may not be locked by its writer yet
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 
 
@@ -33,13 +40,16 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
 
     Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
     processes may write one file: the last to finish wins. A killed writer leaves its partial
-    file behind, which nothing reads and git ignores.
+    file behind, which nothing reads and git ignores, and which the next writer removes.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    remove_partial(path)
     partial = path.with_name(f"{path.name}.{uuid4().hex}.partial")
     try:
-        with open(partial, "xb") as file:
+        with open(partial, "x+b") as file:
+            with suppress(OSError):  # some file systems have no locks
+                _lock(file)
             write(file)
             file.flush()
             os.fsync(file.fileno())
@@ -51,6 +61,23 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
         raise OSError(error.errno, reason, str(path)) from error
     finally:
         partial.unlink(missing_ok=True)  # of a write that failed
+
+
+def remove_partial(path: Path) -> None:
+    """Remove what killed writers of a file have left beside it; a living one locks its own."""
+    for partial in path.parent.glob(f"{escape(path.name)}.{'[0-9a-f]' * 32}.partial"):
+        with suppress(OSError), open(partial, "rb") as file:
+            if time.time() - os.fstat(file.fileno()).st_mtime > FRESH:
+                _lock(file)
+                if fcntl is None:
+                    file.close()
+                partial.unlink()
+
+
+def _lock(file: BinaryIO) -> None:
+    """Lock an open file until it is closed; OSError if another process has done so."""
+    if fcntl is not None:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _replace(partial: Path, path: Path) -> None:
@@ -105,34 +132,64 @@ def read_json(path: str | Path, checked: bool = False) -> dict:
 
 def _digest_of(value: object) -> str:
     """Digest of a value as JSON writes it."""
-    return blake2b(json.dumps(value).encode(), digest_size=16).hexdigest()
+    return _hash(json.dumps(value).encode()).hexdigest()
 
 
-def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
-    """Write an ``.npz`` file of plain arrays (nothing pickled)."""
-    write_atomically(path, lambda file: np.savez(file, allow_pickle=False, **arrays))
+def _hash(content: bytes = b"") -> blake2b:
+    return blake2b(content, digest_size=16)
 
 
-def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays."""
-    try:
-        # NumPy leaves a damaged file open that it has opened itself.
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-    except FileNotFoundError:
-        raise
-    except Exception as error:  # zipfile, zlib, tokenize and NumPy each raise errors of their own
-        raise ValueError(f"{path} is not a readable .npz file: {error}") from error
+def write_arrays(path: str | Path, arrays: dict[str, np.ndarray], checked: bool = False) -> None:
+    """Write an ``.npz`` file of plain arrays (nothing pickled).
+
+    If ``checked``, a digest of all its bytes follows them, by which ``read_arrays`` notices
+    changes. The format has checksums of its own, but none of what says how much is to be read.
+    """
+
+    def write(file: BinaryIO) -> None:
+        np.savez(file, allow_pickle=False, **arrays)
+        if checked:
+            file.seek(0)
+            content = _hash()
+            while part := file.read(2**20):
+                content.update(part)
+            file.write(content.digest())
+
+    write_atomically(path, write)
+
+
+def read_arrays(path: str | Path, checked: bool = False) -> dict[str, np.ndarray]:
+    """Read an ``.npz`` file of plain arrays, of which nothing is read before it is ``checked``."""
+    # Opened here, because NumPy leaves a damaged file open that it has opened itself.
+    with open(path, "rb") as file:
+        if checked:
+            _check_end(path, file)
+        try:
+            with np.load(file, allow_pickle=False) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+        except Exception as error:  # zipfile, zlib, tokenize and NumPy have errors of their own
+            raise ValueError(f"{path} is not a readable .npz file: {error}") from error
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):
             raise ValueError(f"{path} is not a readable .npz file: {name} is not an array")
     return arrays
 
 
+def _check_end(path: str | Path, file: BinaryIO) -> None:
+    """Raise ValueError unless a file ends with the digest of the bytes before; go to its start."""
+    content = _hash()
+    left = os.fstat(file.fileno()).st_size - content.digest_size
+    while left > 0 and (part := file.read(min(left, 2**20))):
+        content.update(part)
+        left -= len(part)
+    _check_equal(path, file.read().hex(), content.hexdigest())
+    file.seek(0)
+
+
 def digest(path: str | Path) -> str:
     """Digest of a file's bytes: BLAKE2b, 32 hexadecimal digits."""
     with open(path, "rb") as file:
-        return file_digest(file, lambda: blake2b(digest_size=16)).hexdigest()
+        return file_digest(file, _hash).hexdigest()
 
 
 def check_digest(path: str | Path, wanted: str) -> None:

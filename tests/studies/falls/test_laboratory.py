@@ -13,6 +13,7 @@ from studies import changes, paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
+from studies.networks import NETWORKS
 from studies.paper.training import PAPER
 from studies.results import read_provenance, read_table
 from unload import evaluate, policies
@@ -20,7 +21,6 @@ from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
-from unload.network.variants import NETWORKS
 
 
 @pytest.mark.slow

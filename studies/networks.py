@@ -1,18 +1,15 @@
 """Networks more expressive than the paper's (Sec. V-A, "Network architecture").
 
 Their input and output are those of ``PEQNetwork``. They are permutation-equivariant, too: the
-same weights serve every item, so permuting the items permutes the values.
+same weights serve every item, so permuting the items permutes the values. They have no compiled
+twin, and take padded rows for items in training.
 """
-
-from collections.abc import Callable
-from copy import deepcopy
 
 import torch
 from torch import nn
 from torch.nn.functional import linear
 
-from unload.network.peq import PEQNetwork, ScoringNetwork, pooled
-from unload.support import checks
+from unload.network.peq import ScoringNetwork, pooled
 
 HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 features
 
@@ -90,50 +87,11 @@ class AttentionNetwork(ScoringNetwork):
         return self.norm(own)
 
 
-NETWORKS = {  # by their names in TrainConfig
-    "peq": PEQNetwork,
+NETWORKS = {  # by their names in published settings
     "two_layer": TwoLayerScorer,
     "stack": EquivariantStack,
     "attention": AttentionNetwork,
 }
-
-
-def make_network(
-    network: str | Callable, n_features: int, generator: torch.Generator | None = None
-) -> nn.Module:
-    """Make a network in float32 on the CPU, whatever PyTorch's defaults are.
-
-    Args:
-        network: a name in ``NETWORKS``, or a function ``(n_features, generator)`` that returns a
-            module whose arguments and values are those of ``PEQNetwork.forward``.
-        n_features, generator: as of ``PEQNetwork``.
-
-    Raises:
-        TypeError: the function returns no module, or one with weights of another dtype.
-        ValueError: its module returns other than a value per item.
-    """
-    default = torch.get_default_dtype()
-    torch.set_default_dtype(torch.float32)
-    try:
-        with torch.device("cpu"):
-            make = NETWORKS[network] if isinstance(network, str) else network
-            made = make(n_features, generator)
-            _check(made)
-            return made
-    finally:
-        torch.set_default_dtype(default)
-
-
-@torch.no_grad()
-def _check(network: object) -> None:
-    """Raise unless this is a network that can be trained and saved, before hours are spent."""
-    made = checks.instance("what network returned", network, nn.Module, "a torch.nn.Module")
-    for name, value in made.state_dict().items():
-        if value.dtype != torch.float32:
-            raise TypeError(f"network has {name} of dtype {value.dtype}; expected torch.float32")
-    # A copy, because a module may count its calls.
-    values = deepcopy(made).eval()(torch.zeros(2, 3, 3), torch.ones(2, 3, dtype=torch.bool))
-    checks.shaped("what network returned", values, (2, 3), torch.float32)
 
 
 def linear_with_context(layer: nn.Linear, own: torch.Tensor, context: torch.Tensor) -> torch.Tensor:

@@ -1,19 +1,19 @@
+"""The paper's network. What holds for every ``kind`` is tested of those of the studies, too."""
+
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 import torch
 
-from tests.agent.runs import HeightNetwork
-from unload import AttentionNetwork, EquivariantStack, PEQNetwork, TwoLayerScorer
-from unload.network.variants import NETWORKS, make_network
+from unload import PEQNetwork
 
 ITEMS = torch.zeros(2, 4, 3)
 
 
-@pytest.fixture(params=NETWORKS.values())
-def kind(request) -> type:
-    return request.param
+@pytest.fixture
+def kind() -> type:
+    return PEQNetwork
 
 
 @pytest.fixture
@@ -68,38 +68,6 @@ def test_permuting_the_items_permutes_the_values(kind, items, rng):
     values = network(batch)
     assert values.shape == (4, 128) and values.std(dim=1).min() > 1e-3
     torch.testing.assert_close(network(batch[:, order]), values[:, order], atol=1e-6, rtol=0)
-
-
-def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):
-    """Written out as in Sec. III-G: global features beside each item's own."""
-    network, batch = make(TwoLayerScorer), items(3, 9)
-    own = torch.relu(network.extractor(batch))
-    pooled = torch.cat([own.amin(dim=1), own.amax(dim=1), own.mean(dim=1)], dim=1)
-    enhanced = torch.cat([own, pooled[:, None].expand(-1, 9, -1)], dim=2)
-    values = torch.tanh(network.scorer(torch.relu(network.hidden(enhanced)))).squeeze(2)
-    torch.testing.assert_close(network(batch), values)
-
-
-def test_the_stack_is_three_layers_on_own_features_and_maxima(items):
-    network, own = make(EquivariantStack), items(3, 9)
-    values = network(own)
-    for layer in network.layers:
-        maxima = own.amax(dim=1)[:, None].expand_as(own)
-        own = torch.relu(layer(torch.cat([own, maxima], dim=2)))
-    assert len(network.layers) == 3
-    torch.testing.assert_close(values, torch.tanh(network.scorer(own)).squeeze(2))
-
-
-def test_the_attention_network_is_two_blocks_with_normalization_first(items):
-    network, batch = make(AttentionNetwork), items(3, 9)
-    own = network.extractor(batch)
-    for block in network.blocks:
-        normed = block.norm1(own)
-        own = own + block.self_attn(normed, normed, normed)[0]
-        own = own + block.linear2(torch.relu(block.linear1(block.norm2(own))))
-    values = torch.tanh(network.scorer(network.norm(own))).squeeze(2)
-    assert len(network.blocks) == 2
-    torch.testing.assert_close(network(batch), values)
 
 
 def test_the_generator_alone_decides_the_weights(kind):
@@ -177,27 +145,3 @@ def test_bad_numbers_of_features_are_refused(kind):
     for number, error in ((0, ValueError), (1.5, TypeError)):
         with pytest.raises(error, match=f"n_features is {number}"):
             kind(number)
-    with pytest.raises(ValueError, match="n_features is 5; expected a multiple of 2"):
-        AttentionNetwork(5)
-
-
-def test_a_network_is_in_single_precision_whatever_pytorchs_default_is():
-    torch.set_default_dtype(torch.float64)
-    try:
-        assert make_network("peq", 4).extractor.weight.dtype == torch.float32
-        assert torch.get_default_dtype() == torch.float64
-    finally:
-        torch.set_default_dtype(torch.float32)
-
-
-@pytest.mark.parametrize(
-    ("returned", "error", "message"),
-    [
-        (None, TypeError, "what network returned is None; expected a torch.nn.Module"),
-        (HeightNetwork().double(), TypeError, "weight of dtype torch.float64; expected torch.floa"),
-        (HeightNetwork(torch.ones(2, 1, 1)), ValueError, r"\(2, 2, 3\); expected \(2, 3\)"),
-    ],
-)
-def test_a_network_of_ones_own_that_cannot_be_trained_is_refused(returned, error, message):
-    with pytest.raises(error, match=message):
-        make_network(lambda n_features, generator: returned, 4)

@@ -1,0 +1,90 @@
+"""Networks more expressive than the paper's; what holds for that one holds for them, too."""
+
+import numpy as np
+import pytest
+import torch
+
+from studies.networks import NETWORKS, AttentionNetwork, EquivariantStack, TwoLayerScorer
+from tests.agent.runs import CONTAINER, assert_same, interrupt_run
+from tests.network.test_peq import (  # noqa: F401
+    make,
+    test_bad_arguments_are_refused,
+    test_bad_numbers_of_features_are_refused,
+    test_permuting_the_items_permutes_the_values,
+    test_the_generator_alone_decides_the_weights,
+    test_values_and_gradients_are_finite_where_there_is_no_item,
+    test_weights_are_drawn_from_plus_minus_one_over_root_inputs,
+    test_what_absent_rows_hold_has_no_influence,
+)
+from unload import Greedy, TrainConfig, load_policy, train
+from unload.agent.learner import highest_values
+from unload.task import PADDING
+
+
+@pytest.fixture(params=NETWORKS.values())
+def kind(request) -> type:
+    return request.param
+
+
+@pytest.fixture
+def items(rng):
+    """``items(batch, count)``: random observations."""
+    return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
+
+
+def test_their_runs_go_on_and_their_policies_come_back(kind, tmp_path):
+    config = TrainConfig(**CONTAINER | {"network": kind})
+    train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "broken", 17)
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")
+    loaded = load_policy(tmp_path / "broken" / "policy.safetensors", kind(4))
+    assert type(loaded.network) is kind
+
+
+def test_rows_without_an_item_have_no_part_in_the_choice(kind, rng):
+    network, observations = make(kind, seed=2), rng.uniform(-1, 1, (40, 25, 3)).astype(np.float32)
+    masks = np.ones((len(observations), 25))
+    full = Greedy(network, equalize=False)(observations, masks, rng)
+    few = network(torch.from_numpy(observations[:, :4])).argmax(dim=1).numpy()
+    observations[:, 4:], masks[:, 4:] = PADDING, 0
+    assert (Greedy(network, equalize=False)(observations, masks, rng) == few).all()
+    with_padding = highest_values(network, observations, masks.astype(bool))
+    assert (with_padding != few).any() and (full != few).any()
+
+
+def test_the_two_layer_scorer_is_the_papers_network_with_a_hidden_layer(items):
+    """Written out as in Sec. III-G: global features beside each item's own."""
+    network, batch = make(TwoLayerScorer), items(3, 9)
+    own = torch.relu(network.extractor(batch))
+    pooled = torch.cat([own.amin(dim=1), own.amax(dim=1), own.mean(dim=1)], dim=1)
+    enhanced = torch.cat([own, pooled[:, None].expand(-1, 9, -1)], dim=2)
+    values = torch.tanh(network.scorer(torch.relu(network.hidden(enhanced)))).squeeze(2)
+    torch.testing.assert_close(network(batch), values)
+
+
+def test_the_stack_is_three_layers_on_own_features_and_maxima(items):
+    network, own = make(EquivariantStack), items(3, 9)
+    values = network(own)
+    for layer in network.layers:
+        maxima = own.amax(dim=1)[:, None].expand_as(own)
+        own = torch.relu(layer(torch.cat([own, maxima], dim=2)))
+    assert len(network.layers) == 3
+    torch.testing.assert_close(values, torch.tanh(network.scorer(own)).squeeze(2))
+
+
+def test_the_attention_network_is_two_blocks_with_normalization_first(items):
+    network, batch = make(AttentionNetwork), items(3, 9)
+    own = network.extractor(batch)
+    for block in network.blocks:
+        normed = block.norm1(own)
+        own = own + block.self_attn(normed, normed, normed)[0]
+        own = own + block.linear2(torch.relu(block.linear1(block.norm2(own))))
+    values = torch.tanh(network.scorer(network.norm(own))).squeeze(2)
+    assert len(network.blocks) == 2
+    torch.testing.assert_close(network(batch), values)
+
+
+def test_an_odd_number_of_features_has_no_two_heads():
+    with pytest.raises(ValueError, match="n_features is 5; expected a multiple of 2"):
+        AttentionNetwork(5)

@@ -1,0 +1,59 @@
+"""The learning curve of a training run."""
+
+import time
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
+
+
+class Point(NamedTuple):
+    """A point of the learning curve, see ``TrainResult``."""
+
+    picks: int
+    mean_reward: float
+    success_rate: float
+    deadlocked: float
+    loss: float
+    epsilon: float
+    wall_time: float
+
+
+class Curve:
+    """The learning curve: points over every ``log_interval`` steps, and the sums since the last.
+
+    Attributes:
+        points: so far.
+        sums: since the last point, by the names in ``SUMS``.
+    """
+
+    def __init__(self) -> None:
+        self.points: list[Point] = []
+        self.sums = dict.fromkeys(SUMS, 0.0)
+
+    def add(self, rewards: np.ndarray, deadlocked: np.ndarray, losses: Iterable[float]) -> None:
+        """Count the picks of one step, (num_envs,) arrays, and the losses of its updates."""
+        sums = self.sums
+        sums["picks"] += len(rewards)
+        sums["rewards"] += rewards.sum()
+        sums["deadlocked"] += deadlocked.sum()
+        for loss in losses:
+            sums["losses"] += loss
+            sums["updates"] += 1
+
+    def end_point(self, picks: int, epsilon: float) -> None:
+        """Add the point of the steps since the last one, after ``picks`` picks in all."""
+        sums = self.sums
+        reward, deadlocked = sums["rewards"] / sums["picks"], sums["deadlocked"] / sums["picks"]
+        loss = sums["losses"] / sums["updates"] if sums["updates"] else float("nan")
+        self.points.append(
+            Point(picks, reward, (reward + 1) / 2, deadlocked, loss, epsilon, time.time())
+        )
+        self.sums = dict.fromkeys(SUMS, 0.0)
+
+    def table(self) -> pd.DataFrame:
+        """Return one row per point."""
+        return pd.DataFrame(self.points, columns=Point._fields)

@@ -1,0 +1,171 @@
+"""The state of a training run as named arrays: gathered, and put back, by one walk.
+
+The walk goes through the attributes of a ``Training`` and of its parts. Arrays, weights,
+generators and numbers are state; functions, words and all else are not, because whoever makes the
+run again makes them again.
+"""
+
+import json
+from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+
+from unload import task
+from unload.agent.curve import Curve, Point
+from unload.agent.dqn import DQN
+from unload.agent.learner import PlainLearner
+from unload.agent.replay import ReplayBuffer
+from unload.agent.rollout import Rollout
+from unload.env.base import PickingVectorEnv
+from unload.fast.containers import Containers, allocate
+from unload.fast.learner import FusedLearner
+from unload.support import checks
+
+LEAVES = (np.ndarray, torch.Tensor, np.random.Generator, Containers)
+PARTS = (DQN, FusedLearner, PlainLearner, ReplayBuffer, Rollout, Curve, PickingVectorEnv)
+GROUPS = (torch.nn.Module, torch.optim.Optimizer, dict, list)
+# The numbers that change; all others follow from the run's configuration.
+COUNTS = ("agent.learner.steps", "replay.total", "rollout.steps", "curve.")
+REPLAY = "replay.arrays."
+
+
+class Place(NamedTuple):
+    """Where a part of the state stands: ``value`` is the attribute or entry ``key`` of ``owner``.
+
+    Its name is made of the attributes that lead to it.
+    """
+
+    name: str
+    owner: Any
+    key: Any
+    value: Any
+
+
+def places(owner: Any) -> list[Place]:
+    """What an object and its parts hold of the state."""
+    return [*_walk(owner, "", set())]
+
+
+def _walk(owner: Any, prefix: str, seen: set[int]) -> Iterator[Place]:
+    seen.add(id(owner))  # parts share others, such as the network
+    for key, value in _entries(owner):
+        name = f"{prefix}{key}"
+        if isinstance(value, LEAVES) or _is_plain(value):
+            yield Place(name, owner, key, value)
+        elif isinstance(value, (*PARTS, *GROUPS)) and id(value) not in seen:
+            yield from _walk(value, f"{name}.", seen)
+
+
+def _entries(owner: Any) -> Iterable[tuple[Any, Any]]:
+    if isinstance(owner, torch.nn.Module):
+        return owner.state_dict().items()
+    if isinstance(owner, torch.optim.Optimizer):  # by the number of a parameter
+        return enumerate(owner.state.values())
+    if isinstance(owner, list):
+        return enumerate(owner)
+    return (owner if isinstance(owner, dict) else vars(owner)).items()
+
+
+def _is_plain(value: Any, depth: int = 2) -> bool:
+    """Whether this is a number, or a list of numbers or of points, as JSON can hold them."""
+    if depth and isinstance(value, (list, tuple)):
+        return all(_is_plain(each, depth - 1) for each in value)
+    return isinstance(value, (bool, int, float))
+
+
+def gather(run: Any) -> dict[str, np.ndarray]:
+    """Return the state of a ``Training`` by name; the arrays are its own, not copies.
+
+    All that is no array stands in ``numbers``, as JSON. Of the replay memory, what is filled.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    numbers: dict[str, Any] = {}
+    for name, _, _, value in run.places():
+        if isinstance(value, Containers):
+            arrays |= {f"{name}.{field}": array for field, array in value._asdict().items()}
+        elif isinstance(value, np.ndarray):
+            arrays[name] = value[: len(run.replay)] if name.startswith(REPLAY) else value
+        elif isinstance(value, torch.Tensor):
+            arrays[name] = value.numpy()
+        elif isinstance(value, np.random.Generator):
+            numbers[name] = value.bit_generator.state
+        else:
+            numbers[name] = value
+    return arrays | {"numbers": np.array(json.dumps(numbers))}
+
+
+@torch.no_grad()
+def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
+    """Let a fresh ``Training`` of the same settings go on from what ``gather`` returned.
+
+    Raises:
+        KeyError, TypeError, ValueError: what is stored is not of such a run; it is of no use then.
+    """
+    stored: dict[str, Any] = dict(arrays)
+    stored |= json.loads(str(stored.pop("numbers")))
+    filled = min(checks.integer("replay.total", stored["replay.total"], 0), run.replay.size)
+    for name, owner, key, value in run.places():
+        if isinstance(value, Containers):
+            parts = {field: stored.pop(f"{name}.{field}") for field in value._fields}
+            new: Any = _checked_containers(Containers(**parts), len(value.left))
+        elif isinstance(value, (np.ndarray, torch.Tensor)):
+            new = stored.pop(name)
+            whole: np.ndarray = np.asarray(value)
+            shape = (filled, *whole.shape[1:]) if name.startswith(REPLAY) else whole.shape
+            checks.shaped(name, new, shape, whole.dtype)
+            if isinstance(value, torch.Tensor):  # whose memory others share
+                value.copy_(torch.from_numpy(new))
+                continue
+            if shape != whole.shape:
+                whole[:filled] = new
+                continue
+        elif isinstance(value, np.random.Generator):
+            value.bit_generator.state = stored.pop(name)
+            continue
+        else:
+            new = stored.pop(name)
+            same = new == value or name.startswith(COUNTS)
+            if not (same and _is_plain(new) and isinstance(new, type(value))):
+                raise ValueError(f"{name} is {new!r}; expected {value!r}")
+        if isinstance(owner, (dict, list)):
+            owner[key] = new
+        else:
+            setattr(owner, key, new)
+    if stored:
+        raise ValueError(f"it holds {', '.join(stored)}; expected nothing of the kind")
+    _check(run)
+
+
+def _check(run: Any) -> None:
+    """Raise ValueError unless the counts of a run agree, and its actions are rows."""
+    config, steps, envs = run.config, run.rollout.steps, run.rollout.envs.unwrapped
+    run.curve.points = [Point(*each) for each in run.curve.points]
+    last = config.picks // config.num_envs
+    checks.integer("rollout.steps", steps, 0, last)
+    ends = [*range(config.log_interval, steps + 1, config.log_interval)]
+    if steps == last and steps % config.log_interval:
+        ends.append(steps)
+    if [point.picks for point in run.curve.points] != [step * config.num_envs for step in ends]:
+        raise ValueError(f"the curve has other points than a run has after {steps} steps")
+    checks.integer_array("picks", envs._picks, None, config.max_picks)
+    actions = run.replay.arrays["actions"][: len(run.replay)]
+    checks.integer_array("actions", actions, None, task.N_VISIBLE - 1)
+    run.agent.check_finite()
+
+
+def _checked_containers(found: Containers, num_envs: int) -> Containers:
+    """Containers, after a check that compiled code stays within their arrays."""
+    room, links = found.present.shape[1], found.links.shape[1]
+    for name, array, like in zip(found._fields, found, allocate(num_envs, room, links)):
+        checks.shaped(name, array, like.shape, like.dtype)
+    highest = {
+        "starts": links, "links": room - 1, "by_distance": room - 1, "ranks": task.N_VISIBLE - 1,
+        "left": room, "unloaded": room, "masks": 1,
+    }  # fmt: skip
+    for name, most in highest.items():
+        checks.integer_array(name, getattr(found, name), None, most)
+    checks.integer_array("visible", found.visible + 1, None, room)
+    checks.integer_array("items", found.left + found.unloaded, None, room)
+    return found
