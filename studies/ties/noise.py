@@ -19,6 +19,7 @@ from unload.env.observation import POSITION_NOISE
 # Standard deviation of the offsets on each axis in scaled coordinates. Ranks depend on their
 # order alone, as long as they are small beside the 3.5 cm between the places of the paper's loads.
 SPREAD = 2 * POSITION_NOISE / task.CONTAINER
+MOST_ITEMS = 1100  # for which the environments make room, where a load has up to 1,000
 LEVELS = ((2 * np.arange(task.N_VISIBLE) - task.N_VISIBLE + 1) / (task.N_VISIBLE - 1)).astype("f4")
 
 
@@ -30,7 +31,8 @@ class DriftingTies:
         correlation: ρ of the offsets along x, y and z from one pick to the next.
 
     Attributes:
-        offsets: (num_envs, items, 3) float32, of each item in units of ``SPREAD``.
+        offsets: (num_envs, ``MOST_ITEMS``, 3) float32, of each item in units of ``SPREAD``; a part
+            of the run's state.
 
     Raises:
         ValueError: the run's own noise would be added.
@@ -46,7 +48,11 @@ class DriftingTies:
         self._run = run
         self._kept = np.asarray(correlation, np.float32)
         self._drawn = np.sqrt(1 - self._kept**2)
-        self.offsets = np.zeros((config.num_envs, 0, 3), np.float32)
+        run.kept["ties"] = np.zeros((config.num_envs, MOST_ITEMS, 3), np.float32)
+
+    @property
+    def offsets(self) -> np.ndarray:
+        return self._run.kept["ties"]  # another array in a run that goes on
 
     def observations(self) -> np.ndarray:
         """Observe the containers after the offsets have moved on by a pick, float32 in [-1, 1].
@@ -57,8 +63,8 @@ class DriftingTies:
         state = self._run.rollout.envs.unwrapped._containers
         rng = np.random.default_rng((config.seed, step, 0))
         if step % config.max_picks == 0:  # all containers have just been filled
-            items = state.present.shape[1]
-            self.offsets = rng.standard_normal((config.num_envs, items, 3), np.float32)
+            room = state.present.shape[1]
+            self.offsets[:, :room] = rng.standard_normal((config.num_envs, room, 3), np.float32)
         fresh = rng.standard_normal((config.num_envs, task.N_VISIBLE, 3), np.float32)
         positions = np.empty(state.values.shape)
         _move(self.offsets, state.visible, fresh, self._kept, self._drawn, state.values, positions)
@@ -97,7 +103,6 @@ def drifting(run: Training, correlation: Sequence[float]) -> None:
     """
     ties = DriftingTies(run, correlation)
     choose, add = run.agent.choose, run.replay.add
-    state, load_state = run.state, run.load_state
     seen = np.empty(0)
 
     def choose_by_ties(observations: np.ndarray, *rest) -> np.ndarray:
@@ -105,11 +110,5 @@ def drifting(run: Training, correlation: Sequence[float]) -> None:
         seen = ties.observations()
         return choose(seen, *rest)
 
-    def load_ties(arrays: dict[str, np.ndarray]) -> None:
-        ties.offsets = arrays.pop("ties")
-        load_state(arrays)
-
     run.agent.choose = choose_by_ties
     run.replay.add = lambda observations, **rest: add(observations=seen, **rest)
-    run.state = lambda: state() | {"ties": ties.offsets}
-    run.load_state = load_ties

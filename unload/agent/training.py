@@ -62,6 +62,7 @@ class Training:
         replay: the picks that the agent learns from.
         curve: the learning curve so far.
         rng: draws exploration and batches.
+        kept: arrays of its change by name, which are a part of the run's state.
     """
 
     def __init__(
@@ -80,8 +81,10 @@ class Training:
         self.replay = ReplayBuffer.of(config)
         self.curve = Curve()
         self.rollout = Rollout(config, stack)
+        self.kept: dict[str, np.ndarray] = {}
         self._own = {place.name for place in places(self)}
         change(self)
+        self._own |= {f"kept.{name}" for name in self.kept}
         self.places()
 
     def step(self) -> None:
