@@ -1,6 +1,8 @@
 """Cells that need PyBullet, where it is missing."""
 
 import json
+import re
+import symtable
 from types import SimpleNamespace
 
 import pytest
@@ -53,6 +55,30 @@ def test_a_marked_cell_shows_what_is_stored_of_it_and_others_run(transform, caps
 def test_of_a_cell_that_was_changed_nothing_is_stored(transform):
     with pytest.raises(ValueError, match="the cell was changed"):
         exec(transform(stored.MARK + "world = None\n"), {})
+
+
+def names(source: str, made: bool) -> set[str]:
+    """The names that a cell itself, not a function in it, uses or makes; no functions."""
+    code = re.sub(r"^[%!].*", "", source, flags=re.MULTILINE)
+    symbols = symtable.symtable(code, "cell", "exec").get_symbols()
+    return {
+        symbol.get_name()
+        for symbol in symbols
+        if (symbol.is_assigned() and not symbol.is_namespace() if made else symbol.is_referenced())
+    }
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_what_marked_cells_make_is_used_by_marked_cells_only(path):
+    """Functions aside, which nobody calls where they are not defined."""
+    made, others = set(), set()
+    for source in sources(path):
+        if source.startswith(stored.MARK):
+            made |= names(source, made=True)
+        else:
+            used = names(source, made=False) & (made - others) - names(source, made=True)
+            assert not used, f"{sorted(used)} in {source}"
+            others |= names(source, made=True)
 
 
 def test_a_notebook_with_marked_cells_says_so_in_its_first():

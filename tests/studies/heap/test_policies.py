@@ -49,6 +49,7 @@ def test_the_nearest_box_is_the_one_nearest_to_the_camera(cubes):
     assert _nearness(features(heap, np.array([9, 9])))[:2] == pytest.approx(-distances)
 
 
+@pytest.mark.pybullet
 def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):
     env = make_heap_env(max_picks=4)
     episode = play(env, RULES["lowest"], pile, 0)
@@ -61,6 +62,7 @@ def test_an_episode_holds_what_was_seen_and_done(make_heap_env, pile):
     assert np.array_equal(info["item_mask"], episode.observations[2].any(axis=1))
 
 
+@pytest.mark.pybullet
 def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes, monkeypatch):
     """A first physics in which all boxes look alike leaves the choice to the second.
 
@@ -84,6 +86,7 @@ def test_few_pixels_show_no_box_unless_there_are_no_others_and_the_foremost_get_
     assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))
 
 
+@pytest.mark.pybullet
 def test_features_of_upright_cubes(cubes):
     """The last stands half before the one beside it."""
     heap = cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (5.5, 1.2, 0))

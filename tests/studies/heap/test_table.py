@@ -36,6 +36,7 @@ def test_the_best_rule_depends_on_the_weight_of_falls():
     assert players[4.0, "best rule"] == {"rule": "shy"}
 
 
+@pytest.mark.pybullet
 def test_all_policies_play_the_same_heaps_and_are_kept(own_data, monkeypatch, pile):
     small = [pile, pile.only(np.arange(8))]
     for name, value in {
@@ -99,6 +100,7 @@ def test_data_of_heaps_are_those_that_are_read():
     assert played.tolist() == list(study.candidates())
 
 
+@pytest.mark.pybullet
 def test_a_published_episode_is_played_again():
     """The learned policy at λ = 1 on the smallest heap."""
     place = paths.DATA / "heap"
@@ -145,6 +147,7 @@ def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):
     assert made["more", "train"][0] != made["more", "test"][0]
 
 
+@pytest.mark.pybullet
 def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pile):
     for name, value in {
         "stored_heaps": lambda split: [pile, pile.only(np.arange(8))],
