@@ -177,7 +177,7 @@ function savePicture() {
   const picture = make("canvas", {});
   const names = ["with x, y and height", "with height only"];
   const rates = names.map((name, i) => [name, run.rates[i > 0].success_rate]);
-  const lines = ["Hide x and y", "The same weights, and nothing was", "trained: a preferred side outweighed", "what they know of height."];
+  const lines = ["Hide x and y", "The same weights, and nothing", "was trained: a preferred side", "had outweighed the height."];
   poster(picture, canvas, lines, rates);
   make("a", { href: picture.toDataURL(), download: "hide_x_and_y.png" }).click();
 }
@@ -245,11 +245,14 @@ element("reset").onclick = () => set(toText(config), true);
 plot.onpointermove = ({ offsetX }) => {
   if (!run) return;
   const end = Math.max(config.picks, run.picks);
-  const at = [run.points, run.frozen].map((points) => pointAt(points, offsetX / plot.clientWidth, end));
-  const says = at.map((point) => point && `${point.picks.toLocaleString("en")} picks: ${percent(point.success_rate)}`);
-  element("readout").textContent = says.filter(Boolean).join("; frozen, ");
+  const share = offsetX / plot.clientWidth;
+  const at = [run.points, run.frozen].map((points) => pointAt(points, share, end));
+  const [rate, frozen] = at.map((point) => point && percent(point.success_rate));
+  const also = frozen ? `, frozen ${frozen}` : "";
+  const says = rate && `${at[0].picks.toLocaleString("en")} picks: ${rate}${also}`;
+  element("readout").textContent = says || "picks";
 };
-plot.onpointerleave = () => (element("readout").textContent = "");
+plot.onpointerleave = () => (element("readout").textContent = "picks");
 canvas.onclick = ({ offsetX, offsetY }) => pick(drawing.boxAt(offsetX, offsetY));
 canvas.onkeydown = (event) => {
   if (!element("mine").checked) return;

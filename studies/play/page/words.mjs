@@ -110,13 +110,13 @@ export function headline(rates) {
 export function blankVerdict({ rates }, config, task) {
   const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
   if (blank === undefined) return "";
-  const without = `With height alone these weights succeed in ${percent(blank)} of fresh picks`;
+  const without = `With height alone these weights succeed in ${percent(blank)} of picks`;
   if (seen === undefined) return `${without}.`;
   const both = `${without}, with x and y in ${percent(seen)}`;
   const good = blank >= task.errs * ceiling(config);
   const [all, part] =
     blank - seen < MISLED
       ? ["no place misleads them", "their mistakes are not those of a place"]
-      : ["they have learned height, but a preferred side outweighed it", "not only a place misled them"];
+      : ["they know height, but a side outweighed it", "not only a place misled them"];
   return `${both}: ${good ? all : part}.`;
 }

@@ -331,12 +331,12 @@ test("what blank coordinates show, and what of it is shared", () => {
   const start = "With height alone these weights succeed in ";
   for (const [seen, blank, line, shared, changes] of [
     [0.96, undefined, "", ""],
-    [undefined, 0.96, `${start}96 % of fresh picks.`, ""],
-    [0.34, 1, `${start}.*in 34 %: they have learned height, but a preferred side outweighed it.`, "34 to 100"],
+    [undefined, 0.96, `${start}96 % of picks.`, ""],
+    [0.34, 1, `${start}.*in 34 %: they know height, but a side outweighed it.`, "34 to 100"],
     [0.34, 0.8, `${start}.*in 34 %: not only a place misled them.`, "34 to 80"],
     [0.34, 0.43, `${start}.*in 34 %: their mistakes are not those of a place.`, ""],
-    [0.99, 1, `${start}100 % of fresh picks, with x and y in 99 %: no place misleads them.`, ""],
-    [0.3, 0.58, `${start}.*: they have learned height, .*`, "30 to 58", { seamless: true }],
+    [0.99, 1, `${start}100 % of picks, with x and y in 99 %: no place misleads them.`, ""],
+    [0.3, 0.58, `${start}.*: they know height, .*`, "30 to 58", { seamless: true }],
   ]) {
     const judged = { rates: {} };
     if (seen) judged.rates.false = { success_rate: seen };
