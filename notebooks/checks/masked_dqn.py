@@ -11,7 +11,7 @@ import torch
 from IPython.display import HTML, display
 
 import unload
-from notebooks.checks import Exercise, call, function, number, text
+from notebooks.checks import Exercise, call, function, number
 from notebooks.solutions import masked_dqn as solution
 from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training
@@ -148,9 +148,4 @@ EXERCISES = {
         "beyond β the loss of the failures has the slope 1, whatever the value",
     ),
     "5": Exercise(number, lambda most: most == 1, "what would have to change to end one?"),
-    "6": Exercise(
-        text,
-        lambda name: name in SETTINGS and "gamma" in SETTINGS[name][0],
-        "what is the maximum multiplied by?",
-    ),
 }

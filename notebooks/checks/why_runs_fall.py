@@ -21,5 +21,4 @@ EXERCISES = {
         lambda share: abs(share - msr(1.5, 0, "average")) < 0.01,
         "all boxes of a wall share x, and now its rank, too",
     ),
-    "3": Exercise(number, lambda n: 6 <= n <= 7, "each generation doubles it: 0.01 · 2ⁿ = 0.8"),
 }
