@@ -28,7 +28,7 @@ HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
-# What a student takes: minutes for a figure or for a cell of more lines, and for an exercise.
+# What a student takes: minutes for a figure or a cell of more lines to read, and for an exercise.
 WORDS_A_MINUTE, FIGURE, EXERCISE, LONG_CELL = 180, 0.5, 2.0, 5
 UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
@@ -60,7 +60,7 @@ def measured(notebook: Path) -> dict[str, float]:
         "long cells": sum(
             len(cell.source.splitlines()) > LONG_CELL
             for cell in code
-            if not UNREAD & set(cell.metadata.get("tags", []))
+            if not UNREAD & set(cell.metadata.get("tags", [])) and "check(" not in cell.source
         ),
         "exercises": len(re.findall(r"\*\*Exercise \d", text))
         + len(re.findall(r"^\d+\. ", text.partition("\n## Exercises\n")[2], re.M)),

@@ -27,12 +27,7 @@ def seldom_succeeds(policy):
     return unload.evaluate(policy, 2, 1, max_picks=100)["success_rate"].mean() < 0.05
 
 
-def items(count):
-    return count == len(unload.build_load(np.full((12, 3, 4), 2)))
-
-
 EXERCISES = {
     "1": Exercise(number, best_weight, "move the slider"),
     "2": Exercise(function, seldom_succeeds, "observations[..., 2] is the height; obey the masks"),
-    "3": Exercise(number, items, "len(load) counts the items of a load"),
 }
