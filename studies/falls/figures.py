@@ -72,14 +72,13 @@ def dug(
     left.set(xlabel="x, depth (m); the entrance is at the right", ylabel="y, across (m)")
     left.set_title("what 300 picks leave, from above")
     left.grid(False)
-    along_x, along_y = THRESHOLDS
-    along_x = MOST_PREFERENCE if ties == "average" else along_x
+    along_x, along_y = (MOST_PREFERENCE if ties == "average" else THRESHOLDS[0]), THRESHOLDS[1]
     right.set_facecolor("#f6d5c9")
     right.add_patch(plt.Rectangle((-along_x, -along_y), 2 * along_x, 2 * along_y, color="white"))
     axis = np.linspace(-MOST_PREFERENCE, MOST_PREFERENCE, len(rules))
     right.contour(axis, axis, rules, [ERRS], colors="black")
-    errs = "errs" if msr < ERRS else "does not err"
-    right.plot(*preferences, "o", color="C1" if msr < ERRS else "C0", ms=12, clip_on=False)
+    errs, colour = ("errs", "C1") if msr < ERRS else ("does not err", "C0")
+    right.plot(*preferences, "o", color=colour, ms=12, clip_on=False)
     right.set(xlabel="preference along x (depth)", ylabel="along y (across)")
     right.set_title(f"MSR {msr:.1%}: it {errs}")
     return figure

@@ -143,21 +143,18 @@ def rules(ties: str, preferences: np.ndarray, containers: int = 4) -> np.ndarray
         (k, k) float64 in [0, 1].
     """
     along_y, along_x = np.meshgrid(preferences, preferences, indexing="ij")
-    weights = np.stack([along_x, along_y, np.ones_like(along_x)], axis=-1).reshape(-1, 1, 3)
-    weights = weights.repeat(containers, axis=0).astype(np.float32)
-    name, count = "unload/Container-v0", len(weights)
-    envs = gymnasium.make_vec(name, num_envs=count, equalize=True, ties=ties)
+    weights = np.stack([along_x, along_y, np.ones_like(along_x)], -1, dtype=np.float32)
+    weights = weights.reshape(-1, 1, 3).repeat(containers, axis=0)
+    envs = gymnasium.make_vec("unload/Container-v0", len(weights), equalize=True, ties=ties)
     observations, infos = envs.reset(seed=0)
-    total = np.zeros(count)
+    successes = np.zeros(len(weights))
     for _ in range(task.MAX_PICKS):
         scores = (observations * weights).sum(axis=2)
-        allowed = infos["action_mask"].astype(bool)
-        actions = np.where(allowed, scores, -np.inf).argmax(axis=1)
+        actions = np.where(infos["action_mask"] == 1, scores, -np.inf).argmax(axis=1)
         observations, rewards, _, _, infos = envs.step(actions)
-        total += rewards > 0
+        successes += rewards > 0
     envs.close()
-    rates = (total / task.MAX_PICKS).reshape(*along_x.shape, containers)
-    return rates.mean(axis=-1)
+    return successes.reshape(*along_x.shape, containers).mean(axis=-1) / task.MAX_PICKS
 
 
 def surface(policy: Policy, picks: int = 300, containers: int = 8) -> np.ndarray:
