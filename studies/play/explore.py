@@ -31,8 +31,8 @@ class Explore(widgets.VBox):
             control.style.description_width = "initial"  # as wide as the text
             if control.has_trait("continuous_update"):
                 control.continuous_update = False  # of a slider: draw when it is let go
-                # Beside its name and its value, 250 pixels of a slider are left.
-                control.layout.width = f"{330 + 7 * len(control.description)}px"
+                name = 7 * len(control.description)  # pixels; its value takes 80
+                control.layout.width = f"{250 + 80 + name}px"
             control.observe(lambda _: self._show(), "value")
         row = widgets.HBox(list(controls.values()), layout={"flex_flow": "row wrap"})
         self._busy = widgets.HTML()

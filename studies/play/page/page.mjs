@@ -177,7 +177,8 @@ function savePicture() {
   const picture = make("canvas", {});
   const names = ["with x, y and height", "with height only"];
   const rates = names.map((name, i) => [name, run.rates[i > 0].success_rate]);
-  const lines = ["Hide x and y", "The same weights, and nothing", "was trained: a preferred side", "had outweighed the height."];
+  const lines = ["Hide x and y", "The same weights, and nothing", "was trained: a preferred side",
+    "had outweighed the height."];
   poster(picture, canvas, lines, rates);
   make("a", { href: picture.toDataURL(), download: "hide_x_and_y.png" }).click();
 }
