@@ -28,8 +28,8 @@ HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
-# What a student takes: minutes for a figure or for a cell of more lines, and for an exercise.
-WORDS_A_MINUTE, FIGURE, EXERCISE, LONG_CELL = 180, 0.5, 2.0, 20
+# What a student takes: minutes for a figure or a cell of more lines to read, and for an exercise.
+WORDS_A_MINUTE, FIGURE, EXERCISE, LONG_CELL = 180, 0.5, 2.0, 5
 UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
@@ -52,19 +52,18 @@ def reduced_parameters(notebook: Path) -> dict:
 def measured(notebook: Path) -> dict[str, float]:
     """Count ``words``, ``figures``, ``long cells``, ``exercises`` and the ``minutes`` they take."""
     cells = nbformat.read(notebook, as_version=4).cells
-    text = [cell.source for cell in cells if cell.cell_type == "markdown"]
+    text = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
     code = [cell for cell in cells if cell.cell_type == "code"]
     counts = {
-        "words": sum(len(source.split()) for source in text),
+        "words": len(text.split()),
         "figures": sum("image/png" in out.get("data", {}) for cell in code for out in cell.outputs),
         "long cells": sum(
             len(cell.source.splitlines()) > LONG_CELL
             for cell in code
-            if not UNREAD & set(cell.metadata.get("tags", []))
+            if not UNREAD & set(cell.metadata.get("tags", [])) and "check(" not in cell.source
         ),
-        "exercises": len(
-            re.findall(r"^\d+\. ", "\n".join(text).partition("\n## Exercises\n")[2], re.M)
-        ),
+        "exercises": len(re.findall(r"\*\*Exercise \d", text))
+        + len(re.findall(r"^\d+\. ", text.partition("\n## Exercises\n")[2], re.M)),
     }
     minutes = counts["words"] / WORDS_A_MINUTE + EXERCISE * counts["exercises"]
     return counts | {"minutes": minutes + FIGURE * (counts["figures"] + counts["long cells"])}

@@ -53,15 +53,16 @@ def four_cells(curves: pd.DataFrame) -> Figure:
 
 @styled
 def dug(
-    surface: np.ndarray, preferences: tuple[float, float], averaged: bool, msr: float
+    surface: np.ndarray, preferences: tuple[float, float], ties: str, msr: float, rules: np.ndarray
 ) -> Figure:
-    """What a rule leaves of the loads, seen from above, and its place in the phase diagram.
+    """What a rule leaves of the loads, seen from above, and its place among all such rules.
 
     Args:
         surface: what ``measures.surface`` returns.
         preferences: of the rule, along x and y.
-        averaged: whether equal coordinates share one rank.
+        ties: see ``unload.equalize``.
         msr: of the rule, in [0, 1].
+        rules: that of the others, see ``measures.rules``.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.6), width_ratios=(1.4, 1))
     length, width, height = task.CONTAINER
@@ -71,12 +72,15 @@ def dug(
     left.set(xlabel="x, depth (m); the entrance is at the right", ylabel="y, across (m)")
     left.set_title("what 300 picks leave, from above")
     left.grid(False)
-    point = dict(zip(("slope_x", "slope_y", "slope_z", "judged_as_is"), (*preferences, 1, msr)))
-    draw_phase(right, pd.DataFrame([point]), averaged)
-    (dot,) = (line for line in right.lines if line.get_xdata().size)
-    dot.set(markersize=12, alpha=1, clip_on=False)
-    errs = "errs" if msr < ERRS else "does not err"
-    right.set(ylabel="|preference| along y (across)", title=f"MSR {msr:.1%}: it {errs}")
+    along_x, along_y = (MOST_PREFERENCE if ties == "average" else THRESHOLDS[0]), THRESHOLDS[1]
+    right.set_facecolor("#f6d5c9")
+    right.add_patch(plt.Rectangle((-along_x, -along_y), 2 * along_x, 2 * along_y, color="white"))
+    axis = np.linspace(-MOST_PREFERENCE, MOST_PREFERENCE, len(rules))
+    right.contour(axis, axis, rules, [ERRS], colors="black")
+    errs, colour = ("errs", "C1") if msr < ERRS else ("does not err", "C0")
+    right.plot(*preferences, "o", color=colour, ms=12, clip_on=False)
+    right.set(xlabel="preference along x (depth)", ylabel="along y (across)")
+    right.set_title(f"MSR {msr:.1%}: it {errs}")
     return figure
 
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
+import gymnasium
 import numpy as np
 import torch
 from torch import nn
 
 from studies.changes import left, without
+from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.greedy import greedy_actions
@@ -127,6 +129,32 @@ def preferring(along_x: float, along_y: float, ties: str = "noise") -> Policy:
         return np.where(masks.astype(bool), scores, -np.inf).argmax(axis=1)
 
     return policy
+
+
+def rules(ties: str, preferences: np.ndarray, containers: int = 4) -> np.ndarray:
+    """MSR of the rules ``preferring``, with the mask, in containers of their own.
+
+    Args:
+        ties: see ``unload.equalize``.
+        preferences: (k,), taken along y, the rows, and along x, the columns.
+        containers: for each rule.
+
+    Returns:
+        (k, k) float64 in [0, 1].
+    """
+    along_y, along_x = np.meshgrid(preferences, preferences, indexing="ij")
+    weights = np.stack([along_x, along_y, np.ones_like(along_x)], -1, dtype=np.float32)
+    weights = weights.reshape(-1, 1, 3).repeat(containers, axis=0)
+    envs = gymnasium.make_vec("unload/Container-v0", len(weights), equalize=True, ties=ties)
+    observations, infos = envs.reset(seed=0)
+    successes = np.zeros(len(weights))
+    for _ in range(task.MAX_PICKS):
+        scores = (observations * weights).sum(axis=2)
+        actions = np.where(infos["action_mask"] == 1, scores, -np.inf).argmax(axis=1)
+        observations, rewards, _, _, infos = envs.step(actions)
+        successes += rewards > 0
+    envs.close()
+    return successes.reshape(*along_x.shape, containers).mean(axis=-1) / task.MAX_PICKS
 
 
 def surface(policy: Policy, picks: int = 300, containers: int = 8) -> np.ndarray:

@@ -1,10 +1,8 @@
 """The drawing of a container whose boxes can be clicked, as a Jupyter widget.
 
-It is an anywidget with 250 lines of JavaScript beside it, and not plotly's ``FigureWidget``
-(an anywidget, too), because that takes the press of a button for a click, so that whoever turns
-the container picks boxes; because it sends 5 MB of JavaScript for each figure; and because each
-pick sends the colours of all triangles and draws with WebGL. Here a pick is a message of a
-kilobyte.
+It is not plotly's ``FigureWidget``, because that takes the press of a button for a click, so that
+whoever turns the container picks boxes; because it sends 5 MB of JavaScript for each figure; and
+because each pick sends the colours of all triangles. Here a pick is a message of a kilobyte.
 """
 
 from collections.abc import Mapping

@@ -31,18 +31,22 @@ class Explore(widgets.VBox):
             control.style.description_width = "initial"  # as wide as the text
             if control.has_trait("continuous_update"):
                 control.continuous_update = False  # of a slider: draw when it is let go
+                name = 7 * len(control.description)  # pixels; its value takes 80
+                control.layout.width = f"{250 + 80 + name}px"
             control.observe(lambda _: self._show(), "value")
         row = widgets.HBox(list(controls.values()), layout={"flex_flow": "row wrap"})
-        super().__init__([row, self.picture])
+        self._busy = widgets.HTML()
+        super().__init__([row, self._busy, self.picture])
         self._show()
 
     def _show(self) -> None:
+        self._busy.value = "computing …"
         values = {name: control.value for name, control in self._controls.items()}
         figure, content = self._draw(**values), io.BytesIO()
         with plt.style.context(STYLE):
             figure.savefig(content, dpi="figure", format="png", metadata={"Software": None})
         plt.close(figure)  # so that no notebook shows it once more
-        self.picture.value = content.getvalue()
+        self.picture.value, self._busy.value = content.getvalue(), ""
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
         """The widget, and what is shown of it where no kernel runs."""

@@ -261,7 +261,8 @@ def play_moves(page: Page, pictures: Path) -> Iterator[str]:
     score, canvas = output.locator("[data-picks]"), output.locator("canvas")
     before, pixels = score.text_content(), shot(canvas)
     output.locator(".jupyter-widgets.widget-play button").first.click()
-    if not wait_until(lambda: int(score.get_attribute("data-picks")) >= 110):
+    # The deadlock begins at pick 128.
+    if not wait_until(lambda: int(score.get_attribute("data-picks")) >= 150):
         yield f"00: play does not move; the score is {score.text_content()!r}, was {before!r}"
         return
     shot(output, pictures / "deadlock.png")

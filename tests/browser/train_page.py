@@ -92,19 +92,43 @@ def five_steps(page: Page, stem: Path) -> Iterator[str]:
     click(page, 0.28)
     yield from ends("unload", "Unloaded: .* 1 of your 1 picks")
     page.click(button("positions"))
-    yield from ends("positions", r"It learned: 100 % of its last picks succeeded, after \d")
+    yield from ends(
+        "positions", r"It learned: 100 % of its picks in fresh containers succeed, after \d"
+    )
     page.click(button("paper"))
-    yield from ends("paper", "It (fell, from|did not|learned)")
+    yield from ends("paper", "It (fell: best after|did not|learned)")
     frozen = weights(page)
     page.click(button("blank"))
-    yield from ends("blank", r"With z alone .* in \d+ % .* with x and y in \d+ %: ")
+    yield from ends("blank", r"With height alone .* in \d+ % .* with x and y in \d+ %: ")
     if weights(page) != frozen:
         yield "blank coordinates change the weights"
     both = [page.text_content(f"#rate-{blank}") for blank in ("true", "false")]
     if re.findall(r"\d+ %", page.text_content("#verdict")) != both:
         yield f"the verdict {page.text_content('#verdict')!r} is not of {both}"
+    last = page.evaluate("Math.round(100 * run.frozen.at(-1).success_rate)")
+    if f"{last} %" != both[1]:
+        yield f"the curve of the frozen weights ends at {last} %; judged are {both[1]}"
+    yield from shared(page, both, Path(f"{stem}-shared.png"))
     page.click(button("shuffled"))
     yield from ends("shuffled", "It (learned|did not fall): ")
+
+
+def shared(page: Page, rates: list[str], picture: Path) -> Iterator[str]:
+    """Yield whether the words, the link and the picture to share are not of these rates."""
+    blank, seen = (int(rate.removesuffix(" %")) for rate in rates)
+    if page.is_visible("#found") != (blank - seen >= 10):
+        yield f"of {rates} the page offers {page.text_content('#found')!r}"
+    if not page.is_visible("#found"):
+        return
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    page.click("#copy")
+    until(page, lambda: page.text_content("#copy") == "Copied")
+    text = page.evaluate("navigator.clipboard.readText()")
+    if f"from {seen} to {blank} %" not in text or "equalize=true" not in text:
+        yield f"copied is {text!r}"
+    with page.expect_download() as download:
+        page.click("#save")
+    download.value.save_as(picture)
 
 
 def fits(page: Page, size: str) -> Iterator[str]:
@@ -221,7 +245,7 @@ def controls(page: Page) -> Iterator[str]:
         yield "the phase diagram shades no region for ranks"
     box = page.locator("#plot").bounding_box()
     page.mouse.move(box["x"] + box["width"] * 0.99, box["y"] + 20)
-    if not re.fullmatch(r"3\d,\d+ picks: 100 %", page.text_content("#readout")):
+    if not re.fullmatch(r"32,000 picks: 100 %, frozen 100 %", page.text_content("#readout")):
         yield f"at its end the curve says {page.text_content('#readout')!r}"
     before = page.evaluate("tiles[0].toDataURL()")
     page.select_option("#axis", "0")

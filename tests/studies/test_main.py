@@ -1,4 +1,4 @@
-"""The command line, the files it has made in ``data/``, and exercises."""
+"""The command line, and the files it has made in ``data/``."""
 
 import runpy
 import sys
@@ -9,7 +9,6 @@ import pytest
 
 from studies import __main__ as command
 from studies import paths
-from studies.exercise import check
 from studies.paper import visible_items
 from studies.results import read_provenance
 from unload.support import files
@@ -102,14 +101,3 @@ def test_committed_data_is_written_again_byte_for_byte(own_data):
         path = f"obs_hist_equal/{name}.csv"
         assert (own_data / path).read_bytes() == (paths.ROOT / "data" / path).read_bytes()
     assert read_provenance("obs_hist_equal/observation")["settings"] == {"seed": 0}
-
-
-@pytest.mark.parametrize(
-    ("answer", "said"), [(4, "right"), (None, "not yet"), (5, "not yet: 5 is not right; again")]
-)
-def test_an_answer_is_awaited_right_or_wrong_and_stops_a_solution(answer, said, capsys):
-    check("Exercise 1", answer, lambda value: value == 4, "again")
-    assert capsys.readouterr().out == f"Exercise 1: {said}\n"
-    if said != "right":
-        with pytest.raises(AssertionError, match=f"Exercise 1: {said}"):
-            check("Exercise 1", answer, lambda value: value == 4, "again", strict=True)

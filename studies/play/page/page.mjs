@@ -103,7 +103,7 @@ function verdict() {
 
 function render() {
   if (!run) return; // a report will come
-  const { parameters, picks, points, rates, running } = run;
+  const { frozen, parameters, picks, points, rates, running } = run;
   network.parameters.set(parameters);
   if (rates.true) done.add("blank");
   showSteps();
@@ -114,7 +114,8 @@ function render() {
     const rate = rates[blank];
     element(`rate-${blank}`).textContent = rate ? percent(rate.success_rate) : "";
   }
-  showCurve(points, Math.max(config.picks, picks));
+  showCurve({ success_rate: points, frozen }, Math.max(config.picks, picks));
+  showFound(rates);
   showPreferences(points);
   showMaps();
   element("jams").hidden = !config.seamless;
@@ -141,14 +142,45 @@ function showContainer() {
   drawing.draw(container, new Map(places), own ? chosen : -1);
 }
 
-function showCurve(points, end) {
-  for (const name of ["success_rate", "epsilon"]) {
-    element(name).setAttribute("points", line(points, name, end));
+function showCurve(curves, end) {
+  element("epsilon").setAttribute("points", line(curves.success_rate, "epsilon", end));
+  for (const [name, points] of Object.entries(curves)) {
+    element(name).setAttribute("points", line(points, "success_rate", end));
   }
-  const last = points.at(-1);
-  element("rate").textContent = last ? percent(last.success_rate) : "";
+  const last = ([point]) => (point ? percent(point.success_rate) : "");
+  element("rate").textContent = last(curves.success_rate.slice(-1));
+  element("frozen-rate").textContent = last(curves.frozen.slice(-1));
   element("end").textContent = end.toLocaleString("en");
   element("ceiling").setAttribute("d", `M0 ${100 - 100 * ceiling(config)}H100`);
+}
+
+/** Offer what hiding x and y has shown, as words with a link and as a picture. */
+function showFound(rates) {
+  const [found, said] = [element("found"), headline(rates)];
+  if (found.hidden !== !said) element("copy").textContent = "Copy link";
+  found.hidden = !said;
+  found.firstChild.textContent = said;
+}
+
+async function copyLink() {
+  const link = `${location.href.split("#")[0]}#${toText({ ...config, blank: false })}`;
+  const text = `${headline(run.rates)} ${link}`;
+  try {
+    await navigator.clipboard.writeText(text);
+    element("copy").textContent = "Copied";
+  } catch {
+    prompt("Your browser lets no page copy. Copy this:", text);
+  }
+}
+
+function savePicture() {
+  const picture = make("canvas", {});
+  const names = ["with x, y and height", "with height only"];
+  const rates = names.map((name, i) => [name, run.rates[i > 0].success_rate]);
+  const lines = ["Hide x and y", "The same weights, and nothing", "was trained: a preferred side",
+    "had outweighed the height."];
+  poster(picture, canvas, lines, rates);
+  make("a", { href: picture.toDataURL(), download: "hide_x_and_y.png" }).click();
 }
 
 function showPreferences(points) {
@@ -208,15 +240,20 @@ form.onsubmit = (event) => event.preventDefault(); // Enter in a field applies i
 steps.onclick = presets.onclick = ({ target }) => target.value && begin(target.value);
 element("train").onclick = () => watch(run?.running ? "pause" : "train");
 element("step").onclick = () => watch("step");
+element("copy").onclick = copyLink;
+element("save").onclick = savePicture;
 element("reset").onclick = () => set(toText(config), true);
 plot.onpointermove = ({ offsetX }) => {
   if (!run) return;
   const end = Math.max(config.picks, run.picks);
-  const at = pointAt(run.points, offsetX / plot.clientWidth, end);
-  const says = at && `${at.picks.toLocaleString("en")} picks: ${percent(at.success_rate)}`;
-  element("readout").textContent = says || "";
+  const share = offsetX / plot.clientWidth;
+  const at = [run.points, run.frozen].map((points) => pointAt(points, share, end));
+  const [rate, frozen] = at.map((point) => point && percent(point.success_rate));
+  const also = frozen ? `, frozen ${frozen}` : "";
+  const says = rate && `${at[0].picks.toLocaleString("en")} picks: ${rate}${also}`;
+  element("readout").textContent = says || "picks";
 };
-plot.onpointerleave = () => (element("readout").textContent = "");
+plot.onpointerleave = () => (element("readout").textContent = "picks");
 canvas.onclick = ({ offsetX, offsetY }) => pick(drawing.boxAt(offsetX, offsetY));
 canvas.onkeydown = (event) => {
   if (!element("mine").checked) return;

@@ -67,6 +67,30 @@ export function pixels(map, largest) {
   return Uint8ClampedArray.from([...map].flatMap(pixel));
 }
 
+/** Draw what is shared: a picture of a container, what was found, and both rates as bars. */
+export function poster(picture, container, [title, ...lines], rates) {
+  Object.assign(picture, { width: 1200, height: 630 });
+  const pen = picture.getContext("2d");
+  const write = (text, size, x, y, colour = "#1c2126") => {
+    pen.font = `600 ${size}px system-ui, sans-serif`;
+    pen.fillStyle = colour;
+    pen.fillText(text, x, y);
+  };
+  pen.fillStyle = "#f6f6f3";
+  pen.fillRect(0, 0, 1200, 630);
+  pen.drawImage(container, 30, 25, 512, 580);
+  write(title, 64, 580, 110);
+  lines.forEach((line, i) => write(line, 30, 580, 165 + 44 * i));
+  rates.forEach(([name, rate], i) => {
+    const [x, y, colour] = [580, 330 + 140 * i, `rgb(${COLOURS[1 - i]})`];
+    write(`${name}: ${Math.round(100 * rate)} %`, 32, x, y, colour);
+    pen.globalAlpha = 0.2;
+    pen.fillRect(x, y + 16, 580, 44);
+    pen.globalAlpha = 1;
+    pen.fillRect(x, y + 16, 580 * rate, 44);
+  });
+}
+
 /** Fill a canvas with a map, a pixel for each value. */
 export function paint(canvas, map, largest) {
   const side = (canvas.width = canvas.height = Math.sqrt(map.length));

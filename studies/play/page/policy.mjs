@@ -31,8 +31,12 @@ export function judge(network, config, task) {
     const generator = new Generator(number);
     const container = new Container(stackLoad(generator, task), task, generator);
     container.show(config);
+    let seen, scores; // a failed pick leaves what is seen
     for (let failed = -1; container.picks < task.max_picks; ) {
-      const scores = compared(network, container.observation, config);
+      if (seen !== container.observation) {
+        seen = container.observation;
+        scores = compared(network, seen, config);
+      }
       const item = container.visible[highest(scores, container, config)];
       if (item === failed) repeated++;
       const success = container.pick(item);

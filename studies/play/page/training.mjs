@@ -2,29 +2,38 @@
 
 import { Container, Generator, stackLoad } from "./container.mjs";
 import { Adam, PEQNetwork } from "./network.mjs";
-import { compared, highest, slopes } from "./policy.mjs";
+import { compared, highest, judge, slopes } from "./policy.mjs";
 
 export const N_FEATURES = 16;
 const REPLAY_SIZE = 2 ** 15; // picks
-const POINTS = 60; // of the curve of a run
+const POINTS = 50; // of the curve of a run
+const JUDGED = 100; // steps after which the weights are judged
 
 export class Training {
   /** A run of a config, see state.mjs, in containers of the exported numbers `task`. */
   constructor(config, task) {
     Object.assign(this, { config, task, picks: 0, memory: [], points: [] });
     this.latest = []; // rewards since the last point of the curve
+    this.frozen = []; // judgements of the weights, each with the picks before it
     const generators = [0, 1, 2].map((part) => new Generator(3 * config.seed + part));
     [this.loads, this.choices] = generators;
     this.network = new PEQNetwork(N_FEATURES, generators[2]);
     this.optimizer = new Adam(this.network);
-    this.fill();
+    this.containers = Array.from({ length: task.num_envs }, (_, i) => this.fill(i / task.num_envs));
   }
 
-  /** Fill all containers anew. */
-  fill() {
-    const full = () => new Container(stackLoad(this.loads, this.task), this.task, this.loads);
-    this.containers = Array.from({ length: this.task.num_envs }, full);
-    this.change(this.config);
+  /**
+   * A full container, or one that has had a share of its picks, at random: as the containers of a
+   * run are of different ages from the first step, no point of the curve shows full ones alone.
+   */
+  fill(age = 0) {
+    const { config, loads, task } = this;
+    const container = new Container(stackLoad(loads, task), task, loads);
+    container.show(config);
+    while (container.picks + 1 <= age * task.max_picks) {
+      container.pick(container.visible[loads.integer(container.visible.length)]);
+    }
+    return container;
   }
 
   /** Go on with other settings. */
@@ -41,7 +50,8 @@ export class Training {
   /** Pick once in every container, and learn from the picks before. */
   step() {
     const { choices, config, epsilon, memory, network } = this;
-    if (this.containers[0].picks === this.task.max_picks) this.fill();
+    const last = (container) => container.picks === this.task.max_picks;
+    this.containers = this.containers.map((each) => (last(each) ? this.fill() : each));
     const picks = this.containers.map((container) => {
       const { observation, visible } = container;
       const explore = choices.uniform() < epsilon;
@@ -61,6 +71,8 @@ export class Training {
       this.latest.push(pick.reward);
     }
     if (this.latest.length >= config.picks / POINTS) this.addPoint();
+    if (this.picks % (JUDGED * picks.length)) return;
+    this.frozen.push({ picks: this.picks, ...judge(network, config, this.task) });
   }
 
   /** Add what was picked since the last point to the curve, if anything was. */

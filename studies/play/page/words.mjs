@@ -23,7 +23,7 @@ export const SENTENCES = {
     "Now it sees, as in the paper, only ranks: " +
     "each box’s number in the order along x, y and z.",
   blank:
-    "Nothing is trained: the same weights choose in fresh containers, with x and y set to 0.",
+    "Nothing is trained: the same weights choose in fresh containers, where they see height alone.",
   shuffled:
     "It learns anew, with shuffled places: in each remembered pick the boxes exchange theirs, " +
     "so that no place can be learned.",
@@ -53,40 +53,38 @@ export function pickVerdict(container, item, success) {
 }
 
 /**
- * What a run did.
+ * What a run did, by what its weights do in fresh containers where nothing is drawn at random.
  *
- * @param {object} run its `points`, see training.mjs, `picks`, and `seconds` of training; whether
- *   it is `running`; its `rates`, see policy.mjs, by whether x and y are blank.
+ * @param {object} run its `points` and judgements `frozen`, see training.mjs, `picks`, and
+ *   `seconds` of training; whether it is `running`.
  * @param {object} config its settings.
  * @param {object} task its numbers `thresholds` and `errs`.
  */
-export function runVerdict({ points, picks, seconds, running, rates }, config, task) {
+export function runVerdict({ points, frozen, picks, seconds, running }, config, task) {
   if (!points.length) return "";
-  const success = points.map((point) => point.success_rate);
-  const latest = percent(success.at(-1));
-  if (running || picks < config.picks) return `${latest} of its latest picks succeeded.`;
-  const last = success.slice(-Math.ceil(success.length / 10));
-  const [top, best, end] = [ceiling(config), Math.max(...success), mean(last)];
-  const judged = rates[config.blank];
+  const [latest, judged] = [points.at(-1), frozen.at(-1)];
+  const rates = frozen.map((each) => each.success_rate);
+  const [top, best, end] = [ceiling(config), Math.max(...rates), rates.at(-1)];
+  if (running || picks < config.picks || !judged) {
+    const fresh = judged ? `; with its weights frozen, ${percent(end)}` : "";
+    return `${percent(latest.success_rate)} of its latest picks succeeded${fresh}.`;
+  }
   const limit = top < 1 ? ` With these jams nothing ends above ${percent(top)}.` : "";
-
   if (end >= task.errs * top) {
     const time = `after ${seconds.toFixed(1)} s`;
-    return `It learned: ${percent(end)} of its last picks succeeded, ${time}.${limit}`;
+    return `It learned: ${percent(end)} of its picks in fresh containers succeed, ${time}.${limit}`;
   }
-  if (judged?.repeated > STUCK) {
+  if (judged.repeated > STUCK) {
     return `It is stuck: ${percent(judged.repeated)} of its picks repeat one that has just failed.`;
   }
-  const why = misled(points.at(-1).slopes, config, task);
+  const why = misled(latest.slopes, config, task);
   if (best - end < FELL * top) {
     const what = end >= ROSE * top ? "It did not fall" : "It did not learn";
     return `${what}: ${percent(end)} at the end, ${percent(best)} at best; it ${why}.${limit}`;
   }
-  const fell = `It fell, from ${percent(best)} to ${percent(end)}`;
-  if (!judged) return `${fell}.`;
-  if (judged.success_rate < task.errs * top) return `${fell}: it ${why}.${limit}`;
-  const fresh = percent(judged.success_rate);
-  return `${fell}, and rose again: its last weights succeed in ${fresh} of fresh picks.`;
+  const early = frozen[rates.indexOf(best)].picks.toLocaleString("en");
+  const fell = `It fell: best after ${early} picks, with ${percent(best)} in fresh containers`;
+  return `${fell}; ${percent(end)} at the end. It ${why}.${limit}`;
 }
 
 /** What a network prefers to height, by its slopes. */
@@ -100,17 +98,25 @@ function misled(slopes, config, task) {
   return `prefers ${SIDES[axis][along[axis] > 0 ? 1 : 0]} to height`;
 }
 
+/** What is shared of rates with x and y and without; empty if hiding them does not help. */
+export function headline(rates) {
+  const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
+  if (!(blank - seen >= MISLED)) return "";
+  const change = `from ${Math.round(100 * seen)} to ${percent(blank)}`;
+  return `Hide x and y: the same weights go ${change}, and nothing was trained.`;
+}
+
 /** What frozen weights do in fresh containers, with x and y and without. */
 export function blankVerdict({ rates }, config, task) {
   const [seen, blank] = [rates.false, rates.true].map((rate) => rate?.success_rate);
   if (blank === undefined) return "";
-  const without = `With z alone these weights succeed in ${percent(blank)} of fresh picks`;
+  const without = `With height alone these weights succeed in ${percent(blank)} of picks`;
   if (seen === undefined) return `${without}.`;
   const both = `${without}, with x and y in ${percent(seen)}`;
   const good = blank >= task.errs * ceiling(config);
   const [all, part] =
     blank - seen < MISLED
       ? ["no place misleads them", "their mistakes are not those of a place"]
-      : ["they know height, but a place outweighed it", "not only a place misled them"];
+      : ["they know height, but a side outweighed it", "not only a place misled them"];
   return `${both}: ${good ? all : part}.`;
 }

@@ -39,9 +39,9 @@ function judgeWeights([blank, ...others]) {
 }
 
 function report() {
-  const { network, points, picks } = training;
+  const { network, points, frozen, picks } = training;
   const { boxes, present, visible, observation, failed } = training.containers[0];
   const container = { boxes, present, visible, observation, failed };
-  const run = { number, points, picks, running: picks < goal, seconds, rates };
+  const run = { number, points, frozen, picks, running: picks < goal, seconds, rates };
   postMessage({ container, parameters: network.parameters, ...run });
 }

@@ -1,0 +1,136 @@
+"""The checks of the exercises, one file a notebook, called by name: ``check("06/1", answer)``.
+
+A file is called as its notebook without the number. Its ``EXERCISES`` say of each exercise which
+kind of answer is wanted, when it is right, and what to look at again; the solutions pass the same.
+"""
+
+import importlib
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+HERE = Path(__file__).parent
+
+
+class Exercise(NamedTuple):
+    """What an exercise wants: a ``kind`` of answer, when it is ``right``, and a ``hint``.
+
+    ``right`` returns whether the answer is right, or says in a sentence what is not.
+    """
+
+    kind: Callable[[Any], Any]
+    right: Callable[[Any], bool | str]
+    hint: str
+
+
+class Missing(Exception):
+    """A function that is to be written has an empty body still."""
+
+
+def check(name: str, answer: object, *, strict: bool = False) -> None:
+    """Print in one line whether the answer to an exercise is right, wrong or still missing.
+
+    A wrong answer does not stop a notebook, nor does one of a wrong kind, or a function that fails.
+
+    Args:
+        name: number of the notebook and of the exercise, such as ``"06/1"``.
+        answer: the reader's; None, or a function without a body, while there is none.
+        strict: raise an AssertionError if it is missing or wrong, as the solutions do.
+
+    Raises:
+        ValueError: there is no such exercise.
+    """
+    said = judged(exercise(name), answer)
+    if strict and said != "right":
+        raise AssertionError(f"{name}: {said}")
+    print(f"{name}: {said}")
+
+
+def exercise(name: str) -> Exercise:
+    """An exercise by its name, such as ``"06/1"``."""
+    notebook, _, number = name.partition("/")
+    paths = [path for path in HERE.parent.glob("[0-9]*.ipynb") if path.name[:2] == notebook]
+    module = paths and importlib.import_module(f"{__name__}.{paths[0].stem.partition('_')[2]}")
+    if not module or number not in module.EXERCISES:
+        raise ValueError(f'check(): no exercise is called {name!r}; expected one such as "06/1"')
+    return module.EXERCISES[number]
+
+
+def judged(wanted: Exercise, answer: object) -> str:
+    """What is said of an answer: ``"right"``, or a sentence that begins with ``"not yet"``."""
+    if answer is None:
+        return "not yet"
+    try:
+        given = wanted.kind(answer)
+    except (TypeError, ValueError):
+        return f"not yet: {_called(answer)} is not {wanted.kind.__doc__}"
+    try:
+        right = wanted.right(given)
+    except Missing:
+        return "not yet"
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        stopped = f"it stops in line {place.lineno} of {place.name}"
+        return f"not yet: {stopped} with {type(error).__name__}: {error}"
+    if isinstance(right, str):
+        return f"not yet: {right}"
+    return "right" if right else f"not yet: {_called(answer)} is not right; {wanted.hint}"
+
+
+def _called(answer: object) -> str:
+    if callable(answer):
+        return getattr(answer, "__name__", "the function")
+    return f'"{answer}"' if isinstance(answer, str) else str(answer)
+
+
+def call(function: Callable, *args: object, **kwargs: object) -> Any:
+    """What a reader's function returns.
+
+    Raises:
+        Missing: nothing.
+    """
+    returned = function(*args, **kwargs)
+    if returned is None:
+        raise Missing
+    return returned
+
+
+# Kinds of answers; the docstring says what is wanted.
+
+
+def number(answer: object) -> float:
+    """a number"""
+    if isinstance(answer, (bool, np.bool_)) or callable(answer):
+        raise TypeError
+    return float(np.asarray(answer, dtype=float).reshape(()))
+
+
+def pair(answer: Any) -> tuple[float, float]:
+    """a pair of numbers"""
+    values = np.asarray(list(answer), dtype=float)
+    first, second = values.tolist()
+    return first, second
+
+
+def truth(answer: object) -> bool:
+    """True or False"""
+    if str(answer) not in ("True", "False"):
+        raise ValueError
+    return str(answer) == "True"
+
+
+def text(answer: object) -> str:
+    """a text in quotation marks"""
+    if not isinstance(answer, str):
+        raise TypeError
+    return str(answer)
+
+
+def function(answer: object) -> Callable:
+    """a function"""
+    if not callable(answer):
+        raise TypeError
+    return answer

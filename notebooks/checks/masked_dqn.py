@@ -1,0 +1,151 @@
+"""The exercises of notebook 04: the algorithm against the package, bit by bit."""
+
+import html
+import inspect
+from collections.abc import Callable
+from functools import partial
+
+import gymnasium
+import numpy as np
+import torch
+from IPython.display import HTML, display
+
+import unload
+from notebooks.checks import Exercise, call, function, number
+from notebooks.solutions import masked_dqn as solution
+from unload.agent.replay import ReplayBuffer
+from unload.agent.training import Training
+
+SETTINGS = {  # of trainings: what differs from the paper's, and what the environment is given
+    "positions": ({"equalize": False}, {}),
+    "ranks": ({}, {}),
+    "ranks, with the mask": ({"mask": True}, {}),
+    "looking ahead, γ = 0.5": (
+        {"mask": True, "gamma": 0.5},
+        {"stack": partial(unload.stack_load, walls=2)},
+    ),
+}
+
+
+def skipped(name: str) -> Callable:
+    """A function of the solutions, which is shown folded."""
+    chosen = getattr(solution, name)
+    code = html.escape(inspect.getsource(chosen))
+    display(HTML(f"<details><summary>A solution</summary><pre>{code}</pre></details>"))
+    return chosen
+
+
+def small(steps, **changes):
+    """A small configuration of the package, which renews its target every 150 steps."""
+    every = {"target_update_interval": 64 * 150, "log_interval": 1}
+    return unload.TrainConfig(picks=64 * steps, batch_size=64, **every, **changes)
+
+
+def by_hand(loop, config, **env_options):
+    """Losses, mean rewards and weights of a run of ``masked_dqn``."""
+    env_seed, rng_seed, weights_seed = config.seeds()
+    network = unload.PEQNetwork(config.n_features, torch.Generator().manual_seed(weights_seed))
+    env_options |= {"equalize": config.equalize, "max_picks": config.max_picks}
+    envs = gymnasium.make_vec(config.env, num_envs=64, **env_options)
+    steps, seeds = config.picks // 64, (env_seed, rng_seed)
+    losses, means = loop(envs, network, steps, seeds, config.gamma, config.mask, config.batch_size)
+    return losses, means, network.state_dict()
+
+
+def by_the_package(config, stack=None):
+    """Losses and weights of a run of the package that updates in plain PyTorch."""
+    run = Training(config, stack)
+    network = run.agent.network
+    run.agent = unload.DQN(network, config.learning_rate, config.gamma, fused_update=False)
+    run.replay = ReplayBuffer(config.picks, 128, next_state=config.gamma > 0)
+    while not run.rollout.finished:
+        run.step()
+    return run.curve.table()["loss"].dropna().to_numpy(), network.state_dict()
+
+
+def same(weights, others):
+    return all(weights[name].equal(others[name]) for name in weights)
+
+
+def chooses(choose):
+    """Whether actions are the package's, and as many random numbers are drawn."""
+    network = unload.PEQNetwork(8, torch.Generator().manual_seed(0))
+    agent = unload.DQN(network, fused_update=False)
+    observations = np.random.default_rng(0).uniform(-1, 1, (64, 128, 3)).astype(np.float32)
+    allowed = np.random.default_rng(1).random((64, 128)) < 0.05
+    allowed[:, 7] = True
+    for epsilon in (0.0, 0.5, 1.0):
+        mine, theirs = np.random.default_rng(2), np.random.default_rng(2)
+        expected = agent.choose(observations, allowed, epsilon, theirs)
+        got = np.asarray(call(choose, network, observations, allowed, epsilon, mine))
+        if got.shape != expected.shape:
+            return f"for 64 environments it returns {got.shape} actions"
+        if not allowed[np.arange(64), got].all():
+            return f"with ε = {epsilon} it chooses an item that the mask excludes"
+        if not np.array_equal(got, expected) or mine.random() != theirs.random():
+            return f"with ε = {epsilon} the actions, or the random numbers drawn, are others"
+    return True
+
+
+def updates(update):
+    """Whether three updates give the package's losses and weights."""
+    rng, items = np.random.default_rng(0), 9
+    for gamma in (0.0, 0.5):
+        mine, theirs, target = (
+            unload.PEQNetwork(8, torch.Generator().manual_seed(seed)) for seed in (0, 0, 1)
+        )
+        optimizer = torch.optim.Adam(mine.parameters(), lr=1e-3)
+        agent = unload.DQN(theirs, gamma=gamma, fused_update=False)
+        agent.target = target.state_dict()
+        for step in range(1, 4):
+            free = rng.random((64, items)) < 0.5
+            free[:, 0] = True
+            batch = {
+                "observations": rng.uniform(-1, 1, (64, items, 3)).astype(np.float32),
+                "actions": rng.integers(items, size=64),
+                "rewards": rng.choice(np.array([-1, 1], np.float32), 64),
+                "next_observations": rng.uniform(-1, 1, (64, items, 3)).astype(np.float32),
+                "next_masks": free,
+                "terminations": rng.random(64) < 0.2,
+            }
+            got = call(update, mine, target, optimizer, [*zip(*batch.values())], gamma)
+            expected, where = agent.update(batch), f"of update {step} with γ = {gamma}"
+            if got != expected:
+                return f"the loss {where} is {got:.7g}; expected {expected:.7g}"
+            if not same(mine.state_dict(), theirs.state_dict()):
+                return f"the weights after it differ {where}"
+    return True
+
+
+def trains(loop):
+    """Whether short runs give the package's losses and weights, also where episodes end."""
+    for name, (changes, options) in SETTINGS.items():
+        steps = 160 if "gamma" in changes else 20
+        config = small(steps, seed=3, n_features=4, max_picks=50, **changes)
+        losses, _, weights = call(by_hand, _not_empty(loop), config, **options)
+        expected, package_weights = by_the_package(config, **options)
+        if len(losses) != len(expected):
+            return f"{name}: there are {len(losses)} losses; expected {len(expected)}"
+        wrong = np.flatnonzero(losses != expected)
+        if wrong.size:
+            return f"{name}: the losses differ from update {wrong[0] + 1} on"
+        if not same(weights, package_weights):
+            return f"{name}: the losses agree, the weights at the end do not"
+    return True
+
+
+def _not_empty(loop):
+    return lambda *given: call(loop, *given)
+
+
+EXERCISES = {
+    "1": Exercise(function, chooses, ""),
+    "2": Exercise(function, updates, ""),
+    "3": Exercise(function, trains, ""),
+    "4": Exercise(
+        number,
+        lambda q: abs(0.9 * (1 - q) - 0.1) < 0.01,
+        "beyond β the loss of the failures has the slope 1, whatever the value",
+    ),
+    "5": Exercise(number, lambda most: most == 1, "what would have to change to end one?"),
+}

@@ -1,0 +1,46 @@
+"""The exercises of notebook 21."""
+
+import numpy as np
+
+from notebooks.checks import Exercise, call, function, number
+from studies.heap.env import HeapEnv
+from studies.heap.policies import RULES, play
+from studies.heap.table import best_rule
+from studies.results import read_table
+
+
+def luckiest(value):
+    rules, table = read_table("heap/rules"), read_table("heap/table")
+    on_training = rules.set_index("rule").loc[best_rule(rules, 1.0)]
+    unseen = table.query("policy == 'best rule' and falls_weight == 1")["net"].item()
+    return abs(value - (on_training["boxes"] - on_training["falls"] - unseen)) < 0.01
+
+
+def brings_more(rule):
+    """Whether a rule unloads 0.2 boxes a pick more than "highest" on three training heaps."""
+
+    def called(*seen):
+        return call(rule, *seen)
+
+    env, means = HeapEnv("train", physics="coarse"), []
+    for player in (called, RULES["highest"]):
+        played = [play(env, player, heap, 0).unloaded.mean() for heap in env.heaps[:3]]
+        means.append(np.mean(played))
+    env.close()
+    if means[0] < means[1] + 0.2:
+        return f"it unloads {means[0]:.2f} boxes a pick, `highest` {means[1]:.2f}"
+    return True
+
+
+def wider(value):
+    played = read_table("heap/episodes").query("falls_weight == 1")
+    net = played.pivot(index="heap", columns="policy", values="net")
+    one, other = net["learned"], net["best rule"]
+    return abs(value - (one.var() + other.var()) ** 0.5 / (one - other).std()) < 0.05
+
+
+EXERCISES = {
+    "1": Exercise(number, luckiest, "rules.csv holds the training heaps, table.csv the others"),
+    "2": Exercise(function, brings_more, ""),
+    "3": Exercise(number, wider, "variances of independent numbers add up"),
+}
