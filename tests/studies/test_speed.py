@@ -67,6 +67,7 @@ def test_maskable_ppo_learns_on_64_containers():
     envs.close()
 
 
+@pytest.mark.pybullet
 def test_rates_count_what_is_done(small_load, monkeypatch):
     """Each call is made once, and said to take half a second."""
 

@@ -136,6 +136,7 @@ class Training:
         card = {
             "change": settings.pop("change"),
             "loads": settings.pop("stack") or "the paper's",
+            **{name: settings.pop(name) for name in ("engine",) if name in settings},
             "configuration": settings,
             "picks": self.rollout.picks,
             "msr": {"at the end of its training": self.curve.points[-1].success_rate},
