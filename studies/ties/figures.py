@@ -32,14 +32,15 @@ def read_by_ties() -> pd.DataFrame:
     Returns:
         A row per run: ``ties``, ``mask``, ``cell``, ``seed``, and what ``criterion.likeness`` says.
     """
-    curves = {grid: read_grid(grid) for grid in (PAPER, LONG, TIES)} | {None: read_earlier()}
+    curves = {grid.name: read_grid(grid) for grid in (PAPER, LONG, TIES)}
     rows = []
     for ties, cells in KINDS.items():
         for mask in (True, False):
             for grid, name in cells:
                 # A cell of the long runs with the mask has no ending.
                 ending = ("" if grid is LONG else "_mask") if mask else "_no_mask"
-                found = curves[grid][curves[grid]["cell"] == name + ending]
+                table = read_earlier() if grid is None else curves[grid.name]
+                found = table[table["cell"] == name + ending]
                 if len(found):
                     runs = by_run(found, likeness)
                     runs.insert(0, "ties", ties.replace("\n", " "))
