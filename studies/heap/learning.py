@@ -11,7 +11,6 @@ from torch.nn.functional import poisson_nll_loss
 from studies.heap.network import FATES, FEATURES, FateNetwork
 from studies.heap.observation import COLUMN, FELL, UNLOADED
 from studies.heap.policies import Picks
-from unload.agent.learner import flat, grouped
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks
 
@@ -154,7 +153,11 @@ class Learned:
 
 def save_networks(networks: Sequence[FateNetwork], path: str | Path) -> None:
     """Write the weights of several networks into one file, see ``write_weights``."""
-    weights = flat({number: network.state_dict() for number, network in enumerate(networks)})
+    weights = {
+        f"{number}.{name}": weight
+        for number, network in enumerate(networks)
+        for name, weight in network.state_dict().items()
+    }
     settings = {"n_features": [network.n_features for network in networks]}
     write_weights(path, "heap networks", settings, weights)
 
@@ -163,8 +166,11 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
     """Read what ``save_networks`` wrote."""
 
     def networks(settings: dict, weights: dict[str, torch.Tensor]) -> list[FateNetwork]:
-        own = grouped(weights)
-        return [network_of(own[str(each)], n) for each, n in enumerate(settings["n_features"])]
+        own: list[dict[str, torch.Tensor]] = [{} for _ in settings["n_features"]]
+        for name, weight in weights.items():
+            number, _, part = name.partition(".")
+            own[int(number)][part] = weight
+        return [network_of(each, n) for each, n in zip(own, settings["n_features"])]
 
     return read_weights(path, "heap networks", networks)
 
