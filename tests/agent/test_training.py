@@ -97,7 +97,7 @@ def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, coun
 @pytest.mark.parametrize(
     "fields",
     [*RUNS.values(), {"network": own_network}, {"network": own_network, "gamma": 0.9}],
-    ids=str,
+    ids=[*RUNS, "own network", "own network, gamma"],
 )
 def test_every_run_is_gone_on_with(tmp_path, fields):
     """With the same bits where PyTorch's default is double precision."""
