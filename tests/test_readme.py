@@ -52,12 +52,13 @@ def test_the_result_is_that_of_the_data():
     text = " ".join(README.split())
     runs = by_run(read_grid(PAPER, cells=PAPER_CELLS), first_plan)
     ends = 100 * by_cell(runs)["end"][[*PAPER_CELLS]]
-    judged = read_table("falls/published").groupby("cell")[["judged_as_is", "judged_place"]]
+    published = read_table("falls/published")
+    judged = published.groupby("cell")
     for means in (ends, 100 * judged["judged_as_is"].mean()[[*PAPER_CELLS]]):
         first, second, third, last = (f"{mean:.0f}" for mean in means)
         assert f"on average {first}, {second}, {third} and {last} %" in text
     assert (judged["judged_place"].min()[[*PAPER_CELLS]] == 1).all()
-    untrained = judged.get_group("untrained")["judged_place"]
+    untrained = published.query("cell == 'untrained'")["judged_place"]
     assert f"Of {len(untrained)} untrained networks {(untrained == 1).sum()} are perfect" in text
     masked = runs[runs["cell"].str.endswith("_mask") & ~runs["cell"].str.endswith("_no_mask")]
     assert f"with the mask {masked['fell'].sum()} of {len(masked)} reach 95–100 % and fall" in text
