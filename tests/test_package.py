@@ -187,7 +187,7 @@ def careless(source: str) -> list[str]:
             continue
         name = ast.unparse(call.func).rpartition(".")[2]
         given = {keyword.arg for keyword in call.keywords}
-        binary = re.search(r"open\(.*, '[a-z]*b", ast.unparse(call))
+        binary = re.search(r"open\(.*, '[a-z+]*b", ast.unparse(call))
         method = isinstance(call.func, ast.Attribute) and name in ("read_text", "write_text")
         text = method or ast.unparse(call.func) == "open"
         if text and not binary and "encoding" not in given:

@@ -18,7 +18,8 @@ from unload.support import files
 # Folders and files of data/ that rest on no training of the container's agent.
 NOT_TRAINED = {
     "benchmarks", "heap", "lift_agreement", "lifts", "obs_hist_equal", "policies",
-    "seamless/jam_episodes", "seamless/jams", "seamless/mujoco_jams",
+    "seamless/jam_episodes", "seamless/jams", "seamless/mujoco_jams", "ties/earlier", "ties/leak",
+    "ties/noise",
 }  # fmt: skip
 
 

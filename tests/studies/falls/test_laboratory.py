@@ -17,7 +17,7 @@ from studies.networks import NETWORKS
 from studies.paper.training import PAPER
 from studies.results import read_provenance, read_table
 from unload import evaluate, policies
-from unload.agent.config import TrainConfig
+from unload.agent.config import EPSILON_FALLS, TrainConfig
 from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.network.peq import PEQNetwork
@@ -81,6 +81,8 @@ def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(name
     seeds = {cell: sorted(group["seed"]) for cell, group in read_table(name).groupby("cell")}
     assert seeds == {name: list(cell.seeds) for name, cell in planned.items()}
     published = read_provenance(name)["settings"]["config"]
+    assert published.pop("epsilon_fraction") == EPSILON_FALLS  # fields once
+    assert not published.pop("shuffle_places", False) and published.pop("checkpoint_interval", 60)
     assert TrainConfig(**published).plain() == CONFIG.plain()
 
 

@@ -158,18 +158,21 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pi
     }.items():
         monkeypatch.setattr(recording, name, value)
     monkeypatch.setattr("studies.heap.env.stored_heaps", recording.stored_heaps)
-    learned, explorers, explored = [], [], []
     fit, policy = recording.fit, recording.Learned
 
+    # Noted on the functions themselves: what they enclosed would be a part of their identity.
     def noted_fit(picks, seed, steps):
-        learned.append(picks)
+        noted_fit.learned.append(picks)
         return fit(picks, seed, steps)
 
     def noted_policy(networks, weight):
-        explorers.append(weight)
+        noted_policy.explorers.append(weight)
         explorer = policy(networks, weight)
-        return lambda *given: explored.append(weight) or explorer(*given)
+        return lambda *given: noted_policy.explored.append(weight) or explorer(*given)
 
+    learned, explorers, explored = [], [], []
+    noted_fit.learned = learned
+    noted_policy.explorers, noted_policy.explored = explorers, explored
     monkeypatch.setattr(recording, "fit", noted_fit)
     monkeypatch.setattr(recording, "Learned", noted_policy)
     make_networks()

@@ -23,7 +23,7 @@ def test_decisions_are_counted_by_what_lies_on_top():
         "0": [1, 0], "1": [2, 1], "≥ 3": [2, 0], "all": [5, 1]
     }  # fmt: skip
     for _, row in table.iterrows():
-        assert (row["low"], row["high"]) == share_interval(int(row["differ"]), row["situations"])
+        assert (row["low"], row["high"]) == share_interval(*map(int, row[["differ", "situations"]]))
     assert (
         table.loc["0", "apart, mean"] == pytest.approx(0.01) == table.loc["all", "apart, largest"]
     )
@@ -81,9 +81,11 @@ def test_committed_rates_are_those_of_the_published_policies():
     cases = [case for case, _ in engines.played()]
     assert table[["policy", "mask", "condition"]].to_dict("records") == cases
     names = ["policy", "mask", "condition"]
-    published = read_table("policies/comparison").groupby(names)["success_rate"].mean()
+    # Whole containers are left out, see ``played``.
+    played = read_table("policies/comparison").query("condition != 'complete'")
+    published = played.groupby(names)["success_rate"].mean()
     both = table.merge(published.reset_index(), on=names)
-    assert len(both) == len(published) > 60
+    assert len(both) == len(published) > 50
     assert np.allclose(both["pybullet"], both["success_rate"], atol=1e-5)
     equal = table["pybullet"] == table["mujoco"]
     assert (equal | (table["differ"] > 0)).all() and (table["differ"] <= table["containers"]).all()

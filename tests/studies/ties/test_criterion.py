@@ -1,0 +1,116 @@
+"""Whether a run is like the paper's figures, part by part; and what is published of ties."""
+
+import re
+from fnmatch import fnmatch
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import paths
+from studies.grid import read_grid
+from studies.results import read_provenance, read_table
+from studies.ties import creep, earlier, leak, training
+from studies.ties.criterion import FIG11, FIG12, likeness
+from studies.ties.figures import KINDS, draw_ends, read_by_ties
+from studies.ties.laboratory import CELLS, mirrored_load
+from tests.studies.curves import course
+from unload import stack_load, task
+
+# Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
+# noisier after the loss's peak.
+LOSS = np.r_[0.2, 0.15, np.linspace(0.2, 0.5, 10), np.linspace(0.49, 0.45, 8)]
+FLAT = np.r_[0.495, 0.47, np.linspace(0.475, 0.5, 10), np.linspace(0.499, 0.495, 8)]
+RATES = np.r_[np.linspace(0.15, 0.55, 12), 0.55 + np.resize([0.0, 0.04], 8)]
+
+
+@pytest.mark.parametrize(
+    ("part", "rates", "loss"),
+    [
+        (None, RATES, LOSS),
+        ("starts", np.r_[0.19, RATES[1:]], LOSS),
+        ("steady", np.r_[RATES[:13], 0.49, RATES[14:]], LOSS),
+        ("slower", np.r_[np.full(12, 0.15), RATES[12:]], LOSS),
+        ("noisier", np.r_[RATES[:12] - np.resize([0, 0.02], 12), np.linspace(0.56, 0.6, 8)], LOSS),
+        ("ends", RATES + np.linspace(0, 0.1, 20), LOSS),
+        ("loss_falls", RATES, np.r_[0.15, LOSS[1:]]),
+        ("loss_rises", RATES, FLAT),
+        ("loss_sinks", RATES, np.r_[LOSS[:12], np.linspace(0.4, 0.1, 8)]),
+    ],
+)
+def test_each_part_of_the_criterion_is_missed_by_a_run_of_its_own(part, rates, loss):
+    found = likeness(course(rates, loss))
+    assert [name for name in FIG12 + FIG11 if not found[name]] == ([part] if part else [])
+    assert found["fig12"] == (part not in FIG12) and found["fig11"] == (part not in FIG11)
+    assert found["both"] == (part is None)
+
+
+def test_the_cells_are_those_of_the_plan():
+    plan = (paths.DATA / "ties" / "PLAN.md").read_text(encoding="utf-8")
+    patterns = re.findall(r"`([a-z_0-9.*]+)`", plan[plan.index("## Runs") :])
+    assert not [name for name in training.CELLS if not any(fnmatch(name, p) for p in patterns)]
+    assert "ρ = 0.965 along x and y and 0.997 along z" in plan
+    assert training.CORRELATIONS["drifting"] == (0.965, 0.965, 0.997)
+    seeds = {seed for cell in training.CELLS.values() for seed in cell.seeds}
+    assert (min(seeds), max(seeds)) == (60, 64) and "seeds 60–64" in plan
+    assert [len(CELLS[name].seeds) for name in ("rho_0.0", "positions")] == [10, 20]
+
+
+def test_published_runs_are_whole_ones_of_the_grid():
+    runs = read_grid(training.TIES).groupby(["cell", "seed"])["picks"].agg(["size", "max"])
+    assert (runs == [625, 20_000_000]).all(axis=None)
+    planned = training.TIES.configs()
+    assert {f"{cell}/seed_{seed}" for cell, seed in runs.index} <= {*planned}
+    record = read_provenance("ties/runs")
+    assert (record["runs"], record["planned"]) == (len(runs), len(planned))
+
+
+def test_the_runs_of_the_first_plan_are_all_there():
+    table, curves = read_table("ties/earlier"), earlier.read_earlier()
+    assert len(table) == 226 and table["cell"].nunique() == 38
+    twenty = table[table["cell"].isin(earlier.TIES)].set_index(["cell", "seed"])["end"]
+    late = curves[curves["picks"] > 18_000_000].groupby(["cell", "seed"])["success_rate"].mean()
+    assert len(late) == 20 and np.allclose(late.sort_index(), twenty.sort_index(), atol=1e-4)
+
+
+def test_ends_are_drawn_by_mask_and_ties():
+    runs = read_by_ties()
+    figure = draw_ends(runs)
+    dots = [sum(len(line.get_xdata()) for line in axes.lines[:-1]) for axes in figure.axes]
+    assert dots == [runs["mask"].sum(), (~runs["mask"]).sum()]
+    assert {label.replace("\n", " ") for label in KINDS} >= {*runs["ties"]}
+
+
+@pytest.mark.parametrize("ties", ["order", "noise"])
+def test_order_tells_which_box_is_the_upper_one(ties):
+    told = leak.told_by_rank(leak.LOADS[0], ties)
+    table = read_table("ties/leak_ranks").query("ties == @ties").iloc[0]
+    assert (told["pairs"], told["upper"]) == (table["pairs"], table["upper"])
+    if ties == "order":
+        assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
+    else:
+        assert told["upper"] == pytest.approx(told["pairs"] / 2, rel=0.3)
+
+
+def test_a_mirrored_load_exchanges_left_and_right():
+    load, mirrored = (make(np.random.default_rng(1)) for make in (stack_load, mirrored_load))
+    assert np.allclose(load.positions[:, 1] + mirrored.positions[:, 1], task.CONTAINER[1])
+    assert np.allclose(load.positions[:, ::2], mirrored.positions[:, ::2])
+    assert (load.sizes == mirrored.sizes).all()
+
+
+def test_the_order_of_equals_is_followed_among_untouched_boxes():
+    """Offsets of a world that is made up: along x kept, along y reversed at each pick."""
+    world = creep.World(0)
+    count = len(creep.load_of(creep.Case(0, 3)))
+    offsets = np.tile(np.random.default_rng(0).normal(size=(count, 3)), (3, 1, 1)) * 1000
+    offsets[1, :, 1] *= -1
+    touched = np.full(count, -1)
+    rows = pd.DataFrame(creep.rows(world, {"offsets": offsets, "touched": touched}))
+    found = rows.set_index(["lag", "axis"])
+    assert found.loc[(1, "x"), "spearman"] == pytest.approx(1)
+    assert found.loc[(1, "y"), "spearman"] == pytest.approx(-1)
+    assert found.loc[(2, "y"), "spearman"] == pytest.approx(1) and found.loc[(2, "z"), "rms"] == 0
+    assert found.loc[(1, "x"), "boxes"] == count
+    touched[:] = 0
+    assert not creep.rows(world, {"offsets": offsets, "touched": touched})
