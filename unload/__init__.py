@@ -3,10 +3,11 @@
 Every name is imported when it is first used, because PyTorch alone takes seconds.
 """
 
+import sys
 from importlib import import_module
+from importlib.abc import MetaPathFinder
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
-
-import gymnasium
 
 from unload.task import VERSION as __version__
 
@@ -57,22 +58,62 @@ _PLACES = {
 __all__ = ["__version__", *_PLACES]
 
 
-def __getattr__(name: str) -> object:
+# Libraries that not everybody needs, and the extra that installs each.
+_EXTRAS = dict.fromkeys(("gymnasium", "llvmlite", "numba", "safetensors", "torch", "tqdm"), "train")
+_EXTRAS |= dict.fromkeys(("PIL", "matplotlib", "plotly"), "view")
+
+
+def _imported(name: str) -> object:
     """Import a public name (PEP 562)."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module(f"unload.{_PLACES[name]}")
+    try:
+        module = import_module(f"unload.{_PLACES[name]}")
+    except ModuleNotFoundError as error:
+        extra = _EXTRAS.get(error.name)
+        if extra is None:
+            raise
+        wanted = f'expected {error.name}: pip install "unload[{extra}]"'
+        raise ModuleNotFoundError(f"unload.{name} needs more; {wanted}", name=error.name) from error
     value = getattr(module, name, module)
     globals()[name] = value  # found without this function the next time
     return value
+
+
+if not TYPE_CHECKING:  # which would take any name for one of ours
+    __getattr__ = _imported
 
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_PLACES})
 
 
-for _id, _entry, _arrays in (
-    ("unload/Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
-    ("unload/HighestItem-v0", "highest_item:HighestItemEnv", "vector:HighestItemVectorEnv"),
-):
-    gymnasium.register(_id, f"unload.env.{_entry}", vector_entry_point=f"unload.env.{_arrays}")
+def _register() -> None:
+    import gymnasium
+
+    for env, single, arrays in (
+        ("unload/Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
+        ("unload/HighestItem-v0", "highest_item:HighestItemEnv", "vector:HighestItemVectorEnv"),
+    ):
+        place = "unload.env."
+        gymnasium.register(env, place + single, vector_entry_point=place + arrays)
+
+
+class _WithGymnasium(MetaPathFinder):
+    """Registers the environments when Gymnasium is imported, which an order does without."""
+
+    def find_spec(self, name, path=None, target=None):
+        if name != "gymnasium":
+            return None
+        sys.meta_path.remove(self)
+        spec = find_spec(name)
+        if spec is not None:
+            execute = spec.loader.exec_module
+            spec.loader.exec_module = lambda module: (execute(module), _register())
+        return spec
+
+
+if "gymnasium" in sys.modules:
+    _register()
+else:
+    sys.meta_path.insert(0, _WithGymnasium())

@@ -107,7 +107,7 @@ def test_random_picks_are_drawn_from_the_seed(boxes):
         ({"policy": lambda *_: np.array([next(STUBBORN)])}, ValueError, "is 127; expected a row"),
         ({"policy": lambda *_: 0}, ValueError, r"what policy returned has shape \(\)"),
         ({"rule": "reachable"}, TypeError, "rule is 'reachable'; expected a function"),
-        ({"rule": reachable, "policy": "highest"}, TypeError, "and no policy beside it"),
+        ({"rule": reachable, "policy": "highest"}, TypeError, "expected no policy beside it"),
         ({"rule": lambda load, _: load.sizes}, ValueError, r"returned has shape \(136, 3"),
         ({"rule": lambda *_: None}, TypeError, "what rule returned is None; expected arrays of"),
         ({"rule": lambda load, _: [load.ids]}, TypeError, r"what rule returned is \[array"),

@@ -11,17 +11,17 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from unload.physics import pool as pools
 from unload.physics import table
 from unload.physics.local import LocalPhysics
 from unload.physics.pool import Pool
 from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics
-from unload.support.compiled import CONFIG
 
 
 @pytest.fixture(scope="module", autouse=True)
 def three_cores():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CONFIG, "NUMBA_NUM_THREADS", 3)
+        patch.setattr(pools, "threads", lambda: 3)
         yield
 
 

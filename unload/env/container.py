@@ -11,10 +11,7 @@ from unload.env.observation import POSITION_NOISE
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.full import FullPhysics
-from unload.physics.local import LocalPhysics
-from unload.physics.table import TablePhysics, shared_table
-from unload.support import checks
+from unload.physics.choice import Name, make_physics
 
 
 class ContainerEnv(PickingEnv):
@@ -79,7 +76,8 @@ class ContainerEnv(PickingEnv):
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
             ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered). ``"table"``
             answers without a simulation if nothing rests on the chosen box, which then moves by
-            0.463053 m, and if three boxes or more do: it moves by 0 m.
+            0.463053 m, and if three boxes or more do: it moves by 0 m. Or a ``Physics`` of your
+            own, which the environment leaves open.
         after_pick: for ``physics="full"``: ``"restore"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
@@ -108,7 +106,7 @@ class ContainerEnv(PickingEnv):
 
     def __init__(
         self,
-        physics: str = "local",
+        physics: Name | Physics = "local",
         after_pick: str = "restore",
         equalize: bool = False,
         ties: str = "noise",
@@ -120,7 +118,8 @@ class ContainerEnv(PickingEnv):
         super().__init__(equalize, ties, max_picks, position_noise, render_mode)
         check_stack(stack)
         self.stack = stack
-        self.physics = _make_physics(physics, after_pick)
+        self.physics = make_physics(physics, after_pick)
+        self._own = self.physics is not physics
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
         """Fill the container anew; ``options={"load": load}`` gives the load to use."""
@@ -191,7 +190,8 @@ class ContainerEnv(PickingEnv):
         return snapshot(self.physics.load, self.physics.present, self.physics.positions())
 
     def close(self) -> None:
-        self.physics.close()
+        if self._own:
+            self.physics.close()
         super().close()
 
     def observed_positions(self) -> np.ndarray:
@@ -216,12 +216,3 @@ class ContainerEnv(PickingEnv):
             "item_mask": (self.visible >= 0).astype(np.int8),
             "unloaded": np.int64(self._unloaded),
         }
-
-
-def _make_physics(name: str, after_pick: str) -> Physics:
-    checks.one_of("physics", name, ("local", "full", "table"))
-    if name == "full":
-        return FullPhysics(after_pick)
-    if after_pick != "restore":
-        raise ValueError(f"after_pick is {after_pick!r}; expected 'restore' for physics={name!r}")
-    return LocalPhysics() if name == "local" else TablePhysics(shared_table())

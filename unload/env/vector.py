@@ -1,6 +1,7 @@
 """The environments for many containers at once, in arrays (Sec. III-A, Fig. 2)."""
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -24,7 +25,8 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``; there is no other one for arrays.
+        physics: ``"table"``, or a ``TablePhysics`` of your own, which is left open. With
+            ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
 
     Attributes:
         table: the lifts that are known, filled by unknown ones; it may be replaced.
@@ -37,21 +39,24 @@ class ContainerVectorEnv(PickingVectorEnv):
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
-        physics: str = "table",
+        physics: Literal["table"] | TablePhysics = "table",
         stack: Callable[[np.random.Generator], Load] = stack_load,
         **settings,
     ) -> None:
         super().__init__(num_envs, **settings)
-        checks.one_of("physics", physics, ("table",))
+        if not isinstance(physics, TablePhysics):
+            checks.one_of("physics", physics, ("table", "a TablePhysics"))
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
-        self.stack, self.table = stack, shared_table()
-        self._physics = TablePhysics(self.table)
+        self._own = not isinstance(physics, TablePhysics)
+        self._physics = TablePhysics(shared_table()) if self._own else physics
+        self.stack, self.table = stack, self._physics.table
         self._containers = containers.allocate(self.num_envs, 0, 0)
         self._around: dict[int, Surroundings] = {}
 
     def close_extras(self, **kwargs) -> None:
-        self._physics.close()
+        if self._own:
+            self._physics.close()
         super().close_extras(**kwargs)
 
     @property
@@ -80,6 +85,9 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _put(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
+        if (other := load.masses[load.masses != task.MASS]).size:
+            wanted = f"expected {task.MASS} kg each in arrays; physics='local' lifts others"
+            raise ValueError(f"a load holds a box of {other[0]} kg; {wanted}")
         self._around.pop(env, None)
         starts, links = load.contacts
         self._make_room(len(load), len(links))

@@ -12,7 +12,7 @@ import numpy as np
 
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
-from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE
+from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, OVERLAP
 from unload.physics.situation import RESOLUTION
 from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, absorb, slot_of
 from unload.support.compiled import compiled
@@ -127,6 +127,12 @@ def look_up(containers, actions, digests, micrometres):
         # What failed before fails again, as long as nothing has been taken away.
         if containers.masks[env, row] == 0:
             distances[env] = containers.failed[env, row]
+            continue
+
+        # Under a low ceiling there is no pick, see Physics.lift.
+        top = containers.geometry[env, items[env], 2] + containers.geometry[env, items[env], 5] / 2
+        if containers.sizes[env, 2] - top < task.LIFT_THRESHOLD - OVERLAP:
+            distances[env] = 0
             continue
 
         # Free boxes and those under three others need no table, see TablePhysics.

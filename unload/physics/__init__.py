@@ -1,6 +1,6 @@
 """PyBullet, and three physics that say whether a box can be lifted: local, table and full.
 
-Read ``bullet``, ``situation``, ``base``, ``local``, ``pool``, ``table`` and ``full``, in order.
-``bullet`` alone imports PyBullet. A physics that is closed raises a RuntimeError, an item that is
-not in the container a ValueError.
+Read ``bullet``, ``situation``, ``base``, ``local``, ``pool``, ``table``, ``full`` and ``choice``,
+in order. ``bullet`` alone imports PyBullet. A physics that is closed raises a RuntimeError, an item
+that is not in the container a ValueError.
 """

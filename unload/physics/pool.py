@@ -10,7 +10,7 @@ from contextlib import closing, suppress
 
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
-from unload.support.compiled import CONFIG
+from unload.support.compiled import threads
 
 # Not those of ``multiprocessing``, which would run the script that the user has started once more.
 # Ctrl-C is for the process that asks.
@@ -35,7 +35,7 @@ class Pool:
         self, situations: list[Situation], simulate: Callable[[Situation], float]
     ) -> list[float]:
         """Return how far each chosen box moves, in m; ``simulate`` is for this process's share."""
-        count, distances = min(CONFIG.NUMBA_NUM_THREADS, MOST), [0.0] * len(situations)
+        count, distances = min(threads(), MOST), [0.0] * len(situations)
         try:
             while len(self._workers) < count - 1:
                 process = subprocess.Popen(

@@ -10,8 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
+from unload import task
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load
 
+PULL = task.PICK_FORCE / task.MASS  # N per kg
+USUAL = round(task.MASS * 1000)  # g
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 
 
@@ -25,19 +28,32 @@ class Situation:
         dynamic: how many of the rows can move: the chosen box and all on top of it.
         floor: z of the floor if the chosen box stands on it, else None.
         sides: y of the container's side walls that a box of the situation touches.
+        pull: what else decides: the force in mN, and the masses of the dynamic boxes in g; empty
+            for those of the task, 20 N and 1 kg each.
     """
 
     boxes: np.ndarray
     dynamic: int
     floor: int | None
     sides: tuple[int, ...]
+    pull: tuple[int, ...] = ()
 
     @cached_property
     def key(self) -> bytes:
         """Equal for equal situations: its integers in a row, to look a lift up by."""
         floor = () if self.floor is None else (self.floor,)
         head = np.array([self.dynamic, len(floor), *floor, *self.sides], dtype=np.int32)
-        return head.tobytes() + self.boxes.tobytes()
+        return head.tobytes() + self.boxes.tobytes() + np.array(self.pull, np.int32).tobytes()
+
+    @property
+    def force(self) -> float:
+        """N, with which the chosen box is pulled."""
+        return self.pull[0] / 1000 if self.pull else task.PICK_FORCE
+
+    @property
+    def masses(self) -> list[float]:
+        """Of the dynamic boxes in kg."""
+        return [gram / 1000 for gram in self.pull[1:]] or [task.MASS] * self.dynamic
 
     @property
     def on_top(self) -> int:
@@ -49,11 +65,13 @@ class Surroundings:
     """The situations of all boxes of a load, while it is unloaded.
 
     The load knows which boxes touch; picks only take boxes away: ``present``, (n,) bool and owned
-    by the caller, is False for those.
+    by the caller, is False for those. ``force`` is the strongest pull, see ``Physics``.
     """
 
-    def __init__(self, load: Load, present: np.ndarray) -> None:
+    def __init__(self, load: Load, present: np.ndarray, force: float = task.PICK_FORCE) -> None:
         self.load, self.present = load, present
+        self._grams = np.rint(load.masses * 1000).astype(np.int64)
+        self._pulls = np.minimum(self._grams * PULL, force * 1000).astype(np.int64)  # mN
         self._geometry = np.hstack([load.positions, load.sizes])
         self._low = load.positions - load.sizes / 2
         self._high = load.positions + load.sizes / 2
@@ -93,9 +111,13 @@ class Surroundings:
         right = self.load.container[1]
         if self._high[dynamic, 1].max() >= right - CONTACT_TOLERANCE:
             sides.append(right - centre[1])
+        pull = [int(self._pulls[item]), *self._grams[dynamic].tolist()]
+        if pull == [round(PULL * USUAL), *[USUAL] * len(dynamic)]:
+            pull = []
         return Situation(
             boxes=np.rint(boxes / RESOLUTION).astype(np.int32),
             dynamic=len(dynamic),
             floor=None if floor is None else round(floor / RESOLUTION),
             sides=tuple(round(side / RESOLUTION) for side in sides),
+            pull=tuple(pull),
         )
