@@ -1,6 +1,7 @@
 """Container unloading via reinforcement learning: the paper's task, agent and figures.
 
-Every name is imported when it is first used, because PyTorch alone takes seconds.
+Every name is imported when it is first used, because PyTorch alone takes seconds; so an order of
+picks needs none of the libraries that training does.
 """
 
 import sys
@@ -9,6 +10,7 @@ from importlib.abc import MetaPathFinder
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
+from unload.support.extras import needed_for
 from unload.task import VERSION as __version__
 
 # ruff: noqa: F401
@@ -58,23 +60,12 @@ _PLACES = {
 __all__ = ["__version__", *_PLACES]
 
 
-# Libraries that not everybody needs, and the extra that installs each.
-_EXTRAS = dict.fromkeys(("gymnasium", "llvmlite", "numba", "safetensors", "torch", "tqdm"), "train")
-_EXTRAS |= dict.fromkeys(("PIL", "matplotlib", "plotly"), "view")
-
-
 def _imported(name: str) -> object:
     """Import a public name (PEP 562)."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
+    with needed_for(f"unload.{name}"):
         module = import_module(f"unload.{_PLACES[name]}")
-    except ModuleNotFoundError as error:
-        extra = _EXTRAS.get(error.name)
-        if extra is None:
-            raise
-        wanted = f'expected {error.name}: pip install "unload[{extra}]"'
-        raise ModuleNotFoundError(f"unload.{name} needs more; {wanted}", name=error.name) from error
     value = getattr(module, name, module)
     globals()[name] = value  # found without this function the next time
     return value

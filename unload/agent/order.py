@@ -19,6 +19,7 @@ from unload.physics.base import Force, Physics, low_ceiling
 from unload.physics.choice import Name, make_physics
 from unload.physics.table import too_heavy
 from unload.support import checks, files
+from unload.support.extras import needed_for
 
 LOGGER = logging.getLogger(__name__)
 BY_NAME = {each.__name__: each for each in (policies.highest, policies.nearest, policies.random)}
@@ -106,9 +107,7 @@ def picking_order(
                 + ", ".join(map(repr, NAMES))
             )
         if policy != "reachable":
-            from unload import load_policy  # here, because rules need no PyTorch
-
-            policy = BY_NAME.get(policy) or load_policy(policy)
+            policy = BY_NAME.get(policy) or _learned(policy)
     elif not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a name, a path or a function")
     for name, given in (("rule", rule), ("by", by)):
@@ -135,6 +134,12 @@ def picking_order(
     for name, values in load.extras.items():
         table[f"{name} in the list" if name in table else name] = values[table["item"]]
     return table
+
+
+def _learned(name: str) -> Policy:
+    with needed_for(f"policy {name!r}"):
+        from unload.agent.greedy import load_policy  # here, because rules need no PyTorch
+    return load_policy(name)
 
 
 def _picks(physics: Physics, choose: Choice) -> Iterator[tuple[int, float, bool]]:
