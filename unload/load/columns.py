@@ -25,7 +25,7 @@ UNITS = LENGTHS | {
 NAMES = {
     "id": "id label name box box_id item item_id sscc nve hu hu_id hu_nr handling_unit carton "
     "carton_id carton_no case_id package_id pallet_id karton kartonnummer packstück packstueck "
-    "packstück_nr colis palette bulto caja",
+    "packstück_nr colis n_colis no_colis palette bulto n_bulto caja",
     "size_x": "size_x dx length l depth d länge laenge tiefe longueur profondeur largo longitud "
     "profundidad",
     "size_y": "size_y dy width w breite b largeur ancho anchura",

@@ -18,7 +18,7 @@ def needed_for(what: str) -> Iterator[None]:
         yield
     except ImportError as error:
         # pandas gives its own error no name.
-        names = [name for name in EXTRAS if name == error.name or f"'{name}'" in str(error)]
+        names = [name for name in EXTRAS if name == error.name or (not error.name and name in str(error))]
         if not names:
             raise
         wanted = f'expected {names[0]}: pip install "unload[{EXTRAS[names[0]]}]"'
