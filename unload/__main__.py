@@ -23,9 +23,10 @@ A line of the list is a box. Its columns, in any order; capitals make no differe
   size_x, size_y, size_z   edges along the axes (length or depth, width, height)
   id                       or label, name, SSCC, HU; optional
   weight, rotation         optional: 1 kg each if missing, and quarter turns
-German, French and Spanish names are understood, too; what was is printed on stderr. Lengths are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. The axes
-are x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance) and z
-(height, 0 at the floor). unload.read_load and unload.picking_order say more.
+German, French and Spanish names are understood, too; what was is printed on stderr. Lengths
+are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. The axes are
+x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance) and
+z (height, 0 at the floor). unload.read_load and unload.picking_order say more.
 
 "unload train" trains an agent; "unload train --help" says how.
 """

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -88,7 +89,11 @@ def evaluate(
         max_picks = checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
-    settings = {"equalize": equalize, "ties": ties, "position_noise": position_noise}
+    settings: dict[str, Any] = {
+        "equalize": equalize,
+        "ties": ties,
+        "position_noise": position_noise,
+    }
     settings |= {"stack": stack, "max_picks": sys.maxsize if max_picks is None else max_picks}
     arrays = isinstance(physics, str) and physics == "table"
     if arrays:

@@ -125,7 +125,7 @@ def picking_order(
             ruled = rule or (reachable if by is None else _by_stop(load, by))
             choose = partial(_by_rule, ruled, hopeless)
         else:
-            choose = partial(_by_policy, policy, rng)
+            choose = partial(_by_policy, policy, rng)  # type: ignore[arg-type]
         table = pd.DataFrame(_picks(own, choose), columns=["item", "distance", "behind"])
 
     table.insert(2, "unloaded", table["distance"] >= task.LIFT_THRESHOLD)
@@ -199,7 +199,7 @@ def _hopeless(load: Load, force: float) -> np.ndarray:
     low, heavy = low_ceiling(load), too_heavy(load, force)
     for boxes, problem in (
         (low, f"have less than {task.LIFT_THRESHOLD} m above them"),
-        (heavy, f"are too heavy for {force:g} N"),
+        (heavy, f"are too heavy for {force:g} N; force='auto' lifts each"),
     ):
         if boxes.any():
             items = np.flatnonzero(boxes)

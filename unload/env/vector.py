@@ -44,12 +44,14 @@ class ContainerVectorEnv(PickingVectorEnv):
         **settings,
     ) -> None:
         super().__init__(num_envs, **settings)
-        if not isinstance(physics, TablePhysics):
-            checks.one_of("physics", physics, ("table", "a TablePhysics"))
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
-        self._own = not isinstance(physics, TablePhysics)
-        self._physics = TablePhysics(shared_table()) if self._own else physics
+        if isinstance(physics, TablePhysics):
+            self._physics = physics
+        else:
+            checks.one_of("physics", physics, ("table", "a TablePhysics"))
+            self._physics = TablePhysics(shared_table())
+        self._own = self._physics is not physics
         self.stack, self.table = stack, self._physics.table
         self._containers = containers.allocate(self.num_envs, 0, 0)
         self._around: dict[int, Surroundings] = {}

@@ -101,9 +101,9 @@ class Columns:
         needed = [*places[0], *SIZES] if len(places) == 1 else []
         if not len(table) or [len(self.of(name)) for name in needed] != [1] * 6:
             raise ValueError(
-                f"{self._source} has {len(table)} rows and the columns {', '.join(names)}; expected "
-                "boxes with either x, y, z or x_min, y_min, z_min, and with size_x, size_y, size_z, "
-                "each once; columns={...} says what other names mean"
+                f"{self._source} has {len(table)} rows and the columns {', '.join(names)}; "
+                "expected boxes with either x, y, z or x_min, y_min, z_min, and with size_x, "
+                "size_y, size_z, each once; columns={...} says what other names mean"
             )
         understood = [
             f"{name} as {meaning}"

@@ -124,7 +124,7 @@ def read_load(
         load = Load(
             centres + moves,
             sizes - smaller,
-            ids=ids,
+            ids=np.array(ids),
             container=container,
             extras=_extras(path, table, shown, known.first("id")),
             masses=masses,
@@ -141,7 +141,9 @@ def read_load(
         if usual == 1 and sizes.max() > container.max():
             problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
         other = CORNER if place is CENTRE else CENTRE
-        outside = [_outside(centres_of(each), half, container, tolerance) for each in (place, other)]
+        outside = [
+            _outside(centres_of(each), half, container, tolerance) for each in (place, other)
+        ]
         if outside[0] and not outside[1]:
             named = dict(zip(shown, other))
             problem += f"; all lie inside if these are {', '.join(other)}: columns={named}"
@@ -211,7 +213,9 @@ def _extras(path, table: Table, shown: list[str], id_: str | None) -> dict[str, 
     return extras
 
 
-def _outside(centres: np.ndarray, half: np.ndarray, container: np.ndarray, tolerance: float) -> bool:
+def _outside(
+    centres: np.ndarray, half: np.ndarray, container: np.ndarray, tolerance: float
+) -> bool:
     """Whether any box sticks out of the container."""
     low, high = centres - half, centres + half
     return bool(((low < -tolerance) | (high > container + tolerance)).any())

@@ -124,7 +124,8 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
             sides, points = np.roll(later, -1, axis=1) - later, middle - later
             turns = sides[..., 0] * points[..., 1] - sides[..., 1] * points[..., 0]
             if not ((turns > 0).all(axis=1) | (turns < 0).all(axis=1)).any():
-                figure.axes[0].text(*middle, str(number), ha="center", va="center", fontsize=6)
+                x, y = middle.tolist()
+                figure.axes[0].text(x, y, str(number), ha="center", va="center", fontsize=6)
                 break
     file = io.BytesIO()
     Image.fromarray(pixels(figure)).save(file, "PNG", optimize=True)

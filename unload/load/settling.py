@@ -32,7 +32,9 @@ def settle(
     # From the floor upwards, each box sinks or rises onto the highest one below it.
     top, order = high[:, 2].copy(), np.argsort(low[:, 2], kind="stable")
     for count, box in enumerate(order):
-        share = np.minimum(high[box], high[order[:count]]) - np.maximum(low[box], low[order[:count]])
+        share = np.minimum(high[box], high[order[:count]]) - np.maximum(
+            low[box], low[order[:count]]
+        )
         under = order[:count][(share[:, :2].min(axis=1) > between) & (share[:, 2] <= between)]
         most = between if under.size else tolerance
         if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
@@ -51,7 +53,9 @@ def settle(
             if axis == 0:  # along y otherwise, or nowhere
                 beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -between)
             else:  # what is apart along x needs nothing along y
-                depth = np.minimum(end_x[box], end_x[others]) - np.maximum(found[box, 0], found[others, 0])
+                depth = np.minimum(end_x[box], end_x[others]) - np.maximum(
+                    found[box, 0], found[others, 0]
+                )
                 beside &= depth > OVERLAP
             level = np.minimum(top[box], top[others]) - np.maximum(found[box, 2], found[others, 2])
             before.append(others[beside & (level > OVERLAP)])

@@ -15,7 +15,6 @@ from unload.load.boxes import OVERLAP, Load, check_load
 from unload.physics.bullet import World
 from unload.support import checks
 
-
 Force = float | Literal["auto"]  # N, or as much as a box needs
 
 

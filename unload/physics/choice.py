@@ -15,7 +15,7 @@ Name = Literal["local", "full", "table"]
 def make_physics(
     physics: Name | Physics, after_pick: str = "restore", force: Force = task.PICK_FORCE
 ) -> Physics:
-    """Return the physics of a name, or the one that is given, which is its caller's to close.
+    """The physics of a name, or the one that is given, which is its caller's to close.
 
     Args:
         physics: ``"local"``, ``"full"`` or ``"table"``, or a ``Physics`` that is open.
@@ -29,7 +29,8 @@ def make_physics(
     elif force != task.PICK_FORCE:
         raise ValueError(f"force is {force!r}; expected it to be given to the physics itself")
     if after_pick != "restore":
-        raise ValueError(f"after_pick is {after_pick!r}; expected 'restore' for physics={physics!r}")
+        wanted = f"expected 'restore' for physics={physics!r}"
+        raise ValueError(f"after_pick is {after_pick!r}; {wanted}")
     if isinstance(physics, Physics):
         return physics
     return LocalPhysics(force) if physics == "local" else TablePhysics(shared_table(), force)

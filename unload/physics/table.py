@@ -306,10 +306,11 @@ def slot_of(digests, digest):
 def _fill(digests, micrometres, new_digests, new_micrometres):
     """Put entries into the slots of empty arrays, each into the first free one from its own on."""
     last = np.uint64(len(digests) - 1)
+    # Of several that want the same slot the last one has it; the others go on to the next.
     left, slots = np.arange(len(new_digests)), (new_digests ^ (new_digests >> np.uint64(32))) & last
     while left.size:
         free = digests[slots] == EMPTY
-        digests[slots[free]] = new_digests[left[free]]  # of several that want a slot the last has it
+        digests[slots[free]] = new_digests[left[free]]
         placed = digests[slots] == new_digests[left]
         micrometres[slots[placed]] = new_micrometres[left[placed]]
         left, slots = left[~placed], (slots[~placed] + np.uint64(1)) & last

@@ -1,5 +1,6 @@
 """Libraries that not everybody needs: an error that says how each is installed."""
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -18,7 +19,8 @@ def needed_for(what: str) -> Iterator[None]:
         yield
     except ImportError as error:
         # pandas gives its own error no name.
-        names = [name for name in EXTRAS if name == error.name or (not error.name and name in str(error))]
+        said = [error.name] if error.name else re.findall(r"\w+", str(error))
+        names = [name for name in EXTRAS if name in said]
         if not names:
             raise
         wanted = f'expected {names[0]}: pip install "unload[{EXTRAS[names[0]]}]"'
