@@ -25,7 +25,7 @@ LIBRARIES = {
     "matplotlib": ("load/",),
     "numba": ("fast/kernel.py", "support/compiled.py"),
     "numpy": ("",),
-    "pandas": ("load/packing_list.py", "agent/"),
+    "pandas": ("load/packing_list.py", "load/tables.py", "agent/"),
     "plotly": ("load/view.py",),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("network/weights.py",),
@@ -37,6 +37,9 @@ COVERED_BY = {
     "__main__.py": "agent/test_order.py",
     "fast/kernel.py": "fast/test_fused.py",  # its loops
     "agent/learner.py": "agent/test_dqn.py",
+    "load/columns.py": "load/test_packing_list.py",
+    "load/tables.py": "load/test_packing_list.py",
+    "support/extras.py": "test_main.py",
     "agent/rollout.py": "agent/test_training.py",
     "env/highest_item.py": "env/test_container.py",
     "network/peq.py": "network/test_variants.py",

@@ -253,8 +253,9 @@ def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog):
     load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2), (1.3, 0.6))
     low = Load(load.positions, load.sizes, ids=list("abcd"), container=(7, 2.5, 0.9))
     order = picking_order(low)
-    assert order["id"].tolist() == ["a", "b", "d", "c"]
-    assert order["distance"].tolist() == [FREE_LIFT, FREE_LIFT, 0, order["distance"].iloc[-1]]
+    assert order["id"].tolist() == ["a", "b", "c", "d"]
+    assert order["unloaded"].tolist() == [True, True, False, False]
+    assert order["distance"].iloc[-1] == 0
     assert "1 of 4 boxes have less than 0.2 m above them: d\n" in caplog.text
     heavy = Load(load.positions, load.sizes, masses=[3, 1, 25, 0.5])
     assert picking_order(heavy)["item"].tolist() == [3, 1, 0, 2]

@@ -136,7 +136,7 @@ def test_small_faults_are_settled_and_logged(written, caplog):
     load = read_load(written("a,0,0,0,1,1,1", "d,0,1,0,1,1,1.001", bridge))
     assert load.covered(np.ones(3, bool)).tolist() == [True, True, False]
     caplog.clear()
-    read_load(written(*(f"{line},1,0" for line in STACK), columns=f"id,{CORNERS},weight,yaw"))
+    read_load(written(*(f"{line},1,0" for line in STACK), columns=f"id,{CORNERS},weight,rotation"))
     assert not caplog.text
 
 
