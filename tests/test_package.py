@@ -39,7 +39,7 @@ COVERED_BY = {
     "agent/learner.py": "agent/test_dqn.py",
     "load/columns.py": "load/test_packing_list.py",
     "load/tables.py": "load/test_packing_list.py",
-    "support/extras.py": "test_main.py",
+    "support/extras.py": "load/test_packing_list.py",
     "agent/rollout.py": "agent/test_training.py",
     "env/highest_item.py": "env/test_container.py",
     "network/peq.py": "network/test_variants.py",
