@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+from scipy.stats import t
+
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
 from studies.results import read_table
@@ -90,3 +92,19 @@ def test_the_runs_with_jams_are_those_of_the_data():
     measured = [name for name in cells if name.startswith("measured")]
     assert not any(like(*measured)) and sum(len(cells[name]) for name in measured) == 12
     assert f"[all {len(runs)}]" in text
+
+
+def test_the_benchmarks_are_those_of_the_data():
+    text = (ROOT / "notebooks/benchmarks.md").read_text()
+    played = read_table("policies/comparison")
+    played = played[played["condition"] == "500 picks"]
+    rows = re.findall(
+        r"^\| (\w+) \| .* \| (yes|no) \| ([\d.]+) ± ([\d.]+) \| (\d+) \|$", text, re.M
+    )
+    assert len(rows) == len(played.groupby(["policy", "mask"])) == 9
+    for policy, mask, mean, half, longest in rows:
+        each = played[(played["policy"] == policy) & (played["mask"] == (mask == "yes"))]
+        rates = 100 * each["success_rate"]
+        assert len(rates) == 100 and f"{rates.mean():.1f}" == mean
+        assert f"{t.ppf(0.975, 99) * rates.std() / 10:.1f}" == half
+        assert each["longest_deadlock"].max() == int(longest)
