@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.physics.kinds import KINDS, make
+from tests.physics.kinds import EACH, make
 from unload import ContainerEnv, Load, evaluate, policies
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.choice import make_physics
@@ -23,7 +23,7 @@ def weighed(load: Load, *masses: float, **fields) -> Load:
     return Load(load.positions, load.sizes, masses=masses or None, **fields)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_a_box_moves_by_its_mass_and_the_force(boxes, kind):
     """Up to 20 N per kg; a weight that no force holds stays."""
     load = weighed(boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2)), 0.5, 1.25, 5)
@@ -61,7 +61,7 @@ def test_a_table_asks_no_rule_about_other_masses(boxes):
         assert physics.lift(0) == make("local", physics.load, force="auto").lift(0) or not lifted
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", EACH)
 def test_under_a_low_ceiling_no_box_is_lifted(boxes, kind):
     load = boxes((0.3, 0.2), (0.8, 0.2), (0.8, 0.6))
     for height, lifted in ((1.01, [True, False, True]), (0.99, [True, False, False])):
@@ -77,6 +77,31 @@ def test_arrays_know_ceilings_and_refuse_masses(boxes):
         assert envs.liftable().ravel()[:3].sum() == 1
     with pytest.raises(ValueError, match="holds a box of 2.0 kg; expected 1.0 kg each in arrays"):
         ContainerVectorEnv(1).reset(options={"load": weighed(low, 1, 2, 1)})
+    with pytest.raises(ValueError, match="physics.force is 10.0; expected >= 20.0 in arrays"):
+        ContainerVectorEnv(1, physics=TablePhysics(LiftTable(), 10))
+    ContainerVectorEnv(1, physics=TablePhysics(LiftTable(), "auto"))
+
+
+@pytest.mark.parametrize("kind", EACH)
+def test_single_environments_lift_other_masses(boxes, kind):
+    env = ContainerEnv(kind)
+    env.reset(options={"load": weighed(boxes((0.3, 0.2), (0.8, 0.2)), 0.5, 5)})
+    assert env.liftable().sum() == 1 and not env.liftable()[np.argmax(env.visible == 1)]
+
+
+def test_a_file_says_nothing_of_the_pull_of_the_task(boxes, tmp_path):
+    """So that it has the bytes that it had before there were others."""
+    load, table = boxes((0.3, 0.2), (0.3, 0.6)), LiftTable()
+    path, pulls = tmp_path / "lifts.npz", [(), (20_000, 1000, 2000)]
+    for masses, pull, written in (((), pulls[0], False), ((1, 2), pulls[1], True)):
+        situation = Surroundings(weighed(load, *masses), np.ones(2, bool)).situation(0)
+        assert situation.pull == pull
+        table.add(situation, 0.1)
+        table.save(path)
+        with np.load(path) as arrays:
+            assert ("pull" in str(arrays["samples"])) == written
+    assert [*LiftTable.load(path).samples] == [*table.samples]
+    assert {tuple(each.pull) for each in LiftTable.load(path).samples.values()} == {*pulls}
 
 
 def test_a_physics_of_ones_own_stays_open(boxes):
