@@ -17,12 +17,18 @@ from tests import wheels
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-LOWEST = dict(library.split(">=") for library in PROJECT["dependencies"])  # versions by name
+# What loads and orders need, and what the rest of the package does.
+OF_THE_PACKAGE = ("train", "view")
+EXTRAS = PROJECT["optional-dependencies"]
+NEEDED = [*PROJECT["dependencies"], *(name for extra in OF_THE_PACKAGE for name in EXTRAS[extra])]
+LOWEST = dict(library.split(">=") for library in NEEDED)  # versions by name
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"make", "notebooks", "studies", "tests", "unload"}
 WITH_PYTHON = {"pip"}
 # Extras for one command each, pinned in pyproject.toml.
 ON_DEMAND = ("book", "browser")
+# Extras of the package that nothing here needs.
+ASIDE = ("excel", "video")
 # Named, but imported by no statement, and what for.
 RUN_ONLY = {
     "dask": "joblib's backend for a cluster",
@@ -86,12 +92,11 @@ def distributions(folder: str) -> set[str]:
 
 def on_demand() -> set[str]:
     """The names of the libraries that make targets of their own install."""
-    extras = PROJECT["optional-dependencies"]
-    return {library.split("==")[0] for extra in ON_DEMAND for library in extras[extra]}
+    return {library.split("==")[0] for extra in ON_DEMAND for library in EXTRAS[extra]}
 
 
 def test_each_library_is_named_once_and_pinned():
-    extras = dict(PROJECT["optional-dependencies"])
+    extras = {name: EXTRAS[name] for name in EXTRAS.keys() - {*OF_THE_PACKAGE, *ASIDE}}
     for extra in ON_DEMAND:
         assert all("==" in library for library in extras.pop(extra)), f"{extra} is not pinned"
     engines = [line.partition("; ") for line in extras.pop("physics")]
@@ -154,9 +159,9 @@ def test_what_is_installed_is_what_is_pinned():
 
 
 def test_what_is_imported_is_named():
-    extras = PROJECT["optional-dependencies"]
-    assert distributions("unload") == set(LOWEST) | {*extras["pybullet"], *extras["mujoco"]}
+    engines = {*EXTRAS["pybullet"], *EXTRAS["mujoco"]}
+    assert distributions("unload") == set(LOWEST) | engines
     others = distributions("studies") - on_demand()
-    assert set(extras["studies"]) <= others
+    assert set(EXTRAS["studies"]) <= others
     others |= (distributions("tests") | distributions("notebooks")) - on_demand()
     assert distributions("unload") | others | set(RUN_ONLY) == set(pinned())

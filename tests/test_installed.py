@@ -101,7 +101,7 @@ def test_the_checkout_is_found_from_anywhere(tmp_path):
 @pytest.mark.parametrize(
     ("used", "absent"),
     [
-        ("unload", "torch numba pandas matplotlib plotly pybullet"),
+        ("unload", "torch numba gymnasium pandas matplotlib plotly pybullet"),
         ("unload.ContainerEnv", "PIL matplotlib pandas plotly torch"),  # it draws nothing
     ],
 )
@@ -115,7 +115,7 @@ def test_an_import_takes_few_modules(tmp_path, used, absent):
 def test_names_are_where_type_checkers_find_them():
     """What is listed, what is imported for type checkers, and what is imported when it is used."""
     source = ast.parse((ROOT / "unload/__init__.py").read_text())
-    (typed,) = (node for node in source.body if isinstance(node, ast.If))
+    typed = next(node for node in source.body if isinstance(node, ast.If))
     found = {}
     exec(compile(ast.Module(typed.body, []), "imports", "exec"), found)
     del found["__builtins__"]

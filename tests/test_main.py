@@ -9,6 +9,7 @@ from dataclasses import fields
 
 import pytest
 
+import unload
 from studies import paths
 from tests.agent.runs import CONTAINER, at_step, content, few_walls, interrupt
 from unload import PEQNetwork, TrainConfig, train
@@ -87,6 +88,51 @@ def test_help_and_version_take_no_time(tmp_path):
     assert done.stdout.startswith(f"unload {VERSION}, lifts by {engine_of()}\n")
     for text in ("x_min", "size_z", "weight", "in m", "--units", "rear wall", "entrance"):
         assert text in done.stdout
+
+
+ORDER = """if True:
+    import sys
+    from unload.__main__ import main
+
+    arguments = sys.argv[1:]
+    try:
+        main(arguments)
+    except SystemExit as end:
+        print(end.code, file=sys.stderr)
+    print(*sorted({"torch", "gymnasium", "numba", "matplotlib", "pandas"} & {*sys.modules}))
+"""
+
+
+def order_of(*arguments: str) -> tuple[str, str]:
+    command = [sys.executable, "-c", ORDER, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=paths.ROOT, check=True)
+    return done.stdout, done.stderr
+
+
+def test_an_order_needs_neither_torch_nor_gymnasium_nor_numba(tmp_path):
+    """A list that is refused is so before pandas is imported."""
+    printed, said = order_of("--policy", "highest")
+    assert (
+        printed.endswith("\npandas\n") and said == "136 picks, 0 failed, 44% behind other boxes\n"
+    )
+    (tmp_path / "bad.csv").write_bytes(b"\x1f\x8b")
+    printed, said = order_of(str(tmp_path / "bad.csv"))
+    assert printed == "\n" and said.startswith(f"{tmp_path}/bad.csv is not a readable list: ")
+
+
+def test_what_an_extra_brings_is_named_where_it_is_missing(monkeypatch, capsys):
+    for library, name in (("torch", "agent.greedy"), ("matplotlib", "load.picture")):
+        monkeypatch.setitem(sys.modules, library, None)  # as if it were not installed
+        for module in [each for each in sys.modules if each.startswith(f"unload.{name}")]:
+            monkeypatch.delitem(sys.modules, module)
+    monkeypatch.delitem(vars(unload), "load_policy", raising=False)
+    wanted = r'needs more than an order; expected torch: pip install "unload\[train\]"'
+    with pytest.raises(ModuleNotFoundError, match=f"unload.load_policy {wanted}"):
+        _ = unload.load_policy
+    for option, message in (("--policy=paper", "unload[train]"), ("--picture=x", "unload[view]")):
+        with pytest.raises(SystemExit, match="1"):
+            main([option])
+        assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

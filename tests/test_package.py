@@ -26,7 +26,7 @@ LIBRARIES = {
     "mujoco": ("physics/mujoco.py",),
     "numba": ("fast/kernel.py", "support/compiled.py"),
     "numpy": ("",),
-    "pandas": ("load/packing_list.py", "agent/"),
+    "pandas": ("load/packing_list.py", "load/tables.py", "agent/"),
     "plotly": ("load/view.py",),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("network/weights.py",),
@@ -39,6 +39,9 @@ COVERED_BY = {
     "fast/kernel.py": "fast/test_fused.py",  # its loops
     "agent/curve.py": "agent/test_training.py",
     "agent/learner.py": "agent/test_dqn.py",
+    "load/columns.py": "load/test_packing_list.py",
+    "load/tables.py": "load/test_packing_list.py",
+    "support/extras.py": "load/test_packing_list.py",
     "agent/rollout.py": "agent/test_training.py",
     "agent/state.py": "agent/test_checkpoint.py",
     "env/highest_item.py": "env/test_container.py",

@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+from scipy.stats import t
+
 from studies.falls.long import LONG
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
@@ -78,3 +80,19 @@ def test_ties_decide_as_the_data_say():
     assert f"and {frozen['fell'].sum()} of {len(frozen)} do by noise or creep" in text
     going_on = by_run(read_grid(TIES), likeness)
     assert going_on["fell"].tolist() == [False, True], "two first runs"
+
+
+def test_the_benchmarks_are_those_of_the_data():
+    text = (ROOT / "notebooks/benchmarks.md").read_text()
+    played = read_table("policies/comparison")
+    played = played[played["condition"] == "500 picks"]
+    rows = re.findall(
+        r"^\| (\w+) \| .* \| (yes|no) \| ([\d.]+) ± ([\d.]+) \| (\d+) \|$", text, re.M
+    )
+    assert len(rows) == len(played.groupby(["policy", "mask"])) == 9
+    for policy, mask, mean, half, longest in rows:
+        each = played[(played["policy"] == policy) & (played["mask"] == (mask == "yes"))]
+        rates = 100 * each["success_rate"]
+        assert len(rates) == 100 and f"{rates.mean():.1f}" == mean
+        assert f"{t.ppf(0.975, 99) * rates.std() / 10:.1f}" == half
+        assert each["longest_deadlock"].max() == int(longest)

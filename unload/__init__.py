@@ -1,13 +1,16 @@
 """Container unloading via reinforcement learning: the paper's task, agent and figures.
 
-Every name is imported when it is first used, because PyTorch alone takes seconds.
+Every name is imported when it is first used, because PyTorch alone takes seconds; so an order of
+picks needs none of the libraries that training does.
 """
 
+import sys
 from importlib import import_module
+from importlib.abc import MetaPathFinder
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-import gymnasium
-
+from unload.support.extras import needed_for
 from unload.task import VERSION as __version__
 
 # ruff: noqa: F401
@@ -53,22 +56,51 @@ _PLACES = {
 __all__ = ["__version__", *_PLACES]
 
 
-def __getattr__(name: str) -> object:
+def _imported(name: str) -> object:
     """Import a public name (PEP 562)."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module = import_module(f"unload.{_PLACES[name]}")
+    with needed_for(f"unload.{name}"):
+        module = import_module(f"unload.{_PLACES[name]}")
     value = getattr(module, name, module)
     globals()[name] = value  # found without this function the next time
     return value
+
+
+if not TYPE_CHECKING:  # which would take any name for one of ours
+    __getattr__ = _imported
 
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_PLACES})
 
 
-for _id, _entry, _arrays in (
-    ("unload/Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
-    ("unload/HighestItem-v0", "highest_item:HighestItemEnv", "highest_item:HighestItemVectorEnv"),
-):
-    gymnasium.register(_id, f"unload.env.{_entry}", vector_entry_point=f"unload.env.{_arrays}")
+def _register() -> None:
+    import gymnasium
+
+    for name, single, arrays in (
+        ("Container-v0", "container:ContainerEnv", "vector:ContainerVectorEnv"),
+        ("HighestItem-v0", "highest_item:HighestItemEnv", "highest_item:HighestItemVectorEnv"),
+    ):
+        entry, vector_entry = f"unload.env.{single}", f"unload.env.{arrays}"
+        gymnasium.register(f"unload/{name}", entry, vector_entry_point=vector_entry)
+
+
+class _WithGymnasium(MetaPathFinder):
+    """Registers the environments when Gymnasium is imported, which an order does without."""
+
+    def find_spec(self, name, path=None, target=None):
+        if name != "gymnasium":
+            return None
+        sys.meta_path.remove(self)
+        spec = find_spec(name)
+        if spec is not None:
+            execute = spec.loader.exec_module
+            spec.loader.exec_module = lambda module: (execute(module), _register())
+        return spec
+
+
+if "gymnasium" in sys.modules:
+    _register()
+else:
+    sys.meta_path.insert(0, _WithGymnasium())

@@ -10,21 +10,23 @@ from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 
+from unload import task
 from unload.task import VERSION
 
 DESCRIPTION = """\
-Print in which order the boxes of a packing list are picked, as CSV: pick, id, item,
-distance (m), unloaded (False for a pick that fails), behind (True if another box stands in
-front of it), and the list's other columns.
+Print in which order the boxes of a packing list are picked: pick, id, item, distance (m),
+unloaded (False for a pick that fails), behind (True if another box stands in front of it),
+and the list's other columns.
 
 A line of the list is a box. Its columns, in any order; capitals make no difference:
   x_min, y_min, z_min      corner nearest to the origin (pos_x, ...), or x, y, z, the centre
   size_x, size_y, size_z   edges along the axes (length or depth, width, height)
-  id                       or label, name; optional
-  weight, rotation         optional: 1 kg, and quarter turns
-Lengths are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. The axes
-are x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance) and z
-(height, 0 at the floor). unload.read_load and unload.picking_order say more.
+  id                       or label, name, SSCC, HU; optional
+  weight, rotation         optional: 1 kg each if missing, and quarter turns
+German, French and Spanish names are understood, too; what was is printed on stderr. Lengths
+are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. The axes are
+x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance) and
+z (height, 0 at the floor). unload.read_load and unload.picking_order say more.
 
 "unload train" trains an agent; "unload train --help" says how.
 """
@@ -55,14 +57,22 @@ def print_order(arguments: list[str]) -> None:
     parser = _parser("unload", DESCRIPTION)
     shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("policies/*.safetensors")))
     known = f"reachable (the default), highest, nearest, random, {shipped}, or a file of weights"
-    parser.add_argument("list", nargs="?", help="CSV file; an example if missing")
+    text = "CSV, JSON or Excel file; an example if missing"
+    parser.add_argument("list", nargs="?", help=text)
     parser.add_argument("--policy", default="reachable", help=known)
+    text = "what can be reached, by the values of a column: 1, 2, ... (--by=-stop: the last first)"
+    parser.add_argument("--by", metavar="COLUMN", help=text)
+    text = "strongest pull in N (20), up to 20 N per kg; or auto, as much as each box needs"
+    parser.add_argument("--force", type=_force, default=task.PICK_FORCE, help=text)
     parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
+    parser.add_argument("--format", choices=("csv", "json"), default="csv", help="of the output")
+    text = "PNG file for a picture of the load, its first fifty picks numbered"
+    parser.add_argument("--picture", metavar="FILE", help=text)
     parser.add_argument("--units", help="of lengths: m, cm, mm or in")
     size: dict = {"type": float, "nargs": 3, "metavar": ("LENGTH", "WIDTH", "HEIGHT")}
     parser.add_argument("--container", help="its inner size in m; the paper's is 7 2.5 2.5", **size)
     parser.add_argument("--x-from", default="rear", help="where x is 0: rear (the default) or door")
-    text = "in m: gaps and overlaps up to this are closed (%(default)s)"
+    text = "in m: how far each box may be from where it belongs (%(default)s)"
     parser.add_argument("--tolerance", type=float, default=0.005, help=text)
     text = "a column to keep whatever it says, such as weight; may be repeated"
     parser.add_argument("--ignore", action="append", default=[], metavar="COLUMN", help=text)
@@ -72,24 +82,52 @@ def print_order(arguments: list[str]) -> None:
     parser.add_argument("--version", action="version", version=version)
     options = vars(parser.parse_args(arguments))
 
-    from unload.agent.order import picking_order
     from unload.load.packing_list import EXAMPLE, read_load
 
-    path, policy, output = (options.pop(name) for name in ("list", "policy", "output"))
+    path, output, form, drawn = (options.pop(n) for n in ("list", "output", "format", "picture"))
+    asked = {name: options.pop(name) for name in ("policy", "by", "force")}
     columns = dict(each.partition("=")[::2] for each in options.pop("column"))
     try:
         load = read_load(EXAMPLE if path is None else path, columns=columns, **options)
-        order = picking_order(load, policy)
-        order["distance"] = order["distance"].map("{:.6f}".format)
-        order = order.apply(lambda column: column.map(_as_text)).rename(columns=_as_text)
-        order.to_csv(output, index=False, lineterminator="\n")
-    except (ImportError, OSError, ValueError) as error:  # ImportError: of an engine
+        from unload.agent.order import picking_order, stops_of  # when there is a list to order
+
+        order = picking_order(load, **asked)
+        if drawn is not None:  # first, because it may lack a library
+            _draw(load, order, drawn)
+        _write(order, output, form)
+    except (ImportError, OSError, TypeError, ValueError) as error:  # ImportError: of an extra
         parser.exit(1, f"{error}\n")
     failed, behind = (~order["unloaded"]).sum(), order["behind"].mean()
     print(f"{len(order)} picks, {failed} failed, {behind:.0%} behind other boxes", file=sys.stderr)
+    if asked["by"] is not None:
+        for stop, boxes, others in stops_of(load, order, asked["by"]).itertuples(index=False):
+            summary = f"{boxes} boxes, {others} of later ones come out first"
+            print(f"{asked['by'].lstrip('-')} {stop}: {summary}", file=sys.stderr)
     left = len(load) - order["unloaded"].sum()
     if left:
         parser.exit(1, f"{left} boxes are left, of which none that is visible can be lifted\n")
+
+
+def _draw(load, order, path: str) -> None:
+    from unload.support.extras import needed_for
+
+    with needed_for("--picture"):
+        from unload.load.picture import numbered
+    Path(path).write_bytes(numbered(load, order["item"].to_numpy()))
+
+
+def _write(order, output, form: str) -> None:
+    """Write an order, distances to the micrometre."""
+    if form == "json":
+        order.to_json(output, orient="records", indent=1, double_precision=6, force_ascii=False)
+        return
+    order = order.assign(distance=order["distance"].map("{:.6f}".format))
+    order = order.apply(lambda column: column.map(_as_text)).rename(columns=_as_text)
+    order.to_csv(output, index=False, lineterminator="\n")
+
+
+def _force(text: str) -> float | str:
+    return text if text == "auto" else float(text)
 
 
 def _as_text(cell):
@@ -99,9 +137,11 @@ def _as_text(cell):
 
 def train_by(arguments: list[str]) -> None:
     """Train with the fields of ``TrainConfig`` as options."""
-    from unload.agent.config import TrainConfig
-
     parser = _parser("unload train", TRAIN_DESCRIPTION)
+    try:
+        from unload import TrainConfig
+    except ImportError as error:
+        parser.exit(1, f"{error}\n")
     parser.add_argument("--run-dir", required=True, help="folder of the run")
     parser.add_argument("--stack", type=_named, help="module:function that makes the loads")
     parser.add_argument("--lifts", help="file of lifts that have been computed")
@@ -118,7 +158,7 @@ def train_by(arguments: list[str]) -> None:
     given = vars(parser.parse_args(arguments))
     run_dir, stack, lifts = (given.pop(name) for name in ("run_dir", "stack", "lifts"))
 
-    from unload.agent.training import train  # not before, because it takes long
+    from unload import train  # not before, because it takes long
 
     try:
         train(TrainConfig(**given), run_dir, stack=stack, lifts=lifts)

@@ -112,7 +112,7 @@ def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, 
         ({"physics": "none"}, ValueError, "physics is 'none'"),
         ({"max_picks": 0}, ValueError, "max_picks is 0"),
         ({"ties": "coin"}, ValueError, "ties is 'coin'"),
-        ({"num_envs": 3}, ValueError, "an argument of evaluate is 'num_envs'; expected one of"),
+        ({"num_envs": 3}, TypeError, "unexpected keyword argument 'num_envs'"),
         ({"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected one of 'restore'"),
     ],
 )

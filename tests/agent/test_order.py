@@ -1,18 +1,21 @@
 """The order of picks of one load, and its command line."""
 
+import inspect
 import io
 import logging
+import textwrap
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from tests.load.walls import KINDS, own_load
-from unload import Load, picking_order, policies, read_load
+from unload import Load, picking_order, policies, read_load, stack_load
 from unload import __main__ as command
-from unload.agent.order import NAMES, reachable
+from unload.agent.order import NAMES, reachable, stops_of
 from unload.load.packing_list import EXAMPLE
 from unload.physics.local import LocalPhysics
+from unload.physics.table import FREE_LIFT
 from unload.task import LIFT_THRESHOLD
 
 # Allowed at first, until it fails or holds no box; it ends in case nothing stops the policy.
@@ -108,7 +111,18 @@ def test_random_picks_are_drawn_from_the_seed(boxes):
         ({"policy": lambda *_: np.array([next(STUBBORN)])}, ValueError, "is 127; expected a row"),
         ({"policy": lambda *_: 0}, ValueError, r"what policy returned has shape \(\)"),
         ({"rule": "reachable"}, TypeError, "rule is 'reachable'; expected a function"),
-        ({"rule": reachable, "policy": "highest"}, TypeError, "and no policy beside it"),
+        ({"rule": reachable, "policy": "highest"}, TypeError, "expected no policy beside it"),
+        ({"rule": reachable, "by": "stop"}, TypeError, "expected a function, and no by beside it"),
+        ({"by": "stop"}, ValueError, "by is 'stop'; expected one of"),
+        ({"by": 3}, TypeError, "by is 3; expected a name"),
+        ({"force": -1}, ValueError, "force is -1; expected a number >= 0"),
+        ({"force": "much"}, TypeError, "force is 'much'"),
+        ({"physics": "none"}, ValueError, "physics is 'none'; expected one of 'local', 'full', "),
+        (
+            {"physics": LocalPhysics(), "force": 30},
+            ValueError,
+            "force is 30; expected it to be given",
+        ),
         ({"rule": lambda load, _: load.sizes}, ValueError, r"returned has shape \(136, 3"),
         ({"rule": lambda *_: None}, TypeError, "what rule returned is None; expected arrays of"),
         ({"rule": lambda load, _: [load.ids]}, TypeError, r"what rule returned is \[array"),
@@ -148,7 +162,7 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path, capsys, monkeypat
         "=a;50;50;50;100;100;100;5;2.1234567;=1\n"
         "b;50;50;159;100;100;100;7;1;x\n"
     )
-    options = "--units cm --container 12 2 2.2 --x-from door --tolerance 0.1 --ignore weight"
+    options = "--units cm --container 12 2 2.4 --x-from door --tolerance 0.1 --ignore weight"
     list_ = f"{tmp_path}/boxes.csv"
     with monkeypatch.context() as usual:
         usual.setattr(logging.root, "handlers", [])  # pytest's; a program has none
@@ -158,8 +172,9 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path, capsys, monkeypat
     assert order["id"].tolist() == ["b", "'=a"] and order["weight"].tolist() == [7, 5]
     assert order["stop"].tolist() == [1, 2.1234567] and order["'=note"].tolist() == ["x", "'=1"]
     assert said.splitlines() == [
+        f"{list_}: read length as size_x, width as size_y, height as size_z",
         f"{list_}: kept but not used: stop, =note",
-        f"{list_}: 1 of 2 boxes moved by up to 90.0 mm, onto what is below and beside them",
+        f"{list_}: 1 of 2 boxes moved by up to 90.0 mm, to fit what is below and beside them",
         "2 picks, 0 failed, 0% behind other boxes",
     ]
 
@@ -179,3 +194,112 @@ def test_the_command_line_says_what_is_wrong(tmp_path, capsys, monkeypatch):
         command.main(["-h"])
     text = " ".join(capsys.readouterr().out.split())
     assert all(name in text for name in NAMES)
+
+
+def must_leave(load: Load, box: int) -> np.ndarray:
+    """The boxes that stand in front of one or lie on it, found without ``Load``'s own pairs."""
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    shared = np.minimum(high[box], high) - np.maximum(low[box], low)
+    in_front = (shared[:, 1:] > 1e-6).all(axis=1) & (low[:, 0] > low[box, 0])
+    on_top = (shared[:, :2] > 1e-6).all(axis=1) & (abs(low[:, 2] - high[box, 2]) < 1e-4)
+    return np.flatnonzero(in_front | on_top)
+
+
+@pytest.mark.parametrize(
+    ("by", "first_to_last"),
+    [("stop", [1, 2, 3]), ("-stop", [3, 2, 1]), ("town", ["stop 2", "stop 9", "stop 10"])],
+)
+def test_an_order_by_stops_can_be_carried_out_and_takes_out_early_what_it_must(
+    rng, by, first_to_last
+):
+    load = stack_load(rng, walls=3)
+    stops = rng.integers(1, 4, len(load))
+    towns = np.array(["stop 9", "stop 10", "stop 2"])[rng.integers(3, size=len(load))]
+    load = Load(load.positions, load.sizes, extras={"stop": stops, "town": towns})
+    order = picking_order(load, by=by)
+    assert order["unloaded"].all() and not order["behind"].any() and len(order) == len(load)
+    summary = stops_of(load, order, by)
+    assert summary["stop"].tolist() == first_to_last
+    turn = [first_to_last.index(stop) for stop in load.extras[by.strip("-")].tolist()]
+    for number, row in enumerate(summary.itertuples()):
+        # What has to be out before the last box of this stop is: all that one box leads to.
+        out, left = set(), [box for box in range(len(load)) if turn[box] <= number]
+        while left:
+            box = left.pop()
+            if box not in out:
+                out.add(box)
+                left += must_leave(load, box).tolist()
+        assert row.boxes == turn.count(number)
+        assert row.others_first == sum(turn[box] > number for box in out)
+    assert summary["others_first"].iloc[0] > 20 and summary["others_first"].iloc[-1] == 0
+
+
+def test_the_rule_in_the_docstring_works(small_load):
+    text = inspect.cleandoc(picking_order.__doc__)
+    _, _, example = text.partition("the heaviest first::\n\n")
+    code = textwrap.dedent(example.partition("\n\n")[0])
+    exec(code, space := {"reachable": reachable})
+    masses = 1 + np.arange(len(small_load)) % 7
+    load = Load(small_load.positions, small_load.sizes, masses=masses)
+    order = picking_order(load, rule=space["heaviest"], force="auto")
+    assert order["unloaded"].all() and not order["behind"].any() and len(order) == len(load)
+    present = np.ones(len(load), bool)
+    for item in order["item"]:
+        free = present & ~load.covered(present) & ~load.behind(present)
+        assert masses[item] == masses[free].max()
+        present[item] = False
+
+
+def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog):
+    load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2), (1.3, 0.6))
+    low = Load(load.positions, load.sizes, ids=list("abcd"), container=(7, 2.5, 0.9))
+    order = picking_order(low)
+    assert order["id"].tolist() == ["a", "b", "c", "d"]
+    assert order["unloaded"].tolist() == [True, True, False, False]
+    assert order["distance"].iloc[-1] == 0
+    assert "1 of 4 boxes have less than 0.2 m above them: d\n" in caplog.text
+    heavy = Load(load.positions, load.sizes, masses=[3, 1, 25, 0.5])
+    assert picking_order(heavy)["item"].tolist() == [3, 1, 0, 2]
+    assert "2 of 4 boxes are too heavy for 20 N; force='auto' lifts each: 0, 2\n" in caplog.text
+    assert picking_order(heavy, force=60)["unloaded"].tolist() == [True, True, True, False]
+    caplog.clear()
+    assert (picking_order(heavy, force="auto")["distance"] == FREE_LIFT).all()
+    assert not caplog.text
+
+
+def test_a_physics_of_ones_own_lifts(boxes):
+    class Half(LocalPhysics):
+        def simulate(self, situation):
+            return 0.5
+
+    physics = Half()
+    for _ in range(2):  # it stays open
+        assert (
+            picking_order(boxes((0.3, 0.2), (0.3, 0.6)), physics=physics)["distance"] == 0.5
+        ).all()
+
+
+def test_the_command_line_orders_by_stops_and_draws(tmp_path, capsys):
+    list_ = tmp_path / "boxes.csv"
+    list_.write_text(
+        "id,x_min,y_min,z_min,size_x,size_y,size_z,stop,weight\n"
+        "a,0,0,0,1,1,1,1,30\nb,1,0,0,1,1,1,2,2\nc,0,1,0,1,1,1,2,3\n"
+    )
+    out, picture = tmp_path / "order.json", tmp_path / "order.png"
+    files = f"--output {out} --format json --picture {picture}".split()
+    command.main([str(list_), "--by", "stop", "--force", "auto", *files])
+    order = pd.read_json(out)
+    assert order["id"].tolist() == ["b", "a", "c"] and order["distance"].eq(FREE_LIFT).all()
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    said = capsys.readouterr().err.splitlines()[-3:]
+    assert said == [
+        "3 picks, 0 failed, 0% behind other boxes",
+        "stop 1: 1 boxes, 1 of later ones come out first",
+        "stop 2: 2 boxes, 0 of later ones come out first",
+    ]
+    command.main([str(list_), "--by=-stop", "--force", "auto"])
+    assert pd.read_csv(io.StringIO(capsys.readouterr().out))["id"].tolist() == ["b", "c", "a"]
+    with pytest.raises(SystemExit):
+        command.main([str(list_), "--by", "town", "--output", str(out)])
+    assert "by is 'town'; expected one of 'stop', 'weight'" in capsys.readouterr().err
+    assert len(pd.read_json(out)) == 3, "nothing is written"

@@ -1,6 +1,7 @@
 """A load: which boxes it accepts, and what it keeps of them."""
 
 import pickle
+import sys
 from dataclasses import FrozenInstanceError
 from decimal import Decimal
 
@@ -10,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.load.walls import corners, crossed_bars
-from unload import task
+from unload import stack_load, task
 from unload.load.boxes import (
     _SMALLEST_EDGE,
     ABOVE,
@@ -57,6 +58,8 @@ def test_a_load_cannot_be_changed(full_load):
         ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
         ({"packages": [-1]}, ValueError, "packages holds -1"),
         ({"walls": [[0]]}, ValueError, r"walls has shape \(1, 1\)"),
+        ({"masses": [1, 1]}, ValueError, r"masses has shape \(2,\); expected \(1,\)"),
+        ({"masses": [0.0]}, ValueError, r"box \[0\]: a mass of 0.0 kg; expected >= 0.001 kg"),
         ({"ids": ["a", "b"]}, ValueError, r"ids has shape \(2,\); expected \(1,\)"),
         ({"extras": {"stop": [3, 4]}}, ValueError, r"extras\['stop'\] has shape \(2,\)"),
         ({"container": (7.0, 2.5)}, ValueError, r"container has shape \(2,\)"),
@@ -195,3 +198,27 @@ def test_behind_and_covered_are_what_their_definitions_say(boxes, data):
         assert load.behind(present)[box] == front[present].any()
         above = load.contacts.of(ABOVE, box)
         assert load.covered(present)[box] == present[above].any()
+
+
+@pytest.mark.parametrize("walls", [2, 12])
+def test_contacts_without_numba_are_the_same(rng, walls, monkeypatch):
+    """Also where boxes overlap, and in more than one block of boxes."""
+    monkeypatch.setattr("unload.load.boxes._BLOCK", 100)
+    load = stack_load(rng, walls=walls)
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    for blur in (0, 0.001):
+        low[:, 0] = (low[:, 0] + rng.uniform(0, blur, len(low))).clip(0)  # no walls any more
+        with_numba = _find_contacts(low, high, 0.005)
+        with monkeypatch.context() as patch:
+            patch.delitem(sys.modules, "numba")
+            without = _find_contacts(low, high, 0.005)
+            with pytest.raises(BoxError, match="overlap"):
+                _find_contacts(low, high + 0.01)
+        for one, other in zip(with_numba, without):
+            assert np.array_equal(one, other) and one.dtype == other.dtype == np.int32
+
+
+def test_masses_are_those_of_the_task_unless_given_and_headroom_ends_at_the_ceiling():
+    assert one_box().masses.tolist() == [1.0] and one_box(masses=[3]).masses.tolist() == [3.0]
+    assert one_box().headroom.tolist() == [1.5]
+    assert one_box(container=(7, 2.5, 1.1)).headroom == pytest.approx([0.1])

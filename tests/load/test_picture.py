@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from unload import task
+from unload import Load, task
+from unload.load import picture
 from unload.load.picture import (
     _FACES,
     _INSIDES,
@@ -117,3 +118,25 @@ def test_colours_of_packages_are_their_codes_and_begin_again():
     assert [round(255 * part) for part in package_colour(0)] == [0x1F, 0x3A, 0x5F]
     assert [round(255 * part) for part in package_colour(12)] == [0xF6, 0xE2, 0x7F]
     assert package_colour(13) == package_colour(0) and len(set(_PACKAGE_COLOURS)) == 13
+
+
+def test_numbers_stand_on_the_first_picks_that_are_seen(boxes, monkeypatch):
+    """On a face that is not covered; a box that is hidden has none."""
+    written = {}
+
+    def write(axes, x, y, text, **style):
+        written[text] = x, y
+
+    monkeypatch.setattr("matplotlib.axes.Axes.text", write)
+    load = boxes((0.3, 0.2), (0.3, 0.6), (1.0, 0.2), (1.6, 0.2))
+    monkeypatch.setattr(picture, "_NUMBERED", 3)
+    assert picture.numbered(load, np.array([1, 0, 2, 3])).startswith(b"\x89PNG")
+    low, high = picture.corners(load, np.arange(4))
+    faces = picture._faces(low, high, load.container).mean(axis=2)
+    assert [*written] == ["1", "2", "3"]
+    for text, item in (("1", 1), ("2", 0), ("3", 2)):
+        assert any(np.allclose(written[text], face) for face in faces[item])
+    written.clear()
+    wall = Load.from_corners([[0, 1, 0], [3, 0, 0]], [[1, 0.3, 0.3], [1, 2.4, 2.4]])
+    picture.numbered(wall, np.array([0, 1]))
+    assert [*written] == ["2"]

@@ -49,14 +49,17 @@ def own_load(rng: np.random.Generator, kind: str) -> Load:
 
 
 def _cut(rng: np.random.Generator, kind: str, axis: int) -> list[tuple[float, float]]:
-    """Neighbouring intervals that fit into the container along an axis, from 0."""
-    ends = [0.0]
+    """Neighbouring intervals that fit into the container along an axis, from 0.
+
+    Above the highest there is room for a pick.
+    """
+    ends, most = [0.0], task.CONTAINER[axis] - (0.25 if axis == 2 else 0)
     while True:
         if kind == "few sizes":
             step = rng.choice(FEW_SIZES[axis])
         else:
             step = rng.uniform(*CONTINUOUS[axis])
-        if ends[-1] + step > task.CONTAINER[axis]:
+        if ends[-1] + step > most:
             return list(zip(ends, ends[1:]))
         ends.append(ends[-1] + step)
 

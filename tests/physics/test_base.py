@@ -132,7 +132,7 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
 @pytest.mark.needs("/proc")
 def test_the_memory_of_many_lifts_is_flat(monkeypatch):
     """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
-    monkeypatch.setattr(World, "pull", lambda world, body: 0.0)
+    monkeypatch.setattr(World, "pull", lambda *_: 0.0)
     monkeypatch.setattr("unload.physics.local._MOST_BODIES", 1_500)
     physics, resident = LocalPhysics(), []
     for number in range(6_001):

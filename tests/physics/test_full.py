@@ -53,8 +53,8 @@ def test_an_interrupted_lift_moves_no_box(boxes, after_pick, monkeypatch):
     load = boxes(*BRIDGE)
     physics, pull = make("full", load, after_pick=after_pick), World.pull
 
-    def interrupted(world, body):
-        pull(world, body)
+    def interrupted(*given):
+        pull(*given)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):

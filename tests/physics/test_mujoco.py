@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import unload
-from tests.physics.kinds import ONE_BOX, TWO_BOXES, make
-from unload import task
+from tests.physics.kinds import ONE_BOX, TWO_BOXES, lifts, make
+from unload import Load, task
 from unload.env.vector import ContainerVectorEnv
 from unload.physics import bullet, mujoco
 from unload.physics.local import LocalPhysics
 from unload.physics.pool import Pool
 from unload.physics.situation import Situation
-from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, shared_table
+from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, free_lift, shared_table
 from unload.support import files
 
 
@@ -43,6 +43,14 @@ def test_it_moves_boxes_as_far_as_the_appendix_says(boxes):
     assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.004)
     assert physics.lift(1) == pytest.approx(ONE_BOX, rel=0.01)
     assert physics._world is None, "PyBullet is not asked"
+
+
+def test_it_pulls_other_masses_with_other_forces(boxes):
+    load = boxes((0.3, 0.2), (0.8, 0.2), (0.8, 0.6))
+    heavy = Load(load.positions, load.sizes, masses=[2, 0.5, 5])
+    lifted = lifts(make("local", heavy, engine="mujoco", force=30), range(3))
+    assert lifted[0] == pytest.approx(free_lift(30, 2), rel=0.01)
+    assert lifted[1:] == pytest.approx([0, 0], abs=0.001)
 
 
 def test_floor_and_side_walls_hold_what_they_touch():

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 
 from tests.agent.runs import ROOT
+from unload.physics import pool as pools
 from unload.physics import table
 from unload.physics.local import LocalPhysics
 from unload.physics.pool import Pool
 from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics
-from unload.support.compiled import CONFIG
 
 
 @pytest.fixture(scope="module", autouse=True)
 def three_cores():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(CONFIG, "NUMBA_NUM_THREADS", 3)
+        patch.setattr(pools, "threads", lambda: 3)
         yield
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 
+import gymnasium
 import numpy as np
 
 from unload.agent.identity import identity
@@ -13,11 +14,20 @@ from unload.support import checks
 
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
-OPTIONS = {"env": ENVS, "ties": TIES, "network": tuple(NETWORKS)}
+OPTIONS = {"ties": TIES, "network": tuple(NETWORKS)}
 MAY_BE_ZERO = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
 # Of the real numbers, which are 0 or larger.
 HIGHEST = {"position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0}
 EPSILON_FALLS = 0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
+
+
+def _registered(env: object) -> str:
+    spec = gymnasium.registry.get(env) if isinstance(env, str) else None
+    if spec is None or spec.vector_entry_point is None:
+        known = ", ".join(map(repr, ENVS))
+        wanted = f"expected {known}, or an id that is registered with a vector_entry_point"
+        raise ValueError(f"env is {env!r}; {wanted}")
+    return spec.id
 
 
 @dataclass(frozen=True)
@@ -25,7 +35,9 @@ class TrainConfig:
     """One training run. The defaults are the paper's (Sec. IV-B); * marks our own choice.
 
     Attributes:
-        env: the task, ``"unload/Container-v0"`` or ``"unload/HighestItem-v0"``.
+        env: the task, ``"unload/Container-v0"``, ``"unload/HighestItem-v0"``, or an id of your own
+            with the same spaces, registered with a ``vector_entry_point``, such as a subclass of
+            ``ContainerVectorEnv`` with other rewards. A run knows it by its id alone.
         picks: K, over all environments; a multiple of ``num_envs``.
         seed: * of loads, exploration, replay and weights.
         num_envs: environments side by side (Fig. 2).
@@ -85,6 +97,8 @@ class TrainConfig:
                 value = checks.integer(name, value, 0 if name in MAY_BE_ZERO else 1)
             elif isinstance(field.default, float):
                 value = checks.real(name, value, 0, HIGHEST.get(name, np.inf))
+            elif name == "env":
+                value = _registered(value)
             elif not (name == "network" and callable(value)):
                 value = checks.one_of(name, value, OPTIONS[name])
             object.__setattr__(self, name, value)

@@ -4,20 +4,23 @@ import sys
 from collections.abc import Callable
 from contextlib import closing
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 from unload import task
-from unload.agent.policies import choosable
+from unload.agent.policies import Policy, choosable
 from unload.env.container import ContainerEnv
+from unload.env.observation import POSITION_NOISE
 from unload.env.vector import ContainerVectorEnv
+from unload.load.boxes import Load
+from unload.load.substacks import stack_load
+from unload.physics.base import Physics
+from unload.physics.choice import Name
 from unload.support import checks
 
-Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
-# Arguments of ``ContainerEnv`` that ``evaluate`` passes on.
-ENV_KWARGS = ("after_pick", "equalize", "position_noise", "stack", "ties")
 MOST_EPISODES = 10**6
 # Failed picks in a row after which an episode without a limit is given up.
 GIVE_UP = 10 * task.N_VISIBLE
@@ -42,10 +45,14 @@ def evaluate(
     policy: Policy,
     episodes: int = 20,
     seed: int = 0,
-    physics: str = "table",
+    physics: Name | Physics = "table",
     mask: bool = True,
     max_picks: int | None = task.MAX_PICKS,
-    **env_kwargs,
+    after_pick: str = "restore",
+    equalize: bool = False,
+    ties: str = "noise",
+    position_noise: float = POSITION_NOISE,
+    stack: Callable[[np.random.Generator], Load] = stack_load,
 ) -> pd.DataFrame:
     """Let a policy unload fresh containers.
 
@@ -58,14 +65,13 @@ def evaluate(
         seed: of the loads and of the policy's random numbers; load i is the same whatever
             the number of episodes.
         physics: see ``ContainerEnv``. ``"table"`` plays 64 episodes side by side, the others
-            one after the other.
+            one after the other; one of your own is not closed.
         mask: whether the policy's masks exclude items that failed since the last success.
             Rows without an item are always excluded.
         max_picks: most picks per episode; fewer if the container is empty before, or if the
             mask excludes all items. With None it is unloaded completely, unless 1280 picks in a
             row fail.
-        **env_kwargs: ``after_pick``, ``equalize``, ``position_noise``, ``stack`` and ``ties`` of
-            ``ContainerEnv``.
+        after_pick, equalize, ties, position_noise, stack: of ``ContainerEnv``.
 
     Returns:
         One row per episode: ``success_rate``, ``unloaded`` (items), ``deadlocked``
@@ -83,23 +89,27 @@ def evaluate(
         max_picks = checks.integer("max_picks", max_picks, 1)
     if not callable(policy):
         raise TypeError(f"policy is {policy!r}; expected a function, see unload.policies")
-    for name in env_kwargs:
-        checks.one_of("an argument of evaluate", name, ENV_KWARGS)
-    if physics == "table":
-        checks.one_of("after_pick", env_kwargs.pop("after_pick", "restore"), ("restore",))
+    settings: dict[str, Any] = {
+        "equalize": equalize,
+        "ties": ties,
+        "position_noise": position_noise,
+    }
+    settings |= {"stack": stack, "max_picks": sys.maxsize if max_picks is None else max_picks}
+    arrays = isinstance(physics, str) and physics == "table"
+    if arrays:
+        checks.one_of("after_pick", after_pick, ("restore",))
 
     # Each load has a seed of its own, so that it does not depend on how many are played at once;
     # only the table answers many containers in arrays.
-    at_once = task.NUM_ENVS if physics == "table" else 1
+    at_once = task.NUM_ENVS if arrays else 1
     load_seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     frames = []
     for first in range(0, episodes, at_once):
         seeds = load_seeds[first : first + at_once]
-        limit = sys.maxsize if max_picks is None else max_picks
-        if physics == "table":
-            envs: VectorEnv = ContainerVectorEnv(len(seeds), max_picks=limit, **env_kwargs)
+        if arrays:
+            envs: VectorEnv = ContainerVectorEnv(len(seeds), **settings)
         else:
-            make = partial(ContainerEnv, physics, max_picks=limit, **env_kwargs)
+            make = partial(ContainerEnv, physics, after_pick, **settings)
             envs = SyncVectorEnv([make], autoreset_mode=AutoresetMode.SAME_STEP)
         with closing(envs):
             frames.append(_play(envs, policy, seeds, mask, give_up=max_picks is None))

@@ -7,9 +7,13 @@ least in rows that hold no item; ``rng`` a ``numpy.random.Generator``; actions (
 ``unload.Greedy`` is a learned one.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from unload.support import checks
+
+Policy = Callable[[np.ndarray, np.ndarray, np.random.Generator], np.ndarray]
 
 
 def check_batch(observations: np.ndarray, masks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

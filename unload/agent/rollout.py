@@ -5,7 +5,9 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import Box, Discrete
 
+from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.policies import choosable
 
@@ -38,6 +40,12 @@ class Rollout:
             position_noise=config.position_noise,
             **own,
         )
+        for space, wanted in (
+            (self.envs.single_observation_space, Box(-1, 1, (task.N_VISIBLE, 3), np.float32)),
+            (self.envs.single_action_space, Discrete(task.N_VISIBLE)),
+        ):
+            if space != wanted:
+                raise ValueError(f"env={config.env!r} has {space}; expected {wanted}")
         self._see(*self.envs.reset(seed=config.seeds()[0]))
 
     def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:

@@ -202,7 +202,7 @@ def train(
     if not callable(change):
         raise TypeError(f"change is {change!r}; expected a function of a Training")
     for name, value in (("stack", stack), ("lifts", lifts)):
-        if value is not None and config.env != ENVS[0]:
+        if value is not None and config.env == ENVS[1]:
             raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)

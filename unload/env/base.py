@@ -337,7 +337,7 @@ class PickingEnv(EpisodeEnv):
         self._envs.close()
 
     @property
-    def _state(self) -> str:  # type: ignore[override]
+    def _state(self) -> str:
         return self._envs._state
 
 

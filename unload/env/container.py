@@ -13,10 +13,7 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.full import FullPhysics
-from unload.physics.local import LocalPhysics
-from unload.physics.table import TablePhysics, shared_table
-from unload.support import checks
+from unload.physics.choice import Name, make_physics
 
 
 class ContainerEnv(PickingEnv):
@@ -81,7 +78,8 @@ class ContainerEnv(PickingEnv):
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
             ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered). ``"table"``
             answers without a simulation if nothing rests on the chosen box, which then moves by
-            0.463053 m, and if three boxes or more do: it moves by 0 m.
+            0.463053 m, and if three boxes or more do: it moves by 0 m. Or a ``Physics`` of your
+            own, which the environment leaves open.
         after_pick: for ``physics="full"``: ``"restore"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
@@ -112,7 +110,7 @@ class ContainerEnv(PickingEnv):
 
     def __init__(
         self,
-        physics: str = "local",
+        physics: Name | Physics = "local",
         after_pick: str = "restore",
         equalize: bool = False,
         ties: str = "noise",
@@ -123,7 +121,7 @@ class ContainerEnv(PickingEnv):
     ) -> None:
         settings = {"equalize": equalize, "ties": ties, "max_picks": max_picks}
         settings |= {"position_noise": position_noise, "stack": stack}
-        super().__init__(_OneContainer(_make_physics(physics, after_pick), settings), render_mode)
+        super().__init__(_OneContainer(physics, after_pick, settings), render_mode)
 
     @property
     def visible(self) -> np.ndarray:
@@ -166,12 +164,14 @@ class ContainerEnv(PickingEnv):
 class _OneContainer(ContainerVectorEnv):
     """An array of one container, whose lifts its own ``physics`` decides."""
 
-    def __init__(self, physics: Physics, settings: dict[str, Any]) -> None:
+    def __init__(self, physics: Name | Physics, after_pick: str, settings: dict[str, Any]) -> None:
         super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)
-        self.physics = physics
+        self.physics = make_physics(physics, after_pick)
+        self._lent = self.physics is physics
 
     def close_extras(self, **kwargs) -> None:
-        self.physics.close()
+        if not self._lent:
+            self.physics.close()
         super().close_extras(**kwargs)
 
     def observed_positions(self) -> np.ndarray:
@@ -181,7 +181,7 @@ class _OneContainer(ContainerVectorEnv):
         self.physics.reset(load)
         self._failed = np.zeros(len(load), bool)
         self._blur = blur if self.physics.exact else np.zeros_like(blur)
-        super()._put_load(env, load, self._blur)
+        self._put_boxes(env, load, self._blur)
 
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray
@@ -206,12 +206,3 @@ class _OneContainer(ContainerVectorEnv):
         # A row without a box is a failed pick that asks no physics.
         distance = self.physics.lift(item) if item >= 0 else 0.0
         return np.array([item]), np.array([distance])
-
-
-def _make_physics(name: str, after_pick: str) -> Physics:
-    checks.one_of("physics", name, ("local", "full", "table"))
-    if name == "full":
-        return FullPhysics(after_pick)
-    if after_pick != "restore":
-        raise ValueError(f"after_pick is {after_pick!r}; expected 'restore' for physics={name!r}")
-    return LocalPhysics() if name == "local" else TablePhysics(shared_table())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -24,7 +25,8 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``; there is no other one for arrays.
+        physics: ``"table"``, or a ``TablePhysics`` of your own, which is left open. With
+            ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
 
     Attributes:
         table: the lifts that are known, filled by unknown ones; it may be replaced.
@@ -37,19 +39,27 @@ class ContainerVectorEnv(PickingVectorEnv):
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
-        physics: str = "table",
+        physics: Literal["table"] | TablePhysics = "table",
         stack: Callable[[np.random.Generator], Load] = stack_load,
         **settings,
     ) -> None:
         super().__init__(num_envs, **settings)
-        checks.one_of("physics", physics, ("table",))
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
-        self.stack, self._physics = stack, TablePhysics()
+        self.stack, self._own = stack, not isinstance(physics, TablePhysics)
+        if isinstance(physics, TablePhysics):
+            if physics.force < task.PICK_FORCE:
+                wanted = f"expected >= {task.PICK_FORCE} in arrays, where free boxes are lifted"
+                raise ValueError(f"physics.force is {physics.force}; {wanted}")
+            self._physics, self.table = physics, physics.table
+        else:
+            checks.one_of("physics", physics, ("table", "a TablePhysics"))
+            self._physics = TablePhysics()
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
-        self._physics.close()
+        if self._own:
+            self._physics.close()
         super().close_extras(**kwargs)
 
     @cached_property
@@ -77,6 +87,12 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
+        if (other := load.masses[load.masses != task.MASS]).size:
+            wanted = f"expected {task.MASS} kg each in arrays; physics='local' lifts others"
+            raise ValueError(f"a load holds a box of {other[0]} kg; {wanted}")
+        self._put_boxes(env, load, blur)
+
+    def _put_boxes(self, env: int, load: Load, blur: np.ndarray) -> None:
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)
@@ -89,7 +105,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env], state.unloaded[env] = count, 0
-        state.widths[env] = load.container[1]
+        state.widths[env], state.heights[env] = load.container[1:]
         self._show_items(env, np.arange(count), load.positions + blur, load)
 
     def _show_items(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
@@ -126,8 +142,9 @@ class ContainerVectorEnv(PickingVectorEnv):
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             if self._physics.table is not self.table:  # it has been replaced
-                self._physics.close()
-                self._physics = TablePhysics(self.table)
+                if self._own:
+                    self._physics.close()
+                self._physics, self._own = TablePhysics(self.table), True
             state = self._containers
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
             distances[unknown] = self._physics.simulate_all(

@@ -11,6 +11,7 @@ import numpy as np
 
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
+from unload.load.boxes import OVERLAP
 from unload.physics.situation import find_movers, key_length, write_key
 from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, digest_of, slot_of
 from unload.support.compiled import compiled
@@ -23,7 +24,7 @@ class Containers(NamedTuple):
     """The state of E containers with room for ``capacity`` items and ``links`` contacts each.
 
     Attributes:
-        widths: (E,) float64, inner width of each container in m.
+        widths, heights: (E,) float64, inner width and height of each container in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
@@ -40,6 +41,7 @@ class Containers(NamedTuple):
     """
 
     widths: np.ndarray
+    heights: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -60,6 +62,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
         widths=np.zeros(num_envs),
+        heights=np.zeros(num_envs),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
@@ -125,6 +128,13 @@ def look_up(containers, actions, digests, micrometres):
             distances[env] = containers.failed[env, row]
             continue
 
+        # Under a low ceiling there is no pick, see Physics.lift.
+        geometry = containers.geometry[env]
+        top = geometry[items[env], 2] + geometry[items[env], 5] / 2
+        if containers.heights[env] - top < task.LIFT_THRESHOLD - OVERLAP:
+            distances[env] = 0
+            continue
+
         # Free boxes and those under three others need no table, see TablePhysics.
         starts, links = containers.starts[env], containers.links[env]
         present, right = containers.present[env], containers.widths[env]
@@ -133,7 +143,6 @@ def look_up(containers, actions, digests, micrometres):
             distances[env] = FREE_LIFT if dynamic == 1 else 0.0
             continue
 
-        geometry = containers.geometry[env]
         words = write_key(starts, links, present, geometry, right, members, dynamic, key)
         digest = digest_of(key[:words])
         slot = slot_of(digests, digest)

@@ -17,10 +17,12 @@ from unload.support.compiled import compiled
 
 # Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
 _SMALLEST_EDGE = 0.002
+_LIGHTEST = 0.001  # kg, because a situation counts whole grams
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 LARGEST_TOLERANCE = 0.1  # m
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
 ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
+_BLOCK = 512  # boxes whose pairs are compared at once, to bound what these arrays hold
 
 
 class Contacts(NamedTuple):
@@ -67,6 +69,7 @@ class Load:
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
+        masses: (n,) float64, kg, at least 0.001; 1 kg each if not given, as in the task.
         contact_tolerance: m, up to 0.1; boxes this close above one another touch. What bridges two
             boxes of measured heights touches both, though it stands on the higher one.
         contacts: which boxes touch, computed from positions and sizes.
@@ -74,8 +77,8 @@ class Load:
     Raises:
         TypeError: a field's dtype is not numeric.
         ValueError: a field's shape or a value is wrong.
-        BoxError: a ValueError, too: an edge is too short, a box sticks out of the container, two
-            boxes overlap by more than 1 µm, or have the same id.
+        BoxError: a ValueError, too: an edge is too short, a box too light, or sticks out of the
+            container, two boxes overlap by more than 1 µm, or have the same id.
     """
 
     positions: np.ndarray
@@ -85,6 +88,7 @@ class Load:
     ids: np.ndarray | None = None
     container: np.ndarray = None
     extras: Mapping[str, np.ndarray] = None
+    masses: np.ndarray = None
     contact_tolerance: float = CONTACT_TOLERANCE
     contacts: Contacts = field(init=False)
 
@@ -112,6 +116,10 @@ class Load:
             labels[name] = checks.integer_array(name, label, (count,))
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
+        masses = np.full(count, task.MASS) if self.masses is None else self.masses
+        masses = checks.finite_array("masses", np.array(masses, np.float64), (count,))
+        if (light := np.flatnonzero(masses < _LIGHTEST)).size:
+            raise BoxError(light, f"a mass of {masses[light[0]]} kg; expected >= {_LIGHTEST} kg")
         extras = {name: np.array(values) for name, values in dict(self.extras or {}).items()}
         for name, values in extras.items():
             checks.shaped(f"extras[{name!r}]", values, (count,))
@@ -135,7 +143,8 @@ class Load:
         touching = _find_contacts(low, high, tolerance)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
-        fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
+        fields = {"positions": positions, "sizes": sizes, "container": container, "masses": masses}
+        fields |= labels
         for array in (*fields.values(), *extras.values(), *touching):
             array.setflags(write=False)
         rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": touching}
@@ -160,18 +169,28 @@ class Load:
 
         In front of a box is what stands nearer to the door and overlaps it in y and z.
         """
-        box, front = self._fronts
+        box, front = self.fronts
         return np.bincount(box[present[front]], minlength=len(self)) > 0
 
     def covered(self, present: np.ndarray) -> np.ndarray:
         """Which boxes lie under one of the present ones, (n,) bool each."""
-        starts, boxes = self.contacts
-        lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
-        above = boxes[starts[ABOVE, 0] : starts[ABOVE, -1]]
-        return np.bincount(lower[present[above]], minlength=len(self)) > 0
+        lower, upper = self.covers
+        return np.bincount(lower[present[upper]], minlength=len(self)) > 0
+
+    @property
+    def headroom(self) -> np.ndarray:
+        """(n,) float64, from the top of each box to the ceiling, in m."""
+        return self.container[2] - (self.positions[:, 2] + self.sizes[:, 2] / 2)
 
     @cached_property
-    def _fronts(self) -> tuple[np.ndarray, np.ndarray]:
+    def covers(self) -> tuple[np.ndarray, np.ndarray]:
+        """All pairs of a box and one that rests on it, as two arrays."""
+        starts, boxes = self.contacts
+        lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
+        return lower, boxes[starts[ABOVE, 0] : starts[ABOVE, -1]]
+
+    @cached_property
+    def fronts(self) -> tuple[np.ndarray, np.ndarray]:
         """All pairs of a box and one in front of it, as two arrays."""
         low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
         fronts = []
@@ -242,7 +261,47 @@ def _find_contacts(
     return Contacts(*_lists(found, len(low)))
 
 
-@compiled
+def _pairs(low, high, order, ends, tolerance):
+    """``_find`` in NumPy: the same rows in the same order, and the same two boxes."""
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    start, last = 0, []  # of each box, how far to its right others begin before it ends
+    for end in ends:
+        limit = y1[start:end] + CONTACT_TOLERANCE
+        last.append(start + np.searchsorted(y0[start:end], limit, side="right"))
+        start = end
+    counts = np.concatenate(last) - np.arange(len(order)) - 1
+
+    found = []
+    for first in range(0, len(order), _BLOCK):
+        count = counts[first : first + _BLOCK]
+        i = np.repeat(np.arange(first, first + len(count)), count)
+        j = i + 1 + np.arange(len(i)) - np.repeat(np.cumsum(count) - count, count)
+        upwards = np.minimum(z1[i], z1[j]) - np.maximum(z0[i], z0[j])
+        i, j, upwards = (each[upwards >= -tolerance] for each in (i, j, upwards))
+        across = np.minimum(y1[i], y1[j]) - y0[j]
+        along = np.minimum(x1[i], x1[j]) - np.maximum(x0[i], x0[j])
+        overlap = np.minimum(np.minimum(across, upwards), along) > OVERLAP
+        if overlap.any():
+            pair = overlap.argmax()
+            return np.empty((0, 3), np.int32), order[i[pair]], order[j[pair]]
+        touching = (np.maximum(across, upwards) > CONTACT_TOLERANCE) & (along > CONTACT_TOLERANCE)
+        i, j, stacked = i[touching], j[touching], across[touching] > CONTACT_TOLERANCE
+        one = np.where(stacked, np.where(z0[j] > z0[i], ABOVE, BELOW), BESIDE)
+        other = np.where(stacked, np.where(z0[j] > z0[i], BELOW, ABOVE), BESIDE)
+        both = [[one, order[i], order[j]], [other, order[j], order[i]]]
+        found.append(np.array(both, np.int32).transpose(2, 0, 1).reshape(-1, 3))
+    return np.concatenate(found), 0, 0
+
+
+def _sorted(found, count):
+    """``_lists`` in NumPy."""
+    keys = found[:, 0] * (count + 1) + found[:, 1]
+    order = np.argsort(keys[::-1], kind="stable")
+    starts = np.searchsorted(np.sort(keys), np.arange(3 * (count + 1))).reshape(3, -1)
+    return starts.astype(np.int32), found[::-1, 2][order]
+
+
+@compiled(plain=_pairs)
 def _find(low, high, order, ends, tolerance):
     """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
@@ -287,7 +346,7 @@ def _find(low, high, order, ends, tolerance):
     return found[:count], 0, 0
 
 
-@compiled
+@compiled(plain=_sorted)
 def _lists(found, count):
     """``starts`` and ``boxes`` of ``Contacts``."""
     starts = np.zeros((3, count + 1), np.int32)

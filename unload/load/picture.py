@@ -8,6 +8,7 @@ import io
 from collections.abc import Mapping
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
@@ -53,6 +54,7 @@ _EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
 _WIDTH = 8.0  # inches, at 100 pixels each
 _LEGEND = 0.15  # share of the width at the left
 _FILE_COLOURS = 128  # of a still picture
+_NUMBERED = 50  # picks in a picture of an order
 
 
 def package_colour(package: int) -> tuple[float, float, float]:
@@ -98,6 +100,44 @@ def still(
     return file.getvalue()
 
 
+def numbered(load: Load, items: np.ndarray) -> bytes:
+    """Return a PNG picture of a load whose first fifty picks are coloured and numbered.
+
+    Those that no one sees have no number.
+
+    Args:
+        load: as it is before the first pick.
+        items: (k,) int, in the order in which they are picked.
+    """
+    first = items[:_NUMBERED]
+    colours = np.tile(COLOURS["unseen"], (len(load), 1))
+    colours[first[::-1]] = colormaps["viridis_r"](np.linspace(0.1, 0.9, len(first)))[::-1, :3]
+    low, high = corners(load, np.arange(len(load)))
+    figure = _drawn(low, high, colours, (_WIDTH, _WIDTH * 0.6), 0.0, load.container)
+
+    # A number stands in the middle of a face that no box drawn later covers.
+    drawn = np.argsort(back_to_front(low, high))  # the place of each box in the order of drawing
+    faces = _faces(low, high, load.container)
+    for number, item in enumerate(dict.fromkeys(first.tolist()), 1):
+        later = faces[drawn > drawn[item]].reshape(-1, 4, 2)
+        for middle in faces[item].mean(axis=1):
+            sides, points = np.roll(later, -1, axis=1) - later, middle - later
+            turns = sides[..., 0] * points[..., 1] - sides[..., 1] * points[..., 0]
+            if not ((turns > 0).all(axis=1) | (turns < 0).all(axis=1)).any():
+                x, y = middle.tolist()
+                figure.axes[0].text(x, y, str(number), ha="center", va="center", fontsize=6)
+                break
+    file = io.BytesIO()
+    Image.fromarray(pixels(figure)).save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def _faces(low: np.ndarray, high: np.ndarray, container: np.ndarray) -> np.ndarray:
+    """(n, 3, 4, 2) float64, where the corners of each box's three visible faces are seen."""
+    seen = project(low[:, None] + CORNERS * (high - low)[:, None], container)
+    return np.stack([seen[:, list(face)] for face, _ in _FACES], axis=1)
+
+
 def _drawn(low, high, colours, size: tuple[float, float], left: float, container) -> Figure:
     """A figure of boxes in the container, of this size in inches, free in a share at the left."""
     figure = Figure(size, dpi=100, facecolor="white", layout="none")  # type: ignore[arg-type]
@@ -128,8 +168,7 @@ def draw(
         axes.fill(*frame[list(face)].T, color=str(brightness), zorder=0)
 
     # Of each box only three faces are seen, because of where the eye is.
-    seen = project(low[:, None] + CORNERS * (high - low)[:, None], container)
-    polygons = np.stack([seen[:, list(face)] for face, _ in _FACES], axis=1).reshape(-1, 4, 2)
+    polygons = _faces(low, high, container).reshape(-1, 4, 2)
     shades = np.array([shade for _, shade in _FACES])[:, None] * colours[:, None]
     # In one array, which Matplotlib takes faster than a list.
     axes.add_collection(

@@ -9,53 +9,78 @@ SLACK = 0.0005  # m, at each side of a face: physics makes boxes 1 mm narrower
 
 def settle(
     low: np.ndarray, sizes: np.ndarray, container: np.ndarray, tolerance: float
-) -> np.ndarray:
-    """How far boxes move until they lie on what is below, clear of what is beside, and inside.
+) -> tuple[np.ndarray, np.ndarray]:
+    """How boxes change until they lie on what is below, clear of what is beside, and inside.
 
-    Two boxes that share more than ``tolerance`` of depth and of width lie one above the other;
-    others stand side by side. A fault of more than ``tolerance`` is left as it is: a ``Load`` of
-    such boxes is refused.
+    Each box may be off by ``tolerance``, two of them by twice that from each other. Two boxes that
+    share more of depth and of width lie one above the other; others stand side by side. A larger
+    fault is left as it is: a ``Load`` of such boxes is refused.
 
     Args:
         low, sizes: (n, 3) float64, corners nearest to the origin and edge lengths in m.
         container: (3,) float64, in m.
-        tolerance: how far boxes may overlap each other or the walls, or float, in m.
+        tolerance: how far boxes may reach into walls, floor or each other, or float, and how
+            much smaller they may become where a row is longer than the container, in m.
 
     Returns:
-        (n, 3) float64 in m, 0 where a box fits.
+        How far each centre moves, and by how much each edge becomes smaller, (n, 3) float64 in m
+        each; 0 where a box fits.
     """
-    high, found = low + sizes, low.copy()
-
-    def shared(box: int, others: np.ndarray) -> np.ndarray:
-        """How much of each axis a box shares with others as they were listed, (k, 3) in m."""
-        return np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
+    high, found, edges = low + sizes, low.copy(), sizes.copy()
+    between = 2 * tolerance
 
     # From the floor upwards, each box sinks or rises onto the highest one below it.
     top, order = high[:, 2].copy(), np.argsort(low[:, 2], kind="stable")
     for count, box in enumerate(order):
-        share = shared(box, order[:count])
-        under = order[:count][(share[:, :2].min(axis=1) > tolerance) & (share[:, 2] <= tolerance)]
-        if abs(low[box, 2] - high[under, 2].max(initial=0)) <= tolerance:
+        share = np.minimum(high[box], high[order[:count]]) - np.maximum(
+            low[box], low[order[:count]]
+        )
+        under = order[:count][(share[:, :2].min(axis=1) > between) & (share[:, 2] <= between)]
+        most = between if under.size else tolerance
+        if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
             found[box, 2] = top[under].max(initial=0)
             top[box] = found[box, 2] + sizes[box, 2]
 
     # Those that share height now are pushed apart, along x or y: away from the rear wall or the
     # left one, and back where the container ends.
     for axis in (0, 1):
-        edges, end = sizes[:, axis], container[axis]
-        first = np.where(low[:, axis] >= -tolerance, low[:, axis].clip(0), low[:, axis])
-        last = np.where(high[:, axis] <= end + tolerance, end - edges, np.inf)
+        end, end_x = container[axis], found[:, 0] + edges[:, 0]
         order, before = np.argsort(low[:, axis] + high[:, axis], kind="stable"), []
         for count, box in enumerate(order):
-            others, share = order[:count], shared(box, order[:count])
+            others = order[:count]
+            share = np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
+            beside = share[:, axis] <= between
+            if axis == 0:  # along y otherwise, or nowhere
+                beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -between)
+            else:  # what is apart along x needs nothing along y
+                depth = np.minimum(end_x[box], end_x[others]) - np.maximum(
+                    found[box, 0], found[others, 0]
+                )
+                beside &= depth > OVERLAP
             level = np.minimum(top[box], top[others]) - np.maximum(found[box, 2], found[others, 2])
-            beside = share[:, axis] <= np.minimum(share[:, 1 - axis], tolerance)
             before.append(others[beside & (level > OVERLAP)])
-            first[box] = max(first[box], (first + edges)[before[-1]].max(initial=-np.inf))
+
+        # Where the longest row through a box is too long, all boxes in it become a little smaller.
+        wide = sizes[:, axis]
+        left, right = np.zeros(len(low)), np.zeros(len(low))
+        for box, others in zip(order, before):
+            left[box] = (left + wide)[others].max(initial=0)
         for box, others in zip(order[::-1], before[::-1]):
-            last[others] = np.minimum(last[others], last[box] - edges[others])
+            right[others] = np.maximum(right[others], right[box] + wide[box])
+        fitting = wide * np.minimum(1, end / (left + wide + right))
+        wide = edges[:, axis] = np.where(wide - fitting <= tolerance, fitting, wide)
+
+        first = np.where(low[:, axis] >= -tolerance, low[:, axis].clip(0), low[:, axis])
+        last = np.where(high[:, axis] <= end + tolerance, end - wide, np.inf)
+        for box, others in zip(order, before):
+            first[box] = max(first[box], (first + wide)[others].max(initial=-np.inf))
+        for box, others in zip(order[::-1], before[::-1]):
+            last[others] = np.minimum(last[others], last[box] - wide[others])
         found[:, axis] = np.minimum(first, last)
-    return np.where(np.abs(found - low) > OVERLAP / 2, found - low, 0.0)
+
+    smaller = np.where(sizes - edges > OVERLAP / 2, sizes - edges, 0.0)
+    moves = found - low - smaller / 2  # of the centres
+    return np.where(np.abs(moves) > OVERLAP / 2, moves, 0.0), smaller
 
 
 def uncarried(load: Load) -> np.ndarray:

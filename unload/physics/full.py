@@ -4,9 +4,9 @@ import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
-from unload.physics.base import Physics
+from unload.physics.base import Force, Physics
 from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
-from unload.physics.situation import RESOLUTION
+from unload.physics.situation import PULL, RESOLUTION
 from unload.support import checks
 
 _DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
@@ -20,11 +20,12 @@ class FullPhysics(Physics):
             back, ``"keep"`` leaves whatever the simulation made of them: they drift.
             ``"keep"`` simulates them as plain rigid bodies, ``"restore"`` as multibodies,
             see ``bullet.World``.
+        force: see ``Physics``.
     """
 
-    def __init__(self, after_pick: str = "restore") -> None:
+    def __init__(self, after_pick: str = "restore", force: Force = task.PICK_FORCE) -> None:
         checks.one_of("after_pick", after_pick, ("restore", "keep"))
-        super().__init__()
+        super().__init__(force)
         self.after_pick = after_pick
         self.exact = after_pick == "restore"
 
@@ -42,8 +43,8 @@ class FullPhysics(Physics):
             self._add_box(position, size, 0)
         sizes = self._slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION)
         self._bodies = [
-            self._add_box(position, size, task.MASS)
-            for position, size in zip(load.positions, sizes)
+            self._add_box(position, size, mass)
+            for position, size, mass in zip(load.positions, sizes, load.masses.tolist())
         ]
         self._poses: list[tuple] = [(place, UPRIGHT) for place in load.positions.tolist()]
 
@@ -75,7 +76,8 @@ class FullPhysics(Physics):
     def _lift(self, item: int) -> float:
         restore = True  # also when interrupted: no box may stay halfway
         try:
-            distance = self._world.pull(self._bodies[item])
+            force = min(PULL * self.load.masses[item], self.force)
+            distance = self._world.pull(self._bodies[item], force)
             restore = self.after_pick == "restore"
             return distance
         finally:

@@ -11,7 +11,7 @@ from contextlib import closing, suppress
 
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
-from unload.support.compiled import CONFIG
+from unload.support.compiled import threads
 
 # Not those of ``multiprocessing``, which would run the script that the user has started once more.
 # Ctrl-C is for the process that asks. Modules are found where this process finds them, but none in
@@ -49,7 +49,7 @@ class Pool:
         if self._process != os.getpid():  # those of the process that was forked are not ours
             self.close()
             self._own_workers()
-        count = 1 if self._alone else min(CONFIG.NUMBA_NUM_THREADS, _MOST)
+        count = 1 if self._alone else min(threads(), _MOST)
         distances = [0.0] * len(situations)
         try:
             while len(self._workers) < count - 1:

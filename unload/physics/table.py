@@ -19,10 +19,12 @@ from threading import Lock
 import numpy as np
 
 from unload import task
+from unload.load.boxes import Load
+from unload.physics.base import Force
 from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.pool import Pool
-from unload.physics.situation import Situation
+from unload.physics.situation import PULL, Situation
 from unload.support import files
 from unload.support.compiled import compiled
 
@@ -39,20 +41,30 @@ _FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
 _PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
 
 
-def _free_lift() -> float:
-    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes."""
+def free_lift(force: float = task.PICK_FORCE, mass: float = task.MASS) -> float:
+    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes.
+
+    That is 0 where a force in N is less than the weight of a mass in kg.
+    """
     velocity = distance = 0.0
     for _ in range(round(task.LIFT_TIME / TIME_STEP)):
         velocity *= (1 - DAMPING) ** TIME_STEP
-        velocity += (task.PICK_FORCE / task.MASS - task.GRAVITY) * TIME_STEP
+        velocity += (force / mass - task.GRAVITY) * TIME_STEP
         distance += velocity * TIME_STEP
-    return round(distance, 6)
+    return max(0.0, round(distance, 6))
+
+
+def too_heavy(load: Load, force: float) -> np.ndarray:
+    """(n,) bool, True for boxes that a force of so many N at most does not lift, though free."""
+    pulls = np.minimum(PULL * load.masses, force)
+    lifts = [free_lift(*each) for each in zip(pulls.tolist(), load.masses.tolist())]
+    return np.array(lifts) < task.LIFT_THRESHOLD
 
 
 # How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
 # whatever its size and neighbours, because physics makes boxes a millimetre narrower. Neighbours
 # that overlap by more than that, as those of no load do, would rub, and hold the box.
-FREE_LIFT = _free_lift()
+FREE_LIFT = free_lift()
 
 
 class LiftTable:
@@ -142,6 +154,9 @@ class LiftTable:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.own()
         samples = [asdict(situation) for situation in self.samples.values()]
+        for sample in samples:
+            if not sample["pull"]:  # of the task, whose files hold none
+                del sample["pull"]
         arrays = {
             "digests": digests,
             "micrometres": micrometres,
@@ -223,26 +238,28 @@ class LiftTable:
 class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
-    A box with nothing on top moves by ``FREE_LIFT``, as PyBullet says. One with three or more
-    others on it is held down, without a simulation: such situations hardly ever repeat, and of
-    those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
+    A box with nothing on top moves by ``free_lift``, as PyBullet says. One with three or more
+    others on it, all of 1 kg, is held down, without a simulation: such situations hardly ever
+    repeat, and of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
 
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
             their experience; one of its own if None.
+        force: see ``Physics``.
     """
 
-    def __init__(self, table: LiftTable | None = None) -> None:
+    def __init__(self, table: LiftTable | None = None, force: Force = task.PICK_FORCE) -> None:
         self.table = LiftTable() if table is None else table
-        super().__init__(self.table.engine)
+        super().__init__(self.table.engine, force)
         self._pool, self._waited = Pool(self.engine), 0  # and the lifts that might have been shared
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
         self._check_open()
-        if situation.on_top == 0:
-            return FREE_LIFT
-        if situation.on_top >= HELD_DOWN:
+        free = free_lift(situation.force, situation.masses[0]) if situation.pull else FREE_LIFT
+        if situation.on_top == 0 or free == 0:
+            return free
+        if situation.on_top >= HELD_DOWN and not situation.pull:
             return 0.0
         distance = self.table.find(situation)
         if distance is None:
@@ -287,14 +304,14 @@ def _digest_of_file(arrays: dict[str, np.ndarray]) -> np.ndarray:
     return np.frombuffer(blake2b(content, digest_size=32).digest(), np.uint8)
 
 
-@compiled
+@compiled(plain=True)
 def _absorb(digest, word):
     """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
     digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
     return digest ^ (digest >> np.uint64(29))
 
 
-@compiled
+@compiled(plain=True)
 def digest_of(words):
     """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
     digest = np.uint64(len(words))
@@ -303,7 +320,7 @@ def digest_of(words):
     return max(digest, np.uint64(1))
 
 
-@compiled
+@compiled(plain=True)
 def slot_of(digests, digest):
     """The slot of a digest, or the free one where it belongs."""
     last = np.uint64(len(digests) - 1)
@@ -313,9 +330,14 @@ def slot_of(digests, digest):
     return slot
 
 
-@compiled
 def _fill(digests, micrometres, new_digests, new_micrometres):
-    """Put entries into free slots."""
-    for entry in range(len(new_digests)):
-        slot = slot_of(digests, new_digests[entry])
-        digests[slot], micrometres[slot] = new_digests[entry], new_micrometres[entry]
+    """Put entries into the slots of empty arrays, each into the first free one from its own on."""
+    last = np.uint64(len(digests) - 1)
+    # Of several that want the same slot the last one has it; the others go on to the next.
+    left, slots = np.arange(len(new_digests)), (new_digests ^ (new_digests >> np.uint64(32))) & last
+    while left.size:
+        free = digests[slots] == EMPTY
+        digests[slots[free]] = new_digests[left[free]]
+        placed = digests[slots] == new_digests[left]
+        micrometres[slots[placed]] = new_micrometres[left[placed]]
+        left, slots = left[~placed], (slots[~placed] + np.uint64(1)) & last

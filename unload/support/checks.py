@@ -30,7 +30,7 @@ def one_of(name: str, value: object, options: Iterable[_Option]) -> _Option:
     if not (single and value in options):
         known = ", ".join(repr(option) for option in options)
         raise ValueError(f"{name} is {value!r}; expected one of {known}")
-    return options[options.index(value)]  # type: ignore[arg-type]
+    return options[options.index(value)]
 
 
 def boolean(name: str, value: object) -> bool:

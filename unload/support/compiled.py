@@ -3,6 +3,8 @@
 The constants that a function reads and the functions that it calls become part of its compiled
 code. numba's own cache looks at the file of the function alone: after a change to a constant in
 another file it goes on with the old value. Here each state of the sources has a folder of its own.
+
+numba itself, which takes half a second and 200 MB, is imported when a function is first compiled.
 """
 
 import logging
@@ -11,41 +13,89 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache, cached_property, partial, update_wrapper
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import numba
 import numpy as np
 
-CONFIG: Any = numba.config  # whose names type checkers do not see
 _LOGGER = logging.getLogger(__name__)
 _PACKAGE = Path(__file__).resolve().parents[1]
 # All that compiled functions are defined in, or take constants from.
 _SOURCES = ("task.py", "support/*.py", "load/*.py", "physics/*.py", "fast/*.py")
-_VERSIONS = sys.version, numba.__version__, llvmlite.__version__, np.__version__
 
 
-def compiled(function: Callable | None = None, **options) -> Callable:
+def compiled(
+    function: Callable | None = None, plain: Callable | bool = False, **options
+) -> "Compiled":
     """``numba.njit`` of a function in one of ``_SOURCES``, with a cache that follows all of them.
 
     ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. A fresh installation
     compiles for ten seconds, each function at its first call, which is logged when the folder is
     made. Where none can be written, compiled code is kept in memory, with a warning.
+
+    ``plain`` does the same in Python, or is True if the function itself does. It is called for as
+    long as nothing has imported numba: an order calls a function a few times only.
     """
     if function is None:
-        return partial(compiled, **options)
-    place = _folder()
-    if place is None:
-        return numba.njit(**options)(function)
-    # numba reads this setting when it is told to cache a function; it is the user's again after.
-    before, CONFIG.CACHE_DIR = CONFIG.CACHE_DIR, str(place)
-    try:
-        return numba.njit(cache=True, **options)(function)
-    finally:
-        CONFIG.CACHE_DIR = before
+        return partial(compiled, plain=plain, **options)  # type: ignore[return-value]
+    return Compiled(function, plain, options)
+
+
+class Compiled:
+    """A function that is compiled when it is first called, or used by one that is compiled."""
+
+    def __init__(self, function: Callable, plain: Callable | bool, options: dict) -> None:
+        update_wrapper(self, function)
+        self._function, self._options = function, options
+        self._plain = function if plain is True else plain
+
+    def __call__(self, *given):
+        if self._plain and "numba" not in sys.modules:
+            with np.errstate(over="ignore"):  # integers wrap, as compiled ones do
+                return self._plain(*given)
+        return self.dispatcher(*given)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What numba has made of the function."""
+        njit, place, config = _numba().njit, _folder(), _config()
+        if place is None:
+            return njit(**self._options)(self._function)
+        # numba reads this setting when it is told to cache a function; then it is the user's again.
+        before, config.CACHE_DIR = config.CACHE_DIR, str(place)
+        try:
+            return njit(cache=True, **self._options)(self._function)
+        finally:
+            config.CACHE_DIR = before
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What other compiled functions take it for."""
+        return self.dispatcher._numba_type_
+
+
+def _numba() -> Any:
+    import numba
+
+    return numba
+
+
+def _config() -> Any:
+    return _numba().config  # whose names type checkers do not see
+
+
+def threads() -> int:
+    """How many threads numba takes, which the environment's ``NUMBA_NUM_THREADS`` sets."""
+    return _config().NUMBA_NUM_THREADS
+
+
+def _versions() -> tuple[str, ...]:
+    """Of Python and of the libraries that decide what is compiled."""
+    import llvmlite
+
+    return sys.version, _numba().__version__, llvmlite.__version__, np.__version__
 
 
 @cache
@@ -55,7 +105,7 @@ def _folder() -> Path | None:
     They are ``NUMBA_CACHE_DIR`` if it is set, the package's ``__pycache__``, and the user's cache.
     """
     user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for place in (CONFIG.CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
+    for place in (_config().CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
         if not place:
             continue
         kept = Path(place, f"compiled-{_digest(_PACKAGE)}")
@@ -81,7 +131,7 @@ def _folder() -> Path | None:
 
 def _digest(package: Path) -> str:
     """Digest of ``_SOURCES`` in a folder, and of the versions of Python and the libraries."""
-    digest = blake2b(repr(_VERSIONS).encode(), digest_size=8)
+    digest = blake2b(repr(_versions()).encode(), digest_size=8)
     for pattern in _SOURCES:
         for path in sorted(package.glob(pattern)):
             digest.update(path.read_bytes())

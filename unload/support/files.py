@@ -26,7 +26,7 @@ from filelock import FileLock, Timeout
 try:
     import fcntl
 except ImportError:  # on Windows, which lets nobody remove a file that is open
-    fcntl = None  # type: ignore[assignment]
+    fcntl = None
 
 LOGGER = logging.getLogger(__name__)
 PATIENCE = 5.0  # s
