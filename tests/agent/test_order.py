@@ -252,7 +252,7 @@ def test_the_rule_in_the_docstring_works(small_load):
 
 def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog):
     load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2), (1.3, 0.6))
-    low = Load(load.positions, load.sizes, ids=list("abcd"), container=(7, 2.5, 0.9))
+    low = Load(load.positions, load.sizes, ids=list("abcd"), container=(7, 2.5, 0.9), ceiling=0.9)
     order = picking_order(low)
     assert order["id"].tolist() == ["a", "b", "c", "d"]
     assert order["unloaded"].tolist() == [True, True, False, False]

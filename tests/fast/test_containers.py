@@ -13,7 +13,7 @@ def test_distances_are_looked_up_or_unknown(boxes):
     everywhere, table = np.ones(4, bool), LiftTable()
     # The second of two containers, which have room for more than this load.
     state = containers.allocate(2, 7, len(load.contacts.boxes) + 1)
-    state.widths[1], state.heights[1] = load.container[1:]
+    state.widths[1], state.ceilings[1] = load.container[1], load.ceiling
     state.geometry[1, :4] = np.hstack([load.positions, load.sizes])
     state.starts[1, :, :5], state.links[1, :-1] = load.contacts
     state.present[1, :4] = everywhere

@@ -65,13 +65,13 @@ def test_a_table_asks_no_rule_about_other_masses(boxes):
 def test_under_a_low_ceiling_no_box_is_lifted(boxes, kind):
     load = boxes((0.3, 0.2), (0.8, 0.2), (0.8, 0.6))
     for height, lifted in ((1.01, [True, False, True]), (0.99, [True, False, False])):
-        physics = make(kind, weighed(load, container=(7, 2.5, height)))
+        physics = make(kind, weighed(load, ceiling=height))
         assert [physics.lift(item) >= 0.2 for item in range(3)] == lifted
     assert physics.lift(2) == 0
 
 
 def test_arrays_know_ceilings_and_refuse_masses(boxes):
-    low = weighed(boxes((0.3, 0.2), (0.8, 0.2), (0.8, 0.6)), container=(7, 2.5, 0.99))
+    low = weighed(boxes((0.3, 0.2), (0.8, 0.2), (0.8, 0.6)), ceiling=0.99)
     for envs in (ContainerVectorEnv(1), ContainerEnv("table")):
         envs.reset(seed=0, options={"load": low})
         assert envs.liftable().ravel()[:3].sum() == 1

@@ -105,7 +105,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env], state.unloaded[env] = count, 0
-        state.widths[env], state.heights[env] = load.container[1:]
+        state.widths[env], state.ceilings[env] = load.container[1], load.ceiling
         self._show_items(env, np.arange(count), load.positions + blur, load)
 
     def _show_items(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:

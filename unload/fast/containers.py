@@ -24,7 +24,7 @@ class Containers(NamedTuple):
     """The state of E containers with room for ``capacity`` items and ``links`` contacts each.
 
     Attributes:
-        widths, heights: (E,) float64, inner width and height of each container in m.
+        widths, ceilings: (E,) float64, inner width and ``Load.ceiling`` of each container in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
@@ -41,7 +41,7 @@ class Containers(NamedTuple):
     """
 
     widths: np.ndarray
-    heights: np.ndarray
+    ceilings: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -62,7 +62,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
         widths=np.zeros(num_envs),
-        heights=np.zeros(num_envs),
+        ceilings=np.zeros(num_envs),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
@@ -131,7 +131,7 @@ def look_up(containers, actions, digests, micrometres):
         # Under a low ceiling there is no pick, see Physics.lift.
         geometry = containers.geometry[env]
         top = geometry[items[env], 2] + geometry[items[env], 5] / 2
-        if containers.heights[env] - top < task.LIFT_THRESHOLD - OVERLAP:
+        if containers.ceilings[env] - top < task.LIFT_THRESHOLD - OVERLAP:
             distances[env] = 0
             continue
 

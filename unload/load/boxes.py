@@ -70,6 +70,8 @@ class Load:
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
         masses: (n,) float64, kg, at least 0.001; 1 kg each if not given, as in the task.
+        ceiling: m, to which a pick may lift a box; infinite if not given, because the paper's
+            physics has none. Those of packing lists have their container's.
         contact_tolerance: m, up to 0.1; boxes this close above one another touch. What bridges two
             boxes of measured heights touches both, though it stands on the higher one.
         contacts: which boxes touch, computed from positions and sizes.
@@ -89,6 +91,7 @@ class Load:
     container: np.ndarray = None
     extras: Mapping[str, np.ndarray] = None
     masses: np.ndarray = None
+    ceiling: float = None
     contact_tolerance: float = CONTACT_TOLERANCE
     contacts: Contacts = field(init=False)
 
@@ -104,6 +107,8 @@ class Load:
         tolerance = checks.real(
             "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
         )
+
+        ceiling = np.inf if self.ceiling is None else checks.real("ceiling", self.ceiling, 0)
 
         # Labels serve views and lists; what moves does not depend on them.
         labels = {"packages": self.packages, "walls": self.walls}
@@ -147,7 +152,8 @@ class Load:
         fields |= labels
         for array in (*fields.values(), *extras.values(), *touching):
             array.setflags(write=False)
-        rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": touching}
+        rest = {"extras": extras, "ceiling": ceiling, "contact_tolerance": tolerance}
+        rest["contacts"] = touching
         for name, value in {**fields, **rest}.items():
             object.__setattr__(self, name, value)
 
@@ -180,7 +186,7 @@ class Load:
     @property
     def headroom(self) -> np.ndarray:
         """(n,) float64, from the top of each box to the ceiling, in m."""
-        return self.container[2] - (self.positions[:, 2] + self.sizes[:, 2] / 2)
+        return self.ceiling - (self.positions[:, 2] + self.sizes[:, 2] / 2)
 
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:

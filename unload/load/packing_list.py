@@ -126,6 +126,7 @@ def read_load(
             sizes - smaller,
             ids=np.array(ids),
             container=container,
+            ceiling=container[2],
             extras=_extras(path, table, shown, known.first("id")),
             masses=masses,
             contact_tolerance=max(tolerance, CONTACT_TOLERANCE),

@@ -74,6 +74,7 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
     card, shipped = load_policy(tmp_path / file).card, load_policy("paper").card
     # Of its configuration those fields that there still are.
     assert card.pop("configuration").items() <= shipped.pop("configuration").items()
+    assert card.pop("version") == task.VERSION and shipped.pop("version")
     assert card == shipped | {
         name: comparison.measure(load_policy("paper"), scale)
         for scale, name in comparison.SCALES.items()
@@ -137,7 +138,7 @@ def test_play_agrees_with_evaluate():
     ],
 )
 def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, free, jammed):
-    monkeypatch.setattr(World, "pull", lambda world, body: distance)
+    monkeypatch.setattr(World, "pull", lambda *_: distance)
     row = robustness.play(policy, "restore", 0, 20, piles)
     assert row["free"] == free and row["jammed"] == jammed
     assert row["success_rate"] == (distance > 0.2)
