@@ -11,6 +11,7 @@ a non-zero exit status.
 
 import argparse
 import logging
+import os
 import re
 import shutil
 import sys
@@ -22,6 +23,7 @@ import nbformat
 import pandas as pd
 import papermill
 
+from notebooks.checks import REDUCED
 from unload.support import files
 
 HERE = Path(__file__).resolve().parent
@@ -134,6 +136,9 @@ def main() -> int:
         print(f"[{number}/{len(chosen)}] {label} …", end=" ", flush=True)
         start = time.monotonic()
         parameters = {} if options.in_place else reduced_parameters(path)
+        os.environ.pop(REDUCED, None)
+        if parameters:
+            os.environ[REDUCED] = "1"
         try:
             run(path, BUILD / label, parameters)
         except papermill.PapermillExecutionError as error:

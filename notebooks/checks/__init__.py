@@ -5,6 +5,7 @@ kind of answer is wanted, when it is right, and what to look at again; the solut
 """
 
 import importlib
+import os
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 HERE = Path(__file__).parent
+REDUCED = "UNLOAD_REDUCED"  # set where a notebook runs at reduced counts
 
 
 class Exercise(NamedTuple):
@@ -38,13 +40,14 @@ def check(name: str, answer: object, *, strict: bool = False) -> None:
     Args:
         name: number of the notebook and of the exercise, such as ``"06/1"``.
         answer: the reader's; None, or a function without a body, while there is none.
-        strict: raise an AssertionError if it is missing or wrong, as the solutions do.
+        strict: raise an AssertionError if it is missing or wrong, as the solutions do. At reduced
+            counts, where ``REDUCED`` is set in the environment, answers may be others.
 
     Raises:
         ValueError: there is no such exercise.
     """
     said = judged(exercise(name), answer)
-    if strict and said != "right":
+    if strict and said != "right" and REDUCED not in os.environ:
         raise AssertionError(f"{name}: {said}")
     print(f"{name}: {said}")
 
