@@ -1,6 +1,7 @@
 """``unload train``, and what every command says without any work."""
 
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -81,7 +82,8 @@ def test_help_and_version_take_no_time(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True, text=True, cwd=paths.ROOT,
-        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path)},
+        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path),
+             "PYTHONPATH": os.environ.get("PYTHONPATH", "")},
     )  # fmt: skip
     assert done.stderr.splitlines() == ["0 SIG_DFL", "0 SIG_DFL", "0 SIG_DFL torch"]
     assert not list(tmp_path.iterdir())

@@ -9,6 +9,7 @@ import weakref
 from collections.abc import Callable
 from contextlib import closing, suppress
 
+from unload.physics.bullet import engine_of
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
 from unload.support.compiled import threads
@@ -33,7 +34,8 @@ class Pool:
     """
 
     def __init__(self, engine: str | None = None) -> None:
-        self._command = _COMMAND.format(engine)
+        # By name, because the others must not choose otherwise than this process.
+        self._command = _COMMAND.format(engine_of(engine))
         self._alone = False
         self._own_workers()
 
