@@ -108,7 +108,9 @@ class Load:
             "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
         )
 
-        ceiling = np.inf if self.ceiling is None else checks.real("ceiling", self.ceiling, 0)
+        ceiling = np.inf if self.ceiling is None else self.ceiling
+        if ceiling != np.inf:  # which ``replace`` hands over again
+            ceiling = checks.real("ceiling", ceiling, 0)
 
         # Labels serve views and lists; what moves does not depend on them.
         labels = {"packages": self.packages, "walls": self.walls}
