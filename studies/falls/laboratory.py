@@ -104,15 +104,17 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
     return {"row": row, "trace": trace if name in TRACED else []}
 
 
-def keep_cells(place: str, cells: Mapping[str, Cell], n_jobs: int) -> list[Result]:
-    """What ``run_cell`` returns of each seed of some cells, see ``results.kept``."""
+def keep_cells(
+    place: str, cells: Mapping[str, Cell], n_jobs: int, run: Callable = run_cell
+) -> list[Result]:
+    """What ``run`` returns of each seed of some cells, see ``results.kept``."""
     asked, fingerprint = [], training_fingerprint()
     for name, cell in cells.items():
         question = {"cell": name, "change": identity(cell.change), "fingerprint": fingerprint}
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
             asked.append((question | config, (name, cell, seed)))
-    return keep_all(place, run_cell, asked, n_jobs)
+    return keep_all(place, run, asked, n_jobs)
 
 
 def laboratory_data(

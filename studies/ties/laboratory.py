@@ -13,15 +13,14 @@ import pandas as pd
 
 from studies.falls import measures
 from studies.falls.cells import CONFIG
-from studies.falls.laboratory import SLOPES, train_in_laboratory
+from studies.falls.laboratory import SLOPES, keep_cells, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, keep_all, publish
+from studies.results import COMMAND, JOBS, publish
 from studies.seamless.jamming import weigh
 from studies.statistics import end_msr
 from studies.ties.noise import drifting
 from unload import task
-from unload.agent.identity import identity
 from unload.agent.training import Training
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
@@ -78,14 +77,8 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
 
 def laboratory_data(n_jobs: int = -1) -> None:
     """Train all cells; write ``ties/laboratory.csv``, a row per run, see ``run_cell``."""
-    fingerprint, asked = training_fingerprint(), []
-    for name, cell in CELLS.items():
-        question = {"cell": name, "change": identity(cell.change), "fingerprint": fingerprint}
-        for seed in cell.seeds:
-            config = replace(cell.config, seed=seed).plain()
-            asked.append((question | config, (name, cell, seed)))
-    results = keep_all("ties/laboratory", run_cell, asked, n_jobs)
+    results = keep_cells("ties/laboratory", CELLS, n_jobs, run_cell)
     table = pd.DataFrame([result.value for result in results])
     settings = {"config": CONFIG.plain(), "runs": len(table)}
     name, command = "ties/laboratory", f"{COMMAND} ties_laboratory"
-    publish(name, {"laboratory": table}, command, settings, results, fingerprint, "%.4g")
+    publish(name, {"laboratory": table}, command, settings, results, training_fingerprint(), "%.4g")
