@@ -10,9 +10,8 @@ from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
 from studies.results import read_table
 from studies.seamless.training import SEAMLESS
-from studies.statistics import by_cell, by_run, first_plan
+from studies.statistics import by_cell, by_run
 from studies.ties.criterion import likeness
-from studies.ties.figures import read_by_ties
 from studies.ties.training import TIES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -50,36 +49,43 @@ def test_the_way_to_contribute_names_files_that_exist():
     assert not [path for path in paths if not any((place / path).exists() for place in places)]
 
 
-def test_the_result_is_that_of_the_data():
+def test_the_answer_is_that_of_the_data():
     text = " ".join(README.split())
-    runs = by_run(read_grid(PAPER, cells=PAPER_CELLS), first_plan)
-    ends = 100 * by_cell(runs)["end"][[*PAPER_CELLS]]
-    published = read_table("falls/published")
-    judged = published.groupby("cell")
-    for means in (ends, 100 * judged["judged_as_is"].mean()[[*PAPER_CELLS]]):
-        first, second, third, last = (f"{mean:.0f}" for mean in means)
-        assert f"on average {first}, {second}, {third} and {last} %" in text
-    assert (judged["judged_place"].min()[[*PAPER_CELLS]] == 1).all()
-    untrained = published.query("cell == 'untrained'")["judged_place"]
-    assert f"Of {len(untrained)} untrained networks {(untrained == 1).sum()} are perfect" in text
+    runs = by_run(read_grid(PAPER, cells=PAPER_CELLS), likeness)
+    assert f"The {len(runs)} runs of its configuration here start at 26 %" in text
+    assert runs["start"].between(0.25, 0.28).all()
     masked = runs[runs["cell"].str.endswith("_mask") & ~runs["cell"].str.endswith("_no_mask")]
-    assert f"with the mask {masked['fell'].sum()} of {len(masked)} reach 95–100 % and fall" in text
-
-
-def test_ties_decide_as_the_data_say():
-    text = " ".join(README.split())
+    assert f"{masked['fell'].sum()} of {len(masked)} reach 95–100 % and fall" in text
+    published = read_table("falls/published").query("cell in @PAPER_CELLS")
+    assert f"Without x and y all {len(published)} are right" in text
+    assert (published["judged_place"] == 1).all()
     every = [by_run(read_grid(grid), likeness) for grid in (PAPER, LONG, SEAMLESS, TIES)]
-    like = sum(runs["both"].sum() for runs in every)
-    assert f"Of {sum(map(len, every))} runs" in text and like == 1
-    starts = every[0].query("cell in @PAPER_CELLS")["start"]
-    assert "start at 26 %" in text and starts.between(0.25, 0.28).all()
-    masked = read_by_ties().query("mask")
-    neat = masked[masked["ties"].isin(["items' order", "averaged"])]
-    frozen = masked[masked["ties"].str.contains("frozen")]
-    assert f"none of {len(neat)} runs falls" in text and not neat["fell"].any()
-    assert f"and {frozen['fell'].sum()} of {len(frozen)} do by noise or creep" in text
-    going_on = by_run(read_grid(TIES), likeness)
-    assert going_on["fell"].tolist() == [False, True], "two first runs"
+    assert f"one of {sum(map(len, every))} published runs" in text
+    assert sum(runs["both"].sum() for runs in every) == 1
+
+
+def test_the_numbers_are_those_of_the_data():
+    cells = 100 * by_cell(by_run(read_grid(PAPER), likeness))[["end", "lowest", "highest"]]
+    for label, cell in (("b = 2048", "paper_b2048"), ("b = 256", "paper")):
+        (row,) = re.findall(rf"^\| .*, {label} \| [\d +]+ \| (.*) \|$", README, re.M)[:1]
+        columns = (cells.loc[f"{cell}_{mask}"] for mask in ("no_mask", "mask"))
+        wanted = [f"{end:.0f} % ({low:.0f}–{high:.0f})" for end, low, high in map(tuple, columns)]
+        assert row == " | ".join(wanted)
+    positions = cells[cells.index.str.startswith("positions")]
+    assert "| Positions, b = 256 | 5 + 5 | 100 % | 100 % |" in README
+    assert len(positions) == 2 and (positions["lowest"].round() == 100).all()
+
+
+def test_the_moving_picture_is_described_by_its_notebook():
+    """Containers that are emptied, of 100, as notebook 01 prints them."""
+    text, notebook = " ".join(README.split()), (ROOT / "notebooks/01_task.ipynb").read_text()
+    rows = re.findall(r"\d +(\w+) +(True|False) +(\d+) +[\d.]+", notebook)
+    emptied = {(policy, mask == "True"): int(count) for policy, mask, count in rows}
+    stuck = [100 - emptied[policy, False] for policy in ("paper_seed_2", "paper")]
+    assert f"gets stuck on {stuck[0]} of 100 loads, one that was trained" in text
+    assert f"with another seed on {stuck[1]}." in text
+    assert all(count == 100 for (_, mask), count in emptied.items() if mask)
+    assert emptied["recommended", False] == 100
 
 
 def test_the_benchmarks_are_those_of_the_data():

@@ -17,7 +17,7 @@ from unload.load.boxes import Load
 from unload.load.picture import COLOURS, back_to_front, corners, draw, pixels
 from unload.support import files
 
-WIDTH, HEIGHT = 4.4, 4.4  # of one agent's half, in inches at 100 pixels each
+WIDTH, HEIGHT = 4.4, 4.4  # of one agent's part, in inches at 100 pixels each
 RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
 STUCK = task.N_VISIBLE  # failed picks in a row after which an agent counts as stuck
 SLOW, STEP = 10, 9  # frames of one pick each at the beginning, and picks per frame at last
@@ -27,17 +27,17 @@ PALETTE = 127  # colours of all frames, besides white
 LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
 
 
-def record_episode(policy: Policy, seed: int, load: Load | None = None) -> Run:
-    """Let an agent unload a container without the mask.
+def record_episode(policy: Policy, seed: int, load: Load | None = None, mask: bool = False) -> Run:
+    """Let an agent unload a container.
 
     The episode ends when the container is empty, or after 128 failed picks in a row.
 
     Args:
         policy: see ``unload.policies``.
-        seed, load: see ``Run``.
+        seed, load, mask: see ``Run``.
     """
-    run = Run(policy, load, seed, mask=False)
-    while run.allowed(mask=False).any() and (
+    run = Run(policy, load, seed, mask)
+    while run.allowed(mask).any() and (
         len(run.picks) < STUCK or any(pick.success for pick in run.picks[-STUCK:])
     ):
         run.pick(run.choose())
@@ -92,25 +92,25 @@ def _palette(frames: list[Image.Image]) -> Image.Image:
 def _frame(episodes: Mapping[str, Run], before: int, now: int) -> Image.Image:
     """All agents after ``now`` picks; those after the first ``before`` are marked."""
     figure = Figure((WIDTH * len(episodes), HEIGHT), dpi=100, layout="none")
-    halves = figure.subfigures(1, len(episodes), squeeze=False)[0]
-    for half, (title, run) in zip(halves, episodes.items()):
-        _draw_half(half, title, run, before, now)
+    parts = figure.subfigures(1, len(episodes), squeeze=False)[0]
+    for part, (title, run) in zip(parts, episodes.items()):
+        _draw_part(part, title, run, before, now)
     handles = [Patch(color=COLOURS[meaning], label=text) for meaning, text in LEGEND.items()]
     figure.legend(handles=handles, loc="lower center", ncols=len(handles))
     return Image.fromarray(pixels(figure))
 
 
-def _draw_half(half: Figure, title: str, run: Run, before: int, now: int) -> None:
+def _draw_part(part: Figure, title: str, run: Run, before: int, now: int) -> None:
     """One agent: its title, how far it has come, what its last pick was, and its container."""
     count, bold = run.unloaded(now), {"fontsize": 13, "fontweight": "bold"}
-    half.text(0.04, 0.94, title, **bold)
-    half.text(0.96, 0.94, f"{count} of {len(run.load)}", ha="right", **bold)
+    part.text(0.04, 0.94, title, **bold)
+    part.text(0.96, 0.94, f"{count} of {len(run.load)}", ha="right", **bold)
     for length, colour in ((1, RAIL), (count / len(run.load), COLOURS["liftable"])):
-        half.add_artist(Rectangle((0.04, 0.9), 0.92 * length, 0.015, color=colour))
+        part.add_artist(Rectangle((0.04, 0.9), 0.92 * length, 0.015, color=colour))
     text, colour = _state(run, now)
-    half.text(0.04, 0.84, text, color=colour, fontsize=11)
+    part.text(0.04, 0.84, text, color=colour, fontsize=11)
     low, high, colours = _boxes(run, before, now)
-    draw(half.add_axes((0.02, 0.08, 0.96, 0.75)), low, high, colours)
+    draw(part.add_axes((0.02, 0.08, 0.96, 0.75)), low, high, colours)
 
 
 def _state(run: Run, now: int) -> tuple[str, str | tuple]:

@@ -1,15 +1,17 @@
-"""Where runs end, by how ties are broken."""
+"""Where runs end, by how ties are broken, and the README's answer in one figure."""
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
 from studies.paper.training import PAPER
+from studies.seamless.figures import PAPER_START, SMOOTH
 from studies.statistics import PAPER_MSR, by_run
-from studies.style import styled
+from studies.style import COLOURS, styled
 from studies.ties.criterion import likeness
 from studies.ties.earlier import read_earlier
 from studies.ties.training import TIES
@@ -74,3 +76,56 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
         axes.set(title=f"{'with' if mask else 'without'} the mask", ylim=(0, 103))
     panels[0].set_ylabel("MSR over the last tenth of the picks (%)")
     return figure
+
+
+@styled
+def draw_answer() -> Figure:
+    """Learning curves of the paper's configuration, of other ties, and of positions.
+
+    Running means over half a million picks; a label counts the runs whose colour it has.
+    """
+    paper, ties, earlier = read_grid(PAPER), read_grid(TIES), read_earlier()
+    figure, panels = plt.subplots(1, 3, figsize=(11.4, 3.7), sharex=True, sharey=True)
+    left, middle, right = panels
+    ranks, shared, positions = (COLOURS[name] for name in ("ranks", "averaged", "positions"))
+
+    count = _draw_runs(left, paper, ["paper_no_mask", "paper_b2048_no_mask"], "0.75")
+    _label(left, (0.98, 0.04), f"without the mask ({count} runs)", "0.4")
+    count = _draw_runs(left, paper, ["paper_mask", "paper_b2048_mask"], ranks)
+    _label(left, (0.02, 0.96), f"with the mask\n({count} runs)", ranks)
+    left.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", ms=12, clip_on=False, zorder=5)
+    _label(left, (0.04, 0.04), "the paper", "black")
+    left.set_title("Equals ranked by noise that is frozen:\nruns rise, and fall", loc="left")
+
+    drifting = _draw_runs(middle, ties, ["drifting_mask"], ranks)
+    anew = _draw_runs(middle, ties, ["anew_mask"], COLOURS["level"])
+    count = _draw_runs(middle, earlier, ["ties_by_order_mask"], shared)
+    count += _draw_runs(middle, paper, ["averaged_mask", "averaged_b2048_mask"], shared)
+    _label(middle, (0.98, 0.36), f"by noise that drifts ({drifting})", ranks)
+    _label(middle, (0.98, 0.26), f"by noise drawn anew at each pick ({anew})", COLOURS["level"])
+    _label(middle, (0.98, 0.16), f"by the items' order, or alike ({count})", shared)
+    middle.set_title("Equals ranked otherwise, with the mask:\nthat decides", loc="left")
+
+    count = _draw_runs(right, paper, ["positions_mask", "positions_no_mask"], positions)
+    _label(right, (0.98, 0.36), f"with the mask and without ({count} runs)", positions)
+    right.set_title("Positions instead of ranks:\nnone falls", loc="left")
+    for axes in panels:
+        axes.set(xlim=(0, 20), ylim=(0, 102), xlabel="million picks")
+    left.set_ylabel("successful picks while training (%)")
+    return figure
+
+
+def _draw_runs(axes: Axes, curves: pd.DataFrame, cells: list[str], colour: str) -> int:
+    """Draw all runs of some cells, and return how many they are."""
+    runs = curves[curves["cell"].isin(cells)].groupby(["cell", "seed"])
+    for _, run in runs:
+        smooth = 100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean()
+        axes.plot(run["picks"] / 1e6, smooth, color=colour, linewidth=0.9, alpha=0.75)
+    return len(runs)
+
+
+def _label(axes: Axes, place: tuple[float, float], text: str, colour: str) -> None:
+    """Write a label at a place in shares of the panel, on its nearer side."""
+    across, up = place
+    sides = {"ha": "left" if across < 0.5 else "right", "va": "bottom" if up < 0.5 else "top"}
+    axes.text(across, up, text, color=colour, fontsize=9, transform=axes.transAxes, **sides)
