@@ -1,5 +1,6 @@
 """The README's example does what its comments say; its links and commands lead somewhere."""
 
+import json
 import re
 from pathlib import Path
 
@@ -102,3 +103,34 @@ def test_the_benchmarks_are_those_of_the_data():
         assert len(rates) == 100 and f"{rates.mean():.1f}" == mean
         assert f"{t.ppf(0.975, 99) * rates.std() / 10:.1f}" == half
         assert each["longest_deadlock"].max() == int(longest)
+
+
+def prose(path: Path) -> str:
+    """The Markdown of a notebook."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    return "\n\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "markdown")
+
+
+def sentences(text: str) -> list[str]:
+    """The sentences of Markdown, those of lists included; code, tables and headings left out."""
+    text = re.sub(r"```.*?```|\$\$.*?\$\$|!\[[^\]]*\]\([^)]*\)", "", text, flags=re.DOTALL)
+    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+    blocks = re.split(r"\n\s*\n|\n(?=[-*] |\d+\. |\||#)", text)
+    prose = [" ".join(block.split()) for block in blocks if block.lstrip()[:1] not in ("|", "#")]
+    parts = [re.split(r"(?<=[.!?])[”)*]*\s+(?=[“(*A-Z0-9`])", block) for block in prose]
+    return [sentence for block in parts for sentence in block if len(sentence.split()) > 2]
+
+
+def test_sentences_are_short():
+    """On average 15 words in README and first cells, 18 in the reports: long ones are named."""
+    texts = {"README.md": README}
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
+        texts[path.name] = prose(path).partition("\n## ")[0]
+    for path in sorted((ROOT / "notebooks/report").glob("*.ipynb")):
+        texts[f"report/{path.name}"] = prose(path)
+    for name, text in texts.items():
+        lengths = {sentence: len(sentence.split()) for sentence in sentences(text)}
+        longest = max(lengths, key=lengths.get)
+        most = 18 if name.startswith("report") else 15
+        average = sum(lengths.values()) / len(lengths)
+        assert average <= most and lengths[longest] <= 3 * most, (name, longest)
