@@ -1,6 +1,7 @@
 """The site's own code: how it reads notebooks and docstrings, and its check of links."""
 
 import re
+from types import SimpleNamespace
 
 import nbformat
 import pytest
@@ -89,3 +90,15 @@ def test_links_that_lead_nowhere_are_found(tmp_path):
     ]
     with pytest.raises(FileNotFoundError, match="holds no page"):
         links.problems(tmp_path / "empty")
+
+
+def test_a_page_opens_the_one_that_trains_and_says_what_it_is():
+    """Sphinx would have it downloaded, under another address with each change of it."""
+    app = SimpleNamespace(config=SimpleNamespace(html_baseurl="https://example.org/"))
+    place = 'download="" href="../_downloads/0f/train_it_yourself.html"'
+    link = f'<a class="reference download internal" {place}>'
+    context = {"body": f"{link}train</a>", "pathto": lambda name, resource: f"../{name}"}
+    pages.finish_page(app, "notebooks/x", "page.html", context, None)
+    assert context["body"] == '<a href="../play/index.html">train</a>'
+    assert '<meta name="description" content="Container' in context["metatags"]
+    assert 'content="https://example.org/_static/shared.png">' in context["metatags"]

@@ -11,6 +11,8 @@ fetches its theme from a server with each first build. nbconvert makes single pa
 and search, which load MathJax from elsewhere and do not draw plotly's views.
 """
 
+import os
+
 from notebooks.book import pages
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.napoleon"]
@@ -43,6 +45,7 @@ html_theme_options = {
 }
 html_static_path = ["static"]
 html_css_files = ["book.css"]
+html_baseurl = os.environ.get("SITE", "")  # its address, where it is published
 html_copy_source = html_show_copyright = html_use_index = False
 mathjax_path = "mathjax/tex-chtml.js"
 
@@ -53,5 +56,5 @@ def setup(app):
     app.connect("source-read", pages.add_help)
     app.connect("source-read", pages.add_contents)
     app.connect("doctree-read", pages.resolve_folders)
-    app.connect("html-page-context", pages.add_plotly)
+    app.connect("html-page-context", pages.finish_page)
     app.connect("build-finished", pages.add_files)

@@ -9,9 +9,14 @@ from pathlib import Path
 
 import nbformat
 import plotly.io
+from PIL import Image, ImageOps
 
 PLOTLY = "application/vnd.plotly.v1+json"
 WIDGET = "application/vnd.jupyter.widget-view+json"
+PLAYED = "play/index.html"  # where the page that trains stands in the site
+DOWNLOAD = re.compile(r'<a class="reference download internal" [^>]*train_it_yourself.html">')
+DESCRIPTION = "Container unloading by reinforcement learning: a paper reproduced and explained"
+SHARED = "_static/shared.png"  # what a link to the site shows elsewhere
 NEEDS_KERNEL = "*This view needs a kernel: open the notebook in JupyterLab.*"
 
 
@@ -100,16 +105,30 @@ def resolve_folders(app, page) -> None:
             link.replace_self(link.children)
 
 
-def add_plotly(app, name: str, template: str, context: dict, page) -> None:
-    """Let a page with interactive views load plotly's script before them."""
-    if "Plotly.newPlot" in context.get("body", ""):
+def finish_page(app, name: str, template: str, context: dict, page) -> None:
+    """Load plotly's script before interactive views, open the page that trains, say what all is."""
+    body = context.get("body", "")
+    if "Plotly.newPlot" in body:
         app.add_js_file("plotly.min.js", priority=0)
+    context["body"] = DOWNLOAD.sub(f'<a href="{context["pathto"](PLAYED, resource=True)}">', body)
+    said = {"og:title": "unload", "og:description": DESCRIPTION, "og:type": "website"}
+    said["og:image"] = app.config.html_baseurl + SHARED
+    tags = [f'<meta name="description" content="{DESCRIPTION}">']
+    tags += [f'<meta property="{key}" content="{value}">' for key, value in said.items()]
+    context["metatags"] = context.get("metatags", "") + "\n".join(tags)
 
 
 def add_files(app, error) -> None:
-    """Copy MathJax and plotly's script into a site that was built, and add its index.html."""
+    """Copy scripts, the page that trains and a picture into a built site; add its index.html."""
     if error:
         return
+    figures, played = Path(app.srcdir) / "figures", Path(app.outdir) / PLAYED
+    played.parent.mkdir(exist_ok=True)
+    shutil.copy(figures / "train_it_yourself.html", played)
+    with Image.open(figures / "answer.png") as picture:
+        ImageOps.pad(picture.convert("RGB"), (1200, 630), color="white").save(
+            Path(app.outdir) / SHARED
+        )
     static = Path(app.outdir) / "_static"
     mathjax = Path(find_spec("sphinx-mathjax-offline").origin).parent / "static" / "mathjax"
     fonts = Path("output", "chtml", "fonts", "woff-v2")

@@ -33,7 +33,7 @@ element("features").append(...tiles);
 for (const link of document.querySelectorAll("a[data-file]")) {
   const { file } = link.dataset;
   const inside = (folder) => location.pathname.includes(folder);
-  if (inside("/_downloads/")) link.href = `../../${file.replace(/\.\w+$/, ".html")}`;
+  if (inside("/play/")) link.href = `../${file.replace(/\.\w+$/, ".html")}`;
   else if (inside("/figures/")) link.href = `../${file}`;
   else link.title = `In the repository: ${file}`;
 }
