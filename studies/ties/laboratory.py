@@ -5,6 +5,7 @@
 ``data/ties/PLAN.md`` says what was expected of its cells.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -28,7 +29,6 @@ from unload.load.substacks import stack_load
 RHOS = (0.0, 0.8, 0.9, 0.965, 0.985, 0.997, 1.0)
 SEEDS, SIGN_SEEDS = range(4000, 4010), range(4100, 4120)
 POSITIONS = replace(CONFIG, equalize=False)
-OPTIONS = JOBS
 
 
 def mirrored_load(rng: np.random.Generator) -> Load:
@@ -59,6 +59,7 @@ CELLS = {
     "ranks_mirrored": Cell(CONFIG, SIGN_SEEDS, mirror_loads),
     "ranks_whole_walls": Cell(CONFIG, SIGN_SEEDS, partial(weigh, z=0.0)),
 }
+OPTIONS = {"--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)}, **JOBS}
 
 
 def run_cell(name: str, cell: Cell, seed: int) -> dict:
@@ -75,10 +76,11 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
     return {"cell": name, "seed": seed, "end": end_msr(run.curve.table()), **last}
 
 
-def laboratory_data(n_jobs: int = -1) -> None:
-    """Train all cells; write ``ties/laboratory.csv``, a row per run, see ``run_cell``."""
-    results = keep_cells("ties/laboratory", CELLS, n_jobs, run_cell)
+def laboratory_data(cells: Sequence[str] = tuple(CELLS), n_jobs: int = -1) -> None:
+    """Train some cells; write ``ties/laboratory.csv``, a row per run of these, see ``run_cell``."""
+    results = keep_cells("ties/laboratory", {name: CELLS[name] for name in cells}, n_jobs, run_cell)
     table = pd.DataFrame([result.value for result in results])
     settings = {"config": CONFIG.plain(), "runs": len(table)}
-    name, command = "ties/laboratory", f"{COMMAND} ties_laboratory"
+    chosen = "" if len(cells) == len(CELLS) else f" --cells {' '.join(cells)}"
+    name, command = "ties/laboratory", f"{COMMAND} ties_laboratory{chosen}"
     publish(name, {"laboratory": table}, command, settings, results, training_fingerprint(), "%.4g")
