@@ -49,7 +49,10 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
     "creep": ("how long the order of equals lasts in PyBullet", creep.creep_data, JOBS),
     "leak": ("what ties by the items' order tell a network", leak.leak_data, JOBS),
-    "ties_laboratory": ("how long an order of equals lasts", ties_laboratory.laboratory_data, ties_laboratory.OPTIONS),
+    "ties_laboratory": (
+        "how long an order of equals lasts: the laboratory",
+        ties_laboratory.laboratory_data, ties_laboratory.OPTIONS,
+    ),
     "ties": ("how equal coordinates are ranked", ties.ties_data, ties.OPTIONS),
     "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),

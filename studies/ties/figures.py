@@ -14,6 +14,7 @@ from studies.statistics import PAPER_MSR, by_run
 from studies.style import COLOURS, styled
 from studies.ties.criterion import likeness
 from studies.ties.earlier import read_earlier
+from studies.ties.laboratory import RHOS
 from studies.ties.training import TIES
 
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
@@ -75,6 +76,29 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
         axes.set_xticks(range(len(KINDS)), labels, fontsize=7)
         axes.set(title=f"{'with' if mask else 'without'} the mask", ylim=(0, 103))
     panels[0].set_ylabel("MSR over the last tenth of the picks (%)")
+    return figure
+
+
+@styled
+def draw_duration(runs: pd.DataFrame) -> Figure:
+    """Where runs of the laboratory end, by how long an order of equals lasts.
+
+    Args:
+        runs: ``ties/laboratory``; of its cells, those that differ in ρ and train without the mask.
+    """
+    ends = {
+        f"{correlation:g}": runs.loc[runs["cell"] == f"rho_{correlation}_no_mask", "end"]
+        for correlation in RHOS
+    }
+    figure, axes = plt.subplots(figsize=(5.6, 3.2))
+    for place, values in enumerate(ends.values()):
+        spread = np.linspace(-0.15, 0.15, len(values))
+        axes.plot(place + spread, 100 * values, "o", color=COLOURS["ranks"], ms=4, alpha=0.6)
+    means = [100 * values.mean() for values in ends.values()]
+    axes.plot(means, "k_-", ms=14, lw=0.8)
+    axes.set_xticks(range(len(ends)), ends)
+    axes.set(xlabel="ρ: correlation of the noise from one pick to the next", ylim=(0, 103))
+    axes.set_ylabel("MSR over the last tenth (%)")
     return figure
 
 
