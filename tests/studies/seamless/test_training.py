@@ -1,4 +1,4 @@
-"""The runs in seamless walls: their plan, what is published of them, their measures and figures."""
+"""The runs in seamless walls: their plan, what is published of them, and their measures."""
 
 import re
 from dataclasses import replace
@@ -12,7 +12,7 @@ import pytest
 from studies import grid, paths
 from studies.grid import Cell, Grid, read_grid
 from studies.results import read_table
-from studies.seamless import figures, training
+from studies.seamless import training
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from tests.studies.curves import curve
@@ -114,9 +114,3 @@ RISE = np.linspace(0.2, 0.5, 20)
 )
 def test_a_run_is_like_fig_12_by_its_msr_and_like_fig_11_by_its_loss(figure, run, like):
     assert seamless_plan(run)[figure] is like
-
-
-def test_the_line_of_jams_passes_the_papers_point():
-    bound, paper = figures.draw_start_and_end({}).axes[0].lines
-    at_start = np.interp(15, bound.get_xdata()[::-1], bound.get_ydata()[::-1])
-    assert at_start == pytest.approx(57.7, abs=0.1) and paper.get_xydata().tolist() == [[15, 60]]
