@@ -12,7 +12,6 @@ from studies.lifts import agreement, engines
 from studies.lifts import lift_table as lifts
 from studies.policies.robustness import front_walls
 from studies.results import read_provenance, read_table
-from studies.statistics import share_interval
 from unload import policies, task
 from unload.agent.evaluation import evaluate
 from unload.env.vector import ContainerVectorEnv
@@ -74,31 +73,6 @@ def test_full_is_asked_and_a_stopped_run_goes_on(own_data, monkeypatch):
     monkeypatch.setattr(agreement, "FIRST_SEED", 6)
     with pytest.raises(TypeError):  # an answer to another question is not taken
         agreement.agreement_data()
-
-
-def test_bounds_count_each_kind_of_lift():
-    columns = ["situation", "on_top", "asked_full", "local", "full"]
-    rows = [
-        (0, 0, "drawn", 0.4, 0.4),
-        (0, 0, "drawn", 0.4, 0.1),
-        (1, 4, "buried", 0.0, 0.0),
-        (2, 1, "close", 0.1, 0.3),
-        (3, 1, "", 0.0, np.nan),
-    ]
-    frame = pd.DataFrame(rows, columns=columns).assign(seed=0, picks=100)
-    frame["table"] = frame["local"]
-    bounds = agreement.error_bounds(frame)
-    counted = bounds[["lifts", "states", "situations", "differ"]].T.to_dict("list")
-    assert counted == {
-        "table, local": [4, 1, 4, 0],
-        "table, local: three or more on top": [1, 1, 1, 0],
-        "local, full: drawn": [2, 1, 1, 1],
-        "local, full: three or more on top": [1, 1, 1, 0],
-        "local, full: close": [1, 1, 1, 1],
-        "local, full: all": [4, 1, 3, 2],
-    }
-    for _, row in bounds.iterrows():
-        assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))
 
 
 @pytest.mark.pybullet
@@ -164,20 +138,6 @@ def test_lift_data_depends_on_the_command_alone(own_data, monkeypatch):
     monkeypatch.setattr(lifts, "LIFTS_FILE", own_data / "c.npz")
     lifts.lift_data()
     assert read_provenance("c") == provenance
-
-
-def test_decisions_of_the_engines_are_counted_by_what_lies_on_top():
-    columns = ["situation", "on_top", *ENGINES]
-    rows = [(0, 0, 0.46, 0.45), (1, 1, 0.1, 0.3), (2, 1, 0.0, 0.1), (3, 5, 0.0, 0.0), (4, 3, 0, 0)]
-    table = engines.decided(pd.DataFrame(rows, columns=columns))
-    assert table[["situations", "differ"]].T.to_dict("list") == {
-        "0": [1, 0], "1": [2, 1], "≥ 3": [2, 0], "all": [5, 1]
-    }  # fmt: skip
-    for _, row in table.iterrows():
-        assert (row["low"], row["high"]) == share_interval(*map(int, row[["differ", "situations"]]))
-    apart = table[["apart, mean", "apart, largest"]]
-    assert apart.loc["0"].tolist() == pytest.approx([0.01] * 2) == apart.loc["all"].tolist()
-    assert apart.loc["1"].isna().all(), "of none both engines lift"
 
 
 def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):

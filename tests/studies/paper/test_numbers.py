@@ -1,6 +1,5 @@
 """The paper's numbers beside ours."""
 
-import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
@@ -17,18 +16,6 @@ def test_what_differs_does_not_agree(monkeypatch):
     monkeypatch.setattr(numbers, "CHANCE_ERROR", 0.1)
     agrees = numbers.measured(1, 1, 5)["agrees"]
     assert agrees.tolist()[1:4] == ["no"] * 3 and agrees["MSR of random picks"] == "yes"
-
-
-def test_the_tallest_bar_is_of_the_items_nearest_by_either_weight():
-    (counted,) = numbers.full_containers(1).itertuples()
-    env = gymnasium.make("unload/Container-v0", physics="table")
-    env.reset(seed=0)
-    positions = env.unwrapped.observed_positions()
-    for weight, found in ((4, counted.bar), (1, counted.bar_1)):
-        away = (7 - positions[:, 0]) ** 2 + weight * (2.5 - positions[:, 2]) ** 2
-        x = 2 / 7 * positions[away.argsort(kind="stable")[:128], 0] - 1
-        assert found == np.histogram(x, np.linspace(-1.001, 1.001, 111))[0].max()
-    env.close()
 
 
 # Of ten million picks: it falls, rises and falls.

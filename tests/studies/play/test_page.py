@@ -295,7 +295,7 @@ def test_presets_end_where_they_say(preset):
 def test_a_browser_shows_it(tmp_path):
     """The five steps do what they say at three sizes with a seed each, and the controls answer."""
     pytest.importorskip("playwright", reason="make browser installs it")
-    from tests.browser.train_page import BROWSERS, browser, look_at_page
+    from tests.browser.look import BROWSERS, browser, look_at_page
 
     if not any(map(shutil.which, BROWSERS)):
         pytest.skip("Chromium is not installed")
