@@ -64,9 +64,6 @@ def test_all_policies_play_the_same_heaps_and_are_kept(own_data, monkeypatch, pi
     assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
     assert read_provenance("heap/table")["settings"]["heaps"] == 2
     pd.testing.assert_frame_equal(read_table("heap/table"), table, check_dtype=False)
-    kept = {path: path.stat().st_mtime_ns for path in (own_data / "runs/heap/episodes").iterdir()}
-    pd.testing.assert_frame_equal(study.compare(), table)
-    assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
     players = []
 
     def made_up(player, split, number, physics):
@@ -173,13 +170,8 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pi
     written = published.read_bytes()
     make_networks()
     assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
-    with monkeypatch.context() as patch:
-        patch.setattr(paths, "RUNS", own_data / "again")
-        make_networks()
-    assert published.read_bytes() == written and len(learned) == 8
     monkeypatch.setattr(recording, "STEPS", 3)
     make_networks()
-    assert len(learned) == 12 and published.read_bytes() != written, "another question"
-    assert len(list((own_data / "runs" / "heap" / "picks").glob("*.json"))) == 6, (
-        "other explorers, too"
-    )
+    assert len(learned) == 8 and published.read_bytes() != written, "another question"
+    picks = list((own_data / "runs" / "heap" / "picks").glob("*.json"))
+    assert len(picks) == 6, "other explorers, too"
