@@ -21,7 +21,6 @@ from studies.heap.observation import (
     EYE,
     ROWS,
     SEEN,
-    Camera,
     features,
     visible_boxes,
 )
@@ -96,24 +95,6 @@ def test_few_pixels_show_no_box_unless_there_are_no_others_and_the_foremost_get_
     count = ROWS + 10
     heap = cubes(*((x, 1, 0) for x in np.linspace(4, 7, count)))
     assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))
-
-
-@pytest.mark.pybullet
-def test_features_of_upright_cubes(cubes):
-    """The last stands half before the one beside it."""
-    heap = cubes((5.0, 1.0, 0), (5.0, 1.0, 1), (5.5, 1.2, 0))
-    pixels = Camera().pixels(heap)
-    visible = visible_boxes(heap, pixels)
-    rows = features(heap.only(visible), pixels[visible])
-    assert visible.tolist() == [2, 0, 1]
-    assert rows.shape == (ROWS, len(COLUMNS)) and rows.dtype == np.float32 and not rows[3:].any()
-    edges = ("extent_x", "extent_y", "extent_z", "longest", "middle", "shortest")
-    for name, values in {
-        "behind": [0.2, 0.7, 0.7], "y": [-0.05, -0.25, -0.25], "z": [0.2, 0.2, 0.6],
-        "tilt": [0, 0, 0], "clear_above": [1, 0, 1], "clear_in_front": [1, 0.5, 1],
-        "pixels": pixels[visible] / 1000, **dict.fromkeys(edges, [0.4] * 3),
-    }.items():  # fmt: skip
-        assert rows[:3, COLUMN[name]] == pytest.approx(values, abs=1e-6)
 
 
 BOXES = 6
