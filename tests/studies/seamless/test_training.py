@@ -38,6 +38,18 @@ def test_the_jams_of_the_next_episode_are_others():
     assert (found[0] != found[1])[free].mean() == pytest.approx(2 / 3, abs=0.1)
 
 
+def test_a_masked_box_is_tried_again_and_its_mask_is_kept():
+    """Which no run does but where all boxes are masked."""
+    run = Training(replace(CONFIG, seed=3), change=partial(jam, share=0.0))
+    envs, actions = run.rollout.envs.unwrapped, np.full(run.config.num_envs, 5)
+    before = envs._look_up(actions)[1].copy()
+    envs._containers.masks[:, 5] = 0
+    envs._containers.failed[:, 5] = 0.123
+    assert (envs._look_up(actions)[1] == before).all()
+    assert (envs._containers.masks[:, 5] == 0).all()
+    run.rollout.close()
+
+
 def test_the_cells_are_those_of_the_plan():
     plan = (paths.DATA / "seamless" / "PLAN.md").read_text()
     assert f"drawn again within {training.LASTS} successes" in " ".join(plan.split())
