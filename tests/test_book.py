@@ -29,6 +29,14 @@ def test_plotly_is_preferred_to_a_picture_of_it():
     assert 'id="view-1"' in first["text/html"] and 'id="view-2"' in second["text/html"]
 
 
+def test_an_animation_waits_for_its_button():
+    """Several that start at once can block a browser that draws without a graphics card."""
+    line = [{"type": "scatter", "y": [1, 2]}]
+    (animation,) = read({pages.PLOTLY: {"data": line, "layout": {}, "frames": [{"data": line}]}})
+    assert "Plotly.addFrames" in animation["text/html"]
+    assert "Plotly.animate" not in animation["text/html"]
+
+
 def test_a_widget_gives_way_to_what_needs_no_kernel():
     widget = {pages.WIDGET: {"model_id": "0"}, "text/plain": "Button()"}
     alone, with_picture = read(widget, widget | {"image/png": "AA=="})

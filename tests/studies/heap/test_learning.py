@@ -163,6 +163,12 @@ def test_policy_weighs_falls_and_tells_fates(learned, rng):
     assert (guessed == found).mean() > 0.9 and chances[..., 1].max() < 0.1
 
 
+def test_first_weights_are_drawn_as_those_of_linear_layers():
+    for layer in FateNetwork(16, torch.Generator().manual_seed(0)).children():
+        largest = max(weight.abs().max().item() for weight in layer.parameters())
+        assert 0.6 < largest * layer.in_features**0.5 <= 1
+
+
 def test_all_picks_are_learned_from_half_of_them_mirrored_ever_more_slowly(rng, monkeypatch):
     seen, rates, step = [], [], torch.optim.AdamW.step
 
