@@ -117,6 +117,14 @@ def test_a_run_is_the_same_however_it_is_played(full_load):
     assert in_parts.picks == at_once.picks
 
 
+def test_a_random_player_draws_another_row_at_each_pick(full_load):
+    run, rows = Run("random", full_load, seed=2, mask=False), []
+    for count in range(1, 31):
+        rows.append(run.visible.tolist().index(run.choose()))
+        run.play_to(count)
+    assert len(set(rows)) > 20
+
+
 def test_a_recorded_episode_ends_when_the_container_is_empty_or_the_agent_stuck(
     boxes, tmp_path, monkeypatch
 ):

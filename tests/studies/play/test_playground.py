@@ -270,6 +270,19 @@ def test_the_settings_show_why_the_agent_is_stuck(stuck, changed, can):
     assert ranks < 30 if changed == {"ties": "average"} else ranks == 128
 
 
+def test_noise_is_in_millimetres(stuck, monkeypatch):
+    """In draws, and in the environment's own, whose standard deviation is 0.5 mm."""
+    drawn, seen = [], []
+    monkeypatch.setattr("studies.play.agent_view.drift", lambda *given: drawn.append(given[1]) or 0)
+    monkeypatch.setattr(
+        "studies.play.agent_view.look", lambda at, *given: seen.append(at) or look(at, *given)
+    )
+    agent_view(stuck, **SETTINGS)
+    assert set(drawn) == {0.0005}
+    own = stuck.observed_positions()[stuck.moment().visible]
+    assert seen[0] == pytest.approx(own, abs=1e-9)
+
+
 def test_chance_mixes_the_greedy_and_a_random_pick(full_load):
     env = ContainerEnv(physics="table", position_noise=0)
     env.reset(seed=0, options={"load": full_load})
