@@ -1,20 +1,23 @@
 """The heaps, recorded picks, learning and comparison at reduced size; and the figures."""
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 
 from studies import paths
-from studies.heap import generate, recording
+from studies.heap import generate, picture, recording
 from studies.heap import table as study
 from studies.heap.generate import stored_heaps
 from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
+from studies.heap.rake import Outcome
 from studies.heap.recording import HEAPS, make_heaps, make_networks
 from studies.heap.table import best_rule, family, plan
 from studies.results import read_provenance, read_table
 from unload.agent.identity import identity
+from unload.load.picture import COLOURS
 
 
 def test_the_best_rule_depends_on_the_weight_of_falls():
@@ -105,6 +108,21 @@ def test_a_published_episode_is_played_again():
     assert played == pytest.approx(
         dict(episodes.loc["learned", 1.0, 18][["boxes", "falls"]]), abs=1e-5
     )
+
+
+def test_a_box_is_drawn_in_the_colour_of_what_a_pick_does_to_it(cubes):
+    """The one that is nearer to the eye is drawn last, and is dragged; the other comes or falls."""
+    heap, both = cubes((5, 1, 0), (6, 2, 0)), np.array([True, True])
+    axes = plt.figure().add_subplot()
+    falls = picture.outcome_colours(Outcome(heap, both, both, 0.7, True), box=1)
+    assert (falls[0] == COLOURS["failed"]).all()
+    colours = picture.outcome_colours(Outcome(heap, both, ~both, 0.7, True), box=1)
+    picture.draw_heap(axes, heap, colours)
+    painted = axes.collections[0].get_facecolors()[:, :3]
+    assert len(painted) == 6, "three faces of a box are turned to the eye"
+    along, dragged = (np.array(COLOURS[name]) for name in ("liftable", "tried"))
+    for face, colour in zip(painted, [along] * 3 + [dragged] * 3):
+        assert face / face.max() == pytest.approx(colour / colour.max(), abs=0.02)
 
 
 def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):
