@@ -15,12 +15,14 @@ from studies.falls.laboratory import CONFIG
 from studies.grid import Cell, Grid, read_grid
 from studies.results import read_table
 from studies.seamless import training
-from studies.seamless.jamming import jam
+from studies.seamless.jamming import jam, neighbours
+from studies.seamless.jams import place
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from tests.studies.curves import curve
 from unload import TrainConfig, task
 from unload.agent.training import Training
+from unload.load.boxes import Load
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
 
@@ -48,6 +50,27 @@ def test_a_masked_box_is_tried_again_and_its_mask_is_kept():
     assert (envs._look_up(actions)[1] == before).all()
     assert (envs._containers.masks[:, 5] == 0).all()
     run.rollout.close()
+
+
+def test_neighbours_are_those_of_the_measured_places():
+    run = Training(replace(CONFIG, seed=3, epsilon_final=1.0, mask=False))
+    for _ in range(40):
+        run.step()
+    run.rollout.close()
+    envs = run.rollout.envs.unwrapped
+    state, seen = envs._containers, set()
+    for row in range(0, 128, 9):
+        items = state.visible[:, row].astype(np.int64)
+        covered, beside = neighbours(state, items)
+        for env in range(0, 64, 7):
+            count = int(np.flatnonzero(state.present[env])[-1]) + 1
+            boxes = state.geometry[env, :count]
+            walls = np.unique(boxes[:, 0] - boxes[:, 3] / 2, return_inverse=True)[1]
+            load = Load(boxes[:, :3], boxes[:, 3:], np.zeros(count, int), walls)
+            found = place(load, state.present[env, :count].astype(bool), int(items[env]))
+            assert (covered[env], beside[env]) == (found["covered"], found["beside"])
+            seen.add((found["covered"], found["beside"]))
+    assert len(seen) >= 6
 
 
 def test_the_cells_are_those_of_the_plan():
