@@ -34,7 +34,7 @@ book:  ## make a site of README, notebooks and solutions: build/book/index.html
 
 browser:  ## use notebooks in JupyterLab and the page that trains in a browser without a window
 	@$(PYTHON) make.py ready browser
-	$(BIN)/python tests/browser/look.py
+	$(BIN)/python -m tests.browser.look
 
 mutants: ready  ## change the code in small ways and count what the tests notice (an hour)
 	nice -n 10 $(BIN)/python -m studies.speed.mutants

@@ -1,7 +1,6 @@
 """The commands that need no make: which Pythons they take, what they install, what they hand on."""
 
 import re
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -84,12 +83,6 @@ def test_an_unknown_command_lists_the_known_ones(ran):
         with pytest.raises(SystemExit, match="Commands: figures, test, lab"):
             make.main(name)
     assert not ran
-
-
-def test_it_reads_nothing_but_the_standard_library():
-    source = (ROOT / "make.py").read_text(encoding="utf-8")
-    modules = re.findall(r"^(?:import|from) (\w+)", source, re.MULTILINE)
-    assert len(modules) > 5 and not {*modules} - sys.stdlib_module_names
 
 
 def test_the_makefile_has_its_commands():

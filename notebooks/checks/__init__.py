@@ -1,19 +1,18 @@
-"""The checks of the exercises, one file a notebook, called by name: ``check("06/1", answer)``.
+"""The checks of the exercises, one file a track, called by name: ``check("06/1", answer)``.
 
-A file is called as its notebook without the number. Its ``EXERCISES`` say of each exercise which
-kind of answer is wanted, when it is right, and what to look at again; the solutions pass the same.
+Its ``EXERCISES`` say of each exercise which kind of answer is wanted, when it is right, and what to
+look at again; the solutions pass the same.
 """
 
 import importlib
 import os
 import traceback
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-HERE = Path(__file__).parent
+TRACKS = {"0": "core", "1": "reproduction", "2": "beyond"}  # by the first digit of a notebook
 REDUCED = "UNLOAD_REDUCED"  # set where a notebook runs at reduced counts
 
 
@@ -54,12 +53,11 @@ def check(name: str, answer: object, *, strict: bool = False) -> None:
 
 def exercise(name: str) -> Exercise:
     """An exercise by its name, such as ``"06/1"``."""
-    notebook, _, number = name.partition("/")
-    paths = [path for path in HERE.parent.glob("[0-9]*.ipynb") if path.name[:2] == notebook]
-    module = paths and importlib.import_module(f"{__name__}.{paths[0].stem.partition('_')[2]}")
-    if not module or number not in module.EXERCISES:
+    track = TRACKS.get(name[:1])
+    exercises = importlib.import_module(f"{__name__}.{track}").EXERCISES if track else {}
+    if name not in exercises:
         raise ValueError(f'check(): no exercise is called {name!r}; expected one such as "06/1"')
-    return module.EXERCISES[number]
+    return exercises[name]
 
 
 def judged(wanted: Exercise, answer: object) -> str:

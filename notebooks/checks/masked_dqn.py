@@ -139,13 +139,13 @@ def _not_empty(loop):
 
 
 EXERCISES = {
-    "1": Exercise(function, chooses, ""),
-    "2": Exercise(function, updates, ""),
-    "3": Exercise(function, trains, ""),
-    "4": Exercise(
+    "04/1": Exercise(function, chooses, ""),
+    "04/2": Exercise(function, updates, ""),
+    "04/3": Exercise(function, trains, ""),
+    "04/4": Exercise(
         number,
         lambda q: abs(0.9 * (1 - q) - 0.1) < 0.01,
         "beyond β the loss of the failures has the slope 1, whatever the value",
     ),
-    "5": Exercise(number, lambda most: most == 1, "what would have to change to end one?"),
+    "04/5": Exercise(number, lambda most: most == 1, "what would have to change to end one?"),
 }

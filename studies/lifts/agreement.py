@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from studies.lifts.lift_table import mixed
-from studies.results import COMMAND, keep_all, measured, publish, read_table
+from studies.results import COMMAND, keep_all, measured, publish
 from studies.statistics import share_interval
 from unload import task
 from unload.agent import policies
@@ -57,7 +57,14 @@ UNLOADED_BY = {
 
 
 def agreement_data(n_jobs: int = 1) -> None:
-    """Compare lifts; write ``lift_agreement.csv`` and its provenance.
+    """Compare lifts; write ``lift_agreement.csv``, one row per lift, and its provenance.
+
+    ``policy``, ``seed`` and ``picks`` name the state of the container; ``item`` is the box lifted,
+    ``on_top`` the number of boxes on it; lifts with equal ``situation`` are the same to ``local``;
+    ``table``, ``local`` and ``full`` are how far the box moved in m, NaN where ``full`` was not
+    asked. ``asked_full`` says why it was, "drawn", "buried" or "close", and is empty where it was
+    not; ``walls`` is how many item walls it simulated: 5 for the item's own and two on each side,
+    12 for the whole container.
 
     A run that was stopped goes on with the answers of ``full`` that it has.
     """
@@ -85,20 +92,6 @@ def agreement_data(n_jobs: int = 1) -> None:
     publish(NAME, tables, command, settings, [collected, *answers], float_format="%.6f")
 
 
-def read_agreement() -> pd.DataFrame:
-    """The table that ``agreement_data`` wrote, one row per lift.
-
-    Returns:
-        ``policy``, ``seed`` and ``picks`` name the state of the container; ``item`` is the
-        box lifted, ``on_top`` the number of boxes on it; lifts with equal ``situation``
-        are the same to ``local``; ``table``, ``local`` and ``full`` are how far the box moved
-        in m, NaN where ``full`` was not asked. ``asked_full`` says why it was, "drawn", "buried"
-        or "close", and is empty where it was not; ``walls`` is how many item walls it simulated:
-        5 for the item's own and two on each side, 12 for the whole container.
-    """
-    return read_table(NAME).fillna({"asked_full": ""})
-
-
 def disagreements(frame: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
     """The lifts that succeed in one physics and not in the other; both must be known."""
     known = frame.dropna(subset=[one, other])
@@ -110,7 +103,7 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
     """How often two physics decide differently, and 95 % bounds on how often they may.
 
     Args:
-        frame: see ``read_agreement``.
+        frame: see ``agreement_data``.
 
     Returns:
         Indexed by what is compared: ``lifts``; from how many ``states`` of a container;
@@ -119,7 +112,7 @@ def error_bounds(frame: pd.DataFrame) -> pd.DataFrame:
         each situation counts once, because both give equal situations equal answers.
     """
     once = frame.drop_duplicates("situation")
-    asked, why = frame[frame["asked_full"] != ""], frame["asked_full"]
+    asked, why = frame[frame["full"].notna()], frame["asked_full"]
     groups = {
         "table, local": (once, "table"),
         "table, local: three or more on top": (once[once["on_top"] >= HELD_DOWN], "table"),
@@ -158,7 +151,7 @@ def collect_lifts(lifts: int, seed: int) -> tuple[list[tuple[Load, np.ndarray]],
 
     Returns:
         The states, of each the load and (n,) bool, which items are left; and the columns of
-        ``read_agreement`` without those of ``full`` but with ``state``, an index into the states.
+        ``agreement_data`` without those of ``full`` but with ``state``, an index into the states.
     """
     local, states, rows, names = LocalPhysics(ENGINES[0]), [], [], list(UNLOADED_BY)
     numbers: dict[bytes, int] = {}  # of situations

@@ -10,14 +10,13 @@ more, with none but MuJoCo's answers.
 from collections.abc import Iterator
 from unittest import mock
 
-import numpy as np
 import pandas as pd
 
 from studies import paths
 from studies.lifts.agreement import FIRST_SEED, LIFT_COUNT, collect_lifts
 from studies.paper.training import default_policies
 from studies.policies.comparison import CONDITIONS, LOADS, PLAYERS, SEED, find_policy
-from studies.results import COMMAND, keep_all, measured, publish, read_table
+from studies.results import COMMAND, keep_all, measured, publish
 from studies.statistics import share_interval
 from unload import task
 from unload.agent.evaluation import Policy, evaluate
@@ -42,14 +41,11 @@ def engines_data(n_jobs: int = -1) -> None:
 
 
 def msr_data(n_jobs: int) -> None:
-    """Let all policies play with the answers of the second engine."""
+    """Let all policies play with the answers of either engine: the rows of ``both_rates``."""
     cases, settings = list(played()), engine_settings()
     asked = [({"engines": settings, **case}, arguments) for case, arguments in cases]
-    answers = keep_all("engines", second_rates, asked, n_jobs)
-    rows = [
-        case | compared_rates(first_rates(case, *arguments), np.array(answer.value))
-        for (case, arguments), answer in zip(cases, answers)
-    ]
+    answers = keep_all("engines", both_rates, asked, n_jobs)
+    rows = [case | answer.value for (case, _), answer in zip(cases, answers)]
     settings |= {"loads": LOADS, "seed": SEED, "notebook 12": APPLIED}
     tables = {"engines_msr": pd.DataFrame(rows)}
     publish(MSR_NAME, tables, f"{COMMAND} engines", settings, answers)
@@ -68,19 +64,16 @@ def situations() -> Iterator[tuple[int, Situation]]:
 
 
 def compare_lifts() -> pd.DataFrame:
-    """How far each engine moves the box of each situation, see ``read_engines``."""
+    """How far each engine moves the box of each situation: the rows of ``lifts/engines.csv``.
+
+    ``situation`` is its number in ``lift_agreement.csv``, ``on_top`` how many boxes rest on the
+    chosen one; by engine, how far this one moved, in m.
+    """
     physics, rows = {engine: LocalPhysics(engine) for engine in ENGINES}, []
     for number, situation in situations():
         distances = {engine: each.simulate(situation) for engine, each in physics.items()}
         rows.append({"situation": number, "on_top": situation.on_top, **distances})
     return pd.DataFrame(rows)
-
-
-def read_engines() -> pd.DataFrame:
-    """One row per situation: ``situation``, its number in ``lift_agreement.csv``; ``on_top``, the
-    boxes that rest on the chosen one; and by engine how far this one moved, in m.
-    """
-    return read_table(NAME)
 
 
 def decided(frame: pd.DataFrame) -> pd.DataFrame:
@@ -105,7 +98,7 @@ def decided(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def played() -> Iterator[tuple[dict, tuple[Policy, dict]]]:
-    """Who plays where: names for a row, and the arguments of ``second_rates``.
+    """Who plays where: names for a row, and the arguments of ``both_rates``.
 
     All of ``CONDITIONS`` but whole containers, which would take as long as the others together.
     """
@@ -120,34 +113,16 @@ def played() -> Iterator[tuple[dict, tuple[Policy, dict]]]:
             yield case, (policy, APPLIED | {"mask": mask})
 
 
-def first_rates(case: dict, policy: Policy, arguments: dict) -> np.ndarray:
-    """The MSR in each container with PyBullet's answers, as published where it is."""
-    if case["condition"] not in CONDITIONS:
-        return evaluate(policy, **arguments)["success_rate"].to_numpy()
-    table = read_table("policies/comparison")
-    rows = (table[[*case]] == pd.Series(case)).all(axis=1)
-    return table.loc[rows, "success_rate"].to_numpy()
+def both_rates(policy: Policy, arguments: dict) -> dict[str, float]:
+    """The mean MSR by engine, the number of ``containers``, and in how many it ``differ``s.
 
-
-def second_rates(policy: Policy, arguments: dict) -> list[float]:
-    """The MSR in each container with MuJoCo's answers alone, which ``LIFTS`` keeps."""
+    MuJoCo gives all its answers itself, which ``LIFTS`` keeps.
+    """
+    first = evaluate(policy, **arguments)["success_rate"]
     table = LiftTable(ENGINES[1])
     table.exchange(LIFTS)
     with mock.patch.object(vector, "shared_table", lambda: table):
-        rates = evaluate(policy, **arguments)["success_rate"].tolist()
+        second = evaluate(policy, **arguments)["success_rate"]
     table.exchange(LIFTS)
-    return rates
-
-
-def compared_rates(first: np.ndarray, second: np.ndarray) -> dict[str, float]:
-    """Of the MSRs of the same containers: their means, and in how many they differ."""
-    differ = int((~np.isclose(first, second, atol=1e-5)).sum())  # tables have six digits
-    means = {engine: float(each.mean()) for engine, each in zip(ENGINES, (first, second))}
-    return means | {"containers": len(first), "differ": differ}
-
-
-def read_msr() -> pd.DataFrame:
-    """One row per ``policy``, ``mask`` and ``condition``: the mean MSR by engine; how many
-    ``containers`` were played; and in how many of them the MSR would ``differ``.
-    """
-    return read_table(MSR_NAME)
+    means = dict(zip(ENGINES, (float(first.mean()), float(second.mean()))))
+    return means | {"containers": len(first), "differ": int((first != second).sum())}

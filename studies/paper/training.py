@@ -5,17 +5,20 @@
 The first plan, ``data/falls/FIRST_PLAN.md``, says why its grid has these cells and seeds.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from studies import paths
 from studies.grid import Cell, Grid, read_policies, train_grid
 from studies.results import COMMAND, JOBS
-from studies.style import COLOURS
+from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, save_policy
@@ -51,6 +54,8 @@ PAPER = Grid(
 DEFAULTS = "paper_b2048_no_mask"  # the cell of ``TrainConfig``'s defaults, of Figs. 11 and 12
 DEFAULT_SEEDS = range(4)  # of its runs that the figures show; the first is the paper's line
 PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # policies that play elsewhere
+MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
+SMOOTH = 16  # episodes of all containers, about half a million picks
 OPTIONS = {
     "--cells": {"nargs": "+", "choices": PAPER.cells},
     "--picks": {"type": int, "help": "of a run, if not the paper's; the data go to data/reduced"},
@@ -100,3 +105,37 @@ def draw_learning_curve(
     axes.plot(middle, means, "o-", color=color, markersize=3.5, label=name)
     axes.set(xlabel="picks", ylabel="MSR while training", ylim=(0, 1.02), xlim=(0, None))
     axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+
+
+@styled
+def over_picks(
+    curves: pd.DataFrame, column: str, panels: Mapping[str, Mapping[str, str]]
+) -> Figure:
+    """A measure of all runs over picks, a panel for each setting (Figs. 11 and 12).
+
+    Thin lines are means over episodes of all containers, strong ones running means of the first
+    seed over half a million picks.
+
+    Args:
+        curves: ``cell``, ``seed``, ``picks`` and the measure.
+        column: which measure.
+        panels: the cells of each by a key of ``MASK_LINES``, by its title.
+    """
+    figure, (all_axes,) = plt.subplots(
+        1, len(panels), figsize=(3 + 2.6 * len(panels), 3.6), sharex=True, sharey=True,
+        squeeze=False,
+    )  # fmt: skip
+    for axes, (title, cells) in zip(all_axes, panels.items()):
+        for (name, cell), colour in zip(cells.items(), (COLOURS["ranks"], WITHOUT_MASK)):
+            for number, (_, run) in enumerate(curves[curves["cell"] == cell].groupby("seed")):
+                axes.plot(run["picks"], run[column], colour, linewidth=0.4, alpha=0.35)
+                if number == 0:
+                    smooth = run[column].rolling(SMOOTH, min_periods=1).mean()
+                    look = {"linestyle": MASK_LINES[name], "linewidth": 1.8, "zorder": 3}
+                    axes.plot(run["picks"], smooth, colour, label=name, **look)
+        axes.set(title=title, xlabel="step $k$ (picks)", xlim=(0, 2e7), xticks=np.arange(5) * 5e6)
+        axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+    figure.get_layout_engine().set(wspace=0.06)  # the last tick of a panel, the first of the next
+    handles, labels = all_axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    return figure

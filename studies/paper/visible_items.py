@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from studies.results import COMMAND, measured, publish, read_table
+from studies.results import COMMAND, measured, publish
 from studies.style import styled
 from unload.env import observation
 from unload.env.equalization import equalize
@@ -49,29 +49,18 @@ def _positions() -> dict[str, np.ndarray]:
     }
 
 
-def read_points(name: str) -> np.ndarray:
-    """Points of one of the paper's scatter plots.
-
-    Args:
-        name: ``"all_items"``, ``"Observation"`` or ``"Equalized_Observation"``.
-
-    Returns:
-        (n, 2) float64, x and z of each item, scaled to [-1, 1].
-    """
-    return read_table(f"{FOLDER}/{name}").to_numpy()
-
-
 @styled
-def scaled_side_view(groups: Mapping[str, tuple[np.ndarray, tuple]], symbol: str) -> Figure:
+def scaled_side_view(groups: Mapping[str, tuple[pd.DataFrame, tuple]], symbol: str) -> Figure:
     """Items from the side, in scaled coordinates (Figs. 4 and 6).
 
     Args:
-        groups: name → (n, 2) points and their colour; the later ones are drawn above.
+        groups: name → points and their colour; the later ones are drawn above.
         symbol: of a position, in LaTeX.
     """
     figure, axes = plt.subplots(figsize=(4.6, 4.8))
     for name, (points, colour) in groups.items():
-        axes.plot(*points.T, "o", ms=4.5, mew=0.3, mec="0.55", color=colour, label=name)
+        look = {"ms": 4.5, "mew": 0.3, "mec": "0.55", "color": colour}
+        axes.plot(points["x"], points["y"], "o", label=name, **look)
     ticks = np.arange(-1, 1.1, 0.5)
     axes.set(xlim=(-1.1, 1.1), ylim=(-1.1, 1.1), xticks=ticks, yticks=ticks, aspect="equal")
     axes.set_xlabel(rf"${symbol}_{{0,i,\mathrm{{x}}}}$")

@@ -23,7 +23,7 @@ from studies.grid import Cell, Grid, train_grid
 from studies.networks import NETWORKS as KINDS
 from studies.results import COMMAND, JOBS, read_table
 from studies.statistics import t_interval
-from studies.style import styled
+from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import checks, files
@@ -34,7 +34,10 @@ SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32, log_interval=50
 LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
 SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
 RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False, log_interval=500)
-APPLIED = {"msr_mask": ("C0", "o", "with the mask"), "msr_no_mask": ("C1", "s", "without the mask")}
+APPLIED = {
+    "msr_mask": (COLOURS["ranks"], "o", "with the mask"),
+    "msr_no_mask": (WITHOUT_MASK, "s", "without the mask"),
+}
 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:

@@ -2,5 +2,5 @@
 
 Read ``jams`` (measured with PyBullet), ``episodes`` (jams while a policy unloads), ``jam_tables``
 (what is published of both), ``mujoco_jams`` (the same with another engine), ``jamming`` (a jam in a
-training run), ``training`` (the runs) and ``figures``, in this order.
+training run) and ``training`` (the runs), in this order.
 """

@@ -39,7 +39,7 @@ ROOMS = dict.fromkeys(path.parent.relative_to(ROOT).as_posix() for path in MODUL
 ROOMS = {room: f"tests/{room.removeprefix('unload/')}" for room in ROOMS} | {
     "unload": "tests/test_main.py tests/load tests/env tests/agent/test_[op]*.py",
     "unload/fast": "tests/fast tests/env/test_vector.py",
-    "studies": "tests/studies/test_*.py tests/studies/policies/test_variants.py",
+    "studies": "tests/studies/test_*.py tests/studies/policies/test_policies.py",
     "studies/speed": "tests/studies/test_speed.py",
 }
 # What a study draws and tells is compared with what is published, and so are its settings.

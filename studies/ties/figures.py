@@ -8,10 +8,9 @@ from matplotlib.figure import Figure
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
-from studies.paper.training import PAPER
-from studies.seamless.figures import PAPER_START, SMOOTH
-from studies.statistics import PAPER_MSR, by_run
-from studies.style import COLOURS, styled
+from studies.paper.training import PAPER, SMOOTH
+from studies.statistics import PAPER_MSR, PAPER_START, by_run
+from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.criterion import likeness
 from studies.ties.earlier import read_earlier
 from studies.ties.laboratory import RHOS
@@ -113,8 +112,8 @@ def draw_answer() -> Figure:
     left, middle, right = panels
     ranks, shared, positions = (COLOURS[name] for name in ("ranks", "averaged", "positions"))
 
-    count = _draw_runs(left, paper, ["paper_no_mask", "paper_b2048_no_mask"], "0.75")
-    _label(left, (0.98, 0.04), f"without the mask ({count} runs)", "0.4")
+    count = _draw_runs(left, paper, ["paper_no_mask", "paper_b2048_no_mask"], WITHOUT_MASK)
+    _label(left, (0.98, 0.04), f"without the mask ({count} runs)", WITHOUT_MASK)
     count = _draw_runs(left, paper, ["paper_mask", "paper_b2048_mask"], ranks)
     _label(left, (0.02, 0.96), f"with the mask\n({count} runs)", ranks)
     left.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", ms=12, clip_on=False, zorder=5)

@@ -1,13 +1,14 @@
 """Use notebooks in JupyterLab, and the page that trains, in a browser without a window.
 
-    python tests/browser/look.py               00, 01, 04, 06, 21 and the page
-    python tests/browser/look.py 00 04         notebooks whose names start so
-    python tests/browser/look.py page          the page alone
+    python -m tests.browser.look               00, 01, 04, 06, 21 and the page
+    python -m tests.browser.look 00 04         notebooks whose names start so
+    python -m tests.browser.look page          the page alone
 
 Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
 nothing on stderr; formulas are typeset; 3D views hold pixels; figures under sliders change when
-one is moved; in 00 a click changes the score and the play buttons move, with a kernel and
-without. Pictures of all are kept in build/browser/.
+one is moved; in 00 a click changes the score, and an agent who is watched plays, with a kernel and
+without. On the page a reader takes the five steps, picks, trains and shares a setting. Pictures of
+all are kept in build/browser/.
 """
 
 import argparse
@@ -22,8 +23,9 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import chain
 from pathlib import Path
 
 import nbformat
@@ -31,66 +33,83 @@ import numpy as np
 from papermill.iorw import load_notebook_node
 from papermill.parameterize import parameterize_notebook
 from PIL import Image
-from playwright.sync_api import Locator, Page
+from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
-from train_page import browser, look_at_page  # noqa: E402
-
-from notebooks import run  # noqa: E402
+from notebooks import run
+from studies.paths import ROOT
+from studies.play.page import PAGE
 
 BUILD = ROOT / "build" / "browser"
 COPIES = BUILD / "notebooks"
 NOTEBOOKS = ("00", "01", "04", "06", "21")
-PAGE = "page"
 PLAYGROUND = "00_playground"
 RUN_LIMIT = 400  # s, for all cells of a notebook
 DRAW_LIMIT = 60  # s, for a picture, without a graphics card
-CLICKS = 4
+TRAIN_LIMIT = 240  # s, for a run of 96,000 picks on a busy machine
+START_LIMIT = 120  # s, for JupyterLab
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# Graphics without a graphics card, and nothing that the browser asks the network for by itself.
+OPTIONS = ("--use-gl=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking")
+# Of the page: width, height and colours, each with a seed of its own, its place here.
+SIZES = {
+    "desktop": (1400, 900, "dark"),
+    "tablet": (820, 1180, "light"),
+    "phone": (390, 844, "light"),
+}
+FINGER = 44  # pixels, the height of what is touched
 PLOTLY = ".jp-RenderedPlotly"
-SIZE = {"width": 1500, "height": 1000}
 LAB = {
     "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
     "docmanager-extension/plugin": {"autosave": False},
     "notebook-extension/tracker": {"windowingMode": "none"},  # all cells are in the page
 }
-START_LIMIT = 120  # s
-
 CELLS = "() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells"
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help="beginnings of notebook names")
-    names = tuple(parser.parse_args().names or (*NOTEBOOKS, PAGE))
+    names = tuple(parser.parse_args().names or (*NOTEBOOKS, "page"))
     chosen = [p for p in run.notebooks() if p.parent == run.HERE and p.name.startswith(names)]
-    if not chosen and PAGE not in names:
+    if not chosen and "page" not in names:
         parser.error(f"no notebook starts with {names}")
     shutil.rmtree(BUILD, ignore_errors=True)
-    problems = []
+    failed = 0
     with browser() as chromium:
-        if PAGE in names:
-            print("the page that trains …", flush=True)
-            for problem in look_at_page(chromium, BUILD):
-                print(f"  FAILED: {problem}", flush=True)
-                problems.append(problem)
-        for theme in ("Light", "Dark") if chosen else ():
-            copy(chosen)
-            with jupyterlab(COPIES, BUILD / theme.lower(), theme) as address:
-                for notebook in chosen:
-                    print(f"{notebook.stem}, {theme.lower()} …", flush=True)
-                    page = chromium.new_page(viewport=SIZE)
-                    page.goto(address.format(notebook.name))
-                    for problem in look_at(page, notebook.stem, BUILD / theme.lower(), theme):
-                        print(f"  FAILED: {problem}", flush=True)
-                        problems.append(problem)
-                    page.close()
-    print(f"{len(problems)} failed; pictures are in {BUILD.relative_to(ROOT)}")
-    return 1 if problems else 0
+        looks = [look_at_page(chromium, BUILD)] if "page" in names else []
+        looks += [look_at_notebooks(chromium, chosen)] if chosen else []
+        for problem in chain(*looks):
+            print(f"  FAILED: {problem}", flush=True)
+            failed += 1
+    print(f"{failed} failed; pictures are in {BUILD.relative_to(ROOT)}")
+    return 1 if failed else 0
 
 
-def copy(notebooks: list[Path]) -> None:
-    """Put notebooks with their reduced counts and their outputs into a folder of their own."""
+@contextmanager
+def browser() -> Iterator[Browser]:
+    """Chromium, or what its own name on this system is.
+
+    Raises:
+        SystemExit: none is installed; the message says how to get one.
+    """
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    # A container's root may not use Chromium's sandbox.
+    options = [*OPTIONS, *(["--no-sandbox"] if hasattr(os, "getuid") and not os.getuid() else [])]
+    with sync_playwright() as playwright:
+        try:
+            chromium = playwright.chromium.launch(executable_path=found, args=options)
+        except Error as error:
+            sys.exit(
+                f"No browser can be started: {error.message.splitlines()[0]}\n"
+                "Install Chromium with your system's packages, or Playwright's own by\n"
+                "    .venv/bin/python -m playwright install chromium"
+            )
+        yield chromium
+        chromium.close()
+
+
+def look_at_notebooks(chromium: Browser, notebooks: list[Path]) -> Iterator[str]:
+    """Yield what is wrong with copies of notebooks, as they are stored and after a run."""
     COPIES.mkdir(parents=True, exist_ok=True)
     for path in notebooks:
         content = load_notebook_node(str(path))
@@ -98,17 +117,22 @@ def copy(notebooks: list[Path]) -> None:
         if reduced:
             content = parameterize_notebook(content, reduced)
         nbformat.write(content, COPIES / path.name)
+    with jupyterlab(COPIES, BUILD) as address:
+        for path in notebooks:
+            print(f"{path.stem} …", flush=True)
+            page = chromium.new_page(viewport={"width": 1500, "height": 1000})
+            page.goto(address.format(path.name))
+            yield from look_at(page, path.stem)
+            page.close()
 
 
-def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
+def look_at(page: Page, name: str) -> Iterator[str]:
     """Yield what is wrong with a notebook, as it is stored and after a run."""
     page.wait_for_selector(".jp-Notebook .jp-MarkdownOutput", timeout=60_000)
     page.wait_for_timeout(3000)
-    if name == PLAYGROUND and theme == "Light":
-        yield from replay_moves(page, pictures)
-    yield from drawn(page, f"{name}, as stored", pictures)
-    if theme == "Dark" and name != PLAYGROUND:  # of the others, the stored outputs are enough
-        return
+    if name == PLAYGROUND:
+        yield from replay_moves(page)
+    yield from drawn(page, f"{name}, as stored")
     page.evaluate("() => jupyterapp.serviceManager.ready")
     page.wait_for_function(
         "() => jupyterapp.shell.currentWidget.sessionContext.session?.kernel?.status === 'idle'",
@@ -128,11 +152,11 @@ def look_at(page: Page, name: str, pictures: Path, theme: str) -> Iterator[str]:
                 if not text.startswith("compiling "):  # said once, after a fresh installation
                     yield f"{name}: cell {number} says {text[:300]!r}"
     yield from typeset(page, name)
-    yield from drawn(page, name, pictures)
-    yield from sliders_answer(page, name, pictures)
-    if name == PLAYGROUND and theme == "Light":
-        yield from clicks_count(page, pictures)
-        yield from play_moves(page, pictures)
+    yield from drawn(page, name)
+    yield from sliders_answer(page, name)
+    if name == PLAYGROUND:
+        yield from clicks_count(page)
+        yield from play_moves(page)
 
 
 def typeset(page: Page, name: str) -> Iterator[str]:
@@ -149,7 +173,7 @@ def typeset(page: Page, name: str) -> Iterator[str]:
         yield f"{name}: a formula is not typeset in {left[0][:200]!r}"
 
 
-def drawn(page: Page, name: str, pictures: Path) -> Iterator[str]:
+def drawn(page: Page, name: str) -> Iterator[str]:
     """Yield which 3D views are blank, and keep a picture of each and of the page's parts."""
     stem = re.sub(r"\W+", "-", name)
     views = page.locator(f"{PLOTLY}, canvas.unload-canvas")
@@ -159,12 +183,12 @@ def drawn(page: Page, name: str, pictures: Path) -> Iterator[str]:
             interact(view)
         if not wait_until(lambda view=view: is_drawn(shot(view))):
             yield f"{name}: view {number} is blank"
-        shot(view, pictures / f"{stem}-view-{number}.png")
+        shot(view, BUILD / f"{stem}-view-{number}.png")
     cells = page.locator(".jp-Cell")
     for number in range(0, cells.count(), 4):
         cells.nth(number).scroll_into_view_if_needed()
         page.wait_for_timeout(300)
-        page.screenshot(path=pictures / f"{stem}-{number}.png")
+        page.screenshot(path=BUILD / f"{stem}-{number}.png")
 
 
 def interact(view: Locator) -> None:
@@ -202,7 +226,7 @@ def wait_until(holds, seconds: float = DRAW_LIMIT) -> bool:
     return True
 
 
-def sliders_answer(page: Page, name: str, pictures: Path) -> Iterator[str]:
+def sliders_answer(page: Page, name: str) -> Iterator[str]:
     """Yield which figures stay as they are when their first slider is moved by a key."""
     figures = page.locator(".jp-OutputArea-output:has(img.widget-image)")
     for number in range(figures.count()):
@@ -213,70 +237,55 @@ def sliders_answer(page: Page, name: str, pictures: Path) -> Iterator[str]:
         figure.locator(".noUi-handle").first.press("ArrowRight")
         if not wait_until(lambda image=image, old=before: image.get_attribute("src") != old):
             yield f"{name}: a slider does not change figure {number}"
-        shot(figure, pictures / f"{name}-slider-{number}.png")
+        shot(figure, BUILD / f"{name}-slider-{number}.png")
 
 
-def replay_moves(page: Page, pictures: Path) -> Iterator[str]:
+def replay_moves(page: Page) -> Iterator[str]:
     """Yield whether the stored replay, which needs no kernel, stands still."""
     replay = page.locator(PLOTLY).first
     interact(replay)
-    if not wait_until(lambda: is_drawn(shot(replay))):
-        yield "00: the replay is blank"
-        return
     label = replay.locator(".slider-label").first
-    before, pixels = label.text_content(), shot(replay, pictures / "replay-before.png")
+    before, pixels = label.text_content(), shot(replay)
     replay.locator(".updatemenu-button").first.click()
     moved = wait_until(lambda: label.text_content() != before)
     page.wait_for_timeout(4000)
-    after = shot(replay, pictures / "replay-after.png")
+    after = shot(replay, BUILD / "replay.png")
     if not moved or (np.abs(after - pixels).max(axis=2) > 40).mean() < 0.01:
         yield f"00: the replay's play button moves nothing; it shows {label.text_content()!r}"
 
 
-def clicks_count(page: Page, pictures: Path) -> Iterator[str]:
-    """Yield whether clicks on boxes fail to change the score."""
-    canvas = page.locator("canvas.unload-canvas").first
-    score = page.locator("[data-picks]").first
-    rng = np.random.default_rng(0)
-    for _ in range(CLICKS):
-        pixels = shot(canvas)
-        # Boxes that may be picked are blue, and bluer than the text's antialiasing.
-        blue = (pixels[:, :, 2] - pixels[:, :, 0] > 70) & (pixels[:, :, 1] > pixels[:, :, 0] + 40)
-        blue[:200, :200] = False  # the legend
-        y, x = (int(value) for value in rng.permutation(np.argwhere(blue))[0])
-        before = score.text_content()
-        canvas.click(position={"x": x, "y": y})
-        if not wait_until(lambda before=before: score.text_content() != before, 10):
-            yield f"00: a click at {x}, {y} does not change the score {before!r}"
-            return
-        page.wait_for_timeout(600)  # the box rises
-    shot(
-        page.locator(".jp-OutputArea-output:has(canvas.unload-canvas)").first, pictures / "you.png"
-    )
+def clicks_count(page: Page) -> Iterator[str]:
+    """Yield whether a click on a box does not change the score."""
+    canvas, score = (page.locator(each).first for each in ("canvas.unload-canvas", "[data-picks]"))
+    pixels = shot(canvas, BUILD / "you.png")
+    # Boxes that may be picked are blue, and bluer than the text's antialiasing.
+    blue = (pixels[:, :, 2] - pixels[:, :, 0] > 70) & (pixels[:, :, 1] > pixels[:, :, 0] + 40)
+    blue[:200, :200] = False  # the legend
+    y, x = (int(value) for value in np.random.default_rng(0).permutation(np.argwhere(blue))[0])
+    before = score.text_content()
+    canvas.click(position={"x": x, "y": y})
+    if not wait_until(lambda: score.text_content() != before, 10):
+        yield f"00: a click at {x}, {y} does not change the score {before!r}"
 
 
-def play_moves(page: Page, pictures: Path) -> Iterator[str]:
+def play_moves(page: Page) -> Iterator[str]:
     """Yield whether an agent who is watched picks nothing when play is pressed."""
     output = page.locator(".jp-OutputArea-output:has(canvas.unload-canvas)").nth(2)  # a deadlock
-    score, canvas = output.locator("[data-picks]"), output.locator("canvas")
-    before, pixels = score.text_content(), shot(canvas)
+    score = output.locator("[data-picks]")
     output.locator(".jupyter-widgets.widget-play button").first.click()
     # The deadlock begins at pick 128.
     if not wait_until(lambda: int(score.get_attribute("data-picks")) >= 150):
-        yield f"00: play does not move; the score is {score.text_content()!r}, was {before!r}"
+        yield f"00: play does not move; the score is {score.text_content()!r}"
         return
-    shot(output, pictures / "deadlock.png")
-    unloaded = score.locator("b").first.text_content()
-    if np.array_equal(shot(canvas), pixels):
-        yield "00: play changes no pixel"
+    shot(output, BUILD / "deadlock.png")
+    unloaded = int(score.locator("b").first.text_content())
     output.get_by_text("With the mask").click()
-    if not wait_until(lambda: int(score.locator("b").first.text_content()) > int(unloaded) + 5):
+    if not wait_until(lambda: int(score.locator("b").first.text_content()) > unloaded + 5):
         yield f"00: the mask does not end the deadlock; the score is {score.text_content()!r}"
-    shot(output, pictures / "deadlock-ended.png")
 
 
 @contextmanager
-def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
+def jupyterlab(notebooks: Path, home: Path) -> Iterator[str]:
     """A running JupyterLab; its address, in which ``format`` puts a notebook's name.
 
     The address resets the workspace, which would open earlier notebooks again, too.
@@ -284,10 +293,8 @@ def jupyterlab(notebooks: Path, home: Path, theme: str) -> Iterator[str]:
     Args:
         notebooks: folder that it shows.
         home: folder for its settings and messages; made.
-        theme: ``"Light"`` or ``"Dark"``.
     """
-    themes = {"apputils-extension/themes": {"theme": f"JupyterLab {theme}"}}
-    for name, values in (LAB | themes).items():
+    for name, values in LAB.items():
         file = home / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(values))
@@ -321,6 +328,200 @@ def answers(address: str) -> bool:
     with suppress(OSError):
         urllib.request.urlopen(address, timeout=5).close()
         return True
+    return False
+
+
+def look_at_page(chromium: Browser, pictures: Path) -> Iterator[str]:
+    """Yield what is wrong with the page; keep pictures of it before and after training."""
+    for seed, (size, (width, height, scheme)) in enumerate(SIZES.items()):
+        context = chromium.new_context(
+            viewport={"width": width, "height": height}, color_scheme=scheme
+        )
+        page, errors, requests = context.new_page(), [], []
+        page.on("pageerror", lambda error, to=errors: to.append(str(error)))
+        page.on("request", lambda request, to=requests: to.append(request.url))
+        start(page, f"seed={seed}")
+        for problems in (fits(page, size), five_steps(page, f"{pictures}/train-{size}")):
+            yield from (f"{size}: {each}" for each in problems)
+        yield from (f"{size}: {each}" for each in fits(page, size))
+        if size == "desktop":
+            for look in (keys, settings, controls):
+                start(page)
+                yield from look(page)
+        yield from (f"the page says {error!r}" for error in errors)
+        known = (PAGE.as_uri(), "blob:", "about:")
+        others = [url for url in requests if not url.startswith(known)]
+        if others:
+            yield f"the page asks for {others}"
+        context.close()
+
+
+def five_steps(page: Page, stem: Path) -> Iterator[str]:
+    """Yield whether a step does not do what it says; keep a picture of each."""
+
+    def ends(step: str, expected: str) -> Iterator[str]:
+        if not until(page, lambda: "done" in (page.get_attribute(button(step), "class") or "")):
+            yield f"step {step} does not end"
+        until(page, lambda: not page.evaluate("run.running") and judged(page))
+        page.screenshot(path=f"{stem}-{step}.png", full_page=True)
+        said = page.text_content("#verdict")
+        if not re.match(expected, said):
+            yield f"the verdict of step {step} is {said!r}; expected {expected!r}"
+
+    page.screenshot(path=f"{stem}-start.png", full_page=True)
+    click(page, 0.28)
+    yield from ends("unload", "Unloaded: .* 1 of your 1 picks")
+    page.click(button("positions"))
+    yield from ends(
+        "positions", r"It learned: 100 % of its picks in fresh containers succeed, after \d"
+    )
+    page.click(button("paper"))
+    yield from ends("paper", "It (fell: best after|did not|learned)")
+    frozen = weights(page)
+    page.click(button("blank"))
+    yield from ends("blank", r"With height alone .* in \d+ % .* with x and y in \d+ %: ")
+    if weights(page) != frozen:
+        yield "blank coordinates change the weights"
+    both = [page.text_content(f"#rate-{blank}") for blank in ("true", "false")]
+    if re.findall(r"\d+ %", page.text_content("#verdict")) != both:
+        yield f"the verdict {page.text_content('#verdict')!r} is not of {both}"
+    yield from shared(page, both)
+    page.click(button("shuffled"))
+    yield from ends("shuffled", "It (learned|did not fall): ")
+
+
+def shared(page: Page, rates: list[str]) -> Iterator[str]:
+    """Yield whether what is offered to share is not of these rates."""
+    blank, seen = (int(rate.removesuffix(" %")) for rate in rates)
+    if page.is_visible("#found") != (blank - seen >= 10):
+        yield f"of {rates} the page offers {page.text_content('#found')!r}"
+    if page.is_visible("#found"):
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        page.click("#copy")
+        until(page, lambda: page.text_content("#copy") == "Copied")
+        text = page.evaluate("navigator.clipboard.readText()")
+        if f"from {seen} to {blank} %" not in text or "equalize=true" not in text:
+            yield f"copied is {text!r}"
+
+
+def fits(page: Page, size: str) -> Iterator[str]:
+    """Yield whether the page is too wide, or hands and eyes do not find all in one view."""
+    wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+    if wide > 0:
+        yield f"the page is {wide} pixels too wide"
+    if size == "desktop":
+        return
+    page.evaluate("scrollTo(0, 0)")
+    for name in ("#canvas", "#train", "#plot"):
+        box = page.locator(name).bounding_box()
+        if box["y"] + box["height"] > SIZES[size][1]:
+            yield f"{name} ends at {box['y'] + box['height']}, below the view"
+    for each in page.locator("button, select, .choice label, #settings input").all():
+        box = each.bounding_box()
+        if box and box["height"] < FINGER:
+            yield f"{each.inner_text()!r} is {box['height']} pixels high"
+
+
+def keys(page: Page) -> Iterator[str]:
+    """Yield whether clicks and keys do not pick."""
+    click(page, 0.95)  # out of sight
+    if "not among the 128" not in page.text_content("#verdict"):
+        yield f"a click on a box that is not seen says {page.text_content('#verdict')!r}"
+    page.focus("#canvas")
+    for key in ("ArrowDown", "ArrowLeft", "ArrowUp", "ArrowUp", "ArrowUp", "Enter"):
+        page.keyboard.press(key)
+    if "1 of your 1 picks" not in page.text_content("#verdict"):
+        yield f"Enter on a box chosen by arrows says {page.text_content('#verdict')!r}"
+
+
+def settings(page: Page) -> Iterator[str]:
+    """Yield whether the address does not hold the settings, or a bad one stays."""
+    page.select_option("select[name=replay]", "shuffled")
+    page.fill("input[name=seed]", "5")
+    page.keyboard.press("Enter")
+    address = page.evaluate("location.href")
+    start(page, address.partition("#")[2])
+    for name, value in {"replay": "shuffled", "seed": "5"}.items():
+        there = page.input_value(f"[name={name}]")
+        if there != value:
+            yield f"{address} gives {name} as {there!r}; expected {value!r}"
+    first = weights(page)
+    page.click("#step")
+    if not until(page, lambda: page.text_content("#picks") == "64 picks"):
+        yield f"a step makes {page.text_content('#picks')}"
+    page.click("#reset")
+    until(page, lambda: page.text_content("#picks") == "0 picks")
+    if weights(page) != first or page.evaluate("location.href") != address:
+        yield "Reset does not bring back the first weights or the settings"
+    start(page, "seed=1e21&replay=gone")
+    said = page.text_content("#problems")
+    if "1e21" not in said or "gone" not in said or "1e21" in page.evaluate("location.href"):
+        yield f"of a bad address the page says {said!r}"
+
+
+def controls(page: Page) -> Iterator[str]:
+    """Yield whether training cannot be paused, or pictures do not answer."""
+    page.click("#train")
+    if not until(page, lambda: page.evaluate("run.points.length") >= 3):
+        yield "Train draws no curve"
+    page.click("#train")  # pause
+    if not until(page, lambda: page.text_content("#train") == "Train"):
+        yield "Pause does not pause"
+    early = page.get_attribute("#success_rate", "points"), page.get_attribute("#dot", "transform")
+    page.click("#train")
+    if not until(page, lambda: page.text_content("#picks").startswith("32,0")):
+        yield f"the run ends at {page.text_content('#picks')}"
+    until(page, lambda: judged(page))
+    if page.text_content("#rate") != "100 %" or page.text_content("#rate-false") != "100 %":
+        yield f"a run on positions ends at {page.text_content('#rate')}"
+    late = page.get_attribute("#success_rate", "points"), page.get_attribute("#dot", "transform")
+    if early[0] == late[0] or early[1] == late[1]:
+        yield "the curve or the dot in the phase diagram does not move"
+    box = page.locator("#plot").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.99, box["y"] + 20)
+    if page.text_content("#readout") != "32,000 picks: 100 %, frozen 100 %":
+        yield f"at its end the curve says {page.text_content('#readout')!r}"
+    before = page.evaluate("tiles[0].toDataURL()")
+    page.select_option("#axis", "0")
+    if page.evaluate("tiles[0].toDataURL()") == before:
+        yield "the maps of features do not change from y to x"
+    for link in page.locator("nav a").all():
+        target = link.evaluate("(link) => link.href")
+        if not (target.startswith("https:") or Path(target.removeprefix("file://")).is_file()):
+            yield f"{link.inner_text()} leads to {target!r}"
+
+
+def start(page: Page, settings: str = "") -> None:
+    """Open the page anew with settings in its address."""
+    page.goto("about:blank")
+    page.goto(f"{PAGE.as_uri()}#{settings}")
+    page.wait_for_selector("#picks:has-text('0 picks')")
+
+
+def button(step: str) -> str:
+    return f"#steps button[value={step}]"
+
+
+def click(page: Page, down: float) -> None:
+    """Click in the middle of the canvas, some way down."""
+    box = page.locator("#canvas").bounding_box()
+    page.click("#canvas", position={"x": box["width"] / 2, "y": box["height"] * down})
+
+
+def judged(page: Page) -> bool:
+    return page.evaluate("!run.picks || config.blank in run.rates")
+
+
+def weights(page: Page) -> list[float]:
+    return page.evaluate("[...run.parameters]")
+
+
+def until(page: Page, holds: Callable[[], object]) -> bool:
+    """Whether something holds within some time; the page's own rules forbid to ask from inside."""
+    for _ in range(20 * TRAIN_LIMIT):
+        if holds():
+            return True
+        page.wait_for_timeout(50)
     return False
 
 

@@ -192,8 +192,6 @@ def test_runs_that_do_not_fit_the_memory_are_warned_of(monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"configs": [1]}, r"configs is \[1\]; expected a dict"),
-        ({"folder": None}, "folder is None; expected a path"),
         ({"changes": {"run_7": print}}, "changes is 'run_7'; expected one of 'set/run_0'"),
         ({"n_jobs": 0}, "n_jobs == 0"),
     ],

@@ -118,12 +118,10 @@ def test_a_table_is_read_and_of_a_missing_one_is_said_where_its_command_stands(o
 def test_records_are_joined(monkeypatch):
     first = results.run_record(9.96)
     assert {"numba", "joblib", "torch", "mujoco-core", "numpy"} <= set(first["versions"])
-    assert first["engine"] == engine_of()
-    assert str(os.cpu_count()) in first["machine"] and first["wall_time_s"] == 10.0
+    assert first["engine"] == engine_of() and first["wall_time_s"] == 10.0
     resource = pytest.importorskip("resource")
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
     assert first["peak_memory_mib"] == pytest.approx(peak, rel=0.1)
-    assert len(first["revision"].rstrip("+")) == 12 or first["revision"] == "unknown"
     monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
     assert results.run_record(1.0)["peak_memory_mib"] is None
     nowhere = first | {"peak_memory_mib": None}

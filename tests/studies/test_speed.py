@@ -86,48 +86,28 @@ def test_rates_count_what_is_done(small_load, monkeypatch):
 
 
 def test_training_is_timed_where_it_counts(monkeypatch):
-    """Made-up trainings take 1 ms a pick, theirs 2 ms, and more in the picks before."""
-    memory, ours, theirs = unload.TrainConfig().replay_size, [], []
+    """Made-up trainings take 1 ms a pick, and more in the picks before."""
+    memory, ours = unload.TrainConfig().replay_size, []
 
     def train(config, folder, progress, stack):
-        ours.append(
-            (
-                torch.get_num_threads(),
-                fused.applies(None),
-                config.picks,
-                stack,
-                config.epsilon(10**9),
-            )
-        )
+        epsilon = config.epsilon(10**9)
+        ours.append((torch.get_num_threads(), fused.applies(None), config.picks, stack, epsilon))
         picks = np.arange(1, config.picks // 640 + 1) * 640
         before = memory if config.picks > memory else config.picks // 2
         times = (picks + 4 * np.minimum(picks, before)) / 1000
         return SimpleNamespace(curve=pd.DataFrame({"picks": picks, "wall_time": times}))
 
-    def learn(picks, callback):
-        count = picks // 64
-        times = np.repeat([0.5, 0.128], [count - 15, 15]).cumsum().tolist()
-        monkeypatch.setattr("time.perf_counter", iter(times).__next__)
-        assert all(callback({}, {}) for _ in range(count)), "or they would stop"
-
-    def model(policy, envs, **settings):
-        names = "learning_starts", "train_freq", "policy_kwargs"
-        theirs.append((torch.get_num_threads(), envs, *(settings[name] for name in names)))
-        return SimpleNamespace(learn=learn)
-
     monkeypatch.setattr(unload, "train", train)
     monkeypatch.setattr(fused, "applies", lambda network: True)
-    monkeypatch.setattr(stable_baselines3, "DQN", model)
-    monkeypatch.setattr(run, "make_vec_env", lambda name, count, env_kwargs: count)
+    monkeypatch.setattr(run, "_their_rate", lambda picks, threads: 100 * threads)
     rates = run.training_rates()
-    assert list(rates.values()) == pytest.approx([500, 500, 1000, 1000, 1000, 1000])
+    assert list(rates.values()) == pytest.approx([100, 200, 1000, 1000, 1000, 1000])
     assert ours == [
         (1, False, 2 * run.PLAIN, None, 0),
         (1, True, run.FUSED + memory, None, 0),
         (2, True, run.FUSED + memory, None, 0),
         (2, True, 2 * run.NEW, run.new_load, 1),
     ]
-    assert theirs == [(threads, 64, 2048, 1, {"net_arch": [64]}) for threads in (1, 2)]
     assert torch.get_num_threads() == 1
 
 

@@ -67,9 +67,6 @@ def test_all_policies_play_the_same_heaps_and_are_kept(own_data, monkeypatch, pi
     assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
     assert read_provenance("heap/table")["settings"]["heaps"] == 2
     pd.testing.assert_frame_equal(read_table("heap/table"), table, check_dtype=False)
-    kept = {path: path.stat().st_mtime_ns for path in (own_data / "runs/heap/episodes").iterdir()}
-    pd.testing.assert_frame_equal(study.compare(), table)
-    assert all(path.stat().st_mtime_ns == time for path, time in kept.items())
     players = []
 
     def made_up(player, split, number, physics):
@@ -114,9 +111,11 @@ def test_a_published_episode_is_played_again():
 
 
 def test_a_box_is_drawn_in_the_colour_of_what_a_pick_does_to_it(cubes):
-    """The one that is nearer to the eye is drawn last, and is dragged."""
+    """The one that is nearer to the eye is drawn last, and is dragged; the other comes or falls."""
     heap, both = cubes((5, 1, 0), (6, 2, 0)), np.array([True, True])
     axes = plt.figure().add_subplot()
+    falls = picture.outcome_colours(Outcome(heap, both, both, 0.7, True), box=1)
+    assert (falls[0] == COLOURS["failed"]).all()
     colours = picture.outcome_colours(Outcome(heap, both, ~both, 0.7, True), box=1)
     picture.draw_heap(axes, heap, colours)
     painted = axes.collections[0].get_facecolors()[:, :3]
@@ -189,13 +188,8 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pi
     written = published.read_bytes()
     make_networks()
     assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
-    with monkeypatch.context() as patch:
-        patch.setattr(paths, "RUNS", own_data / "again")
-        make_networks()
-    assert published.read_bytes() == written and len(learned) == 8
     monkeypatch.setattr(recording, "STEPS", 3)
     make_networks()
-    assert len(learned) == 12 and published.read_bytes() != written, "another question"
-    assert len(list((own_data / "runs" / "heap" / "picks").glob("*.json"))) == 6, (
-        "other explorers, too"
-    )
+    assert len(learned) == 8 and published.read_bytes() != written, "another question"
+    picks = list((own_data / "runs" / "heap" / "picks").glob("*.json"))
+    assert len(picks) == 6, "other explorers, too"

@@ -1,4 +1,4 @@
-"""The three physics decide alike; and the data of the lift table."""
+"""The physics and the engines decide alike; and the data of the lift table."""
 
 from functools import partial
 
@@ -8,14 +8,16 @@ import pandas as pd
 import pytest
 
 from studies import paths
-from studies.lifts import agreement
+from studies.lifts import agreement, engines
 from studies.lifts import lift_table as lifts
 from studies.policies.robustness import front_walls
-from studies.results import read_provenance
-from studies.statistics import share_interval
+from studies.results import read_provenance, read_table
 from unload import policies, task
+from unload.agent.evaluation import evaluate
 from unload.env.vector import ContainerVectorEnv
 from unload.load.substacks import stack_load
+from unload.physics.bullet import ENGINES
+from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.table import LIFTS_FILE, LiftTable
 from unload.support import files
 
@@ -50,7 +52,7 @@ def test_a_fresh_lift_is_in_the_boxes_left_in_the_walls_around(full_load):
 
 
 @pytest.mark.pybullet
-def test_full_is_asked_and_a_stopped_run_goes_on(own_data, monkeypatch):
+def test_full_is_asked_once(own_data, monkeypatch):
     """Three lifts in a container of two walls, after 30 picks."""
     stack = {"stack": lambda rng: front_walls(stack_load(rng), 2)}
     monkeypatch.setattr(agreement.gymnasium, "make", partial(gymnasium.make, **stack))
@@ -59,7 +61,7 @@ def test_full_is_asked_and_a_stopped_run_goes_on(own_data, monkeypatch):
     for name, value in small.items():
         monkeypatch.setattr(agreement, name, value)
     agreement.agreement_data()
-    frame = agreement.read_agreement()
+    frame = read_table(agreement.NAME)
     assert (frame["asked_full"] == "drawn").all() and frame["full"].notna().all()
     assert not len(agreement.disagreements(frame, "local", "full"))
     assert frame["full"].max() == pytest.approx(frame["local"].max(), abs=0.01)
@@ -68,39 +70,11 @@ def test_full_is_asked_and_a_stopped_run_goes_on(own_data, monkeypatch):
     monkeypatch.setattr(agreement.FullPhysics, "reset", None)
     agreement.agreement_data()
     assert (own_data / "lift_agreement.csv").read_bytes() == written
-    monkeypatch.setattr(agreement, "FIRST_SEED", 6)
-    with pytest.raises(TypeError):  # an answer to another question is not taken
-        agreement.agreement_data()
-
-
-def test_bounds_count_each_kind_of_lift():
-    columns = ["situation", "on_top", "asked_full", "local", "full"]
-    rows = [
-        (0, 0, "drawn", 0.4, 0.4),
-        (0, 0, "drawn", 0.4, 0.1),
-        (1, 4, "buried", 0.0, 0.0),
-        (2, 1, "close", 0.1, 0.3),
-        (3, 1, "", 0.0, np.nan),
-    ]
-    frame = pd.DataFrame(rows, columns=columns).assign(seed=0, picks=100)
-    frame["table"] = frame["local"]
-    bounds = agreement.error_bounds(frame)
-    counted = bounds[["lifts", "states", "situations", "differ"]].T.to_dict("list")
-    assert counted == {
-        "table, local": [4, 1, 4, 0],
-        "table, local: three or more on top": [1, 1, 1, 0],
-        "local, full: drawn": [2, 1, 1, 1],
-        "local, full: three or more on top": [1, 1, 1, 0],
-        "local, full: close": [1, 1, 1, 1],
-        "local, full: all": [4, 1, 3, 2],
-    }
-    for _, row in bounds.iterrows():
-        assert (row["low"], row["high"]) == share_interval(int(row["differ"]), int(row["lifts"]))
 
 
 @pytest.mark.pybullet
 def test_committed_lifts_can_be_computed_again():
-    committed = agreement.read_agreement()
+    committed = read_table(agreement.NAME)
     assert list(committed) == agreement.COLUMNS
     assert len(agreement.disagreements(committed, "table", "local")) == 0
     of = {why: committed[committed["asked_full"] == why] for why in agreement.ASKED_FULL}
@@ -155,9 +129,55 @@ def test_lift_data_depends_on_the_command_alone(own_data, monkeypatch):
     assert max(seeds) > 1_000_000  # of the loads, so that hardly any is met twice
     count = len(LiftTable.load(own_data / "a.npz"))
     assert count > 50 and [*shipped.values()][:3] == planned
-    provenance = read_provenance("b")
-    assert provenance["settings"]["lifts"] == count
-    # What is kept is not computed again.
-    monkeypatch.setattr(lifts, "LIFTS_FILE", own_data / "c.npz")
-    lifts.lift_data()
-    assert read_provenance("c") == provenance
+    assert read_provenance("b")["settings"]["lifts"] == count
+
+
+def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):
+    """PyBullet's answers, which ship, are never taken; MuJoCo's are kept for the next process."""
+    monkeypatch.setattr(engines, "LIFTS", own_data / "mujoco.npz")
+    monkeypatch.setattr(LiftTable, "check", lambda *_: None)
+    asked = []
+
+    def simulate(physics: LocalPhysics, situation) -> float:
+        asked.append(physics.engine)
+        return task.LIFT_THRESHOLD
+
+    monkeypatch.setattr(LocalPhysics, "simulate", simulate)
+    arguments = {"episodes": 2, "seed": 0, "mask": False, "max_picks": 60}
+    row = engines.both_rates(policies.random, arguments)
+    kept, count = LiftTable.load(own_data / "mujoco.npz", "mujoco"), len(asked)
+    assert {*asked} == {"mujoco"} and 0 < len(kept) <= count
+    assert engines.both_rates(policies.random, arguments) == row and len(asked) == count
+    assert row["pybullet"] == evaluate(policies.random, **arguments)["success_rate"].mean()
+    assert row["containers"] == row["differ"] == 2 and row["mujoco"] > row["pybullet"]
+
+
+@pytest.mark.pybullet
+def test_committed_lifts_of_the_second_engine_can_be_computed_again(monkeypatch):
+    """Of all situations of the other comparison; a few are asked again."""
+    table = read_table(engines.NAME)
+    known = read_table(agreement.NAME).drop_duplicates("situation").reset_index()
+    assert (table[["situation", "on_top"]] == known[["situation", "on_top"]]).all(axis=None)
+    assert np.allclose(table["pybullet"], known["local"], atol=1e-6)
+    assert read_provenance(engines.NAME)["settings"]["mujoco"] == settings_of_lifts("mujoco")
+    lifted = table[[*ENGINES]] >= task.LIFT_THRESHOLD
+    readme = (paths.ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"decided none of {len(table):,} situations otherwise" in readme
+    assert (lifted["pybullet"] == lifted["mujoco"]).all()
+    monkeypatch.setattr(engines, "LIFT_COUNT", 60)
+    table, physics = table.set_index("situation"), LocalPhysics("mujoco")
+    for number, situation in engines.situations():
+        assert physics.simulate(situation) == pytest.approx(table.loc[number, "mujoco"], abs=1e-4)
+
+
+def test_committed_rates_are_those_of_the_published_policies():
+    table, names = read_table(engines.MSR_NAME), ["policy", "mask", "condition"]
+    assert table[names].to_dict("records") == [case for case, _ in engines.played()]
+    # Whole containers are left out, see ``played``.
+    played = read_table("policies/comparison").query("condition != 'complete'")
+    published = played.groupby(names)["success_rate"].mean()
+    both = table.merge(published.reset_index(), on=names)
+    assert len(both) == len(published) > 50
+    assert np.allclose(both["pybullet"], both["success_rate"], atol=1e-5)
+    equal = table["pybullet"] == table["mujoco"]
+    assert (equal | (table["differ"] > 0)).all() and (table["differ"] <= table["containers"]).all()

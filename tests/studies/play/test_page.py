@@ -86,30 +86,7 @@ def test_its_parts_do_what_they_are_for():
 
 
 @needs_node
-def test_scores_are_those_of_pytorch(rng):
-    network, seen = PEQNetwork(16, torch.Generator().manual_seed(0)), observations(rng, 4)
-    got = run_js(
-        """
-        const network = new PEQNetwork(16, new Generator(0));
-        network.parameters.set(given.parameters);
-        const seen = given.seen.map((each) => Float32Array.from(each.flat()));
-        const items = [...Array(128).keys()];
-        result.values = seen.map((o) => items.map((item) => Math.tanh(network.read(o, item))));
-        result.scores = seen.map((o) => [...network.scores(o)]);
-        """,
-        parameters=parameters(network),
-        seen=seen.tolist(),
-    )
-    with torch.no_grad():
-        values = network(torch.from_numpy(seen)).numpy()
-        features = torch.relu(network.extractor(torch.from_numpy(seen)))
-        scores = (features @ network.scorer.weight[0, :16]).numpy()
-    assert np.abs(np.array(got["values"]) - values).max() < 1e-5
-    assert np.abs(np.array(got["scores"]) - scores).max() < 1e-5
-
-
-@needs_node
-def test_updates_are_those_of_the_learner(rng):
+def test_updates_and_scores_are_those_of_the_learner(rng):
     network = PEQNetwork(16, torch.Generator().manual_seed(0))
     start, seen = parameters(network), observations(rng, 64)
     actions, rewards = rng.integers(128, size=64), rng.choice([-1.0, 1.0], 64)
@@ -119,6 +96,9 @@ def test_updates_are_those_of_the_learner(rng):
     for _ in range(3):
         loss = learner.start(batch, rewards.astype(np.float32))()
         expected.append([loss, *parameters(network)])
+    with torch.no_grad():
+        features = torch.relu(network.extractor(torch.from_numpy(seen[:4])))
+        scores = (features @ network.scorer.weight[0, :16]).numpy()
     got = run_js(
         """
         const network = new PEQNetwork(16, new Generator(0));
@@ -134,6 +114,7 @@ def test_updates_are_those_of_the_learner(rng):
           adam.step(0.003);
           return [loss, ...network.parameters];
         });
+        result.scores = batch.slice(0, 4).map((each) => [...network.scores(each.observation)]);
         """,
         start=start,
         seen=seen.tolist(),
@@ -141,6 +122,7 @@ def test_updates_are_those_of_the_learner(rng):
         rewards=rewards.tolist(),
     )
     assert np.abs(np.array(got["updates"]) - expected).max() < 1e-5
+    assert np.abs(np.array(got["scores"]) - scores).max() < 1e-5
 
 
 @needs_node
@@ -295,7 +277,7 @@ def test_presets_end_where_they_say(preset):
 def test_a_browser_shows_it(tmp_path):
     """The five steps do what they say at three sizes with a seed each, and the controls answer."""
     pytest.importorskip("playwright", reason="make browser installs it")
-    from tests.browser.train_page import BROWSERS, browser, look_at_page
+    from tests.browser.look import BROWSERS, browser, look_at_page
 
     if not any(map(shutil.which, BROWSERS)):
         pytest.skip("Chromium is not installed")

@@ -1,8 +1,9 @@
-"""The runs in seamless walls: their plan, what is published of them, their measures and figures."""
+"""Jams in a training run; and the runs in seamless walls: their plan, data and measures."""
 
 import re
 from dataclasses import replace
 from fnmatch import fnmatch
+from functools import partial
 from shutil import copytree
 
 import numpy as np
@@ -10,16 +11,66 @@ import pandas as pd
 import pytest
 
 from studies import grid, paths
+from studies.falls.laboratory import CONFIG
 from studies.grid import Cell, Grid, read_grid
 from studies.results import read_table
-from studies.seamless import figures, training
+from studies.seamless import training
+from studies.seamless.jamming import jam, neighbours
+from studies.seamless.jams import place
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from tests.studies.curves import curve
-from unload import TrainConfig
+from unload import TrainConfig, task
 from unload.agent.training import Training
+from unload.load.boxes import Load
 
 NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
+
+
+def test_the_jams_of_the_next_episode_are_others():
+    """Those of the first are in the published runs."""
+    change = partial(jam, share=0.5, lasts=10_000)
+    run, found = Training(replace(CONFIG, seed=3, mask=False), change=change), []
+    for _ in range(2):
+        rows = (np.full(run.config.num_envs, row) for row in range(task.N_VISIBLE))
+        found.append(np.stack([run.rollout.envs.unwrapped._look_up(row)[1] for row in rows]))
+        run.rollout.steps += run.config.max_picks
+    run.rollout.close()
+    free = np.maximum(*found) >= task.LIFT_THRESHOLD
+    assert (found[0] != found[1])[free].mean() == pytest.approx(2 / 3, abs=0.1)
+
+
+def test_a_masked_box_is_tried_again_and_its_mask_is_kept():
+    """Which no run does but where all boxes are masked."""
+    run = Training(replace(CONFIG, seed=3), change=partial(jam, share=0.0))
+    envs, actions = run.rollout.envs.unwrapped, np.full(run.config.num_envs, 5)
+    before = envs._look_up(actions)[1].copy()
+    envs._containers.masks[:, 5] = 0
+    envs._containers.failed[:, 5] = 0.123
+    assert (envs._look_up(actions)[1] == before).all()
+    assert (envs._containers.masks[:, 5] == 0).all()
+    run.rollout.close()
+
+
+def test_neighbours_are_those_of_the_measured_places():
+    run = Training(replace(CONFIG, seed=3, epsilon_final=1.0, mask=False))
+    for _ in range(40):
+        run.step()
+    run.rollout.close()
+    envs = run.rollout.envs.unwrapped
+    state, seen = envs._containers, set()
+    for row in range(0, 128, 9):
+        items = state.visible[:, row].astype(np.int64)
+        covered, beside = neighbours(state, items)
+        for env in range(0, 64, 7):
+            count = int(np.flatnonzero(state.present[env])[-1]) + 1
+            boxes = state.geometry[env, :count]
+            walls = np.unique(boxes[:, 0] - boxes[:, 3] / 2, return_inverse=True)[1]
+            load = Load(boxes[:, :3], boxes[:, 3:], np.zeros(count, int), walls)
+            found = place(load, state.present[env, :count].astype(bool), int(items[env]))
+            assert (covered[env], beside[env]) == (found["covered"], found["beside"])
+            seen.add((found["covered"], found["beside"]))
+    assert len(seen) >= 6
 
 
 def test_the_cells_are_those_of_the_plan():
@@ -114,9 +165,3 @@ RISE = np.linspace(0.2, 0.5, 20)
 )
 def test_a_run_is_like_fig_12_by_its_msr_and_like_fig_11_by_its_loss(figure, run, like):
     assert seamless_plan(run)[figure] is like
-
-
-def test_the_line_of_jams_passes_the_papers_point():
-    bound, paper = figures.draw_start_and_end({}).axes[0].lines
-    at_start = np.interp(15, bound.get_xdata()[::-1], bound.get_ydata()[::-1])
-    assert at_start == pytest.approx(57.7, abs=0.1) and paper.get_xydata().tolist() == [[15, 60]]

@@ -1,5 +1,6 @@
-"""Policies compared by the lift table and with every box simulated; cards; and the margin."""
+"""Policies compared, by the table and with all boxes simulated; cards, margin, and the outlook."""
 
+from dataclasses import asdict, replace
 from functools import partial
 from itertools import islice
 
@@ -8,13 +9,15 @@ import pandas as pd
 import pytest
 import torch
 
-from studies.policies import comparison, robustness
+from studies import grid
+from studies.policies import comparison, robustness, variants
 from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
+from studies.policies.variants import GRIDS, PARTS, REWARDS, judged, read_variants, variants_data
 from studies.results import read_provenance, read_table
 from tests.agent.runs import lowest
-from unload import PEQNetwork, evaluate, load_policy, policies, task
+from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
 from unload.env.observation import nearest
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
@@ -145,26 +148,20 @@ def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, fre
 
 
 @pytest.mark.pybullet
-def test_a_stopped_run_goes_on(own_data, monkeypatch):
+def test_all_play_the_same_containers(own_data, monkeypatch):
     play = robustness.play
     small = {"PLAYED": (("highest", "keep"), ("highest", "restore")), "EPISODES": 2, "PICKS": 2}
     small["play"] = partial(play, stack=lambda rng: front_walls(stack_load(rng), 1))
     for name, value in small.items():
         monkeypatch.setattr(robustness, name, value)
     robustness.robustness_data()
-    written = (own_data / "policies/robustness.csv").read_text()
-    assert read_table("policies/robustness")["after_pick"].tolist() == 2 * ["keep"] + 2 * [
-        "restore"
-    ]
+    table = read_table("policies/robustness")
+    assert table["after_pick"].tolist() == ["keep", "keep", "restore", "restore"]
+    assert table["episode"].tolist() == [0, 1, 0, 1]
+    seeds = np.random.SeedSequence(robustness.SEED).generate_state(2).tolist()
+    again = small["play"](policies.highest, "restore", seeds[1], 2)
+    assert table.iloc[-1][[*again]].tolist() == pytest.approx([*again.values()])
     assert read_provenance("policies/robustness")["settings"]["episodes"] == 2
-    # Of a class of the package, whose methods are no part of what is kept.
-    again = lambda *_, **__: pytest.fail("played again")  # noqa: E731
-    monkeypatch.setattr(robustness.ContainerEnv, "__init__", again)
-    robustness.robustness_data()
-    assert (own_data / "policies/robustness.csv").read_text() == written
-    monkeypatch.setattr(robustness, "play", partial(play, stack=two_walls))
-    with pytest.raises(pytest.fail.Exception, match="played again"):
-        robustness.robustness_data()
 
 
 def test_front_walls_keep_their_place(full_load):
@@ -206,3 +203,56 @@ def test_pairs_are_of_boxes_that_are_visible_and_lie_on_one_another():
 
 def test_a_container_ends_after_its_picks():
     assert len(list(containers(policies.highest, seed=0, max_picks=7))) == 7
+
+
+FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
+
+
+def test_each_cell_differs_from_the_paper_in_little():
+    varied = {"networks": {"network"}, "rewards": set()}
+    varied |= {"settings": {"learning_rate", "gradient_steps"}, "recommended": {"equalize"}}
+    paper = asdict(TrainConfig())
+    for name, cells in {**PARTS, "recommended": GRIDS["recommended"].cells}.items():
+        for cell in cells.values():
+            config = asdict(cell.config)
+            differing = {field for field in paper if paper[field] != config[field]}
+            assert differing <= varied[name] | FREE
+        assert len(set(map(repr, cells.values()))) == len(cells)
+
+
+def test_an_unknown_part_is_refused():
+    with pytest.raises(ValueError, match="part is 'loss'; expected one of 'networks', "):
+        read_variants("loss")
+
+
+def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 3, "seed": 1000})
+    policy = load_policy("paper_seed_2")
+    expected = [
+        evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
+    ]
+    assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
+
+
+def test_the_recommended_policy_is_judged_as_the_data_say():
+    policy = load_policy("recommended")
+    first = read_table("variants/recommended").iloc[0]
+    assert judged(policy, variants.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
+
+
+def test_grids_are_trained_and_read_back(own_data, monkeypatch):
+    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
+    small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5, picks=200)
+    for name, cells in (("variants", REWARDS), ("recommended", GRIDS["recommended"].cells)):
+        cells = {
+            cell: one._replace(config=replace(small, equalize=one.config.equalize), seeds=[0])
+            for cell, one in cells.items()
+        }
+        monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 1, "seed": 1000})
+    monkeypatch.setattr(files, "SHIPPED", own_data)
+    variants_data(n_jobs=1)
+    rows = read_table("variants/variants")
+    assert rows["cell"].tolist() == [*REWARDS] and rows["msr_mask"].between(0, 1).all()
+    assert read_provenance("variants/recommended")["fingerprint"] == "f"
+    assert not load_policy(own_data / "policies/recommended.safetensors").equalize

@@ -1,12 +1,30 @@
-"""The exercises of notebook 21."""
+"""The exercises beyond the paper, notebooks 20 to 22, that have an answer to check."""
 
 import numpy as np
 
-from notebooks.checks import Exercise, call, function, number
+import unload
+from notebooks.checks import Exercise, call, function, number, pair
 from studies.heap.env import HeapEnv
 from studies.heap.policies import RULES, play
 from studies.heap.table import best_rule
 from studies.results import read_table
+from unload import policies
+
+# Notebook 20
+
+
+def beats_highest(policy):
+    def called(*seen):
+        return call(policy, *seen)
+
+    msr = [
+        unload.evaluate(player, 8, 100, position_noise=0.05)["success_rate"].mean()
+        for player in (called, policies.highest)
+    ]
+    return msr[0] > msr[1] + 0.03 or f"its MSR is {msr[0]:.1%}, that of `highest` {msr[1]:.1%}"
+
+
+# Notebook 21
 
 
 def luckiest(value):
@@ -40,7 +58,15 @@ def wider(value):
 
 
 EXERCISES = {
-    "1": Exercise(number, luckiest, "rules.csv holds the training heaps, table.csv the others"),
-    "2": Exercise(function, brings_more, ""),
-    "3": Exercise(number, wider, "variances of independent numbers add up"),
+    "20/1": Exercise(number, lambda msr: 0 <= msr < 0.05, "extractor.weight[:, 2] reads z"),
+    "20/2": Exercise(
+        number,
+        lambda height: abs(height - 0.17 * 1.25 / 2) < 0.02,
+        "a step goes half a width to the side and one height up",
+    ),
+    "20/3": Exercise(function, beats_highest, ""),
+    "21/1": Exercise(number, luckiest, "rules.csv holds the training heaps, table.csv the others"),
+    "21/2": Exercise(function, brings_more, ""),
+    "21/3": Exercise(number, wider, "variances of independent numbers add up"),
+    "22/1": Exercise(pair, lambda kept: kept == (16 * 16, 128 * 16), "see section 4"),
 }

@@ -1,0 +1,181 @@
+"""The exercises of the core, notebooks 00 to 06; those of 04 stand in ``masked_dqn``."""
+
+import numpy as np
+import torch
+
+import unload
+from notebooks.checks import Exercise, call, function, masked_dqn, number, pair, truth
+from studies.falls import measures
+from studies.play.episode import Run
+from unload import PEQNetwork, task
+from unload.physics.table import TablePhysics, shared_table
+
+# Notebook 00
+
+
+def runs(player, picks, **options):
+    """A player's runs on 20 loads."""
+    played = []
+    for seed in range(20):
+        run = Run(player, unload.stack_load(np.random.default_rng(seed)), seed, **options)
+        run.play_to(picks)
+        played.append(run)
+    return played
+
+
+def successes(mean):
+    return abs(mean - np.mean([run.unloaded() for run in runs("random", 50)])) < 1.5
+
+
+def deadlocks(loads):
+    played = runs("the paper's agent, seed 3", 100, mask=False)
+    return loads == sum(any(pick.deadlocked for pick in run.picks) for run in played)
+
+
+# Notebook 01
+
+WEIGHTS = 1, 4, 16  # of z, in the slider
+
+
+def best_weight(weight):
+    """The one of the weights of z with which the most of 128 visible items can be lifted."""
+    load, physics = unload.stack_load(np.random.default_rng(1)), TablePhysics(shared_table())
+    physics.reset(load)
+
+    def share(each):
+        distance = np.sqrt((task.VIEWPOINT - load.positions) ** 2 @ np.array([1, 0, each]))
+        visible = np.argsort(distance, kind="stable")[:128].tolist()
+        return np.mean([physics.lift(item) >= task.LIFT_THRESHOLD for item in visible])
+
+    return weight == max(WEIGHTS, key=share)
+
+
+def seldom_succeeds(policy):
+    return unload.evaluate(policy, 2, 1, max_picks=100)["success_rate"].mean() < 0.05
+
+
+# Notebook 02
+
+
+def equalizes(equalized):
+    """Whether a function is Algorithm 1, where equal values share the mean of their ranks."""
+    rng = np.random.default_rng(0)
+    for items in (2, 7, 128, 128):
+        positions = rng.integers(items, size=(items, 3)) / items
+        expected = unload.equalize(positions, "average")
+        got = np.asarray(call(equalized, positions.copy()))
+        if got.shape != expected.shape:
+            return f"of {positions.shape} positions it makes {got.shape} values"
+        wrong = np.abs(got - expected).max(axis=1) > 1e-6
+        if wrong.any():
+            row = int(wrong.argmax())
+            return (
+                f"of {items} items, item {row} at {positions[row].round(3)} "
+                f"becomes {got[row].round(3)}; expected {expected[row].round(3)}"
+            )
+    return True
+
+
+def leaves_the_ranks(change):
+    values = np.random.default_rng(0).uniform(-1, 1, 128)
+    changed = np.asarray(call(change, values.copy()))
+    same = np.array_equal(unload.equalize(changed[:, None]), unload.equalize(values[:, None]))
+    return same and not np.allclose(changed, values)
+
+
+# Notebook 03
+
+
+@torch.no_grad()
+def is_the_network(scores):
+    """Whether a function computes what the network does, of any number of items and features."""
+    for batch, items, n_features in ((1, 128, 64), (3, 5, 8)):
+        generator = torch.Generator().manual_seed(items)
+        network = PEQNetwork(n_features, generator)
+        x = 2 * torch.rand((batch, items, 3), generator=generator) - 1
+        extractor, scorer = network.extractor, network.scorer
+        got = call(scores, x, extractor.weight, extractor.bias, scorer.weight, scorer.bias)
+        if got.shape != (batch, items):
+            return f"of x with shape {tuple(x.shape)} it makes {tuple(got.shape)}"
+        if not torch.allclose(got, network(x), atol=1e-5):
+            away = (got - network(x)).abs().max().item()
+            return f"of x with shape {tuple(x.shape)} a score is off by {away:.2g}"
+    return True
+
+
+# Notebook 05
+
+
+def along_depth(observations, masks, rng):
+    """The rule that picks the highest z + x."""
+    scores = observations @ np.array([1, 0, 1], np.float32)
+    return np.where(masks.astype(bool), scores, -np.inf).argmax(axis=1)
+
+
+def both(shares):
+    found = [
+        unload.evaluate(along_depth, 4, 0, equalize=ranks)["success_rate"].mean()
+        for ranks in (False, True)
+    ]
+    return np.allclose(shares, found, atol=0.02)
+
+
+def digs_left(rule):
+    """Whether a rule never misses in two containers and keeps to the left side."""
+    places = []
+
+    def noted(observations, masks, rng):
+        actions = np.asarray(call(rule, observations, masks, rng))
+        places.extend(observations[np.arange(len(actions)), actions, 1].tolist())
+        return actions
+
+    msr = unload.evaluate(noted, 2, 0, max_picks=150)["success_rate"].mean()
+    if msr < 1:
+        return f"{msr:.1%} of its picks succeed; expected all"
+    if np.mean(places) > LEFT:
+        return f"the mean y of its picks is {np.mean(places):.2f}; expected {LEFT} or less"
+    return True
+
+
+LEFT = -0.2  # mean y of the picks; -1 is the left side wall
+
+
+# Notebook 06
+
+
+def msr(along_x, along_y, ties="noise"):
+    policy = measures.preferring(along_x, along_y, ties)
+    return unload.evaluate(policy, 2)["success_rate"].mean()
+
+
+EXERCISES = {
+    "00/1": Exercise(number, successes, "load and run have the same seed, 0 to 19"),
+    "00/2": Exercise(number, deadlocks, "did you give mask=False?"),
+    "01/1": Exercise(number, best_weight, "move the slider"),
+    "01/2": Exercise(
+        function, seldom_succeeds, "observations[..., 2] is the height; obey the masks"
+    ),
+    "02/1": Exercise(function, equalizes, ""),
+    "02/2": Exercise(function, leaves_the_ranks, "which functions keep the order of numbers?"),
+    "03/1": Exercise(function, is_the_network, ""),
+    "03/2": Exercise(number, lambda score: abs(score - 0.9) < 1e-6, "which pooled numbers change?"),
+    "03/3": Exercise(truth, lambda can: can, "try it with random weights"),
+    **masked_dqn.EXERCISES,
+    "05/1": Exercise(
+        number,
+        lambda height: abs(height - 0.3 * 1.25 / 2) < 0.005,
+        "a step goes half a width to the side and one height up",
+    ),
+    "05/2": Exercise(pair, both, "evaluate over 4 containers from seed 0 on"),
+    "05/3": Exercise(function, digs_left, ""),
+    "06/1": Exercise(
+        number,
+        lambda least: msr(0, least) < 0.95 <= msr(0, least - 0.1),
+        "the title of the figure gives the MSR",
+    ),
+    "06/2": Exercise(
+        number,
+        lambda share: abs(share - msr(1.5, 0, "average")) < 0.01,
+        "all boxes of a wall share x, and now its rank, too",
+    ),
+}

@@ -1,0 +1,145 @@
+"""The paper's numbers beside ours, its training, and its search: data, plots and measures."""
+
+from dataclasses import replace
+from shutil import copytree
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+from studies import grid, paths
+from studies.grid import read_policies
+from studies.paper import numbers, training, tuning
+from studies.paper.training import PAPER
+from studies.paper.tuning import tuning_grid
+from studies.results import read_table
+from tests.studies.curves import course
+from unload import TrainConfig, load_policy, task
+from unload.support import files
+
+
+def test_what_differs_does_not_agree(monkeypatch):
+    """Neither values instead of ranks nor lifts that differ by a little."""
+    monkeypatch.setattr(numbers, "CONTAINERS", 2)
+    monkeypatch.setattr(numbers, "equalize", lambda values: values)
+    monkeypatch.setattr(numbers, "lifted_distance", lambda stack: {1: 0.466, 2: 0.0096}[stack])
+    monkeypatch.setattr(numbers, "CHANCE_ERROR", 0.1)
+    agrees = numbers.measured(1, 1, 5)["agrees"]
+    assert agrees.tolist()[1:4] == ["no"] * 3 and agrees["MSR of random picks"] == "yes"
+
+
+# Of ten million picks: it falls, rises and falls.
+LOSS = np.r_[np.linspace(1, 0.1, 7), np.linspace(0.1, 0.8, 7), np.linspace(0.8, 0.2, 6)]
+RISE, WAVES = np.linspace(0.15, 0.5, 14), 0.02 * np.resize([1, -1], 6)
+COURSES = {  # of three runs, and what agrees
+    "like the paper's": (
+        [np.r_[RISE, np.linspace(0.55, end, 6) + WAVES] for end in (0.61, 0.62, 0.63)],
+        ["yes"] * 6,
+    ),
+    "of a higher mean": (
+        [np.linspace(0.15, end, 20) for end in (0.67, 0.68, 0.69)],
+        ["yes", "no", "yes", "no", "yes", "yes"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", COURSES)
+def test_runs_agree_with_the_paper_by_the_plan(name, monkeypatch):
+    rates, agree = COURSES[name]
+    runs = [course(msr, LOSS).assign(cell="paper_mask", seed=i) for i, msr in enumerate(rates)]
+    monkeypatch.setattr(numbers, "read_grid", lambda *_, **__: pd.concat(runs))
+    found = numbers.training()["with the mask, b = 256"]
+    assert [text.rpartition(": ")[2] for text in found] == agree
+
+
+@pytest.mark.parametrize(
+    ("cells", "picks", "written"),
+    [
+        (None, None, True),
+        (["paper_mask", training.DEFAULTS], None, True),
+        (["paper_mask"], None, False),
+        (None, 64_000, False),
+    ],
+)
+def test_policies_play_elsewhere_once_their_cell_is_trained(
+    cells, picks, written, tmp_path, monkeypatch
+):
+    trained = []
+    monkeypatch.setattr(training, "train_grid", lambda *given: trained.append(given))
+    monkeypatch.setattr(files, "SHIPPED", tmp_path)
+    training.training_data(cells, picks)
+    assert trained == [(PAPER, cells, picks, -1)]
+    policies = read_policies(paths.DATA / "falls/paper.safetensors")
+    assert [*policies] == [*PAPER.configs()]
+    for seed, name in {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}.items():
+        weights = policies[f"{training.DEFAULTS}/seed_{seed}"].network.state_dict()
+        file = tmp_path / "policies" / f"{name}.safetensors"
+        assert file.exists() == written
+        for each in (name, file)[: 1 + written]:  # what ships is the same
+            stored = load_policy(each).network.state_dict()
+            assert all(stored[key].equal(weights[key]) for key in weights)
+
+
+def test_the_default_cell_has_the_defaults():
+    assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
+
+
+def test_means_over_whole_episodes_are_drawn():
+    """Points of 10 of 500 steps; the last, incomplete episode is left out."""
+    picks = np.arange(1, 121) * 640
+    curve = pd.DataFrame({"picks": picks, "success_rate": np.arange(120.0)})
+    _, axes = plt.subplots()
+    training.draw_learning_curve(axes, curve, "run")
+    points, episodes = axes.lines
+    assert len(points.get_ydata()) == 120
+    assert axes.get_ylim() == (0, 1.02) and axes.get_xlim()[0] == 0
+    assert episodes.get_xydata().tolist() == [[16_000, 24.5], [48_000, 74.5]]
+
+
+def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch):
+    """Of two batch sizes, two runs each."""
+    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
+    small = tuning_grid([1e-3], [8, 16], runs=2, equalize=[True], steps=20)
+    monkeypatch.setattr(tuning, "TUNING", small)
+    monkeypatch.setattr(tuning, "SHOWN", (("with", "loss", 8, 1e-3, 1),))
+    tuning.tuning_data(n_jobs=1)
+    names = {path.name for path in (own_data / "tuning").iterdir()}
+    tables = {f"b{size}_{column}.csv" for size in (8, 16) for column in ("loss", "success_rate")}
+    assert names == tables | {"tuning.provenance.json"}
+    table = read_table("tuning/b8_success_rate")
+    assert table.shape == (20, 1 + 2)
+    curves = tuning.read_curves("success_rate", 8, 1e-3)
+    assert np.array_equal(curves[1], table["b8/with_fe_lr_0.001/seed_1"])
+    summary = tuning.tuning_summary().set_index("batch_size")
+    assert summary["runs"].tolist() == [2, 2]
+    mean = np.mean([run.mean() for run in curves.values()])
+    assert summary.loc[8, "final_msr"] == pytest.approx(mean)
+    (path,) = (own_data / "dummy_sim_with_hist_equal").iterdir()
+    assert path.name == "loss_curve_bz_8_lr_0.001_agent_1.csv"
+    lines = path.read_text().splitlines()
+    losses = tuning.read_curves("loss", 8, 1e-3)[1]
+    assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
+
+
+def test_committed_files_of_the_papers_plots_are_those_of_the_tables(own_data):
+    committed = paths.ROOT / "data"
+    copytree(committed / "tuning", own_data / "tuning")
+    tuning.export_tuning()
+    written = {path.relative_to(own_data) for path in own_data.glob("dummy_sim_*/*")}
+    assert written == {path.relative_to(committed) for path in committed.glob("dummy_sim_*/*")}
+    assert len(written) == 8
+    for path in written:
+        assert (own_data / path).read_bytes() == (committed / path).read_bytes()
+
+
+def test_the_search_has_240_runs_of_which_slow_ones_come_first():
+    sizes = [config.batch_size for config in tuning.TUNING.configs().values()]
+    assert len(sizes) == 240 and sizes == sorted(sizes, reverse=True)
+
+
+def test_chance_counts_all_others(monkeypatch):
+    """Of three items of two heights: one below is among the highest if both others are below."""
+    monkeypatch.setattr(tuning, "GRID", np.array([[0, 0, 0.1], [0, 0, 0.2]]))
+    monkeypatch.setattr(task, "N_VISIBLE", 3)
+    assert tuning.chance() == pytest.approx(0.5 + 0.5 * 0.25)
