@@ -96,26 +96,6 @@ def test_drifting_boxes_are_seen_where_they_are():
 
 
 @pytest.mark.parametrize(
-    "kwargs",
-    [
-        {"physics": "local"},
-        pytest.param({"physics": "full"}, marks=pytest.mark.pybullet),
-        pytest.param({"physics": "full", "after_pick": "keep"}, marks=pytest.mark.pybullet),
-    ],
-    ids=str,
-)
-def test_every_physics_goes_to_the_last_item(kwargs):
-    env = make_env(stack=lambda rng: few_items(rng, 3), **kwargs)
-    seen, _ = env.reset(seed=0)
-    rewards, terminated = [], False
-    while not terminated:
-        row = int(np.where(observation.holds_item(seen), seen[:, 2], -2).argmax())
-        seen, reward, terminated, _, _ = env.step(row)
-        rewards.append(reward)
-    assert rewards == [1, 1, 1]
-
-
-@pytest.mark.parametrize(
     ("action", "error"),
     [(128, ValueError), (-1, ValueError), (np.array([3]), TypeError)],
 )

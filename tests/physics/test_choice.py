@@ -6,7 +6,6 @@ import pytest
 from tests.physics.kinds import EACH, make
 from unload import ContainerEnv, Load, evaluate, policies
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.choice import make_physics
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Surroundings
 from unload.physics.table import FREE_LIFT, LiftTable, TablePhysics, free_lift
@@ -82,13 +81,6 @@ def test_arrays_know_ceilings_and_refuse_masses(boxes):
     ContainerVectorEnv(1, physics=TablePhysics(LiftTable(), "auto"))
 
 
-@pytest.mark.parametrize("kind", EACH)
-def test_single_environments_lift_other_masses(boxes, kind):
-    env = ContainerEnv(kind)
-    env.reset(options={"load": weighed(boxes((0.3, 0.2), (0.8, 0.2)), 0.5, 5)})
-    assert env.liftable().sum() == 1 and not env.liftable()[np.argmax(env.visible == 1)]
-
-
 def test_a_file_says_nothing_of_the_pull_of_the_task(boxes, tmp_path):
     """So that it has the bytes that it had before there were others."""
     load, table = boxes((0.3, 0.2), (0.3, 0.6)), LiftTable()
@@ -121,26 +113,3 @@ def test_a_physics_of_ones_own_stays_open(boxes):
     assert len(table.table) == 1 and not table._closed
     with pytest.raises(ValueError, match="expected one of 'table', 'a TablePhysics'"):
         ContainerVectorEnv(1, physics=own)
-
-
-@pytest.mark.parametrize(
-    ("given", "error", "message"),
-    [
-        (
-            ("tabel",),
-            ValueError,
-            "physics is 'tabel'; expected one of 'local', 'full', ",
-        ),
-        (("local", "keep"), ValueError, "after_pick is 'keep'; expected 'restore' for phys"),
-        (
-            (Half(), "restore", 30),
-            ValueError,
-            "force is 30; expected it to be given",
-        ),
-        (("table", "restore", -1), ValueError, "force is -1; expected a number >= 0"),
-        (("full", "restore", "much"), TypeError, "force is 'much'"),
-    ],
-)
-def test_what_is_no_physics_is_refused(given, error, message):
-    with pytest.raises(error, match=message):
-        make_physics(*given)
