@@ -267,18 +267,6 @@ def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog):
     assert not caplog.text
 
 
-def test_a_physics_of_ones_own_lifts(boxes):
-    class Half(LocalPhysics):
-        def simulate(self, situation):
-            return 0.5
-
-    physics = Half()
-    for _ in range(2):  # it stays open
-        assert (
-            picking_order(boxes((0.3, 0.2), (0.3, 0.6)), physics=physics)["distance"] == 0.5
-        ).all()
-
-
 def test_the_command_line_orders_by_stops_and_draws(tmp_path, capsys):
     list_ = tmp_path / "boxes.csv"
     list_.write_text(

@@ -126,7 +126,7 @@ def clients() -> int:
 def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monkeypatch, boxes):
     """28 MB each. By counting references: the garbage collector may come too late."""
     load = boxes((0.3, 0.2), (0.3, 0.6))
-    monkeypatch.setattr("unload.physics.choice.shared_table", LiftTable)
+    monkeypatch.setattr("unload.physics.full.shared_table", LiftTable)
     monkeypatch.setattr("unload.env.vector.shared_table", LiftTable)
     # Imports leave cycles behind, whose frames refer to the environment that draws first.
     importlib.import_module("unload.load.picture")

@@ -27,7 +27,6 @@ from unload.physics.table import (
     LIFTS_FILE,
     LiftTable,
     TablePhysics,
-    shared_table,
 )
 from unload.support import files
 
@@ -93,13 +92,6 @@ def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap
     boxes = np.array([[0, y, 0, 400_000, 400_000, 400_000] for y in (0, side, -side)], np.int32)
     local = LocalPhysics()
     assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
-
-
-def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):
-    monkeypatch.setattr("unload.physics.table.LIFTS_FILE", tmp_path / "missing.npz")
-    shared_table.cache_clear()
-    assert len(shared_table()) == 0
-    shared_table.cache_clear()
 
 
 @pytest.mark.pybullet

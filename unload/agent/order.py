@@ -16,7 +16,7 @@ from unload.agent.policies import Policy
 from unload.env.observation import nearest, scaled
 from unload.load.boxes import OVERLAP, BoxError, Load, check_stacked
 from unload.physics.base import Force, Physics, low_ceiling
-from unload.physics.choice import Name, make_physics
+from unload.physics.full import Name, make_physics
 from unload.physics.table import too_heavy
 from unload.support import checks, files
 from unload.support.extras import needed_for
