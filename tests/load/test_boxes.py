@@ -121,6 +121,12 @@ def test_a_box_that_reaches_into_another_is_refused(boxes, data):
         Load.from_corners(low, high - low)
 
 
+def test_boxes_side_by_side_touch_up_to_the_tolerance():
+    for gap, beside in ((CONTACT_TOLERANCE, [1]), (1.01 * CONTACT_TOLERANCE, [])):
+        low = np.array([[0, 0, 0], [0, 1 + gap, 0]])
+        assert _find_contacts(low, low + 1).of(BESIDE, 0).tolist() == beside
+
+
 @pytest.mark.parametrize("tolerance", [CONTACT_TOLERANCE, 0.003])
 def test_boxes_above_one_another_touch_up_to_the_tolerance_of_their_load(tolerance):
     """Those side by side do not, whatever it is."""
