@@ -118,11 +118,7 @@ def test_random_picks_are_drawn_from_the_seed(boxes):
         ({"force": -1}, ValueError, "force is -1; expected a number >= 0"),
         ({"force": "much"}, TypeError, "force is 'much'"),
         ({"physics": "none"}, ValueError, "physics is 'none'; expected one of 'local', 'full', "),
-        (
-            {"physics": LocalPhysics(), "force": 30},
-            ValueError,
-            "force is 30; expected it to be given",
-        ),
+        ({"physics": LocalPhysics(), "force": 30}, ValueError, "force is 30; expected it to be"),
         ({"rule": lambda load, _: load.sizes}, ValueError, r"returned has shape \(136, 3"),
         ({"rule": lambda *_: None}, TypeError, "what rule returned is None; expected arrays of"),
         ({"rule": lambda load, _: [load.ids]}, TypeError, r"what rule returned is \[array"),

@@ -95,19 +95,6 @@ def test_drifting_boxes_are_seen_where_they_are():
         container.liftable()
 
 
-@pytest.mark.parametrize(
-    ("action", "error"),
-    [(128, ValueError), (-1, ValueError), (np.array([3]), TypeError)],
-)
-def test_bad_actions_change_nothing(action, error):
-    env, untouched = (ContainerEnv(physics="table") for _ in range(2))
-    for container in (env, untouched):
-        container.reset(seed=0)
-    with pytest.raises(error, match="action is .*; expected an integer >= 0 and <= 127"):
-        env.step(action)
-    assert_same(env.step(5), untouched.step(5))
-
-
 @pytest.mark.parametrize("make", [ContainerEnv, partial(ContainerVectorEnv, 2)])
 def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
     tower = boxes((1.2, 0.2), (1.2, 0.6 + 2 * CONTACT_TOLERANCE))
