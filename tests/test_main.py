@@ -60,66 +60,43 @@ def test_every_field_is_an_option_that_is_explained(monkeypatch, capsys):
 
 
 @pytest.mark.needs("SIGPIPE")
-def test_help_and_version_take_no_time(tmp_path):
-    """A script entry point calls ``command``; nothing is compiled, and little is imported.
+def test_nothing_is_imported_before_it_is_needed(tmp_path):
+    """Not by help, nor by a list that is refused; an order takes pandas, but compiles nothing.
 
-    A pipe that is closed, as by ``head``, ends the program without an error.
+    A script entry point calls ``command``. A pipe that is closed, as by ``head``, ends the program
+    without an error.
     """
     entry = tomllib.loads((paths.ROOT / "pyproject.toml").read_text())["project"]["scripts"]
     module, _, name = entry["unload"].partition(":")
+    (tmp_path / "bad.csv").write_bytes(b"\x1f\x8b")
     program = f"""if True:
         import signal, sys
         from {module} import {name}
 
-        for arguments in (["--version"], ["--help"], ["train", "--help"]):
-            sys.argv[1:] = arguments
+        for arguments in ("--version", "--help", "bad.csv", "--policy highest", "train --help"):
+            sys.argv[1:], code = arguments.split(), None
             try:
                 {name}()
             except SystemExit as end:
-                slow = {{"numba", "torch", "pandas", "matplotlib"}} & {{*sys.modules}}
-                print(end.code, signal.getsignal(signal.SIGPIPE).name, *slow, file=sys.stderr)
+                code = end.code
+            slow = {{"gymnasium", "numba", "torch", "pandas", "matplotlib"}} & {{*sys.modules}}
+            print(code, signal.getsignal(signal.SIGPIPE).name, *sorted(slow), file=sys.stderr)
     """
     done = subprocess.run(
         [sys.executable, "-c", program],
-        capture_output=True, text=True, cwd=paths.ROOT,
-        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path),
-             "PYTHONPATH": os.environ.get("PYTHONPATH", "")},
+        capture_output=True, text=True, cwd=tmp_path,
+        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "compiled"),
+             "PYTHONPATH": os.pathsep.join([str(paths.ROOT), os.environ.get("PYTHONPATH", "")])},
     )  # fmt: skip
-    assert done.stderr.splitlines() == ["0 SIG_DFL", "0 SIG_DFL", "0 SIG_DFL torch"]
-    assert not list(tmp_path.iterdir())
+    *before, refused, after, summary, ordered, trained = done.stderr.splitlines()
+    assert before == ["0 SIG_DFL", "0 SIG_DFL"] and after == "1 SIG_DFL"
+    assert refused.startswith("bad.csv is not a readable list: ")
+    assert summary == "136 picks, 0 failed, 44% behind other boxes"
+    assert ordered == "None SIG_DFL pandas" and "torch" in trained
+    assert not (tmp_path / "compiled").exists()
     assert done.stdout.startswith(f"unload {VERSION}, lifts by {engine_of()}\n")
     for text in ("x_min", "size_z", "weight", "in m", "--units", "rear wall", "entrance"):
         assert text in done.stdout
-
-
-ORDER = """if True:
-    import sys
-    from unload.__main__ import main
-
-    arguments = sys.argv[1:]
-    try:
-        main(arguments)
-    except SystemExit as end:
-        print(end.code, file=sys.stderr)
-    print(*sorted({"torch", "gymnasium", "numba", "matplotlib", "pandas"} & {*sys.modules}))
-"""
-
-
-def order_of(*arguments: str) -> tuple[str, str]:
-    command = [sys.executable, "-c", ORDER, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=paths.ROOT, check=True)
-    return done.stdout, done.stderr
-
-
-def test_an_order_needs_neither_torch_nor_gymnasium_nor_numba(tmp_path):
-    """A list that is refused is so before pandas is imported."""
-    printed, said = order_of("--policy", "highest")
-    assert (
-        printed.endswith("\npandas\n") and said == "136 picks, 0 failed, 44% behind other boxes\n"
-    )
-    (tmp_path / "bad.csv").write_bytes(b"\x1f\x8b")
-    printed, said = order_of(str(tmp_path / "bad.csv"))
-    assert printed == "\n" and said.startswith(f"{tmp_path}/bad.csv is not a readable list: ")
 
 
 def test_what_an_extra_brings_is_named_where_it_is_missing(monkeypatch, capsys):

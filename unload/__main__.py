@@ -186,12 +186,12 @@ def _named(text: str) -> Callable:
 def _explained(kind: type) -> dict[str, str]:
     """What the docstring of a dataclass says of each of its attributes."""
     text = inspect.getdoc(kind) or ""  # from Python 3.13 on, docstrings have no indent
-    attributes = text.partition("Attributes:\n")[2].partition("\n\n")[0]
-    found: dict[str, str] = {}
-    for entry in re.split(r"\n {4}(?=\w)", "\n" + attributes)[1:]:
-        names, _, meaning = " ".join(entry.replace("``", "").split()).partition(": ")
-        found |= dict.fromkeys(names.split(", "), meaning)
-    return found
+    entries = re.findall(r"^ {4}([a-z_, ]+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)
+    return {
+        name: " ".join(meaning.replace("``", "").split())
+        for names, meaning in entries
+        for name in names.split(", ")
+    }
 
 
 def command() -> None:

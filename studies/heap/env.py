@@ -7,7 +7,7 @@ from studies.heap.boxes import Heap
 from studies.heap.generate import SPLITS, stored_heaps
 from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
 from studies.heap.rake import Outcome, Rake
-from unload.env.base import AllOrReset, EpisodeEnv
+from unload.env.base import EpisodeEnv
 from unload.support import checks
 
 MAX_PICKS = 15  # they unload some 25 to 40 of 100 boxes, the front of the heap
@@ -134,11 +134,11 @@ class HeapEnv(EpisodeEnv):
         super().reset(seed=seed)
         if heap is None:
             heap = self.heaps[self.np_random.integers(len(self.heaps))]
-        with AllOrReset(self):
-            self.heap, self._failed, self._picks = heap, np.zeros(len(heap), bool), 0
-            self.outcome = None
-            self._state = "running"
-            self._look()
+        self._state = "broken off"  # until all is done
+        self.heap, self._failed, self._picks = heap, np.zeros(len(heap), bool), 0
+        self.outcome = None
+        self._look()
+        self._state = "running"
         return self._observation.copy(), self._info()
 
     def step(self, action: int):
@@ -147,17 +147,18 @@ class HeapEnv(EpisodeEnv):
         box, seen = int(self.visible[row]), self.visible >= 0
         none = np.zeros(len(self.heap), bool)
         outcome = Outcome(self.heap, none, none, 0.0, False)
-        with AllOrReset(self):
-            self._picks += 1
-            if box >= 0:
-                outcome = self._rake.pick(self.heap, box)
-                self._failed[box] = True
-            fates = np.zeros(ROWS, np.int8)
-            fates[seen] = (UNLOADED * outcome.unloaded + FELL * outcome.fallen)[self.visible[seen]]
-            if outcome.unloaded.any():
-                self._failed = np.zeros(len(outcome.heap), bool)
-            self.outcome, self.heap = outcome, outcome.heap
-            self._look()
+        self._state = "broken off"  # until all is done
+        self._picks += 1
+        if box >= 0:
+            outcome = self._rake.pick(self.heap, box)
+            self._failed[box] = True
+        fates = np.zeros(ROWS, np.int8)
+        fates[seen] = (UNLOADED * outcome.unloaded + FELL * outcome.fallen)[self.visible[seen]]
+        if outcome.unloaded.any():
+            self._failed = np.zeros(len(outcome.heap), bool)
+        self.outcome, self.heap = outcome, outcome.heap
+        self._look()
+        self._state = "running"
         pick = {
             "unloaded": outcome.unloaded.sum(),
             "falls": outcome.fallen.sum(),

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from studies.play.episode import Run, policy_of
 from unload.agent.greedy import Greedy, greedy_actions
 from unload.env.equalization import equalize
-from unload.env.observation import POSITION_NOISE, drift, scaled
+from unload.env.observation import POSITION_NOISE, drift, scale
 from unload.load.picture import COLOURS, back_to_front, corners, draw
 
 HEIGHT = 2  # column of the ranks along z
@@ -33,7 +33,7 @@ def look(
         (k, 3) float64, the rank of each item along x, y and z, from 0 to k - 1; the row of the
         item with the highest value; and the probability that the next pick succeeds.
     """
-    seen = scaled(seen)
+    seen = scale(seen)
     equalized = equalize(seen, ties)
     features = equalized if agent.equalize else seen
     everything = np.ones((1, len(seen)), bool)

@@ -15,7 +15,7 @@ from studies.results import COMMAND, JOBS, keep_all, measured, publish
 from studies.seamless.training import SEAMLESS
 from unload.agent.evaluation import evaluate
 from unload.env.equalization import equalize
-from unload.env.observation import POSITION_NOISE, drift, nearest, scaled
+from unload.env.observation import POSITION_NOISE, drift, nearest, scale
 from unload.load.boxes import ABOVE
 from unload.load.substacks import stack_load
 
@@ -38,7 +38,7 @@ def told_by_rank(load_seed: int, ties: str) -> dict:
     load = stack_load(rng)
     positions = load.positions + drift(len(load), NOISE[ties], rng)
     seen = nearest(positions)
-    ranks = equalize(scaled(positions[seen]))
+    ranks = equalize(scale(positions[seen]))
     walls = load.walls[seen]
     found = [
         spearmanr(*ranks[walls == wall][:, [0, 2]].T).statistic

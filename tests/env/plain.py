@@ -77,7 +77,7 @@ class Plain(gymnasium.Env):
     def features(self, positions: np.ndarray, container: np.ndarray) -> np.ndarray:
         """The observation of items at ``positions``, nearest first; then padding."""
         seen = np.full((task.N_VISIBLE, 3), -1, np.float32)
-        seen[: len(positions)] = observation.scaled(positions, container)
+        seen[: len(positions)] = observation.scale(positions, container)
         present = np.arange(task.N_VISIBLE) < len(positions)
         return equalize(seen, self.ties, present=present) if self.equalize else seen
 

@@ -126,7 +126,7 @@ def clients() -> int:
 def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monkeypatch, boxes):
     """28 MB each. By counting references: the garbage collector may come too late."""
     load = boxes((0.3, 0.2), (0.3, 0.6))
-    monkeypatch.setattr("unload.physics.choice.shared_table", LiftTable)
+    monkeypatch.setattr("unload.physics.full.shared_table", LiftTable)
     monkeypatch.setattr("unload.env.vector.shared_table", LiftTable)
     # Imports leave cycles behind, whose frames refer to the environment that draws first.
     importlib.import_module("unload.load.picture")
@@ -169,48 +169,44 @@ def test_seeds():
     assert not (unseeded[0] == unseeded[1]).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "error", "message"),
-    [
-        ("actions", [0, 128], ValueError, "actions holds 0 to 128; expected 0 to 127"),
-        ("actions", [0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
-        ("seed", -1, ValueError, "seed is -1"),
-        ("seed", [1, 2, 3], ValueError, "seed holds 3 seeds; expected 2"),
-        ("seed", [1, -1], ValueError, "seed is -1; expected an integer >= 0"),
-    ],
-)
-def test_bad_actions_and_seeds_change_nothing(name, value, error, message):
-    envs = gymnasium.make_vec(CONTAINER, 2)
-    envs.reset(seed=0)
-    other = gymnasium.make_vec(CONTAINER, 2)
-    other.reset(seed=0)
-    with pytest.raises(error, match=message):
-        envs.step(value) if name == "actions" else envs.reset(seed=value)
-    for _ in range(2):  # an episode later, too
-        assert_same(envs.step([3, 4]), other.step([3, 4]))
-        assert_same(envs.reset(), other.reset())
+ARRAY = partial(gymnasium.make_vec, num_envs=2)
+BAD_OPTIONS = [
+    (CONTAINER, {"load": None}, TypeError, "load is None; expected an unload.Load"),
+    (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
+    (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
+    (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
+]
 
 
-@pytest.mark.parametrize("make", [make_env, partial(gymnasium.make_vec, num_envs=2)])
 @pytest.mark.parametrize(
-    ("env_id", "options", "error", "message"),
+    ("make", "env_id", "given", "error", "message"),
     [
-        (CONTAINER, {"load": None}, TypeError, "load is None; expected an unload.Load"),
-        (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
-        (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
-        (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
+        (ARRAY, CONTAINER, [0, 128], ValueError, "actions holds 0 to 128; expected 0 to 127"),
+        (ARRAY, CONTAINER, [0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
+        (make_env, CONTAINER, 128, ValueError, "action is 128; .* >= 0 and <= 127"),
+        (make_env, CONTAINER, -1, ValueError, "action is -1"),
+        (make_env, CONTAINER, np.array([3]), TypeError, r"action is array\(\[3\]\)"),
+        (ARRAY, CONTAINER, {"seed": -1}, ValueError, "seed is -1"),
+        (ARRAY, CONTAINER, {"seed": [1, 2, 3]}, ValueError, "seed holds 3 seeds; expected 2"),
+        (ARRAY, CONTAINER, {"seed": [1, -1]}, ValueError, "seed is -1; expected an integer >= 0"),
+        *(
+            (make, env_id, {"seed": 3, "options": options}, *refused)
+            for env_id, options, *refused in BAD_OPTIONS
+            for make in (make_env, ARRAY)
+        ),
     ],
 )
-def test_bad_options_leave_the_episodes_as_they_were(make, env_id, options, error, message):
-    """Both draw the same at the next reset, and were given the same picks before."""
+def test_bad_input_changes_nothing(make, env_id, given, error, message):
+    """Both draw the same at the next resets, and were given the same picks before."""
     env, other = make(env_id), make(env_id)
-    actions = 0 if make is make_env else np.zeros(2, int)
     for each in (env, other):
         each.reset(seed=0)
     with pytest.raises(error, match=message):
-        env.reset(seed=3, options=options)
-    assert_same(env.step(actions), other.step(actions))
-    assert_same(env.reset(), other.reset())
+        env.reset(**given) if isinstance(given, dict) else env.step(given)
+    actions = 3 if make is make_env else [3, 4]
+    for _ in range(2):
+        assert_same(env.step(actions), other.step(actions))
+        assert_same(env.reset(), other.reset())
 
 
 @pytest.mark.parametrize("failing", [1, 2, 3])

@@ -95,39 +95,6 @@ def test_drifting_boxes_are_seen_where_they_are():
         container.liftable()
 
 
-@pytest.mark.parametrize(
-    "kwargs",
-    [
-        {"physics": "local"},
-        pytest.param({"physics": "full"}, marks=pytest.mark.pybullet),
-        pytest.param({"physics": "full", "after_pick": "keep"}, marks=pytest.mark.pybullet),
-    ],
-    ids=str,
-)
-def test_every_physics_goes_to_the_last_item(kwargs):
-    env = make_env(stack=lambda rng: few_items(rng, 3), **kwargs)
-    seen, _ = env.reset(seed=0)
-    rewards, terminated = [], False
-    while not terminated:
-        row = int(np.where(observation.holds_item(seen), seen[:, 2], -2).argmax())
-        seen, reward, terminated, _, _ = env.step(row)
-        rewards.append(reward)
-    assert rewards == [1, 1, 1]
-
-
-@pytest.mark.parametrize(
-    ("action", "error"),
-    [(128, ValueError), (-1, ValueError), (np.array([3]), TypeError)],
-)
-def test_bad_actions_change_nothing(action, error):
-    env, untouched = (ContainerEnv(physics="table") for _ in range(2))
-    for container in (env, untouched):
-        container.reset(seed=0)
-    with pytest.raises(error, match="action is .*; expected an integer >= 0 and <= 127"):
-        env.step(action)
-    assert_same(env.step(5), untouched.step(5))
-
-
 @pytest.mark.parametrize("make", [ContainerEnv, partial(ContainerVectorEnv, 2)])
 def test_loads_of_something_else_or_of_floating_boxes_are_refused(make, boxes):
     tower = boxes((1.2, 0.2), (1.2, 0.6 + 2 * CONTACT_TOLERANCE))

@@ -126,15 +126,6 @@ def test_episodes_that_end_at_different_steps(kwargs):
     assert {0, 1} < set(together.tolist())
 
 
-@pytest.mark.parametrize("mode", AutoresetMode)
-def test_episodes_that_end_at_once(mode):
-    settings = {"max_picks": 2, "autoreset_mode": mode}
-    ends = play_both(CONTAINER, 3, 20, **settings, stack=lambda rng: few_items(rng, 1))
-    assert ends[:, 0].any() and ends[:, 1].any()
-    together = ends.any(axis=1).sum(axis=1)
-    assert 3 in together and {1, 2} & set(together.tolist())
-
-
 def test_an_episode_that_is_over_waits_for_its_reset():
     envs = gymnasium.make_vec(HIGHEST, 2, max_picks=2, autoreset_mode=AutoresetMode.DISABLED)
     with pytest.raises(ResetNeeded):

@@ -1,7 +1,8 @@
-"""The fused update and choice against PyTorch."""
+"""The fused update and choice, and our Adam, against PyTorch."""
 
 import multiprocessing
 from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from torch.nn.functional import smooth_l1_loss
 from tests.agent.runs import Subclass, make_batch, peq, without_next
 from unload.agent.dqn import DQN
 from unload.fast import fused
+from unload.fast.learner import FusedLearner
 from unload.network.peq import PEQNetwork
 
 BATCH, ITEMS = 300, 128
@@ -132,14 +134,6 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
     assert len(submitted) == 1  # and none for a batch that one thread has done as soon
 
 
-def test_the_caller_may_act_while_gradients_are_computed(rng, two_threads):
-    net, batch = peq(64), random_batch(rng, FOR_TWO_THREADS)
-    finish = fused.start_gradients(fused.weights_of(net), *batch.values(), 1.0)
-    everything = np.ones(batch["observations"].shape[:2], bool)
-    fused.best_actions(fused.weights_of(net), batch["observations"], everything)
-    assert np.array_equal(finish(), gradients(net, batch))
-
-
 @pytest.mark.needs("fork")
 def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
     net, batch = peq(8), random_batch(rng, FOR_TWO_THREADS)
@@ -240,3 +234,36 @@ def test_any_update_is_that_of_double_precision(shape, n_features, scale, bias, 
         "rewards": rng.uniform(-1, 1, size).astype(np.float32),
     }
     check(net, batch, beta, tolerance=1e-4)
+
+
+def flat(network) -> np.ndarray:
+    return torch.cat([weight.detach().flatten() for weight in network.parameters()]).numpy()
+
+
+@pytest.mark.parametrize("learning_rate", [1e-3, 0.1])
+def test_steps_are_those_of_pytorch(rng, learning_rate):
+    ours = peq(2)
+    theirs, before = deepcopy(ours).double(), flat(ours)
+    learner = FusedLearner(ours, learning_rate, beta=1.0)
+    reference = torch.optim.Adam(theirs.parameters(), learning_rate)
+    ends = np.cumsum([weight.numel() for weight in theirs.parameters()])[:-1]
+    for number in range(100):
+        gradients = rng.normal(size=len(before)) * 10.0 ** -(number % 7)
+        gradients[3] = 0
+        learner.step(gradients)
+        for weight, part in zip(theirs.parameters(), np.split(gradients, ends)):
+            weight.grad = torch.from_numpy(part.copy()).reshape(weight.shape)
+        reference.step()
+    after = flat(ours)
+    assert np.abs(after - flat(theirs)).max() < 1e-5 < np.abs(after - before).max()
+    assert after[3] == before[3]
+
+
+def test_a_gradient_as_small_as_epsilon_moves_a_weight_by_half_as_much():
+    """A constant gradient g moves a weight by g / (|g| + 1e-8) of the learning rate."""
+    network = peq(1)
+    before, learner = flat(network), FusedLearner(network, 0.01, beta=1.0)
+    for _ in range(3):
+        learner.step(np.array([1.0, 1e-8, -3e-8, *np.zeros(6)]))
+    moved = flat(network) - before
+    assert moved == pytest.approx([-0.03, -0.015, 0.0225, *np.zeros(6)], rel=1e-4)

@@ -8,8 +8,6 @@ from matplotlib.image import imread
 from unload import Load, task
 from unload.load import picture
 from unload.load.picture import (
-    _FACES,
-    _INSIDES,
     _LEGEND,
     _PACKAGE_COLOURS,
     COLOURS,
@@ -104,14 +102,6 @@ def test_the_colour_blind_tell_all_meanings_apart(kind):
     seen = (linear @ np.transpose(BLINDNESS[kind])).clip(0, 1) ** (1 / 2.2)
     for (one, a), (other, b) in combinations(zip(COLOURS, seen), 2):
         assert np.linalg.norm(a - b) > 0.1, (one, other)
-
-
-def test_faces_lie_in_the_sides_of_a_box():
-    """Their corners go round."""
-    for corners, _ in (*_FACES, *_INSIDES):
-        ring = CORNERS[list(corners)]
-        assert (np.abs(np.roll(ring, 1, axis=0) - ring).sum(axis=1) == 1).all()
-        assert sorted(np.ptp(ring, axis=0)) == [0, 1, 1]
 
 
 def test_colours_of_packages_are_their_codes_and_begin_again():

@@ -77,7 +77,3 @@ def test_a_box_tips_if_its_centre_lies_beside_what_it_stands_on(supports, tips):
     low = np.array([(x, y, 0) for x, y in supports] + [(1.0, 1.0, 0.5)], float)
     load = Load.from_corners(low, np.full((len(low), 3), 0.5))
     assert uncarried(load).tolist() == ([len(supports)] if tips else [])
-
-
-def test_no_box_of_the_paper_tips(full_load):
-    assert uncarried(full_load).size == 0

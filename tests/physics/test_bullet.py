@@ -69,21 +69,6 @@ def test_a_box_can_be_turned_and_have_its_own_friction(make_world):
     assert world.pose(box)[0][0] > 2.03
 
 
-def test_a_cleared_world_is_as_good_as_new(make_world):
-    def fall(world: World) -> tuple:
-        world.add_box((0, 0, -0.5), (9, 9, 1), 0)
-        box = world.add_box((0, 0, 1), (0.3, 0.4, 0.5), 1.0, (0.5, 0.1, 0.7, 0.5))
-        world.step(1.0)
-        return world.pose(box)
-
-    used, _ = make_world(boxes=3)
-    used.step(0.5)
-    used.clear()
-    fresh, _ = make_world(boxes=0)
-    fresh.clear()
-    assert fall(used) == fall(fresh)
-
-
 @pytest.mark.parametrize("before", ["", "import os; os.close(2)"], ids=["usual", "no stderr"])
 def test_importing_is_silent_and_so_is_an_end_with_an_open_world(before):
     lines = before, "from unload.physics.bullet import World", "world = World()", "world.it = world"

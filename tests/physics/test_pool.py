@@ -53,12 +53,6 @@ def test_shared_lifts_are_those_of_one_process(pool, local, hard):
     assert len(pool._workers) == 2, "they stay"
 
 
-def test_each_process_has_its_share(pool, hard):
-    own = []
-    pool.simulate(hard, lambda situation: own.append(situation) or 0.0)
-    assert own == hard[::3]
-
-
 def test_an_interrupted_call_leaves_no_answer_for_the_next(pool, local, hard):
     with pytest.raises(KeyboardInterrupt):
         pool.simulate(hard, Mock(side_effect=KeyboardInterrupt))

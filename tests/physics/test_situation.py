@@ -14,17 +14,6 @@ def surroundings(load: Load) -> Surroundings:
     return Surroundings(load, np.ones(len(load), dtype=bool))
 
 
-def test_on_top_is_transitive_and_skips_removed_boxes(boxes):
-    tower = surroundings(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0), (1.4, 0.2)))
-    assert tower.on_top(0) == [1, 2]
-    assert tower.on_top(1) == [2]
-    assert tower.on_top(2) == tower.on_top(3) == []
-    tower.present[1] = False
-    assert tower.on_top(0) == []
-    everything = surroundings(boxes((1.0, 0.2), (1.0, 0.6), (1.0, 1.0)))
-    assert everything.on_top(0) == [1, 2] and everything.situation(0).dynamic == 3
-
-
 def test_a_box_that_bridges_two_rests_on_both(boxes):
     bridge = surroundings(boxes((1.0, 0.2), (1.4, 0.2), (1.2, 0.6)))
     assert bridge.on_top(0) == bridge.on_top(1) == [2]
@@ -47,14 +36,6 @@ def test_floor_and_side_walls(boxes):
     y = task.CONTAINER[1] - CONTACT_TOLERANCE - 0.25  # exact in bits, and so is y + 0.25
     at_the_tolerance = surroundings(Load([[3.5, y, 0.25]], np.full((1, 3), 0.5)))
     assert at_the_tolerance.situation(0).sides == (250_100,)
-
-
-def test_side_walls_that_only_a_box_on_top_touches(boxes):
-    left = surroundings(boxes((0.5, 0.2), (0.2, 0.6)))
-    right = surroundings(boxes((2.0, 0.2), (2.3, 0.6)))
-    assert left.situation(0).sides == (-500_000,) and right.situation(0).sides == (500_000,)
-    left.present[1] = right.present[1] = False
-    assert left.situation(0).sides == right.situation(0).sides == ()
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])

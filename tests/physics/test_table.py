@@ -15,9 +15,8 @@ import unload.physics.table
 from tests.load.walls import KINDS, own_load
 from tests.physics.kinds import make
 from unload import task
-from unload.load.boxes import OVERLAP
 from unload.load.substacks import stack_load
-from unload.physics.bullet import GAP, SETTINGS, World
+from unload.physics.bullet import SETTINGS, World
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation, Surroundings
 from unload.physics.table import (
@@ -27,7 +26,6 @@ from unload.physics.table import (
     LIFTS_FILE,
     LiftTable,
     TablePhysics,
-    shared_table,
 )
 from unload.support import files
 
@@ -82,24 +80,6 @@ def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
             if not around.on_top(item) and asked < 500:
                 assert local.simulate(around.situation(item)) == FREE_LIFT
                 asked += 1
-
-
-@pytest.mark.pybullet
-@pytest.mark.parametrize(("overlap", "free"), [(GAP, True), (GAP + 1e-4, False)])
-def test_a_box_is_free_until_its_neighbours_overlap_by_more_than_the_gap(overlap, free):
-    """A load allows a thousandth of that."""
-    assert OVERLAP < GAP / 100
-    side = round((0.4 - overlap) * 1e6)
-    boxes = np.array([[0, y, 0, 400_000, 400_000, 400_000] for y in (0, side, -side)], np.int32)
-    local = LocalPhysics()
-    assert (local.simulate(Situation(boxes, 1, None, ())) == FREE_LIFT) == free
-
-
-def test_without_a_shipped_table_the_shared_one_is_empty_at_first(monkeypatch, tmp_path):
-    monkeypatch.setattr("unload.physics.table.LIFTS_FILE", tmp_path / "missing.npz")
-    shared_table.cache_clear()
-    assert len(shared_table()) == 0
-    shared_table.cache_clear()
 
 
 @pytest.mark.pybullet

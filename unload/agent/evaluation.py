@@ -18,7 +18,7 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.choice import Name
+from unload.physics.full import Name
 from unload.support import checks
 
 MOST_EPISODES = 10**6

@@ -13,10 +13,10 @@ import pandas as pd
 from unload import task
 from unload.agent import policies
 from unload.agent.policies import Policy
-from unload.env.observation import nearest, scaled
+from unload.env.observation import nearest, scale
 from unload.load.boxes import OVERLAP, BoxError, Load, check_stacked
 from unload.physics.base import Force, Physics, low_ceiling
-from unload.physics.choice import Name, make_physics
+from unload.physics.full import Name, make_physics
 from unload.physics.table import too_heavy
 from unload.support import checks, files
 from unload.support.extras import needed_for
@@ -169,7 +169,7 @@ def _by_policy(
     mask = np.zeros((1, task.N_VISIBLE), np.int8)
     seen = np.full((1, task.N_VISIBLE, 3), task.PADDING, np.float32)
     mask[0, : len(items)] = allowed[items]
-    seen[0, : len(items)] = scaled(load.positions[items], load.container)
+    seen[0, : len(items)] = scale(load.positions[items], load.container)
     chosen = checks.integer_array("what policy returned", policy(seen, mask, rng), (1,))
     if chosen[0] not in np.flatnonzero(mask):
         wanted = "expected a row that the mask allows"

@@ -49,27 +49,11 @@ def stacked(stack: Callable, rng: np.random.Generator) -> Load:
     return load
 
 
-class AllOrReset:
-    """Context manager that requires a reset of ``env`` if its block raises.
-
-    A class, because ``contextlib.contextmanager`` is three times as slow, and steps are short.
-    """
-
-    def __init__(self, env: Any) -> None:
-        self._env = env
-
-    def __enter__(self) -> None: ...
-
-    def __exit__(self, kind: type | None, error: object, trace: object) -> None:
-        if kind is not None:
-            self._env._state = "broken off"
-
-
 class InOrder:
     """What refuses calls out of order.
 
-    Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``;
-    ``AllOrReset`` sets it to ``"broken off"``.
+    Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``, and
+    while they change an episode to ``"broken off"``, which it stays if that raises an error.
     """
 
     _state = "not started"
@@ -105,8 +89,6 @@ class EpisodeEnv(InOrder, gymnasium.Env):
 
 class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
     """Base of environments in which each action picks one of 128 visible items.
-
-    What changes the episodes stands in ``AllOrReset``.
 
     Args:
         num_envs: number of environments.
@@ -212,31 +194,32 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         highest = task.N_VISIBLE - 1
         actions = checks.integer_array("actions", actions, (self.num_envs,), highest)
 
-        with AllOrReset(self):
-            rewards, picked = self._pick(actions, ~waiting)
-            self._picks += 1
-            if waiting.any():
-                rewards[waiting] = 0
-                self._begin(waiting, self._rngs)
-            terminations, truncations = self._emptied(), self._picks == self.max_picks
+        self._state = "broken off"  # until all is done
+        rewards, picked = self._pick(actions, ~waiting)
+        self._picks += 1
+        if waiting.any():
+            rewards[waiting] = 0
+            self._begin(waiting, self._rngs)
+        terminations, truncations = self._emptied(), self._picks == self.max_picks
 
-            # What the last pick of an episode showed goes aside, as Gymnasium wants it.
-            final: dict[str, Any] = {}
-            ended, began = terminations | truncations, waiting
-            if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-                last, began = self._copy_observations(), ended
-                observations = np.full(self.num_envs, None)
-                for env in np.flatnonzero(ended):
-                    observations[env] = last[env]
-                final_infos = _flagged(self._infos() | picked, ended)
-                final = {"final_obs": observations, "_final_obs": ended}
-                final |= {"final_info": final_infos, "_final_info": ended}
-                self._begin(ended, self._rngs)
+        # What the last pick of an episode showed goes aside, as Gymnasium wants it.
+        final: dict[str, Any] = {}
+        ended, began = terminations | truncations, waiting
+        if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
+            last, began = self._copy_observations(), ended
+            observations = np.full(self.num_envs, None)
+            for env in np.flatnonzero(ended):
+                observations[env] = last[env]
+            final_infos = _flagged(self._infos() | picked, ended)
+            final = {"final_obs": observations, "_final_obs": ended}
+            final |= {"final_info": final_infos, "_final_info": ended}
+            self._begin(ended, self._rngs)
 
-            # The infos are the reset's where an episode has begun, and the pick's elsewhere.
-            infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
-            if not began.all():  # a reset has no infos about a pick
-                infos |= _flagged(picked, ~began)
+        # The infos are the reset's where an episode has begun, and the pick's elsewhere.
+        infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
+        if not began.all():  # a reset has no infos about a pick
+            infos |= _flagged(picked, ~began)
+        self._state = "running"
         return self._copy_observations(), rewards, terminations, truncations, infos | final
 
     def action_masks(self) -> np.ndarray:
@@ -246,10 +229,10 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
 
     def _begin(self, where: np.ndarray, rngs: list[np.random.Generator], **options) -> None:
         """Begin an episode in some environments, (num_envs,) bool, by the generators of all."""
-        with AllOrReset(self):
-            self._picks[where] = 0
-            envs = np.flatnonzero(where)
-            self._fill(envs, [rngs[env] for env in envs], **options)
+        self._state = "broken off"
+        self._picks[where] = 0
+        envs = np.flatnonzero(where)
+        self._fill(envs, [rngs[env] for env in envs], **options)
 
     def close_extras(self, **kwargs) -> None:
         """Free what the environments hold."""

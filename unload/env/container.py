@@ -13,7 +13,7 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.choice import Name, make_physics
+from unload.physics.full import Name, make_physics
 
 
 class ContainerEnv(PickingEnv):

@@ -7,7 +7,7 @@ from unload import task
 from unload.env import observation
 from unload.env.base import PickingEnv, PickingVectorEnv
 from unload.env.equalization import equalize
-from unload.env.observation import drift, scaled
+from unload.env.observation import drift, scale
 from unload.load.substacks import COLUMNS, ROWS, WALLS, build_load
 
 _HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
@@ -15,12 +15,6 @@ _HEIGHT_TOLERANCE = 1e-6  # m, places this close are at the same height
 GRID = np.concatenate(
     [build_load(np.full((WALLS, ROWS, len(COLUMNS)), variant)).positions for variant in range(3)]
 )
-
-
-def _highest_places(places: np.ndarray) -> np.ndarray:
-    """(..., items) bool, True where no other of the (..., items, 3) places in m is higher."""
-    heights = places[..., 2]
-    return heights > heights.max(axis=-1, keepdims=True) - _HEIGHT_TOLERANCE
 
 
 class HighestItemVectorEnv(PickingVectorEnv):
@@ -43,9 +37,11 @@ class HighestItemVectorEnv(PickingVectorEnv):
         positions = (places + offsets).reshape(-1, 3)
         order = observation.distance(positions).reshape(shape).argsort(axis=1, kind="stable")
         rows = order[:, :, np.newaxis]
-        seen = np.take_along_axis(scaled(positions).reshape(*shape, 3), rows, axis=1)
+        seen = np.take_along_axis(scale(positions).reshape(*shape, 3), rows, axis=1)
         self._observations[envs] = equalize(seen, self.ties) if self.equalize else seen
-        self._highest[envs] = np.take_along_axis(_highest_places(places), order, axis=1)
+        heights = np.take_along_axis(places[..., 2], order, axis=1)
+        highest = heights.max(axis=1, keepdims=True)
+        self._highest[envs] = heights > highest - _HEIGHT_TOLERANCE
 
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray

@@ -47,7 +47,7 @@ def nearest(
 
 
 def scale(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
-    """Positions relative to the container.
+    """Positions relative to the container; what is outside is seen at its edge.
 
     Args:
         positions: (n, 3) float, in m.
@@ -55,7 +55,7 @@ def scale(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.n
     Returns:
         (n, 3) float32, [-1, 1] from one side of the container to the other.
     """
-    return (2 / container * positions - 1).astype(np.float32)
+    return np.clip((2 / container * positions - 1).astype(np.float32), -1, 1)
 
 
 def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
@@ -64,11 +64,6 @@ def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.nda
     if position_noise:
         offsets[:, 2] -= SINK
     return offsets
-
-
-def scaled(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.ndarray:
-    """``scale`` within [-1, 1]: an item that is outside the container is seen at its edge."""
-    return np.clip(scale(positions, container), -1, 1)
 
 
 def holds_item(observations: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from unload import task
 from unload.env import observation
 from unload.env.base import PickingVectorEnv, stacked
 from unload.env.equalization import TIE_TOLERANCE
-from unload.env.observation import drift, scaled
+from unload.env.observation import drift, scale
 from unload.fast import containers
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
@@ -114,7 +114,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         order = observation.nearest(positions[items], len(items), load.container)
         first = state.unloaded[env]
         state.by_distance[env, first : first + len(items)] = items[order]
-        state.seen[env, : len(load)] = scaled(positions, load.container)
+        state.seen[env, : len(load)] = scale(positions, load.container)
         containers.show_nearest(state, env, *self._features)
 
     def _make_room(self, items: int, links: int) -> None:

@@ -22,7 +22,6 @@ CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 LARGEST_TOLERANCE = 0.1  # m
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
 ABOVE, BELOW, BESIDE = range(3)  # kinds of contact
-_BLOCK = 512  # boxes whose pairs are compared at once, to bound what these arrays hold
 
 
 class Contacts(NamedTuple):
@@ -269,47 +268,7 @@ def _find_contacts(
     return Contacts(*_lists(found, len(low)))
 
 
-def _pairs(low, high, order, ends, tolerance):
-    """``_find`` in NumPy: the same rows in the same order, and the same two boxes."""
-    (x0, y0, z0), (x1, y1, z1) = low, high
-    start, last = 0, []  # of each box, how far to its right others begin before it ends
-    for end in ends:
-        limit = y1[start:end] + CONTACT_TOLERANCE
-        last.append(start + np.searchsorted(y0[start:end], limit, side="right"))
-        start = end
-    counts = np.concatenate(last) - np.arange(len(order)) - 1
-
-    found = []
-    for first in range(0, len(order), _BLOCK):
-        count = counts[first : first + _BLOCK]
-        i = np.repeat(np.arange(first, first + len(count)), count)
-        j = i + 1 + np.arange(len(i)) - np.repeat(np.cumsum(count) - count, count)
-        upwards = np.minimum(z1[i], z1[j]) - np.maximum(z0[i], z0[j])
-        i, j, upwards = (each[upwards >= -tolerance] for each in (i, j, upwards))
-        across = np.minimum(y1[i], y1[j]) - y0[j]
-        along = np.minimum(x1[i], x1[j]) - np.maximum(x0[i], x0[j])
-        overlap = np.minimum(np.minimum(across, upwards), along) > OVERLAP
-        if overlap.any():
-            pair = overlap.argmax()
-            return np.empty((0, 3), np.int32), order[i[pair]], order[j[pair]]
-        touching = (np.maximum(across, upwards) > CONTACT_TOLERANCE) & (along > CONTACT_TOLERANCE)
-        i, j, stacked = i[touching], j[touching], across[touching] > CONTACT_TOLERANCE
-        one = np.where(stacked, np.where(z0[j] > z0[i], ABOVE, BELOW), BESIDE)
-        other = np.where(stacked, np.where(z0[j] > z0[i], BELOW, ABOVE), BESIDE)
-        both = [[one, order[i], order[j]], [other, order[j], order[i]]]
-        found.append(np.array(both, np.int32).transpose(2, 0, 1).reshape(-1, 3))
-    return np.concatenate(found), 0, 0
-
-
-def _sorted(found, count):
-    """``_lists`` in NumPy."""
-    keys = found[:, 0] * (count + 1) + found[:, 1]
-    order = np.argsort(keys[::-1], kind="stable")
-    starts = np.searchsorted(np.sort(keys), np.arange(3 * (count + 1))).reshape(3, -1)
-    return starts.astype(np.int32), found[::-1, 2][order]
-
-
-@compiled(plain=_pairs)
+@compiled(plain=True)
 def _find(low, high, order, ends, tolerance):
     """Rows (kind, box, box that touches it), and two boxes that overlap; 0 twice if none do.
 
@@ -354,7 +313,7 @@ def _find(low, high, order, ends, tolerance):
     return found[:count], 0, 0
 
 
-@compiled(plain=_sorted)
+@compiled(plain=True)
 def _lists(found, count):
     """``starts`` and ``boxes`` of ``Contacts``."""
     starts = np.zeros((3, count + 1), np.int32)

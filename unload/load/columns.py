@@ -3,7 +3,8 @@
 import logging
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import NoReturn
 
 import numpy as np
 
@@ -65,10 +66,13 @@ class Columns:
         table: the list.
         renamed: name in the list → meaning, or one of its names, by the caller.
         ignore: names of columns without a meaning.
+
+    Attributes:
+        ids: of the rows, their numbers from 1 if the list has none.
     """
 
     def __init__(self, table: Table, renamed: dict[str, str], ignore: Iterable[str]) -> None:
-        self._source, names = table.source, [*table.cells]
+        self._table, self._source, names = table, table.source, [*table.cells]
         words = {name: plain(name)[0] for name in names}
         self._scales = {name: plain(name)[1] for name in names}
         twice = [name for name in names if [*words.values()].count(words[name]) > 1]
@@ -114,6 +118,8 @@ class Columns:
         for how, columns in (("read", understood), ("kept but not used:", rest)):
             if columns:
                 LOGGER.warning("%s: %s %s", self._source, how, ", ".join(columns))
+        rows = [str(row + 1) for row in range(len(table))]
+        self.ids = table.cells.get(self.first("id"), rows)
 
     def of(self, meaning: str) -> list[str]:
         """The names of the columns of a meaning."""
@@ -123,12 +129,24 @@ class Columns:
         """The name of the column of a meaning, None without one."""
         return next(iter(self.of(meaning)), None)
 
-    def scale(self, name: str, usual: float) -> float:
-        """How many of a column's unit are 1 m, kg or degree; ``usual`` if its name says none."""
-        return self._scales[name] or usual
+    def numbers(self, names: list[str], usual: float = 1.0) -> np.ndarray:
+        """Columns in m, kg or degrees, (n, k) float64, with ``usual`` where a name says no unit."""
+        cells = [[_number(cell) for cell in self._table.with_points(name)] for name in names]
+        numbers = np.array(cells).T
+        unreadable = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
+        if unreadable.size:
+            self.refuse(unreadable, "a cell that is no number; expected one", names)
+        return numbers / [self._scales[name] or usual for name in names]
+
+    def refuse(self, rows: Sequence[int] | np.ndarray, problem: str, shown: list[str]) -> NoReturn:
+        """Raise a ValueError that names rows, and shows cells of the first."""
+        named = ", ".join(f"row {row + 1} (id {self.ids[row]!r})" for row in rows[:5])
+        more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
+        cells = ", ".join(f"{name} {self._table.cells[name][rows[0]]!r}" for name in shown)
+        raise ValueError(f"{self._source}: {named}{more}: {problem} (the first has {cells})")
 
     def unit(self, lengths: list[str], units: str | None) -> float:
-        """``scale`` of lengths whose names say none: of ``units``, or that of the others."""
+        """How many are 1 m where a length's name says no unit: of ``units``, or as the others'."""
         silent = [name for name in lengths if self._scales[name] is None]
         stated = {self._scales[name] for name in lengths} - {None}
         if silent and units is None and stated:
@@ -138,3 +156,10 @@ class Columns:
             found = ", ".join(silent)
             LOGGER.warning("%s: in the unit of the other lengths: %s", self._source, found)
         return LENGTHS[units] if units else max(stated, default=1.0)
+
+
+def _number(cell: str) -> float:
+    try:
+        return np.nan if "_" in cell else float(cell)
+    except ValueError:
+        return np.nan

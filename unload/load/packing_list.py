@@ -7,7 +7,7 @@ import logging
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:  # of a third of a second to import
 
 LOGGER = logging.getLogger(__name__)
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
-COMMA = re.compile(r"^(-?\d+),(\d+)$")  # a decimal one
 NUMBER = re.compile(r"-?(0|[1-9]\d*)(\.\d+)?")  # no code with zeros in front
 
 
@@ -88,26 +87,24 @@ def read_load(
     renamed = dict(columns or {})
     table = read_table(path, lambda name: name in renamed or is_known(name))
     known = Columns(table, renamed, ignore)
-    ids = table.cells.get(known.first("id"), [str(row + 1) for row in range(len(table))])
-    rows = _Rows(table, ids)
 
     # A box turned otherwise than by quarter turns is none along the axes.
     for name in known.of("rotation"):
-        angles = rows.numbers([name], [known.scale(name, 1.0)])[:, 0]
+        angles = known.numbers([name])[:, 0]
         if (turned := np.flatnonzero(np.abs((angles + 45) % 90 - 45) > 1e-3)).size:
             problem = "a rotation that is no quarter turn; expected none"
-            rows.refuse(turned, f"{problem}, or {name!r} in ignore", [name])
+            known.refuse(turned, f"{problem}, or {name!r} in ignore", [name])
         if angles.any():
             LOGGER.warning("%s: sizes are taken for those after the turns", table.source)
     masses, weight = None, known.first("weight")
     if weight is not None:
-        masses = rows.numbers([weight], [known.scale(weight, 1.0)])[:, 0]
+        masses = known.numbers([weight])[:, 0]
 
     # Lengths in m, and x from the rear.
     place = CENTRE if known.first(CENTRE[0]) else CORNER
     shown = [known.first(name) for name in (*place, *SIZES)]
     usual = known.unit(shown, units)
-    listed, sizes = np.hsplit(rows.numbers(shown, [known.scale(name, usual) for name in shown]), 2)
+    listed, sizes = np.hsplit(known.numbers(shown, usual), 2)
     half = sizes / 2
 
     def centres_of(place: Sequence[str]) -> np.ndarray:
@@ -124,7 +121,7 @@ def read_load(
         load = Load(
             centres + moves,
             sizes - smaller,
-            ids=np.array(ids),
+            ids=np.array(known.ids),
             container=container,
             ceiling=container[2],
             extras=_extras(path, table, shown, known.first("id")),
@@ -142,16 +139,17 @@ def read_load(
         if usual == 1 and sizes.max() > container.max():
             problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
         other = CORNER if place is CENTRE else CENTRE
-        outside = [
-            _outside(centres_of(each), half, container, tolerance) for each in (place, other)
+        outside = [  # whether any box sticks out
+            (abs(centres_of(each) - container / 2) + half > container / 2 + tolerance).any()
+            for each in (place, other)
         ]
         if outside[0] and not outside[1]:
             named = dict(zip(shown, other))
             problem += f"; all lie inside if these are {', '.join(other)}: columns={named}"
         light = masses is not None and "a mass of" in problem
-        rows.refuse(error.boxes, problem, [weight] if light else shown)
+        known.refuse(error.boxes, problem, [weight] if light else shown)
     if (tipping := uncarried(load)).size:
-        rows.refuse(tipping, "tips, because nothing carries its centre of mass", shown)
+        known.refuse(tipping, "tips, because nothing carries its centre of mass", shown)
     for changes, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
         if changes.any():
             LOGGER.warning(
@@ -162,61 +160,19 @@ def read_load(
     return load
 
 
-class _Rows:
-    """The rows of a list: their numbers, and errors that name them."""
-
-    def __init__(self, table: Table, ids: Sequence[str]) -> None:
-        self._table, self._ids = table, ids
-
-    def refuse(self, items: Sequence[int] | np.ndarray, problem: str, shown: list[str]) -> NoReturn:
-        named = ", ".join(f"row {item + 1} (id {self._ids[item]!r})" for item in items[:5])
-        more = f" and {len(items) - 5} more" if len(items) > 5 else ""
-        cells = {name: self._table.cells[name][items[0]] for name in shown}
-        first = ", ".join(f"{name} {cell!r}" for name, cell in cells.items())
-        raise ValueError(f"{self._table.source}: {named}{more}: {problem} (the first has {first})")
-
-    def numbers(self, names: list[str], scales: list[float]) -> np.ndarray:
-        """Columns divided by their units, (n, k) float64."""
-        table = self._table
-        cells = np.array([[_number(c, table) for c in table.cells[name]] for name in names]).T
-        unreadable = np.flatnonzero(~np.isfinite(cells).all(axis=1))
-        if unreadable.size:
-            self.refuse(unreadable, "a cell that is no number; expected one", names)
-        return cells / scales
-
-
-def _number(cell: str, table: Table) -> float:
-    if table.comma:
-        cell = COMMA.sub(r"\1.\2", cell)
-    try:
-        return np.nan if "_" in cell else float(cell)
-    except ValueError:
-        return np.nan
-
-
 def _extras(path, table: Table, shown: list[str], id_: str | None) -> dict[str, np.ndarray]:
     """What a list says besides, as numbers where all cells are; of a table as they are."""
     extras = {}
-    for name, cells in table.cells.items():
+    for name in table.cells:
         if name in shown or name == id_:
             continue
+        cells = table.with_points(name)
         extras[name] = np.array(cells, object)
-        given = None if isinstance(path, (str, Path)) else path.iloc[:, table.names.index(name)]
-        if given is not None and given.dtype.kind in "biuf":
-            extras[name] = given.to_numpy()
-        elif given is None:
-            numbers = [COMMA.sub(r"\1.\2", cell) if table.comma else cell for cell in cells]
-            if all(map(NUMBER.fullmatch, numbers)):
-                whole = not any("." in number for number in numbers)
-                extras[name] = np.array([(int if whole else float)(number) for number in numbers])
-            elif table.comma:
-                extras[name] = np.array(numbers, object)
+        if hasattr(path, "columns"):
+            given = path.iloc[:, table.names.index(name)]
+            if given.dtype.kind in "biuf":
+                extras[name] = given.to_numpy()
+        elif all(map(NUMBER.fullmatch, cells)):
+            number = float if "." in "".join(cells) else int
+            extras[name] = np.array([number(cell) for cell in cells])
     return extras
-
-
-def _outside(
-    centres: np.ndarray, half: np.ndarray, container: np.ndarray, tolerance: float
-) -> bool:
-    """Whether any box sticks out of the container."""
-    low, high = centres - half, centres + half
-    return bool(((low < -tolerance) | (high > container + tolerance)).any())

@@ -94,10 +94,7 @@ def still(
     figure = _drawn(low, high, colours, (_WIDTH, height), _LEGEND, container)
     handles = [Patch(facecolor=colour, edgecolor="0.5", label=n) for n, colour in legend.items()]
     figure.legend(handles=handles, loc="upper left", fontsize=8, frameon=False)
-    file = io.BytesIO()
-    # Few colours take a quarter of the bytes.
-    Image.fromarray(pixels(figure)).quantize(_FILE_COLOURS).save(file, "PNG", optimize=True)
-    return file.getvalue()
+    return _png(figure)
 
 
 def numbered(load: Load, items: np.ndarray) -> bytes:
@@ -127,8 +124,13 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
                 x, y = middle.tolist()
                 figure.axes[0].text(x, y, str(number), ha="center", va="center", fontsize=6)
                 break
+    return _png(figure)
+
+
+def _png(figure: Figure) -> bytes:
+    """The file of a figure, in few colours, which take a quarter of the bytes."""
     file = io.BytesIO()
-    Image.fromarray(pixels(figure)).save(file, "PNG", optimize=True)
+    Image.fromarray(pixels(figure)).quantize(_FILE_COLOURS).save(file, "PNG", optimize=True)
     return file.getvalue()
 
 

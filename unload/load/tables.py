@@ -18,6 +18,7 @@ SEPARATORS = ",;\t"
 MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 BINARY = re.compile("[\0-\x08\x0e-\x1f]")  # characters of no text
 TOTAL = re.compile(r"((grand )?total|sum|summe|gesamt|somme|suma)\b", re.IGNORECASE)
+COMMA = re.compile(r"^(-?\d+),(\d+)$")  # a decimal one
 TITLE_LINES = 20  # before the names, at most
 # The line of names, as far as one can tell, and how many of its names are known.
 Header = tuple[int, int]
@@ -41,6 +42,11 @@ class Table:
 
     def __len__(self) -> int:
         return len(next(iter(self.cells.values()), []))
+
+    def with_points(self, name: str) -> list[str]:
+        """The cells of a column, its numbers with decimal points."""
+        cells = self.cells[name]
+        return [COMMA.sub(r"\1.\2", cell) for cell in cells] if self.comma else cells
 
 
 def read_table(path: Any, known: Callable[[str], bool]) -> Table:

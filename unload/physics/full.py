@@ -1,4 +1,6 @@
-"""Lifts in a simulation of every box of the container."""
+"""Lifts in a simulation of every box of the container; and a physics by its name."""
+
+from typing import Literal
 
 import numpy as np
 
@@ -6,8 +8,12 @@ from unload import task
 from unload.load.boxes import Load
 from unload.physics.base import Force, Physics
 from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
+from unload.physics.local import LocalPhysics
 from unload.physics.situation import PULL, RESOLUTION
+from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
+
+Name = Literal["local", "full", "table"]
 
 _DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
@@ -103,3 +109,27 @@ class FullPhysics(Physics):
     def positions(self) -> np.ndarray:
         self._check_filled()
         return np.array([position for position, _ in self._poses])
+
+
+def make_physics(
+    physics: Name | Physics, after_pick: str = "restore", force: Force = task.PICK_FORCE
+) -> Physics:
+    """The physics of a name, or the one that is given, which is its caller's to close.
+
+    Args:
+        physics: ``"local"``, ``"full"`` or ``"table"``, or a ``Physics`` that is open.
+        after_pick: of ``"full"``, see ``FullPhysics``.
+        force: of those that have a name, see ``Physics``.
+    """
+    if not isinstance(physics, Physics):
+        checks.one_of("physics", physics, ("local", "full", "table", "a Physics"))
+        if physics == "full":
+            return FullPhysics(after_pick, force)
+    elif force != task.PICK_FORCE:
+        raise ValueError(f"force is {force!r}; expected it to be given to the physics itself")
+    if after_pick != "restore":
+        wanted = f"expected 'restore' for physics={physics!r}"
+        raise ValueError(f"after_pick is {after_pick!r}; {wanted}")
+    if isinstance(physics, Physics):
+        return physics
+    return LocalPhysics(force=force) if physics == "local" else TablePhysics(shared_table(), force)

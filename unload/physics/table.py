@@ -288,7 +288,7 @@ class TablePhysics(LocalPhysics):
 @cache
 def shared_table() -> LiftTable:
     """The lifts known to this process: PyBullet's in ``LIFTS_FILE``, and all made since."""
-    table = LiftTable.load(LIFTS_FILE, ENGINES[0]) if LIFTS_FILE.exists() else LiftTable()
+    table = LiftTable.load(LIFTS_FILE, ENGINES[0])
     if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
         table.engine, table.foreign, table.samples = engine_of(), table.entries()[0], {}
     return table

@@ -26,17 +26,15 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 _SOURCES = ("task.py", "support/*.py", "load/*.py", "physics/*.py", "fast/*.py")
 
 
-def compiled(
-    function: Callable | None = None, plain: Callable | bool = False, **options
-) -> "Compiled":
+def compiled(function: Callable | None = None, plain: bool = False, **options) -> "Compiled":
     """``numba.njit`` of a function in one of ``_SOURCES``, with a cache that follows all of them.
 
     ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. A fresh installation
     compiles for ten seconds, each function at its first call, which is logged when the folder is
     made. Where none can be written, compiled code is kept in memory, with a warning.
 
-    ``plain`` does the same in Python, or is True if the function itself does. It is called for as
-    long as nothing has imported numba: an order calls a function a few times only.
+    A ``plain`` function runs as it is written for as long as nothing has imported numba: an order
+    calls it a few times only.
     """
     if function is None:
         return partial(compiled, plain=plain, **options)  # type: ignore[return-value]
@@ -46,15 +44,14 @@ def compiled(
 class Compiled:
     """A function that is compiled when it is first called, or used by one that is compiled."""
 
-    def __init__(self, function: Callable, plain: Callable | bool, options: dict) -> None:
+    def __init__(self, function: Callable, plain: bool, options: dict) -> None:
         update_wrapper(self, function)
-        self._function, self._options = function, options
-        self._plain = function if plain is True else plain
+        self._function, self._plain, self._options = function, plain, options
 
     def __call__(self, *given):
         if self._plain and "numba" not in sys.modules:
             with np.errstate(over="ignore"):  # integers wrap, as compiled ones do
-                return self._plain(*given)
+                return self._function(*given)
         return self.dispatcher(*given)
 
     @cached_property
