@@ -119,9 +119,9 @@ def test_each_flipped_bit_of_a_shape_is_refused_by_name(checkpoint):
         damaged = bytearray(whole)
         damaged[place] ^= 1 << bit
         checkpoint.write_bytes(damaged)
-        with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged: its digest"):
-            files.read_arrays(checkpoint, checked=True)
-    with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged: .* another vers"):
+        with pytest.raises(ValueError, match="checkpoint.npz (was changed or damaged|is not a r)"):
+            files.read_arrays(checkpoint)
+    with pytest.raises(ValueError, match="checkpoint.npz (was changed|is not a).* another vers"):
         train(config, checkpoint.parent, progress=False)
 
 
@@ -140,7 +140,7 @@ CONTAINERS = "rollout.envs._containers"
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
-        ("format", lambda _: np.array(7), "is not of format 8; if another version of unload"),
+        ("format", lambda _: np.array(8), "is not of format 9; if another version of unload"),
         ("settings", lambda _: np.array("{"), "JSONDecodeError"),
         ("settings", lambda _: np.array("[]"), "TypeError|holds a run of another"),
         ("numbers", lambda _: np.array("{"), "JSONDecodeError"),
@@ -164,17 +164,17 @@ CONTAINERS = "rollout.envs._containers"
 )
 def test_what_a_run_cannot_have_is_refused_before_the_first_pick(checkpoint, name, change, message):
     """A checkpoint may come from anywhere: 1,000 steps once never ended."""
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint, checked=True)
-    files.write_arrays(checkpoint, changed(arrays, name, change), checked=True)
+    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
+    files.write_arrays(checkpoint, changed(arrays, name, change))
     with at_step(1, crash), pytest.raises(ValueError, match=f"checkpoint.npz .*({message})"):
         train(config, checkpoint.parent, progress=False)
 
 
 def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint, checked=True)
+    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
     contents = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
     for other in (*contents, arrays | {"more": np.zeros(1)}):
-        files.write_arrays(checkpoint, other, checked=True)
+        files.write_arrays(checkpoint, other)
         with pytest.raises(ValueError, match="checkpoint.npz"):
             train(config, checkpoint.parent, progress=False)
 
@@ -254,7 +254,7 @@ def test_a_run_that_another_process_finishes_meanwhile_is_read(finished, monkeyp
     [
         ("policy.safetensors", b"0.", b"1."),
         ("curve.csv", b"0.", b"1."),
-        ("config.json", b'"digest"', b'"other"'),
+        ("config.json", b'"digest": "', b'"digest": "0'),
     ],
 )
 def test_a_damaged_file_of_a_finished_run_is_refused_by_name(finished, name, old, new):
