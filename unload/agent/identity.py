@@ -63,9 +63,9 @@ def identity(value: Any) -> Any:
     except (RecursionError, TypeError, ValueError):
         pass
     if isinstance(value, partial):
-        named = {name: identity(each) for name, each in sorted(value.keywords.items())}
         arguments = [identity(each) for each in value.args]
-        return {"function": identity(value.func), "arguments": arguments, "keywords": named}
+        keywords = {name: identity(each) for name, each in sorted(value.keywords.items())}
+        return {"function": identity(value.func), "arguments": arguments, "keywords": keywords}
 
     # With a digest of all else.
     named = value if isinstance(value, (FunctionType, MethodType, type)) else type(value)

@@ -156,7 +156,7 @@ def _digest_of_arrays(arrays: dict[str, np.ndarray]) -> np.ndarray:
     """Digest of the contents of arrays in the order of their names, (32,) uint8."""
     content = blake2b(digest_size=32)
     for name in sorted(arrays):
-        content.update(np.ascontiguousarray(arrays[name]))
+        content.update(np.ascontiguousarray(arrays[name]).data)
     return np.frombuffer(content.digest(), np.uint8)
 
 
