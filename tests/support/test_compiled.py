@@ -104,10 +104,10 @@ def test_the_digest_follows_sources_and_versions(copy, monkeypatch):
     assert compiled._digest(package) == before
 
 
-def test_numbas_own_setting_is_the_users_again(monkeypatch):
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "elsewhere")
+def test_numbas_own_setting_is_the_users_again(monkeypatch, tmp_path):
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     assert compiled.compiled(lambda x: x)(2) == 2
-    assert numba.config.CACHE_DIR == "elsewhere"
+    assert numba.config.CACHE_DIR == str(tmp_path)
 
 
 def test_all_that_compiled_functions_read_is_among_the_sources():
