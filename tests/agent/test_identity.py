@@ -138,24 +138,19 @@ def with_later_default(walls: int):
     return stack
 
 
-def with_module(walls: int):
-    SIBLING.walls = walls
-    return lambda rng: stack_load(rng, walls=SIBLING.walls)
-
-
-def with_options(walls: int):
-    OPTIONS.walls = walls
-    return lambda rng: stack_load(rng, walls=OPTIONS.walls)
-
-
 @cache
 def cached() -> int:
     return OPTIONS.walls
 
 
-def with_cached(walls: int):
-    OPTIONS.walls = walls
-    return lambda rng: stack_load(rng, walls=cached())
+def with_names_of(use):
+    """Makes a function that uses names of modules, which hold a number."""
+
+    def make(walls: int):
+        SIBLING.walls = OPTIONS.walls = walls
+        return use
+
+    return make
 
 
 class Maker:
@@ -199,9 +194,9 @@ VALUES = [
         enclosing,
         with_default,
         with_later_default,
-        with_module,
-        with_options,
-        with_cached,
+        with_names_of(lambda rng: stack_load(rng, walls=SIBLING.walls)),
+        with_names_of(lambda rng: stack_load(rng, walls=OPTIONS.walls)),
+        with_names_of(lambda rng: stack_load(rng, walls=cached())),
         lambda walls: [lambda rng: 10, lambda rng: 11][walls - 10],
         Maker,
         lambda walls: Maker(walls).stack,

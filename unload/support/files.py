@@ -130,7 +130,7 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
 
     The format has checksums of its own, but none of what says how much is to be read.
     """
-    held = arrays | {"digest": _digest_of_arrays(arrays)}
+    held = {"digest": _digest_of_arrays(arrays)} | arrays  # first: damage may cut off the last
     write_atomically(path, lambda file: np.savez(file, allow_pickle=False, **held))
 
 
