@@ -33,6 +33,8 @@ LIBRARIES = {
     "torch": ("network/", "fast/", "agent/"),
     "tqdm": ("agent/training.py",),
 }
+
+
 def module_name(path: Path) -> str:
     """Full name of the module or package in a file."""
     parts = path.relative_to(ROOT).with_suffix("").parts

@@ -110,6 +110,14 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
     check_arrays(files.read_arrays(path))
 
 
+def test_a_dtype_that_has_no_bytes_to_compare_is_refused_by_name(tmp_path):
+    path = tmp_path / "arrays.npz"
+    files.write_arrays(path, {"long": np.arange(9000)})
+    path.write_bytes(path.read_bytes().replace(b"<i8", b"<m8"))
+    with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
+        files.read_arrays(path)
+
+
 def check_arrays(read: dict[str, np.ndarray]) -> None:
     assert read.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():

@@ -104,7 +104,7 @@ def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
 
 
 def read_json(path: str | Path) -> dict:
-    """Read a JSON file that holds an object; without its ``digest``, which must be right."""
+    """Read a JSON file that holds an object; without its ``digest``, right if there is one."""
     try:
         value = json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError, MemoryError) as error:  # RecursionError: of deep nesting
@@ -135,20 +135,20 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
 
 
 def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays; without their ``digest``, which must be right."""
+    """Read an ``.npz`` file of plain arrays; without their ``digest``, right if there is one."""
     # Opened here, because NumPy leaves a damaged file open that it has opened itself.
     with open(path, "rb") as file:
         try:
             with np.load(file, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
+            wanted, found = arrays.pop("digest", None), _digest_of_arrays(arrays)
         except Exception as error:  # zipfile, zlib, tokenize and NumPy have errors of their own
             raise ValueError(f"{path} is not a readable .npz file: {error}") from error
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):
             raise ValueError(f"{path} is not a readable .npz file: {name} is not an array")
-    if "digest" in arrays:
-        wanted = arrays.pop("digest").tobytes().hex()
-        _check_equal(path, wanted, _digest_of_arrays(arrays).tobytes().hex())
+    if wanted is not None:
+        _check_equal(path, np.asarray(wanted).tobytes().hex(), found.tobytes().hex())
     return arrays
 
 
