@@ -6,11 +6,10 @@ picks needs none of the libraries that training does.
 
 import sys
 from importlib import import_module
-from importlib.abc import MetaPathFinder
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from unload.support.extras import needed_for
+from unload.support.checks import needed_for
 from unload.task import VERSION as __version__
 
 # ruff: noqa: F401
@@ -86,21 +85,21 @@ def _register() -> None:
         gymnasium.register(f"unload/{name}", entry, vector_entry_point=vector_entry)
 
 
-class _WithGymnasium(MetaPathFinder):
+class _WithGymnasium:
     """Registers the environments when Gymnasium is imported, which an order does without."""
 
-    def find_spec(self, name, path=None, target=None):
-        if name != "gymnasium":
-            return None
-        sys.meta_path.remove(self)
-        spec = find_spec(name)
-        if spec is not None:
-            execute = spec.loader.exec_module
-            spec.loader.exec_module = lambda module: (execute(module), _register())
-        return spec
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if name == "gymnasium":
+            sys.meta_path.remove(_WithGymnasium)
+            spec = find_spec(name)
+            if spec is not None:
+                execute = spec.loader.exec_module
+                spec.loader.exec_module = lambda module: (execute(module), _register())
+            return spec
 
 
 if "gymnasium" in sys.modules:
     _register()
 else:
-    sys.meta_path.insert(0, _WithGymnasium())
+    sys.meta_path.insert(0, _WithGymnasium)

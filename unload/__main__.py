@@ -109,7 +109,7 @@ def print_order(arguments: list[str]) -> None:
 
 
 def _draw(load, order, path: str) -> None:
-    from unload.support.extras import needed_for
+    from unload.support.checks import needed_for
 
     with needed_for("--picture"):
         from unload.load.picture import numbered

@@ -6,6 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -75,11 +76,13 @@ def interrupt() -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-def interrupt_run(config: TrainConfig, folder: Path, steps: int) -> None:
-    """Start a run and press Ctrl-C after some steps."""
+def interrupt_run(config: TrainConfig, folder: Path, steps: int, number=signal.SIGINT) -> None:
+    """Start a run and press Ctrl-C after some steps, or send another signal."""
     message = f"stopped after {4 * steps} picks; call train again with run_dir='.*{folder.name}'"
-    with at_step(steps, interrupt), pytest.raises(KeyboardInterrupt, match=message):
+    stop, handler = at_step(steps, partial(signal.raise_signal, number)), signal.getsignal(number)
+    with stop, pytest.raises(KeyboardInterrupt, match=message):
         train(config, folder, progress=False)
+    assert signal.getsignal(number) is handler
 
 
 def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:

@@ -4,7 +4,6 @@ import errno
 import json
 import os
 import re
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
@@ -107,22 +106,19 @@ def test_each_flipped_bit_of_a_shape_is_refused_by_name(checkpoint):
 
     113 of 417 were once read: 23 became other runs, and 19 killed the process.
     """
-    config, whole = TrainConfig(**CONTAINER), checkpoint.read_bytes()
-    digits = [
-        place
-        for shape in re.finditer(rb"'shape': \(([^)]*)\)", whole)
-        for place in range(*shape.span(1))
-        if whole[place : place + 1].isdigit()
-    ]
+    whole, damage = checkpoint.read_bytes(), "checkpoint.npz (was changed or damaged|is not a read)"
+    shapes = re.finditer(rb"'shape': \(([^)]*)\)", whole)
+    places = [place for shape in shapes for place in range(*shape.span(1))]
+    digits = [place for place in places if whole[place : place + 1].isdigit()]
     assert len(digits) > 100
     for place, bit in product(digits, range(8)):
         damaged = bytearray(whole)
         damaged[place] ^= 1 << bit
         checkpoint.write_bytes(damaged)
-        with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged: its digest"):
-            files.read_arrays(checkpoint, checked=True)
-    with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged: .* another vers"):
-        train(config, checkpoint.parent, progress=False)
+        with pytest.raises(ValueError, match=damage):
+            files.read_arrays(checkpoint)
+    with pytest.raises(ValueError, match=f"{damage}.* another vers"):
+        train(TrainConfig(**CONTAINER), checkpoint.parent, progress=False)
 
 
 def changed(arrays: dict, name: str, change) -> dict:
@@ -140,7 +136,7 @@ CONTAINERS = "rollout.envs._containers"
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
-        ("format", lambda _: np.array(7), "is not of format 8; if another version of unload"),
+        ("format", lambda _: np.array(8), "is not of format 9; if another version of unload"),
         ("settings", lambda _: np.array("{"), "JSONDecodeError"),
         ("settings", lambda _: np.array("[]"), "TypeError|holds a run of another"),
         ("numbers", lambda _: np.array("{"), "JSONDecodeError"),
@@ -164,17 +160,17 @@ CONTAINERS = "rollout.envs._containers"
 )
 def test_what_a_run_cannot_have_is_refused_before_the_first_pick(checkpoint, name, change, message):
     """A checkpoint may come from anywhere: 1,000 steps once never ended."""
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint, checked=True)
-    files.write_arrays(checkpoint, changed(arrays, name, change), checked=True)
+    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
+    files.write_arrays(checkpoint, changed(arrays, name, change))
     with at_step(1, crash), pytest.raises(ValueError, match=f"checkpoint.npz .*({message})"):
         train(config, checkpoint.parent, progress=False)
 
 
 def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint, checked=True)
+    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
     contents = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
     for other in (*contents, arrays | {"more": np.zeros(1)}):
-        files.write_arrays(checkpoint, other, checked=True)
+        files.write_arrays(checkpoint, other)
         with pytest.raises(ValueError, match="checkpoint.npz"):
             train(config, checkpoint.parent, progress=False)
 
@@ -207,22 +203,15 @@ def test_what_a_change_puts_on_a_run_is_left_out_and_put_there_again(tmp_path):
 
 def test_a_disk_without_room_is_refused_before_training(tmp_path, monkeypatch):
     """Two versions of the checkpoint must fit, one of which may be there already."""
-    config = TrainConfig(**CONTAINER)
+    config, wider = (TrainConfig(**CONTAINER | {"replay_size": size}) for size in (100, 200))
     interrupt_run(config, tmp_path, 40)  # the memory is full
     there = (tmp_path / "checkpoint.npz").stat().st_size
-
-    def disk(free: int) -> None:
-        usage = shutil._ntuple_diskusage(1, 1, free)
-        monkeypatch.setattr("shutil.disk_usage", lambda path: usage)
-
-    disk(there // 2)
-    with pytest.raises(OSError, match="GB for checkpoints; expected .* that replaces it") as full:
-        train(config, tmp_path, progress=False)
-    assert full.value.errno == errno.ENOSPC
-    disk(2 * there)
-    with pytest.raises(OSError, match="expected"):
-        train(TrainConfig(**CONTAINER | {"replay_size": 200}), tmp_path / "other", progress=False)
-    disk(there)
+    for free, run, folder in ((there // 2, config, tmp_path), (2 * there, wider, tmp_path / "2")):
+        monkeypatch.setattr("shutil.disk_usage", lambda path, free=free: Mock(free=free))
+        with pytest.raises(OSError, match="GB for checkpoints; expected .* that repl") as full:
+            train(run, folder, progress=False)
+        assert full.value.errno == errno.ENOSPC
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Mock(free=there))
     train(config, tmp_path, progress=False)
 
 
@@ -254,7 +243,7 @@ def test_a_run_that_another_process_finishes_meanwhile_is_read(finished, monkeyp
     [
         ("policy.safetensors", b"0.", b"1."),
         ("curve.csv", b"0.", b"1."),
-        ("config.json", b'"digest"', b'"other"'),
+        ("config.json", b'"digest": "', b'"digest": "0'),
     ],
 )
 def test_a_damaged_file_of_a_finished_run_is_refused_by_name(finished, name, old, new):
@@ -272,9 +261,7 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
     tail = f"{'0123456789abcdef' * 2}.partial"
     names = ("curve.csv.bak.partial", "curve.csv.0123.partial", f"notes.{tail}")
     others = [tmp_path / name for name in (*names, f"below/checkpoint.npz.{tail}")]
-    own = [tmp_path / f"{name}.{tail}" for name in OWN]
-    for path in (*others, *own):
+    for path in (*others, *(tmp_path / f"{name}.{tail}" for name in OWN)):
         path.write_bytes(b"half")
-        os.utime(path, (1, 1))
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert sorted(tmp_path.rglob("*.partial")) == sorted(others)

@@ -29,6 +29,7 @@ def own_network(n_features, generator):
 
 
 HIGHEST = TrainConfig(**RUNS["highest item"])
+ADAM = TrainConfig(**CONTAINER | {"network": own_network}, learning_rate=1e39)
 LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 
 
@@ -100,14 +101,18 @@ def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, coun
     ids=[*RUNS, "own network", "own network, gamma"],
 )
 def test_every_run_is_gone_on_with(tmp_path, fields):
-    """With the same bits where PyTorch's default is double precision."""
+    """With the same bits where PyTorch's default is double precision.
+
+    SIGTERM, which SLURM and ``docker stop`` send, stops one as Ctrl-C does.
+    """
     config = TrainConfig(**CONTAINER | fields)
     result = train(config, tmp_path / "straight", progress=False)
     table = evaluate(result.policy, 1, max_picks=20)
     torch.set_default_dtype(torch.float64)
     try:
-        runs.interrupt_run(config, tmp_path / "broken", 17)
-        train(config, tmp_path / "broken", progress=False)
+        runs.interrupt_run(config, tmp_path / "broken", 23, signal.SIGTERM)
+        with at_step(28, lambda: pytest.fail("it has begun anew")):
+            train(config, tmp_path / "broken", progress=False)
         network = None if config.network == "peq" else own_network(4, None)
         loaded = load_policy(tmp_path / "broken" / "policy.safetensors", network)
         pd.testing.assert_frame_equal(evaluate(loaded, 1, max_picks=20), table)
@@ -183,35 +188,6 @@ def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert 1 <= len(written) < 9
     assert not (tmp_path / "checkpoint.npz").exists(), "the step was broken off"
-
-
-def test_sigterm_stops_a_run_as_ctrl_c_does(tmp_path):
-    """SLURM and ``docker stop`` send it; up to ten minutes were once lost."""
-    config, handler = TrainConfig(**CONTAINER), signal.getsignal(signal.SIGTERM)
-    train(config, tmp_path / "straight", progress=False)
-    stop = at_step(23, lambda: signal.raise_signal(signal.SIGTERM))
-    with stop, pytest.raises(KeyboardInterrupt, match="stopped after 92 picks; call train again"):
-        train(config, tmp_path / "broken", progress=False)
-    assert signal.getsignal(signal.SIGTERM) is handler
-    with at_step(28, lambda: pytest.fail("it has begun anew")):
-        train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-
-
-def test_a_learning_rate_that_adam_cannot_take_is_refused_by_name(tmp_path):
-    """With another network than the paper's; it once was PyTorch's RuntimeError in a step."""
-    config = TrainConfig(**CONTAINER | {"network": own_network}, learning_rate=1e39)
-    with at_step(1, runs.crash), pytest.raises(ValueError, match=r"learning_rate is 1e\+39; exp"):
-        train(config, tmp_path, progress=False)
-
-
-@pytest.mark.parametrize("name", ["fifo", "run/checkpoint.npz", "run/../run/policy.safetensors"])
-def test_lifts_that_are_no_file_of_their_own_are_refused(tmp_path, name):
-    """A pipe once hung, and a lift table was written in the place of the checkpoint."""
-    os.mkfifo(tmp_path / "fifo")
-    with pytest.raises(ValueError, match=f"lifts is '.*{name}'.*; expected"):
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, lifts=tmp_path / name)
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
@@ -317,7 +293,10 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),
         ({"config": replace(HIGHEST, network=int)}, TypeError, "network is <class 'int'>; expect"),
+        ({"config": ADAM}, ValueError, r"learning_rate is 1e\+39; expected one that PyTorch's Ada"),
         ({"lifts": ""}, ValueError, "lifts is ''; expected the name of a file"),
+        ({"lifts": "run/checkpoint.npz"}, ValueError, "lifts is 'run/checkpoint.npz', a file of"),
+        ({"lifts": "run/../run/config.json"}, ValueError, "lifts is .*, a file of the run; expec"),
         ({"stack": 3}, TypeError, "stack is 3; expected"),
         ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
@@ -326,12 +305,15 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         ({"run_dir": "/dev/null/run"}, OSError, "/dev/null"),
     ],
 )
-def test_bad_arguments_are_refused(tmp_path, given, error, message):
+def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message):
+    monkeypatch.chdir(tmp_path)
     usual = {"config": TrainConfig(**CONTAINER), "run_dir": tmp_path / "run", "progress": False}
     with pytest.raises(error, match=message):
         train(**usual | given)
     # What a function returns is known only when it has been called.
-    assert (tmp_path / "run").exists() == any(word in message for word in ("returned", "class"))
+    assert (tmp_path / "run").exists() == any(
+        word in message for word in ("returned", "class", "learning_rate")
+    )
     assert not list(tmp_path.glob("*/*.*"))
 
 

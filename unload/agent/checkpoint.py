@@ -19,7 +19,7 @@ from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 8  # of the checkpoints
+FORMAT = 9  # of the checkpoints
 OTHER = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 
@@ -107,7 +107,7 @@ class RunFolder:
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
-        files.write_arrays(self._checkpoint, gather(run) | marks, checked=True)
+        files.write_arrays(self._checkpoint, gather(run) | marks)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -118,7 +118,7 @@ class RunFolder:
         if not self._checkpoint.exists():
             return
         try:
-            stored = files.read_arrays(self._checkpoint, checked=True)
+            stored = files.read_arrays(self._checkpoint)
         except ValueError as error:
             raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
@@ -140,7 +140,7 @@ class RunFolder:
 
     def result(self, config: TrainConfig, settings: dict) -> TrainResult:
         """Read back what a finished run of ``training.train`` has left; see ``settings_of_run``."""
-        stored = files.read_json(self._config, checked=True)
+        stored = files.read_json(self._config)
         marks = stored.pop("marks", {})
         self._check_same(stored, settings)
         for path in (self.policy, self._curve):

@@ -19,7 +19,6 @@ from unload.physics.base import Force, Physics, low_ceiling
 from unload.physics.full import Name, make_physics
 from unload.physics.table import too_heavy
 from unload.support import checks, files
-from unload.support.extras import needed_for
 
 LOGGER = logging.getLogger(__name__)
 BY_NAME = {each.__name__: each for each in (policies.highest, policies.nearest, policies.random)}
@@ -137,7 +136,7 @@ def picking_order(
 
 
 def _learned(name: str) -> Policy:
-    with needed_for(f"policy {name!r}"):
+    with checks.needed_for(f"policy {name!r}"):
         from unload.agent.greedy import load_policy  # here, because rules need no PyTorch
     return load_policy(name)
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from unload.support import checks
-from unload.support.extras import needed_for
 
 LOGGER = logging.getLogger(__name__)
 SEPARATORS = ",;\t"
@@ -115,7 +114,7 @@ def _json(source: str, text: str) -> Any:
 
 def _excel(file: Path) -> Any:
     """The pandas table of the first sheet."""
-    with needed_for(f"{file}, an Excel file,"):
+    with checks.needed_for(f"{file}, an Excel file,"):
         import pandas as pd
 
         try:

@@ -1,4 +1,4 @@
 """Helpers that know nothing of containers.
 
-Read ``checks``, ``files``, ``extras`` and ``compiled``, in this order.
+Read ``checks``, ``files`` and ``compiled``, in this order.
 """

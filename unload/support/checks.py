@@ -1,9 +1,12 @@
 """Errors for bad input: each names the argument, its value and what was expected.
 
-What is of another type is a TypeError, what has another value a ValueError.
+What is of another type is a TypeError, what has another value a ValueError; a library that is not
+installed is a ModuleNotFoundError that says how it is.
 """
 
-from collections.abc import Hashable, Iterable, Mapping
+import re
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +17,12 @@ import numpy as np
 _Shape = tuple[int | None, ...] | None
 _Option = TypeVar("_Option")
 _LARGEST = np.iinfo(np.int64).max
+# The extra of the package that installs a library, by the library's name.
+EXTRAS = {
+    **dict.fromkeys(("gymnasium", "llvmlite", "numba", "safetensors", "torch", "tqdm"), "train"),
+    **dict.fromkeys(("PIL", "matplotlib", "plotly"), "view"),
+    "openpyxl": "excel",
+}
 
 
 def instance(name: str, value: object, kind: Any, expected: str) -> Any:
@@ -151,3 +160,18 @@ def _array(name: str, value: object, shape: _Shape, kinds: str, expected: str) -
         raise TypeError(f"{name} has dtype {array.dtype}; expected {expected}")
     shaped(name, array, shape)
     return array
+
+
+@contextmanager
+def needed_for(what: str) -> Iterator[None]:
+    """Imports for ``what``: a ModuleNotFoundError names the extra that brings the library."""
+    try:
+        yield
+    except ImportError as error:
+        # pandas gives its own error no name.
+        said = [error.name] if error.name else re.findall(r"\w+", str(error))
+        names = [name for name in EXTRAS if name in said]
+        if not names:
+            raise
+        wanted = f'expected {names[0]}: pip install "unload[{EXTRAS[names[0]]}]"'
+        raise ModuleNotFoundError(f"{what} needs more than an order; {wanted}") from error

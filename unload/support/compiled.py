@@ -57,7 +57,7 @@ class Compiled:
     @cached_property
     def dispatcher(self) -> Any:
         """What numba has made of the function."""
-        njit, place, config = _numba().njit, _folder(), _config()
+        njit, config, place = _numba().njit, _numba().config, _folder()
         if place is None:
             return njit(**self._options)(self._function)
         # numba reads this setting when it is told to cache a function; then it is the user's again.
@@ -73,26 +73,15 @@ class Compiled:
         return self.dispatcher._numba_type_
 
 
-def _numba() -> Any:
+def _numba() -> Any:  # type checkers do not see the names of its settings
     import numba
 
     return numba
 
 
-def _config() -> Any:
-    return _numba().config  # whose names type checkers do not see
-
-
 def threads() -> int:
     """How many threads numba takes, which the environment's ``NUMBA_NUM_THREADS`` sets."""
-    return _config().NUMBA_NUM_THREADS
-
-
-def _versions() -> tuple[str, ...]:
-    """Of Python and of the libraries that decide what is compiled."""
-    import llvmlite
-
-    return sys.version, _numba().__version__, llvmlite.__version__, np.__version__
+    return _numba().config.NUMBA_NUM_THREADS
 
 
 @cache
@@ -102,7 +91,7 @@ def _folder() -> Path | None:
     They are ``NUMBA_CACHE_DIR`` if it is set, the package's ``__pycache__``, and the user's cache.
     """
     user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for place in (_config().CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
+    for place in (_numba().config.CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
         if not place:
             continue
         kept = Path(place, f"compiled-{_digest(_PACKAGE)}")
@@ -128,7 +117,8 @@ def _folder() -> Path | None:
 
 def _digest(package: Path) -> str:
     """Digest of ``_SOURCES`` in a folder, and of the versions of Python and the libraries."""
-    digest = blake2b(repr(_versions()).encode(), digest_size=8)
+    versions = sys.version, _numba().__version__, np.__version__
+    digest = blake2b(repr(versions).encode(), digest_size=8)
     for pattern in _SOURCES:
         for path in sorted(package.glob(pattern)):
             digest.update(path.read_bytes())

@@ -23,15 +23,10 @@ from uuid import uuid4
 import numpy as np
 from filelock import FileLock, Timeout
 
-try:
-    import fcntl
-except ImportError:  # on Windows, which lets nobody remove a file that is open
-    fcntl = None
-
 LOGGER = logging.getLogger(__name__)
 PATIENCE = 5.0  # s
 HELD = 1.0  # s for which a spreadsheet or a virus scanner may hold a file open
-FRESH = 1.0  # s, a file that is younger may not be locked by its writer yet
+ABANDONED = 3600.0  # s after which a half file that nothing was added to is nobody's
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 
 
@@ -40,16 +35,14 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
 
     Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
     processes may write one file: the last to finish wins. A killed writer leaves its partial
-    file behind, which nothing reads and git ignores, and which the next writer removes.
+    file behind, which nothing reads and git ignores, and which a later writer removes.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    remove_partial(path)
+    remove_partial(path, ABANDONED)
     partial = path.with_name(f"{path.name}.{uuid4().hex}.partial")
     try:
-        with open(partial, "x+b") as file:
-            with suppress(OSError):  # some file systems have no locks
-                _lock(file)
+        with open(partial, "xb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
@@ -63,21 +56,15 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
         partial.unlink(missing_ok=True)  # of a write that failed
 
 
-def remove_partial(path: Path) -> None:
-    """Remove what killed writers of a file have left beside it; a living one locks its own."""
+def remove_partial(path: Path, age: float = 0.0) -> None:
+    """Remove what killed writers of a file have left beside it, last written ``age`` s ago.
+
+    Right away where a lock keeps living writers out.
+    """
     for partial in path.parent.glob(f"{escape(path.name)}.{'[0-9a-f]' * 32}.partial"):
-        with suppress(OSError), open(partial, "rb") as file:
-            if time.time() - os.fstat(file.fileno()).st_mtime > FRESH:
-                _lock(file)
-                if fcntl is None:
-                    file.close()
+        with suppress(OSError):
+            if time.time() - partial.stat().st_mtime >= age:
                 partial.unlink()
-
-
-def _lock(file: BinaryIO) -> None:
-    """Lock an open file until it is closed; OSError if another process has done so."""
-    if fcntl is not None:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _replace(partial: Path, path: Path) -> None:
@@ -116,17 +103,16 @@ def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
     write_text(path, json.dumps(value, indent=2) + "\n")
 
 
-def read_json(path: str | Path, checked: bool = False) -> dict:
-    """Read a JSON file that holds an object; without its ``digest``, needed if ``checked``."""
+def read_json(path: str | Path) -> dict:
+    """Read a JSON file that holds an object; without its ``digest``, right if there is one."""
     try:
         value = json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError, MemoryError) as error:  # RecursionError: of deep nesting
         raise ValueError(f"{path} is not a readable JSON file: {error}") from error
     if not isinstance(value, dict):
         raise ValueError(f"{path} holds a {type(value).__name__}; expected an object")
-    if checked or "digest" in value:
-        wanted = value.pop("digest", None)
-        _check_equal(path, wanted, _digest_of(value))
+    if "digest" in value:
+        _check_equal(path, value.pop("digest"), _digest_of(value))
     return value
 
 
@@ -139,51 +125,39 @@ def _hash(content: bytes = b"") -> blake2b:
     return blake2b(content, digest_size=16)
 
 
-def write_arrays(path: str | Path, arrays: dict[str, np.ndarray], checked: bool = False) -> None:
-    """Write an ``.npz`` file of plain arrays (nothing pickled).
+def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
+    """Write an ``.npz`` file of plain arrays (nothing pickled) and of a ``digest`` of them.
 
-    If ``checked``, a digest of all its bytes follows them, by which ``read_arrays`` notices
-    changes. The format has checksums of its own, but none of what says how much is to be read.
+    The format has checksums of its own, but none of what says how much is to be read.
     """
-
-    def write(file: BinaryIO) -> None:
-        np.savez(file, allow_pickle=False, **arrays)
-        if checked:
-            file.seek(0)
-            content = _hash()
-            while part := file.read(2**20):
-                content.update(part)
-            file.write(content.digest())
-
-    write_atomically(path, write)
+    held = {"digest": _digest_of_arrays(arrays)} | arrays  # first: damage may cut off the last
+    write_atomically(path, lambda file: np.savez(file, allow_pickle=False, **held))
 
 
-def read_arrays(path: str | Path, checked: bool = False) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays, of which nothing is read before it is ``checked``."""
+def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
+    """Read an ``.npz`` file of plain arrays; without their ``digest``, right if there is one."""
     # Opened here, because NumPy leaves a damaged file open that it has opened itself.
     with open(path, "rb") as file:
-        if checked:
-            _check_end(path, file)
         try:
             with np.load(file, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
+            wanted, found = arrays.pop("digest", None), _digest_of_arrays(arrays)
         except Exception as error:  # zipfile, zlib, tokenize and NumPy have errors of their own
             raise ValueError(f"{path} is not a readable .npz file: {error}") from error
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):
             raise ValueError(f"{path} is not a readable .npz file: {name} is not an array")
+    if wanted is not None:
+        _check_equal(path, np.asarray(wanted).tobytes().hex(), found.tobytes().hex())
     return arrays
 
 
-def _check_end(path: str | Path, file: BinaryIO) -> None:
-    """Raise ValueError unless a file ends with the digest of the bytes before; go to its start."""
-    content = _hash()
-    left = os.fstat(file.fileno()).st_size - content.digest_size
-    while left > 0 and (part := file.read(min(left, 2**20))):
-        content.update(part)
-        left -= len(part)
-    _check_equal(path, file.read().hex(), content.hexdigest())
-    file.seek(0)
+def _digest_of_arrays(arrays: dict[str, np.ndarray]) -> np.ndarray:
+    """Digest of the contents of arrays in the order of their names, (32,) uint8."""
+    content = blake2b(digest_size=32)
+    for name in sorted(arrays):
+        content.update(np.ascontiguousarray(arrays[name]).data)
+    return np.frombuffer(content.digest(), np.uint8)
 
 
 def digest(path: str | Path) -> str:
