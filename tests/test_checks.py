@@ -17,7 +17,7 @@ CHAPTERS = [path for path in run.notebooks() if path.parent == run.HERE]
 
 def said(path, word):
     """The exercises of which the stored outputs of a notebook say a word."""
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text(encoding="utf-8"))
     outputs = [output for cell in content["cells"] for output in cell.get("outputs", [])]
     printed = "".join("".join(output.get("text", "")) for output in outputs)
     return sorted(re.findall(rf"^(\d\d/\d): {word}$", printed, re.MULTILINE))

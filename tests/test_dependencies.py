@@ -16,7 +16,7 @@ import pytest
 from tests import wheels
 
 ROOT = Path(__file__).resolve().parent.parent
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # What loads and orders need, and what the rest of the package does.
 OF_THE_PACKAGE = ("train", "view")
 EXTRAS = PROJECT["optional-dependencies"]
@@ -65,9 +65,9 @@ def wanted_here() -> set[str]:
 def sources(folder: str) -> Iterator[str]:
     """The Python code of a folder: its modules, and the code cells of its notebooks."""
     for path in (ROOT / folder).rglob("*.py"):
-        yield path.read_text()
+        yield path.read_text(encoding="utf-8")
     for path in (ROOT / folder).rglob("*.ipynb"):
-        for cell in json.loads(path.read_text())["cells"]:
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
             if cell["cell_type"] == "code":
                 lines = "".join(cell["source"]).splitlines()
                 yield "\n".join(line for line in lines if not line.startswith(("%", "!")))

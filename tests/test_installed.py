@@ -85,7 +85,9 @@ def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_pa
     assert shipped.items() <= before.items() and sum(map(len, shipped.values())) < 500_000
     work = tmp_path / "work"
     work.mkdir()
-    example, mark, _ = (ROOT / "README.md").read_text().partition("# With PyBullet or MuJoCo:\n")
+    example, mark, _ = (
+        (ROOT / "README.md").read_text(encoding="utf-8").partition("# With PyBullet or MuJoCo:\n")
+    )
     names = f"FOLDER = {str(installed)!r}\nEXAMPLE = {example.partition('```python')[2]!r}"
     printed = run(names + WITHOUT_ENGINES, work, installed)
     assert mark and printed.startswith("136 True\n") and "pip install mujoco-core" in printed
@@ -114,7 +116,7 @@ def test_an_import_takes_few_modules(tmp_path, used, absent):
 
 def test_names_are_where_type_checkers_find_them():
     """What is listed, what is imported for type checkers, and what is imported when it is used."""
-    source = ast.parse((ROOT / "unload/__init__.py").read_text())
+    source = ast.parse((ROOT / "unload/__init__.py").read_text(encoding="utf-8"))
     typed = next(node for node in source.body if isinstance(node, ast.If))
     found = {}
     exec(compile(ast.Module(typed.body, []), "imports", "exec"), found)
@@ -127,6 +129,6 @@ def test_names_are_where_type_checkers_find_them():
 
 
 def test_there_is_one_version():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert unload.__version__ == project["version"]
-    assert f"version: {unload.__version__}" in (ROOT / "CITATION.cff").read_text()
+    assert f"version: {unload.__version__}" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

@@ -66,7 +66,9 @@ def test_nothing_is_imported_before_it_is_needed(tmp_path):
     A script entry point calls ``command``. A pipe that is closed, as by ``head``, ends the program
     without an error.
     """
-    entry = tomllib.loads((paths.ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+    entry = tomllib.loads((paths.ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "scripts"
+    ]
     module, _, name = entry["unload"].partition(":")
     (tmp_path / "bad.csv").write_bytes(b"\x1f\x8b")
     program = f"""if True:

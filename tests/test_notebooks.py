@@ -16,7 +16,7 @@ CHAPTERS = [path for path in NOTEBOOKS if path.parent.name not in run.ASIDE]
 
 
 def cells(path, kind):
-    content = json.loads(path.read_text())
+    content = json.loads(path.read_text(encoding="utf-8"))
     return [cell for cell in content["cells"] if cell["cell_type"] == kind]
 
 
@@ -64,7 +64,7 @@ def test_chapter_tells_what_one_learns_in_how_long_and_closes_with_checked_exerc
     # The minutes are those of its words, figures and exercises.
     stated = int(re.search(r"\*\*Time\*\*: (\d+) minutes to read", prose[0])[1])
     assert abs(stated - run.measured(path)["minutes"]) <= 1
-    readme = (run.HERE.parent / "README.md").read_text()
+    readme = (run.HERE.parent / "README.md").read_text(encoding="utf-8")
     assert re.search(rf"notebooks/{path.name}\) \((\d+)", readme)[1] == str(stated)
 
 
@@ -77,7 +77,7 @@ def test_committed_outputs_are_clean(path):
     assert not [output for output in outputs if output["output_type"] == "error"]
     assert not [output for output in outputs if output.get("name") == "stderr"]
     assert not [output for output in outputs if run.WIDGET_MIMETYPE in output.get("data", {})]
-    assert "widgets" not in json.loads(path.read_text())["metadata"]
+    assert "widgets" not in json.loads(path.read_text(encoding="utf-8"))["metadata"]
     assert path.stat().st_size < 1_500_000
 
 
@@ -88,7 +88,7 @@ def test_a_wrong_answer_stops_every_solution():
 
 
 def test_reduced_parameters_belong_to_notebooks():
-    tables = tomllib.loads((run.HERE / "reduced.toml").read_text())
+    tables = tomllib.loads((run.HERE / "reduced.toml").read_text(encoding="utf-8"))
     assert set(tables) <= {run.key(path) for path in NOTEBOOKS}
 
 
@@ -120,7 +120,10 @@ def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(
 ):
     path = tmp_path / "00_some.ipynb"
     run.nbformat.write(run.nbformat.v4.new_notebook(), path)
-    before, result = path.read_text(), run.nbformat.v4.new_notebook(metadata={"title": "run"})
+    before, result = (
+        path.read_text(encoding="utf-8"),
+        run.nbformat.v4.new_notebook(metadata={"title": "run"}),
+    )
 
     def execute(source: str, output: str, **settings) -> None:
         Path(output).write_text("", encoding="utf-8")  # as papermill does first of all
@@ -135,7 +138,7 @@ def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(
     monkeypatch.setattr(sys, "argv", ["run.py", "--in-place"])
     with pytest.raises(KeyboardInterrupt) if stopped else nullcontext():
         assert run.main() == 0
-    assert (path.read_text() == before) == stopped
+    assert (path.read_text(encoding="utf-8") == before) == stopped
 
 
 def test_a_widget_leaves_what_stands_beside_it(tmp_path):

@@ -106,11 +106,11 @@ def room_graph(package: str) -> dict[str, set[str]]:
     return graph
 
 
-def test_rooms_are_in_the_order_that_the_readme_gives():
+def test_rooms_are_in_the_order_that_is_written_down():
     ordered = levels(room_graph("unload"))
     sentence = " < ".join(", ".join(f"`{name}`" for name in level) for level in ordered)
-    readme = (ROOT / "README.md").read_text().replace("\n", " ")
-    assert f"run one way: {sentence}." in readme, sentence
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").replace("\n", " ")
+    assert f"run one way: {sentence}." in text, sentence
     assert len(room_graph("unload")) <= 8
 
 
@@ -122,7 +122,7 @@ def test_no_imports_run_in_a_circle():
 def test_the_package_does_not_know_the_studies():
     """Nor do its tests, except those of the whole house."""
     files = (ROOT / "unload").rglob("*.py")
-    assert not [path for path in files if re.search(r"\bstudies\b", path.read_text())]
+    assert not [path for path in files if re.search(r"\bstudies\b", path.read_text(encoding="utf-8"))]
     tests = [path for name in room_graph("unload") for path in (TESTS / name).rglob("*.py")]
     assert not [path for path in tests if "studies" in {name.split(".")[0] for name in needs(path)}]
 
@@ -134,7 +134,7 @@ def test_each_room_names_its_files(package):
     if package == "unload":
         folders.remove(ROOT / package)
     for folder in folders:
-        tree = ast.parse((folder / "__init__.py").read_text())
+        tree = ast.parse((folder / "__init__.py").read_text(encoding="utf-8"))
         named = set(re.findall(r"``(\w+)``", ast.get_docstring(tree)))
         there = {path.stem for path in folder.glob("*.py")} - {"__init__"}
         assert there <= named, f"{folder} does not name {sorted(there - named)}"
@@ -145,7 +145,7 @@ def test_each_room_names_its_files(package):
 
 
 def test_the_way_to_contribute_has_a_row_for_each_room():
-    lines = (ROOT / "CONTRIBUTING.md").read_text().splitlines()
+    lines = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").splitlines()
     rows = [line.split("`")[1] for line in lines if line.startswith("| `")]
     in_order = [name for level in levels(room_graph("unload")) for name in level]
     of_unload = [row for row in rows if row.startswith("unload/")]
@@ -191,7 +191,7 @@ def test_text_is_the_same_on_every_system():
     folders = (*PACKAGES, "notebooks")
     paths = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     assert not [call for path in paths for call in careless(path.read_text(encoding="utf-8"))]
-    wrong = "open(x, 'a'); x.read_text(); files.write_text(x, y); t.to_csv(x, encoding='utf-8')"
+    wrong = "open(x, 'a'); x.read_text(encoding="utf-8"); files.write_text(x, y); t.to_csv(x, encoding='utf-8')"
     right = "open(x, 'rb'); x.read_text(encoding='utf-8'); t.to_csv(lineterminator='\\n')"
     assert len(careless(wrong)) == 3 and not careless(right)
 

@@ -16,7 +16,7 @@ from studies.ties.criterion import likeness
 from studies.ties.training import TIES
 
 ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text()
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 (EXAMPLE,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
@@ -36,14 +36,16 @@ def test_links_lead_to_files():
 
 
 def test_commands_are_those_of_the_makefile():
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    text = README + (ROOT / "CONTRIBUTING.md").read_text()
+    targets = set(
+        re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    text = README + (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     named = set(re.findall(r"(?:^|`)make ([a-z]+)", text, re.MULTILINE))
     assert {"figures", "test", "lint", "quick"} <= named <= targets
 
 
 def test_the_way_to_contribute_names_files_that_exist():
-    text = (ROOT / "CONTRIBUTING.md").read_text()
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     paths = re.findall(r"`([a-z_/]+/[\w.]+(?:\.py|\.toml|/))`", text)
     assert len(paths) > 10
     places = (ROOT, ROOT / "unload")
@@ -79,7 +81,10 @@ def test_the_numbers_are_those_of_the_data():
 
 def test_the_moving_picture_is_described_by_its_notebook():
     """Containers that are emptied, of 100, as notebook 01 prints them."""
-    text, notebook = " ".join(README.split()), (ROOT / "notebooks/01_task.ipynb").read_text()
+    text, notebook = (
+        " ".join(README.split()),
+        (ROOT / "notebooks/01_task.ipynb").read_text(encoding="utf-8"),
+    )
     rows = re.findall(r"\d +(\w+) +(True|False) +(\d+) +[\d.]+", notebook)
     emptied = {(policy, mask == "True"): int(count) for policy, mask, count in rows}
     stuck = [100 - emptied[policy, False] for policy in ("paper_seed_2", "paper")]
@@ -90,7 +95,7 @@ def test_the_moving_picture_is_described_by_its_notebook():
 
 
 def test_the_benchmarks_are_those_of_the_data():
-    text = (ROOT / "notebooks/benchmarks.md").read_text()
+    text = (ROOT / "notebooks/benchmarks.md").read_text(encoding="utf-8")
     played = read_table("policies/comparison")
     played = played[played["condition"] == "500 picks"]
     rows = re.findall(

@@ -51,7 +51,7 @@ def test_what_a_run_leaves(tmp_path, fields):
     assert curve["success_rate"].nunique() > 2
     assert loaded.card["loads"] == "the paper's"
     assert loaded.card["msr"] == {"at the end of its training": curve["success_rate"].iloc[-1]}
-    stored = json.loads((folder / "config.json").read_text())
+    stored = json.loads((folder / "config.json").read_text(encoding="utf-8"))
     assert stored.pop("marks").keys() == {"policy.safetensors", "curve.csv"}
     assert stored.pop("change") is None and stored.pop("stack") is None and stored.pop("digest")
     stored.pop("engine", None)  # where it is not the reference
@@ -156,7 +156,7 @@ def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
     assert shown.err == "" and max(map(len, shown.out.splitlines())) <= 100
     with open(tmp_path / "log.txt", "w", encoding="utf-8") as log:
         train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
-    assert "200/200" in (tmp_path / "log.txt").read_text()
+    assert "200/200" in (tmp_path / "log.txt").read_text(encoding="utf-8")
     runs.interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)
     train(TrainConfig(**CONTAINER), tmp_path / "resumed")
     shown = capsys.readouterr().out

@@ -103,9 +103,9 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
         train(config, tmp_path / "alone" / name, progress=False)
         assert_same(folder, tmp_path / "alone" / name)
         record = files.read_json(folder / "record.json")
-        assert '"digest"' in (folder / "record.json").read_text()
+        assert '"digest"' in (folder / "record.json").read_text(encoding="utf-8")
         assert record["peak_memory_mib"] > 50 and 0 <= record["wall_time_s"] < 60
-        assert "256/256" in (folder / "log.txt").read_text()
+        assert "256/256" in (folder / "log.txt").read_text(encoding="utf-8")
     written = sorted(tmp_path.glob("many/set/*/*"))
     before = [path.stat().st_mtime_ns for path in written]
     sweep.run_sweep(configs, tmp_path / "many", n_jobs=1)
@@ -154,7 +154,7 @@ def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp
     report = sweep.run_sweep(configs, tmp_path, n_jobs=1, changes={"set/leaning": leaning})
     blocked, fine, fallen = report["error"]
     assert "run_0" in blocked and fine == "" and fallen == "RuntimeError: it fell over"
-    assert "in leaning" in (tmp_path / "set/leaning/log.txt").read_text()
+    assert "in leaning" in (tmp_path / "set/leaning/log.txt").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -56,7 +56,9 @@ RANDOM = re.compile(r"T_[0-9a-f]{5}|( object)? at 0x[0-9a-f]+")
 
 def cells_of(notebook: str) -> dict[str, dict]:
     """The code cells of a notebook, by their ids."""
-    cells = json.loads((paths.ROOT / "notebooks" / f"{notebook}.ipynb").read_text())["cells"]
+    cells = json.loads(
+        (paths.ROOT / "notebooks" / f"{notebook}.ipynb").read_text(encoding="utf-8")
+    )["cells"]
     return {cell["id"]: cell for cell in cells if cell["cell_type"] == "code"}
 
 

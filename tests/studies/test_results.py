@@ -57,7 +57,7 @@ def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
         assert kept(tmp_path, {"seed": seed}, partial(asked, seed)).value == seed
     assert asked.call_count == 2  # neither replaces the other
     one, other = tmp_path.iterdir()
-    one.write_text(other.read_text())
+    one.write_text(other.read_text(encoding="utf-8"))
     values = [kept(tmp_path, {"seed": seed}, partial(asked, seed)).value for seed in (1, 2)]
     assert values == [1, 2] and asked.call_count == 3
 
@@ -67,7 +67,9 @@ def test_a_damaged_answer_is_named(tmp_path):
     (path,) = tmp_path.iterdir()
     assert len(path.stem) == 16
     for damaged, message in {
-        path.read_text().replace('"value": 0', '"value": 1'): "was changed or damaged",
+        path.read_text(encoding="utf-8").replace(
+            '"value": 0', '"value": 1'
+        ): "was changed or damaged",
         '{"question": {"seed": 1}}': "has no record, value",
         "{": "is not a readable JSON file",
     }.items():
@@ -98,7 +100,10 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     command, settings = "make tea", {"seeds": [0]}
     publish("t/tea", {"a": table, "b": table}, command, settings, results, reduced=True)
     publish("more", {"c": table}, command, settings, results[:1], "f00", "%.12g")
-    texts = [(own_data / f"{name}.csv").read_text() for name in ("reduced/t/a", "reduced/t/b", "c")]
+    texts = [
+        (own_data / f"{name}.csv").read_text(encoding="utf-8")
+        for name in ("reduced/t/a", "reduced/t/b", "c")
+    ]
     assert texts == ["seed,msr\n0,0.333333\n"] * 2 + ["seed,msr\n0,0.333333333333\n"]
     tea, more = map(read_provenance, ("reduced/t/tea", "more"))
     assert (tea["command"], tea["settings"], tea["reduced"]) == (command, settings, True)

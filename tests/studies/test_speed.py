@@ -233,4 +233,4 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     trees.put(tmp_path)
     endless = CODE.encode() + b"while True:\n    pass\n"
     assert mutants.killed_by(trees, room, path, endless, limit=2) == "time limit"
-    assert path.read_text() == CODE and trees.get() == tmp_path
+    assert path.read_text(encoding="utf-8") == CODE and trees.get() == tmp_path

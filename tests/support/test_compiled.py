@@ -54,7 +54,7 @@ def run(copy: Path) -> tuple[str, str]:
 
 def edit(copy: Path, old: str, new: str) -> None:
     path = copy / "unload/task.py"
-    path.write_text(path.read_text().replace(old, new))
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new))
 
 
 def test_code_is_compiled_once_for_each_value_of_a_constant(copy):
@@ -113,7 +113,7 @@ def test_numbas_own_setting_is_the_users_again(monkeypatch, tmp_path):
 def test_all_that_compiled_functions_read_is_among_the_sources():
     sources = {path for pattern in compiled._SOURCES for path in PACKAGE.glob(pattern)}
     for path in PACKAGE.rglob("*.py"):
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         assert "njit" not in text or path.name == "compiled.py", f"{path} should use compiled"
         if "import compiled" not in text:
             continue

@@ -39,13 +39,13 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
         file.write(b"half of the n")
         (partial,) = {*tmp_path.iterdir()} - {path}
         assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", partial.name)
-        assert path.read_text() == "old"
+        assert path.read_text(encoding="utf-8") == "old"
         raise error
 
     with pytest.raises(type(error), match=message):
         files.write_atomically(path, write)
-    assert path.read_text() == "old" and [path] == [*tmp_path.iterdir()]
-    assert "*.partial" in (ROOT / ".gitignore").read_text().splitlines()
+    assert path.read_text(encoding="utf-8") == "old" and [path] == [*tmp_path.iterdir()]
+    assert "*.partial" in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
 
 
 def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
@@ -144,10 +144,10 @@ def test_bad_json_is_refused_by_name(tmp_path, text, message):
 def test_json_has_a_digest_where_it_is_wanted(tmp_path):
     """That of its one-line form, known from the command ``b2sum --length 128``."""
     files.write_json(tmp_path / "x.json", {"share": 0.25})
-    assert (tmp_path / "x.json").read_text() == '{\n  "share": 0.25\n}\n'
+    assert (tmp_path / "x.json").read_text(encoding="utf-8") == '{\n  "share": 0.25\n}\n'
     assert files.read_json(tmp_path / "x.json") == {"share": 0.25}
     files.write_json(tmp_path / "x.json", {"share": 0.25}, checked=True)
-    stored = json.loads((tmp_path / "x.json").read_text())
+    stored = json.loads((tmp_path / "x.json").read_text(encoding="utf-8"))
     assert stored == {"share": 0.25, "digest": "013c6b44fb43c4be645a5d897a096fce"}
     files.write_json(tmp_path / "x.json", stored | {"share": 0.5})
     with pytest.raises(ValueError, match=f"^{tmp_path}/x.json was changed or damaged"):
@@ -269,7 +269,9 @@ def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
     monkeypatch.setattr(files, "HELD", 0.5)
     with nullcontext() if written else pytest.raises(OSError, match="held by a reader"):
         files.write_text(path, "new")
-    assert path.read_text() == ("new" if written else "old") and [*tmp_path.iterdir()] == [path]
+    assert path.read_text(encoding="utf-8") == ("new" if written else "old") and [
+        *tmp_path.iterdir()
+    ] == [path]
     assert len(refused) == times or times == 10**6
 
 
@@ -284,7 +286,7 @@ def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     allowed = (name, link) != ("lock", os.symlink)
     with nullcontext() if allowed else refused, files.locked(tmp_path / "run"):
         assert allowed
-    assert (tmp_path / "notes").read_text() == "precious"
+    assert (tmp_path / "notes").read_text(encoding="utf-8") == "precious"
 
 
 @pytest.mark.needs("fcntl")
@@ -311,5 +313,8 @@ def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, 
 
     monkeypatch.setattr(os, "fsync", sync)
     files.write_text(tmp_path / "x", "whole")
-    assert (tmp_path / "x").read_text() == "whole" and synced == [len("whole"), "folder"]
+    assert (tmp_path / "x").read_text(encoding="utf-8") == "whole" and synced == [
+        len("whole"),
+        "folder",
+    ]
     assert os.listdir("/proc/self/fd") == opened

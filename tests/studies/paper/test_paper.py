@@ -117,7 +117,7 @@ def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch)
     assert summary.loc[8, "final_msr"] == pytest.approx(mean)
     (path,) = (own_data / "dummy_sim_with_hist_equal").iterdir()
     assert path.name == "loss_curve_bz_8_lr_0.001_agent_1.csv"
-    lines = path.read_text().splitlines()
+    lines = path.read_text(encoding="utf-8").splitlines()
     losses = tuning.read_curves("loss", 8, 1e-3)[1]
     assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
 

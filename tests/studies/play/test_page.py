@@ -66,10 +66,10 @@ def observations(rng: np.random.Generator, count: int) -> np.ndarray:
 
 def test_the_file_is_that_of_its_parts(tmp_path, monkeypatch):
     """If not: ``python -m studies.play.page``."""
-    text = page.PAGE.read_text()
+    text = page.PAGE.read_text(encoding="utf-8")
     monkeypatch.setattr(paths, "FIGURES", tmp_path)
     runpy.run_path(page.__file__, run_name="__main__")
-    assert text == (tmp_path / page.PAGE.name).read_text()
+    assert text == (tmp_path / page.PAGE.name).read_text(encoding="utf-8")
     assert len(text.encode()) <= MOST_BYTES
     assert not re.search(r"^(import|export) |^ *//", text, re.MULTILINE)
     links = re.findall(r'<a data-file="(.+?)"', text)

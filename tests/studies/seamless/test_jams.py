@@ -198,7 +198,7 @@ def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
     }
     for name, table in tables.items():
         committed = paths.ROOT / f"data/seamless/{name}.csv"
-        assert committed.read_text().startswith(",".join(table) + "\n")
+        assert committed.read_text(encoding="utf-8").startswith(",".join(table) + "\n")
     counted = tables["jams"][["question", "load", "gap", "moment", "free", "jammed", "median"]]
     assert counted.to_numpy().tolist() == [
         ["fresh", 0, 0, 0, 1, 1, 0.1], ["width", 2, -0.0001, 25, 3, 1, 0.2],

@@ -74,7 +74,7 @@ def test_neighbours_are_those_of_the_measured_places():
 
 
 def test_the_cells_are_those_of_the_plan():
-    plan = (paths.DATA / "seamless" / "PLAN.md").read_text()
+    plan = (paths.DATA / "seamless" / "PLAN.md").read_text(encoding="utf-8")
     assert f"drawn again within {training.LASTS} successes" in " ".join(plan.split())
     patterns = re.findall(r"`([a-z_0-9.*]+)`", plan[plan.index("## Runs") :])
     assert not [name for name in CELLS if not any(fnmatch(name, each) for each in patterns)]
