@@ -122,7 +122,8 @@ def test_no_imports_run_in_a_circle():
 def test_the_package_does_not_know_the_studies():
     """Nor do its tests, except those of the whole house."""
     files = (ROOT / "unload").rglob("*.py")
-    assert not [path for path in files if re.search(r"\bstudies\b", path.read_text(encoding="utf-8"))]
+    texts = (path.read_text(encoding="utf-8") for path in files)
+    assert not [text for text in texts if re.search(r"\bstudies\b", text)]
     tests = [path for name in room_graph("unload") for path in (TESTS / name).rglob("*.py")]
     assert not [path for path in tests if "studies" in {name.split(".")[0] for name in needs(path)}]
 
@@ -191,7 +192,7 @@ def test_text_is_the_same_on_every_system():
     folders = (*PACKAGES, "notebooks")
     paths = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     assert not [call for path in paths for call in careless(path.read_text(encoding="utf-8"))]
-    wrong = "open(x, 'a'); x.read_text(encoding="utf-8"); files.write_text(x, y); t.to_csv(x, encoding='utf-8')"
+    wrong = "open(x, 'a'); x.read_text(); files.write_text(x, y); t.to_csv(x, encoding='utf-8')"
     right = "open(x, 'rb'); x.read_text(encoding='utf-8'); t.to_csv(lineterminator='\\n')"
     assert len(careless(wrong)) == 3 and not careless(right)
 
