@@ -70,7 +70,7 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
                     place + np.asarray(spread)[shown], 100 * group["end"][shown], "o",
                     markersize=5, markeredgecolor="C1", markerfacecolor=face,
                 )  # fmt: skip
-            labels.append(f"{label}\n({len(group)} runs)")
+            labels.append(f"{label}\n({len(group)})")
         axes.axhline(100 * PAPER_MSR, color="0.4", linestyle=":", linewidth=1)
         axes.set_xticks(range(len(KINDS)), labels, fontsize=7)
         axes.set(title=f"{'with' if mask else 'without'} the mask", ylim=(0, 103))
@@ -118,22 +118,25 @@ def draw_answer() -> Figure:
     _label(left, (0.02, 0.96), f"with the mask\n({count} runs)", ranks)
     left.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", ms=12, clip_on=False, zorder=5)
     _label(left, (0.04, 0.04), "the paper", "black")
-    left.set_title("Equals ranked by noise that is frozen:\nruns rise, and fall", loc="left")
+    left.set_title(
+        "Equals ranked by noise that is frozen,\nb = 256 and 2048: runs rise, and fall", loc="left"
+    )
 
     drifting = _draw_runs(middle, ties, ["drifting_mask"], ranks)
     anew = _draw_runs(middle, ties, ["anew_mask"], COLOURS["level"])
-    count = _draw_runs(middle, earlier, ["ties_by_order_mask"], shared)
-    count += _draw_runs(middle, paper, ["averaged_mask", "averaged_b2048_mask"], shared)
+    ordered = _draw_runs(middle, earlier, ["ties_by_order_mask"], shared)
+    count = _draw_runs(middle, paper, ["averaged_mask", "averaged_b2048_mask"], shared)
     _label(middle, (0.98, 0.36), f"by noise that drifts ({drifting})", ranks)
     _label(middle, (0.98, 0.26), f"by noise drawn anew at each pick ({anew})", COLOURS["level"])
-    _label(middle, (0.98, 0.16), f"by the items' order, or alike ({count})", shared)
-    middle.set_title("Equals ranked otherwise, with the mask:\nthat decides", loc="left")
+    said = f"by the items' order ({ordered}), or with shared ranks ({count})"
+    _label(middle, (0.98, 0.16), said, shared)
+    middle.set_title("Equals ranked otherwise, with the mask:\nmost stay up", loc="left")
 
     count = _draw_runs(right, paper, ["positions_mask", "positions_no_mask"], positions)
     _label(right, (0.98, 0.36), f"with the mask and without ({count} runs)", positions)
     right.set_title("Positions instead of ranks:\nnone falls", loc="left")
     for axes in panels:
-        axes.set(xlim=(0, 20), ylim=(0, 102), xlabel="million picks")
+        axes.set(xlim=(0, 20), xticks=range(0, 21, 5), ylim=(0, 102), xlabel="million picks")
     left.set_ylabel("successful picks while training (%)")
     return figure
 
