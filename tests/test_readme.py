@@ -54,7 +54,8 @@ def test_the_way_to_contribute_names_files_that_exist():
 
 def test_the_answer_is_that_of_the_data():
     text = " ".join(README.split())
-    runs = by_run(read_grid(PAPER, cells=PAPER_CELLS), likeness)
+    paper = by_run(read_grid(PAPER), likeness)
+    runs = paper[paper["cell"].isin([*PAPER_CELLS])]
     assert f"The {len(runs)} runs of its configuration here start at 26–27 %" in text
     assert runs["start"].between(0.255, 0.276).all()
     ends = 100 * by_cell(runs)["end"]
@@ -64,13 +65,11 @@ def test_the_answer_is_that_of_the_data():
     published = read_table("falls/published").query("cell in @PAPER_CELLS")
     assert f"Without x and y all {len(published)} are right" in text
     assert (published["judged_place"] == 1).all()
-    paper = by_run(read_grid(PAPER), likeness)
     shared = paper[paper["cell"].isin(["averaged_mask", "averaged_b2048_mask"])]
     ordered = read_table("ties/earlier").query("cell == 'ties_by_order_mask'")
     assert f"none of {len(shared) + len(ordered)} runs falls" in text
     assert not shared["fell"].any() and not ordered["fell"].any()
-    every = [by_run(read_grid(grid), likeness) for grid in (LONG, SEAMLESS, TIES)]
-    every.append(paper)
+    every = [paper, *(by_run(read_grid(grid), likeness) for grid in (LONG, SEAMLESS, TIES))]
     assert f"one of {sum(map(len, every))} published runs" in text
     assert sum(runs["both"].sum() for runs in every) == 1
 
@@ -89,10 +88,8 @@ def test_the_numbers_are_those_of_the_data():
 
 def test_the_moving_picture_is_described_by_its_notebook():
     """Containers that are emptied, of 100, as notebook 01 prints them."""
-    text, notebook = (
-        " ".join(README.split()),
-        (ROOT / "notebooks/01_task.ipynb").read_text(encoding="utf-8"),
-    )
+    text = " ".join(README.split())
+    notebook = (ROOT / "notebooks/01_task.ipynb").read_text(encoding="utf-8")
     rows = re.findall(r"\d +(\w+) +(True|False) +(\d+) +[\d.]+", notebook)
     emptied = {(policy, mask == "True"): int(count) for policy, mask, count in rows}
     stuck = [100 - emptied[policy, False] for policy in ("paper_seed_2", "paper")]

@@ -173,6 +173,9 @@ def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
         files.write_arrays(checkpoint, other)
         with pytest.raises(ValueError, match="checkpoint.npz"):
             train(config, checkpoint.parent, progress=False)
+    np.savez(checkpoint, **arrays)  # as another program writes it, without a digest
+    with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged"):
+        train(config, checkpoint.parent, progress=False)
 
 
 def test_what_a_change_puts_on_a_run_is_left_out_and_put_there_again(tmp_path):
@@ -244,6 +247,7 @@ def test_a_run_that_another_process_finishes_meanwhile_is_read(finished, monkeyp
         ("policy.safetensors", b"0.", b"1."),
         ("curve.csv", b"0.", b"1."),
         ("config.json", b'"digest": "', b'"digest": "0'),
+        ("config.json", b'"digest"', b'"other"'),
     ],
 )
 def test_a_damaged_file_of_a_finished_run_is_refused_by_name(finished, name, old, new):

@@ -257,6 +257,8 @@ def test_files_that_are_no_lift_table_are_refused_and_stay(tmp_path):
     check_refused(tmp_path / "other.npz", "other.npz is not a readable .npz file")
     files.write_arrays(tmp_path / "other.npz", {"weights": np.zeros(3)})
     check_refused(tmp_path / "other.npz", r"other.npz holds \['weights'\]; expected a lift table")
+    np.savez(tmp_path / "other.npz", weights=np.zeros(3))
+    check_refused(tmp_path / "other.npz", "other.npz was changed or damaged: .*, expected None")
     check_refused(tmp_path / "new.json", "new.json is no name of a lift table; .* in .npz")
     with pytest.raises(FileNotFoundError):
         LiftTable.load(tmp_path / "missing.npz")

@@ -108,6 +108,8 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
     assert len(whole) / 2 < refused < len(whole)
     np.savez(path, **ARRAYS)
     check_arrays(files.read_arrays(path))
+    with pytest.raises(ValueError, match="arrays.npz was changed or damaged: .*, expected None"):
+        files.read_arrays(path, checked=True)
 
 
 def test_a_dtype_that_has_no_bytes_to_compare_is_refused_by_name(tmp_path):
@@ -149,9 +151,10 @@ def test_json_has_a_digest_where_it_is_wanted(tmp_path):
     files.write_json(tmp_path / "x.json", {"share": 0.25}, checked=True)
     stored = json.loads((tmp_path / "x.json").read_text(encoding="utf-8"))
     assert stored == {"share": 0.25, "digest": "013c6b44fb43c4be645a5d897a096fce"}
-    files.write_json(tmp_path / "x.json", stored | {"share": 0.5})
-    with pytest.raises(ValueError, match=f"^{tmp_path}/x.json was changed or damaged"):
-        files.read_json(tmp_path / "x.json")
+    for changed, checked in ((stored | {"share": 0.5}, False), ({"share": 0.25}, True)):
+        files.write_json(tmp_path / "x.json", changed)
+        with pytest.raises(ValueError, match=f"^{tmp_path}/x.json was changed or damaged"):
+            files.read_json(tmp_path / "x.json", checked)
 
 
 def test_digest_is_that_of_the_content(tmp_path):

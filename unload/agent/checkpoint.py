@@ -118,7 +118,7 @@ class RunFolder:
         if not self._checkpoint.exists():
             return
         try:
-            stored = files.read_arrays(self._checkpoint)
+            stored = files.read_arrays(self._checkpoint, checked=True)
         except ValueError as error:
             raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
@@ -140,7 +140,7 @@ class RunFolder:
 
     def result(self, config: TrainConfig, settings: dict) -> TrainResult:
         """Read back what a finished run of ``training.train`` has left; see ``settings_of_run``."""
-        stored = files.read_json(self._config)
+        stored = files.read_json(self._config, checked=True)
         marks = stored.pop("marks", {})
         self._check_same(stored, settings)
         for path in (self.policy, self._curve):

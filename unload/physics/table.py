@@ -170,7 +170,7 @@ class LiftTable:
         """Read a table that ``save`` wrote; ValueError if damaged or of other physics settings."""
         # Of a damaged file nothing is taken, nor of one that holds another physics' answers.
         table = cls(engine)
-        arrays = files.read_arrays(path)
+        arrays = files.read_arrays(path, checked=True)
         if set(arrays) != _ARRAYS:
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
         settings, wanted = str(arrays["settings"]), json.dumps(settings_of_lifts(table.engine))

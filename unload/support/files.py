@@ -103,16 +103,17 @@ def write_json(path: str | Path, value: Any, checked: bool = False) -> None:
     write_text(path, json.dumps(value, indent=2) + "\n")
 
 
-def read_json(path: str | Path) -> dict:
-    """Read a JSON file that holds an object; without its ``digest``, right if there is one."""
+def read_json(path: str | Path, checked: bool = False) -> dict:
+    """Read a JSON file that holds an object; without its ``digest``, needed if ``checked``."""
     try:
         value = json.loads(Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError, MemoryError) as error:  # RecursionError: of deep nesting
         raise ValueError(f"{path} is not a readable JSON file: {error}") from error
     if not isinstance(value, dict):
         raise ValueError(f"{path} holds a {type(value).__name__}; expected an object")
-    if "digest" in value:
-        _check_equal(path, value.pop("digest"), _digest_of(value))
+    if checked or "digest" in value:
+        wanted = value.pop("digest", None)
+        _check_equal(path, wanted, _digest_of(value))
     return value
 
 
@@ -134,8 +135,8 @@ def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
     write_atomically(path, lambda file: np.savez(file, allow_pickle=False, **held))
 
 
-def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
-    """Read an ``.npz`` file of plain arrays; without their ``digest``, right if there is one."""
+def read_arrays(path: str | Path, checked: bool = False) -> dict[str, np.ndarray]:
+    """Read an ``.npz`` file of plain arrays; without their ``digest``, needed if ``checked``."""
     # Opened here, because NumPy leaves a damaged file open that it has opened itself.
     with open(path, "rb") as file:
         try:
@@ -147,8 +148,9 @@ def read_arrays(path: str | Path) -> dict[str, np.ndarray]:
     for name, array in arrays.items():
         if not isinstance(array, np.ndarray):
             raise ValueError(f"{path} is not a readable .npz file: {name} is not an array")
-    if wanted is not None:
-        _check_equal(path, np.asarray(wanted).tobytes().hex(), found.tobytes().hex())
+    if checked or wanted is not None:
+        stated = None if wanted is None else np.asarray(wanted).tobytes().hex()
+        _check_equal(path, stated, found.tobytes().hex())
     return arrays
 
 
