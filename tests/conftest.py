@@ -32,6 +32,7 @@ AVAILABLE = {
     "SIGPIPE": hasattr(signal, "SIGPIPE"),
     "fcntl": find_spec("fcntl") is not None,
     "fork": hasattr(os, "fork"),
+    "mkfifo": hasattr(os, "mkfifo"),
     "make": shutil.which("make") is not None,
     "symlinks": os.name == "posix",
 }

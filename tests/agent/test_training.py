@@ -317,6 +317,15 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message)
     assert not list(tmp_path.glob("*/*.*"))
 
 
+@pytest.mark.needs("mkfifo")
+def test_a_pipe_of_lifts_is_refused(tmp_path):
+    """It once hung."""
+    os.mkfifo(tmp_path / "fifo")
+    with pytest.raises(ValueError, match="lifts is '.*fifo'.*; expected"):
+        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, lifts=tmp_path / "fifo")
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_folder_in_use_is_refused(tmp_path):
     message = f"in use by process {os.getpid()}"
     with files.locked(tmp_path), pytest.raises(RuntimeError, match=message):
