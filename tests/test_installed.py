@@ -74,7 +74,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 @pytest.mark.slow
 @pytest.mark.needs("make")
 def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_path):
-    """Without engines all works but what is simulated, the README's example up to its mark, too.
+    """Without engines all works but what is simulated, as does the README's example up to training.
 
     What is computed lies where one works.
     """
@@ -85,10 +85,9 @@ def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_pa
     assert shipped.items() <= before.items() and sum(map(len, shipped.values())) < 500_000
     work = tmp_path / "work"
     work.mkdir()
-    example, mark, _ = (
-        (ROOT / "README.md").read_text(encoding="utf-8").partition("# With PyBullet or MuJoCo:\n")
-    )
-    names = f"FOLDER = {str(installed)!r}\nEXAMPLE = {example.partition('```python')[2]!r}"
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    example, mark, _ = readme.partition("```python\n")[2].partition("# Training, with PyBullet")
+    names = f"FOLDER = {str(installed)!r}\nEXAMPLE = {example!r}"
     printed = run(names + WITHOUT_ENGINES, work, installed)
     assert mark and printed.startswith("136 True\n") and "pip install mujoco-core" in printed
     assert contents(installed) == before
