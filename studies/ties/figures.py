@@ -105,21 +105,24 @@ def draw_duration(runs: pd.DataFrame) -> Figure:
 def draw_answer() -> Figure:
     """Learning curves of the paper's configuration, of other ties, and of positions.
 
-    Running means over half a million picks; a label counts the runs whose colour it has.
+    Running means over half a million picks; a label counts the runs whose colour it has. Thick
+    lines are means over runs.
     """
     paper, ties, earlier = read_grid(PAPER), read_grid(TIES), read_earlier()
     figure, panels = plt.subplots(1, 3, figsize=(11.4, 3.7), sharex=True, sharey=True)
     left, middle, right = panels
     ranks, shared, positions = (COLOURS[name] for name in ("ranks", "averaged", "positions"))
 
-    count = _draw_runs(left, paper, ["paper_no_mask", "paper_b2048_no_mask"], WITHOUT_MASK)
+    count = _draw_runs(
+        left, paper, ["paper_no_mask", "paper_b2048_no_mask"], WITHOUT_MASK, mean=True
+    )
     _label(left, (0.98, 0.04), f"without the mask ({count} runs)", WITHOUT_MASK)
-    count = _draw_runs(left, paper, ["paper_mask", "paper_b2048_mask"], ranks)
+    count = _draw_runs(left, paper, ["paper_mask", "paper_b2048_mask"], ranks, mean=True)
     _label(left, (0.02, 0.96), f"with the mask\n({count} runs)", ranks)
     left.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", ms=12, clip_on=False, zorder=5)
     _label(left, (0.04, 0.04), "the paper", "black")
     left.set_title(
-        "Equals ranked by noise that is frozen,\nb = 256 and 2048: runs rise, and fall", loc="left"
+        "The paper's configuration, ties broken\nby frozen noise: runs rise, and fall", loc="left"
     )
 
     drifting = _draw_runs(middle, ties, ["drifting_mask"], ranks)
@@ -128,9 +131,9 @@ def draw_answer() -> Figure:
     count = _draw_runs(middle, paper, ["averaged_mask", "averaged_b2048_mask"], shared)
     _label(middle, (0.98, 0.36), f"by noise that drifts ({drifting})", ranks)
     _label(middle, (0.98, 0.26), f"by noise drawn anew at each pick ({anew})", COLOURS["level"])
-    said = f"by the items' order ({ordered}), or with shared ranks ({count})"
+    said = f"by the items' order ({ordered}), or averaged ({count})"
     _label(middle, (0.98, 0.16), said, shared)
-    middle.set_title("Equals ranked otherwise, with the mask:\nmost stay up", loc="left")
+    middle.set_title("Ranks, ties broken otherwise,\nwith the mask: most stay up", loc="left")
 
     count = _draw_runs(right, paper, ["positions_mask", "positions_no_mask"], positions)
     _label(right, (0.98, 0.36), f"with the mask and without ({count} runs)", positions)
@@ -141,12 +144,20 @@ def draw_answer() -> Figure:
     return figure
 
 
-def _draw_runs(axes: Axes, curves: pd.DataFrame, cells: list[str], colour: str) -> int:
-    """Draw all runs of some cells, and return how many they are."""
+def _draw_runs(
+    axes: Axes, curves: pd.DataFrame, cells: list[str], colour: str, mean: bool = False
+) -> int:
+    """Draw all runs of some cells, pale below their mean if asked, and return how many they are."""
     runs = curves[curves["cell"].isin(cells)].groupby(["cell", "seed"])
-    for _, run in runs:
-        smooth = 100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean()
-        axes.plot(run["picks"] / 1e6, smooth, color=colour, linewidth=0.9, alpha=0.75)
+    smooth = [
+        pd.Series(100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean().to_numpy(),
+                  run["picks"] / 1e6)
+        for _, run in runs
+    ]  # fmt: skip
+    for run in smooth:
+        axes.plot(run, color=colour, linewidth=0.9, alpha=0.3 if mean else 0.75)
+    if mean:
+        axes.plot(pd.concat(smooth, axis=1).mean(axis=1), color=colour, linewidth=2.5)
     return len(runs)
 
 
