@@ -83,19 +83,22 @@ def draw_duration(runs: pd.DataFrame) -> Figure:
     """Where runs of the laboratory end, by how long an order of equals lasts.
 
     Args:
-        runs: ``ties/laboratory``; of its cells, those that differ in ρ and train without the mask.
+        runs: ``ties/laboratory``; of its cells, those that differ in ρ, with the mask and without.
     """
-    ends = {
-        f"{correlation:g}": runs.loc[runs["cell"] == f"rho_{correlation}_no_mask", "end"]
-        for correlation in RHOS
-    }
     figure, axes = plt.subplots(figsize=(5.6, 3.2))
-    for place, values in enumerate(ends.values()):
-        spread = np.linspace(-0.15, 0.15, len(values))
-        axes.plot(place + spread, 100 * values, "o", color=COLOURS["ranks"], ms=4, alpha=0.6)
-    means = [100 * values.mean() for values in ends.values()]
-    axes.plot(means, "k_-", ms=14, lw=0.8)
-    axes.set_xticks(range(len(ends)), ends)
+    for ending, colour, label, shift in (
+        ("", COLOURS["ranks"], "with the mask", -0.12),
+        ("_no_mask", WITHOUT_MASK, "without the mask", 0.12),
+    ):
+        cells = [f"rho_{correlation}{ending}" for correlation in RHOS]
+        ends = [100 * runs.loc[runs["cell"] == cell, "end"] for cell in cells]
+        places = np.arange(len(RHOS)) + shift
+        for place, values in zip(places, ends):
+            axes.plot(place + np.linspace(-0.1, 0.1, len(values)), values, "o", c=colour, ms=3)
+        means = [values.mean() for values in ends]
+        axes.plot(places, means, "_-", c=colour, mec="k", ms=12, lw=1.2, label=label)
+    axes.legend(loc="lower left")
+    axes.set_xticks(range(len(RHOS)), [f"{correlation:g}" for correlation in RHOS])
     axes.set(xlabel="ρ: correlation of the noise from one pick to the next", ylim=(0, 103))
     axes.set_ylabel("MSR over the last tenth (%)")
     return figure
