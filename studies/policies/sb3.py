@@ -30,7 +30,7 @@ from unload.agent.evaluation import Policy, evaluate
 from unload.agent.training import train
 from unload.network.peq import PEQNetwork
 
-CONFIG = TrainConfig(picks=2**16, replay_size=2**16, batch_size=64)
+CONFIG = TrainConfig(picks=2**15, replay_size=2**15, batch_size=64)
 SEEN = {"ranks": True, "positions": False}  # what is seen, and whether that is equalized
 SEEDS = range(3)
 ROLLOUT = 2048  # picks, the default of MaskablePPO for one environment
