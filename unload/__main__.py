@@ -105,7 +105,7 @@ def print_order(arguments: list[str]) -> None:
             print(f"{asked['by'].lstrip('-')} {stop}: {summary}", file=sys.stderr)
     left = len(load) - order["unloaded"].sum()
     if left:
-        parser.exit(1, f"{left} boxes are left, of which none that is visible can be lifted\n")
+        parser.exit(1, f"{left} boxes are left, of which none that is visible and free is lifted\n")
 
 
 def _draw(load, order, path: str) -> None:

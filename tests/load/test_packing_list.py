@@ -150,7 +150,7 @@ def test_other_columns_are_kept_and_named(written, caplog):
         "stop": [2, 1], "code": ["07", "11"], "note": ["", "top"], "name": ["B", "C"],
         "weight_kg": [1, 1], "yaw": [90, -90], "pitch": [0, 0],
     }  # fmt: skip
-    assert "kept but not used: stop, code, note, name\n" in caplog.text
+    assert "kept as they are: stop, code, note, name\n" in caplog.text
     assert "sizes are taken for those after the turns" in caplog.text
     assert {record.levelno for record in caplog.records} == {logging.WARNING}
 
@@ -213,9 +213,9 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,0,0,1.01,1,1,1"], r"row 2 .*: floats in load, .* at 1.01 m; .* z_min '1.01'"),
         ([UNIT, "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
         (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
-        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m \(the first"),
-        ([UNIT, "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
-        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
+        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m; .* container="),
+        ([UNIT, "a,1,0,0,1,1,1"], r"1 \(id 'a'\), row 2 \(id 'a'\): the same .* box \(.* id 'a'\)"),
+        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is .*has size_z 'wide'\)"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
         ([f"a,0,0,0,1,1,{_SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 7)], r"row 5 \(id '6'\): reaches from"),

@@ -115,7 +115,7 @@ class Columns:
             for name in found
             if name not in renamed and words[name] != meaning
         ]
-        for how, columns in (("read", understood), ("kept but not used:", rest)):
+        for how, columns in (("read", understood), ("kept as they are:", rest)):
             if columns:
                 LOGGER.warning("%s: %s %s", self._source, how, ", ".join(columns))
         rows = [str(row + 1) for row in range(len(table))]
@@ -133,9 +133,10 @@ class Columns:
         """Columns in m, kg or degrees, (n, k) float64, with ``usual`` where a name says no unit."""
         cells = [[_number(cell) for cell in self._table.with_points(name)] for name in names]
         numbers = np.array(cells).T
-        unreadable = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
-        if unreadable.size:
-            self.refuse(unreadable, "a cell that is no number; expected one", names)
+        unreadable = ~np.isfinite(numbers)
+        if (rows := np.flatnonzero(unreadable.any(axis=1))).size:
+            shown = [name for name, wrong in zip(names, unreadable[rows[0]]) if wrong]
+            self.refuse(rows, "a cell that is no number; expected one", shown)
         return numbers / [self._scales[name] or usual for name in names]
 
     def refuse(self, rows: Sequence[int] | np.ndarray, problem: str, shown: list[str]) -> NoReturn:
