@@ -82,6 +82,7 @@ def test_separators_decimals_and_encodings(written, tmp_path, separator, mark, e
         (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {"units": "cm"}),
         ('Box ID,X Min (mm),Y min [mm],z-min in mm,"L (mm)",W mm,H_mm', 1000, {"units": "m"}),
         ('id,x_min inch,y_min,z_min,"depth ("")",width inches,height in', 1 / 0.0254, {}),
+        ("Kolli-Nr.,x_min (ft),y_min,z_min,l,b,h (ft)", 1 / 0.3048, {}),
         ("nr,u,v,w,a,b,c", 1, {"columns": dict(zip("uvwabc", CORNERS.split(","))) | {"nr": "id"}}),
     ],
 )  # fmt: skip
@@ -232,8 +233,8 @@ def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, messag
 def test_files_that_are_no_lists_are_refused(written, tmp_path):
     for columns, message in (
         ("id,x", "has 1 rows and the columns id, x; expected boxes"),
-        ("X,x (cm)", r"has \['X', 'x \(cm\)'\]; expected each column once"),
-        ("x,x", r"has \['x', 'x'\]; expected each column once"),
+        ("X,x (cm)", r"the columns \['X', 'x \(cm\)'\]; expected a line of names, each once"),
+        ("x,x", r"has the columns \['x', 'x'\]; expected a line of names"),
         (f"x,y,z,{CORNERS},id", "expected boxes with either x, y, z or x_min, y_min, z_min"),
         (f"{CORNERS},depth", "size_z, each once; columns={...} says"),
         ("x,y_min", "columns x, y_min; expected boxes with either x, y, z or x_min"),

@@ -14,7 +14,7 @@ from unload import task
 from unload.agent import policies
 from unload.agent.policies import Policy
 from unload.env.observation import nearest, scale
-from unload.load.boxes import OVERLAP, BoxError, Load, check_stacked
+from unload.load.boxes import OVERLAP, Load, check_stacked
 from unload.physics.base import Force, Physics, low_ceiling
 from unload.physics.full import Name, make_physics
 from unload.physics.table import too_heavy
@@ -206,11 +206,15 @@ def _hopeless(load: Load, force: float) -> np.ndarray:
         (heavy, f"are too heavy for {force:g} N; force='auto' lifts each"),
     ):
         if boxes.any():
-            items = np.flatnonzero(boxes)
-            ids = ", ".join(str(i if load.ids is None else load.ids[i]) for i in items[:FEW])
-            more = ", ..." if len(items) > FEW else ""
-            LOGGER.warning("%d of %d boxes %s: %s", len(items), len(load), problem, ids + more)
+            LOGGER.warning("%s", _named(load, np.flatnonzero(boxes), problem))
     return low | heavy
+
+
+def _named(load: Load, items: np.ndarray, problem: str) -> str:
+    """A sentence that says how many boxes have a problem, and names the first."""
+    ids = ", ".join(str(i if load.ids is None else load.ids[i]) for i in items[:FEW])
+    more = ", ..." if len(items) > FEW else ""
+    return f"{len(items)} of {len(load)} boxes {problem}: {ids}{more}"
 
 
 def _by_stop(load: Load, by: str) -> Rule:
@@ -248,7 +252,7 @@ def stop_numbers(load: Load, by: str) -> tuple[np.ndarray, np.ndarray]:
     values = load.extras[name]
     missing = np.flatnonzero(pd.isna(values) | (values == ""))
     if missing.size:
-        raise BoxError(missing, f"{name!r} is empty; expected a value for each box")
+        raise ValueError(_named(load, missing, f"have no {name!r}; expected one for each box"))
     stops, numbers = np.unique(values, return_inverse=True)
     if stops.dtype.kind not in "biuf":  # texts: "stop 2" comes before "stop 10"
         order = sorted(range(len(stops)), key=lambda stop: _parts(str(stops[stop])))
