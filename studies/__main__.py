@@ -32,6 +32,15 @@ def policies(n_jobs: int) -> None:
     robustness.robustness_data(n_jobs=n_jobs)
 
 
+def sb3(n_jobs: int) -> None:
+    """Train agents of Stable-Baselines3."""
+    try:
+        from studies.policies.sb3 import sb3_data  # here, because no other part needs the library
+    except ModuleNotFoundError as error:
+        raise SystemExit(f'{error}; expected it: pip install ".[studies]"') from error
+    sb3_data(n_jobs)
+
+
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
@@ -41,6 +50,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
     "variants": ("other networks, rewards and settings", variants.variants_data, variants.OPTIONS),
     "policies": ("policies compared", policies, JOBS),
+    "sb3": ("agents of Stable-Baselines3, trained for minutes", sb3, JOBS),
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
     ),

@@ -9,7 +9,7 @@ from scipy.stats import t
 from studies.falls.long import LONG
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
-from studies.results import read_table
+from studies.results import read_provenance, read_table
 from studies.seamless.training import SEAMLESS
 from studies.statistics import by_cell, by_run
 from studies.ties.criterion import likeness
@@ -113,6 +113,23 @@ def test_the_benchmarks_are_those_of_the_data():
         assert len(rates) == 100 and f"{rates.mean():.1f}" == mean
         assert f"{t.ppf(0.975, 99) * rates.std() / 10:.1f}" == half
         assert each["longest_deadlock"].max() == int(longest)
+
+
+def test_the_agents_of_another_library_are_those_of_the_data():
+    text = (ROOT / "notebooks/benchmarks.md").read_text(encoding="utf-8")
+    runs = read_table("policies/sb3")
+    rows = []
+    for (agent, seen), each in runs.groupby(["agent", "seen"]):
+        row = f"| {agent} | {seen} | {each['cpu_s'].median():.0f} |"
+        for mask in (True, False):
+            rates = 100 * each.loc[each["mask"] == mask, "msr"]
+            half = t.ppf(0.975, 2) * rates.std() / 3**0.5
+            row += f" {rates.mean():.1f} ± {half:.1f} ({rates.min():.1f}–{rates.max():.1f}) |"
+            assert len(rates) == 3
+        rows.append(row)
+    assert len(rows) == 6 and not [row for row in rows if row not in text.splitlines()]
+    picks = read_provenance("policies/sb3")["settings"]["configuration"]["picks"]
+    assert f"{picks:,} picks each" in " ".join(text.split())
 
 
 def prose(path: Path) -> str:

@@ -28,6 +28,8 @@ are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. 
 x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance) and
 z (height, 0 at the floor). unload.read_load and unload.picking_order say more.
 
+  unload list.csv --units cm --container 13.6 2.48 2.7 --force auto --by stop
+
 "unload train" trains an agent; "unload train --help" says how.
 """
 TRAIN_DESCRIPTION = """\
@@ -56,13 +58,14 @@ def print_order(arguments: list[str]) -> None:
 
     parser = _parser("unload", DESCRIPTION)
     shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("policies/*.safetensors")))
-    known = f"reachable (the default), highest, nearest, random, {shipped}, or a file of weights"
+    known = "reachable (the default: nothing lies on the next box or stands in front of it), "
+    known += f"highest, nearest, random, {shipped}, or a file of weights"
     text = "CSV, JSON or Excel file; an example if missing"
     parser.add_argument("list", nargs="?", help=text)
     parser.add_argument("--policy", default="reachable", help=known)
-    text = "what can be reached, by the values of a column: 1, 2, ... (--by=-stop: the last first)"
+    text = "a column of stops: what can be reached, 1 before 2, ... (--by=-stop: the last first)"
     parser.add_argument("--by", metavar="COLUMN", help=text)
-    text = "strongest pull in N (20), up to 20 N per kg; or auto, as much as each box needs"
+    text = "strongest pull in N (20, which lifts 1.4 kg); or auto, as much as each box needs"
     parser.add_argument("--force", type=_force, default=task.PICK_FORCE, help=text)
     parser.add_argument("--output", default=sys.stdout, help="file; the screen if missing")
     parser.add_argument("--format", choices=("csv", "json"), default="csv", help="of the output")
@@ -76,7 +79,7 @@ def print_order(arguments: list[str]) -> None:
     parser.add_argument("--tolerance", type=float, default=0.005, help=text)
     text = "a column to keep whatever it says, such as weight; may be repeated"
     parser.add_argument("--ignore", action="append", default=[], metavar="COLUMN", help=text)
-    text = "what a column of another name means, such as Tiefe=size_x; may be repeated"
+    text = "what a column means, such as x=x_min if x is a corner; may be repeated"
     parser.add_argument("--column", action="append", default=[], metavar="NAME=MEANING", help=text)
     version = f"unload {VERSION}, lifts by {engine_of()}"
     parser.add_argument("--version", action="version", version=version)
@@ -105,7 +108,7 @@ def print_order(arguments: list[str]) -> None:
             print(f"{asked['by'].lstrip('-')} {stop}: {summary}", file=sys.stderr)
     left = len(load) - order["unloaded"].sum()
     if left:
-        parser.exit(1, f"{left} boxes are left, of which none that is visible can be lifted\n")
+        parser.exit(1, f"{left} boxes are left, of which none that is visible and free is lifted\n")
 
 
 def _draw(load, order, path: str) -> None:

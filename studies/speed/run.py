@@ -17,16 +17,13 @@ from unittest import mock
 
 import numpy as np
 import pandas as pd
-import stable_baselines3
 import torch
-from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 
 import unload
+from studies.policies.sb3 import containers, dqn
 from studies.results import measured, publish
 from studies.speed.parts import lift_rates, pick_rates, three_digits, update_times
 from unload import task
-from unload.agent.config import EPSILON_FALLS
 from unload.fast import fused
 
 COMMAND = "python -m studies.speed.run"
@@ -34,25 +31,6 @@ COMMAND = "python -m studies.speed.run"
 FUSED, PLAIN, THEIRS = 256_000, 3_200, 960
 NEW = 25_600  # of ours on loads that never repeat, with as many before, in which processes start
 THREADS = {1: "1 thread", 2: "2 threads"}
-
-
-class PEQValues(QNetwork):
-    """``PEQNetwork`` where Stable-Baselines3 expects a network; n is ``net_arch[0]``."""
-
-    def __init__(self, *args, **kwargs) -> None:
-        super().__init__(*args, **kwargs)
-        self.q_net = unload.PEQNetwork(self.net_arch[0])
-
-    def forward(self, obs):
-        return self.q_net(obs)
-
-
-class PEQPolicy(DQNPolicy):
-    """Stable-Baselines3's DQN policy with the paper's network; ``net_arch=[n]``."""
-
-    def make_q_net(self) -> PEQValues:
-        arguments = self._update_features_extractor(self.net_args, features_extractor=None)
-        return PEQValues(**arguments).to(self.device)
 
 
 def training_rates() -> dict[str, float]:
@@ -110,26 +88,7 @@ def _our_rate(
 def _their_rate(picks: int, threads: int) -> float:
     torch.set_num_threads(threads)
     config = unload.TrainConfig()
-    settings = {"physics": "table", "equalize": config.equalize}
-    envs = make_vec_env("unload/Container-v0", config.num_envs, env_kwargs=settings)
-    model = stable_baselines3.DQN(
-        PEQPolicy,
-        envs,
-        learning_rate=config.learning_rate,
-        buffer_size=config.replay_size,
-        learning_starts=config.batch_size,
-        batch_size=config.batch_size,
-        gamma=config.gamma,
-        train_freq=1,  # of all environments
-        gradient_steps=config.gradient_steps,
-        target_update_interval=config.target_update_interval,
-        exploration_fraction=EPSILON_FALLS,
-        exploration_initial_eps=config.epsilon_init,
-        exploration_final_eps=config.epsilon_final,
-        policy_kwargs={"net_arch": [config.n_features]},
-        device="cpu",
-        seed=config.seed,
-    )
+    model = dqn(config, containers(config))
     times: list[float] = []
     warm = config.batch_size + 2 * config.num_envs  # two updates do not count
     model.learn(warm + picks, lambda *_: times.append(time.perf_counter()) is None)

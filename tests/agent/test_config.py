@@ -1,5 +1,8 @@
+import inspect
 import json
+import textwrap
 from dataclasses import asdict, fields
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -8,6 +11,7 @@ import pytest
 from unload import TrainConfig, train
 from unload.agent.config import ENVS, EPSILON_FALLS
 from unload.env.vector import ContainerVectorEnv
+from unload.physics.table import TablePhysics
 
 
 def test_the_papers_configuration_is_the_default():
@@ -104,3 +108,21 @@ def test_an_environment_of_ones_own_trains(tmp_path):
     for env in ("tests/Missing-v0", "CartPole-v1-v1", "Acrobot-v1", 3):
         with pytest.raises(ValueError, match="env is .*; expected 'unload/Container-v0', .*, or"):
             TrainConfig(env)
+
+
+def test_the_physics_in_the_docstring_trains(full_load, tmp_path, monkeypatch):
+    """It is asked about each pick, also about boxes whose lifts a table knows."""
+    _, _, example = inspect.cleandoc(train.__doc__).partition("needs another id::\n\n")
+    code = textwrap.dedent(example.partition("\n\nArgs:")[0])
+    size = {"num_envs": 2, "picks": 16, "batch_size": 4, "n_features": 4}
+    given = {"TrainConfig": partial(TrainConfig, **size), "train": partial(train, progress=False)}
+    given |= {"ContainerVectorEnv": ContainerVectorEnv, "TablePhysics": TablePhysics}
+    monkeypatch.chdir(tmp_path)
+    exec(code, given | {"gymnasium": gymnasium})
+    assert (tmp_path / "runs/gripper/policy.safetensors").exists()
+    envs = gymnasium.make_vec("own/Gripper-v0", 2)
+    envs.reset(seed=0, options={"load": full_load})
+    free = ~full_load.covered(np.ones(len(full_load), bool))
+    narrow, seen = full_load.sizes[:, 1] < 0.4 + 1e-6, envs.visible[1]
+    assert np.array_equal(envs.liftable()[1], (free & narrow)[seen])
+    assert free[seen].sum() > (free & narrow)[seen].sum() > 0

@@ -82,6 +82,7 @@ def test_separators_decimals_and_encodings(written, tmp_path, separator, mark, e
         (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {"units": "cm"}),
         ('Box ID,X Min (mm),Y min [mm],z-min in mm,"L (mm)",W mm,H_mm', 1000, {"units": "m"}),
         ('id,x_min inch,y_min,z_min,"depth ("")",width inches,height in', 1 / 0.0254, {}),
+        ("Kolli-Nr.,x_min (ft),y_min,z_min,l,b,h (ft)", 1 / 0.3048, {}),
         ("nr,u,v,w,a,b,c", 1, {"columns": dict(zip("uvwabc", CORNERS.split(","))) | {"nr": "id"}}),
     ],
 )  # fmt: skip
@@ -150,7 +151,7 @@ def test_other_columns_are_kept_and_named(written, caplog):
         "stop": [2, 1], "code": ["07", "11"], "note": ["", "top"], "name": ["B", "C"],
         "weight_kg": [1, 1], "yaw": [90, -90], "pitch": [0, 0],
     }  # fmt: skip
-    assert "kept but not used: stop, code, note, name\n" in caplog.text
+    assert "kept as they are: stop, code, note, name\n" in caplog.text
     assert "sizes are taken for those after the turns" in caplog.text
     assert {record.levelno for record in caplog.records} == {logging.WARNING}
 
@@ -213,9 +214,9 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,0,0,1.01,1,1,1"], r"row 2 .*: floats in load, .* at 1.01 m; .* z_min '1.01'"),
         ([UNIT, "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
         (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
-        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m \(the first"),
-        ([UNIT, "a,1,0,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'a'\): the same id"),
-        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is no number; .* size_z 'wide'"),
+        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m; .* container="),
+        ([UNIT, "a,1,0,0,1,1,1"], r"1 \(id 'a'\), row 2 \(id 'a'\): the same .* box \(.* id 'a'\)"),
+        (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is .*has size_z 'wide'\)"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
         ([f"a,0,0,0,1,1,{_SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 7)], r"row 5 \(id '6'\): reaches from"),
@@ -232,8 +233,8 @@ def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, messag
 def test_files_that_are_no_lists_are_refused(written, tmp_path):
     for columns, message in (
         ("id,x", "has 1 rows and the columns id, x; expected boxes"),
-        ("X,x (cm)", r"has \['X', 'x \(cm\)'\]; expected each column once"),
-        ("x,x", r"has \['x', 'x'\]; expected each column once"),
+        ("X,x (cm)", r"the columns \['X', 'x \(cm\)'\]; expected a line of names, each once"),
+        ("x,x", r"has the columns \['x', 'x'\]; expected a line of names"),
         (f"x,y,z,{CORNERS},id", "expected boxes with either x, y, z or x_min, y_min, z_min"),
         (f"{CORNERS},depth", "size_z, each once; columns={...} says"),
         ("x,y_min", "columns x, y_min; expected boxes with either x, y, z or x_min"),

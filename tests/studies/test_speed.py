@@ -7,16 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-import stable_baselines3
 import torch
 from sb3_contrib import MaskablePPO
 from stable_baselines3.common.env_util import make_vec_env
 
 import unload
+from studies.policies.sb3 import containers, dqn
 from studies.results import read_provenance, read_table
 from studies.speed import mutants, parts, run
 from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
-from studies.speed.run import PEQPolicy
 from unload.agent import learner
 from unload.fast import fused
 
@@ -31,12 +30,9 @@ def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
 
 
 def test_stable_baselines_trains_the_papers_network():
-    settings = {"physics": "table", "max_picks": 3}
-    envs = make_vec_env("unload/Container-v0", 4, env_kwargs=settings)
-    model = stable_baselines3.DQN(
-        PEQPolicy, envs, buffer_size=64, learning_starts=8,
-        batch_size=8, train_freq=1, policy_kwargs={"net_arch": [6]}, seed=0, device="cpu",
-    )  # fmt: skip
+    small = {"num_envs": 4, "batch_size": 8, "replay_size": 64, "n_features": 6, "max_picks": 3}
+    config = unload.TrainConfig(picks=32, **small)
+    model = dqn(config, containers(config))
     network = model.q_net.q_net
     assert type(network) is unload.PEQNetwork
     assert network.n_features == 6

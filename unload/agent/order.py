@@ -14,7 +14,7 @@ from unload import task
 from unload.agent import policies
 from unload.agent.policies import Policy
 from unload.env.observation import nearest, scale
-from unload.load.boxes import OVERLAP, BoxError, Load, check_stacked
+from unload.load.boxes import OVERLAP, Load, check_stacked
 from unload.physics.base import Force, Physics, low_ceiling
 from unload.physics.full import Name, make_physics
 from unload.physics.table import too_heavy
@@ -34,7 +34,7 @@ Choice = Callable[[Load, np.ndarray, np.ndarray], int | None]
 def reachable(load: Load, present: np.ndarray) -> tuple[np.ndarray, ...]:
     """The rule of an order that can be carried out from the entrance.
 
-    First what has no box in front of it, then what has none on it, then the foremost, then the
+    First what has no box on it, then what has none in front of it, then the foremost, then the
     highest. What is in front of a box stands nearer to the entrance and overlaps it in y and z.
 
     Args:
@@ -47,7 +47,7 @@ def reachable(load: Load, present: np.ndarray) -> tuple[np.ndarray, ...]:
     front, top = (load.positions + load.sizes / 2)[:, [0, 2]].T
     # Rounded, so that equal places are equal, however they were computed.
     foremost, highest = np.rint(front / OVERLAP), np.rint(top / OVERLAP)
-    return ~load.behind(present), ~load.covered(present), foremost, highest
+    return ~load.covered(present), ~load.behind(present), foremost, highest
 
 
 def picking_order(
@@ -63,7 +63,8 @@ def picking_order(
 
     A policy sees the 128 nearest boxes, each exactly where it is; a rule knows the load. A box
     that has failed is not picked again before another one has been unloaded. How many boxes the
-    ceiling or their weight lets nobody lift is logged first; rules pick these last.
+    ceiling or their weight lets nobody lift is logged first; rules pick these last, and nothing
+    that lies under them.
 
     Args:
         load: see ``unload.read_load``.
@@ -74,8 +75,8 @@ def picking_order(
             see ``unload.agent.order.reachable``. What can be reached, the heaviest first::
 
                 def heaviest(load, present):
-                    in_front, on_top, *others = reachable(load, present)
-                    return in_front, on_top, load.masses, *others
+                    uncovered, in_front, *others = reachable(load, present)
+                    return uncovered, in_front, load.masses, *others
 
         by: instead of a rule, a name in ``load.extras``, such as ``"stop"``: what can be reached,
             the lowest value first, or with ``"-stop"`` the highest. Boxes of later stops come out
@@ -89,7 +90,7 @@ def picking_order(
         ``distance`` in m by which it was lifted; ``unloaded``, False for a pick that failed;
         ``behind``, True if a box stood in front of it, see ``Load.behind``; and the load's
         ``extras``. Boxes are left out only where a container gets stuck: all boxes that the
-        policy sees have failed then, and they are the last rows.
+        policy sees, or that a rule may pick, have failed then, and they are the last rows.
 
     Raises:
         TypeError, ValueError: an argument is not as described, or ``policy`` returns
@@ -178,8 +179,8 @@ def _by_policy(
 
 def _by_rule(
     rule: Rule, hopeless: np.ndarray, load: Load, present: np.ndarray, allowed: np.ndarray
-) -> int:
-    """What a rule picks of all items; where it may, none that nobody can lift."""
+) -> int | None:
+    """What a rule picks: nothing under boxes that nobody can lift, and these last."""
     returned = rule(load, present)
     try:
         keys = np.array([*returned], np.float64)
@@ -188,9 +189,13 @@ def _by_rule(
             f"what rule returned is {returned!r}; expected arrays of numbers"
         ) from error
     keys = checks.finite_array("what rule returned", keys, (None, len(load)))
-    worth = allowed & ~hopeless
-    items = np.flatnonzero(worth if worth.any() else allowed)
-    return int(items[np.lexsort(-keys[::-1, items])[0]])
+    stuck, (lower, upper) = hopeless & present, load.covers
+    while not stuck[lower[stuck[upper]]].all():
+        stuck[lower[stuck[upper]]] = True
+    for worth in (allowed & ~stuck, allowed & hopeless):
+        if (items := np.flatnonzero(worth)).size:
+            return int(items[np.lexsort(-keys[::-1, items])[0]])
+    return None
 
 
 def _hopeless(load: Load, force: float) -> np.ndarray:
@@ -201,11 +206,15 @@ def _hopeless(load: Load, force: float) -> np.ndarray:
         (heavy, f"are too heavy for {force:g} N; force='auto' lifts each"),
     ):
         if boxes.any():
-            items = np.flatnonzero(boxes)
-            ids = ", ".join(str(i if load.ids is None else load.ids[i]) for i in items[:FEW])
-            more = ", ..." if len(items) > FEW else ""
-            LOGGER.warning("%d of %d boxes %s: %s", len(items), len(load), problem, ids + more)
+            LOGGER.warning("%s", _named(load, np.flatnonzero(boxes), problem))
     return low | heavy
+
+
+def _named(load: Load, items: np.ndarray, problem: str) -> str:
+    """A sentence that says how many boxes have a problem, and names the first."""
+    ids = ", ".join(str(i if load.ids is None else load.ids[i]) for i in items[:FEW])
+    more = ", ..." if len(items) > FEW else ""
+    return f"{len(items)} of {len(load)} boxes {problem}: {ids}{more}"
 
 
 def _by_stop(load: Load, by: str) -> Rule:
@@ -224,8 +233,8 @@ def _by_stop(load: Load, by: str) -> Rule:
         due = sooner
 
     def rule(load: Load, present: np.ndarray) -> Sequence[np.ndarray]:
-        in_front, on_top, *others = reachable(load, present)
-        return in_front, on_top, -due, *others
+        uncovered, in_front, *others = reachable(load, present)
+        return uncovered, in_front, -due, *others
 
     return rule
 
@@ -243,7 +252,7 @@ def stop_numbers(load: Load, by: str) -> tuple[np.ndarray, np.ndarray]:
     values = load.extras[name]
     missing = np.flatnonzero(pd.isna(values) | (values == ""))
     if missing.size:
-        raise BoxError(missing, f"{name!r} is empty; expected a value for each box")
+        raise ValueError(_named(load, missing, f"have no {name!r}; expected one for each box"))
     stops, numbers = np.unique(values, return_inverse=True)
     if stops.dtype.kind not in "biuf":  # texts: "stop 2" comes before "stop 10"
         order = sorted(range(len(stops)), key=lambda stop: _parts(str(stops[stop])))

@@ -173,6 +173,20 @@ def train(
     one in a single piece. A finished run is not repeated. The book's page "Training runs" says
     what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do.
 
+    Lifts by a physics of your own are a task of your own: a run knows it by the id under which it
+    is registered, and another version of it needs another id::
+
+        class Gripper(TablePhysics):  # cannot hold what is wider than 0.4 m
+            def simulate(self, situation):
+                wide = situation.boxes[0, 4] > 400_000  # µm
+                return 0.0 if wide else super().simulate(situation)
+
+        def gripper(num_envs, **settings):
+            return ContainerVectorEnv(num_envs, physics=Gripper(), **settings)
+
+        gymnasium.register("own/Gripper-v0", vector_entry_point=gripper)
+        train(TrainConfig("own/Gripper-v0"), "runs/gripper")
+
     Args:
         config: what to train.
         run_dir: folder of the run alone: its checkpoint, and what it leaves.

@@ -1,8 +1,9 @@
 """Many containers at once, in arrays (Sec. III-A, Fig. 2)."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from unload.env.observation import drift, scale
 from unload.fast import containers
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
-from unload.physics.situation import situation_in
+from unload.physics.local import LocalPhysics
+from unload.physics.situation import Situation, situation_in
 from unload.physics.table import LiftTable, TablePhysics, shared_table
 from unload.support import checks
 
@@ -25,7 +27,8 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``, or a ``TablePhysics`` of your own, which is left open. With
+        physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Unless it is a
+            plain ``TablePhysics``, its ``simulate`` is asked about each pick. With
             ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
 
     Attributes:
@@ -39,22 +42,22 @@ class ContainerVectorEnv(PickingVectorEnv):
     def __init__(
         self,
         num_envs: int = task.NUM_ENVS,
-        physics: Literal["table"] | TablePhysics = "table",
+        physics: Literal["table"] | LocalPhysics = "table",
         stack: Callable[[np.random.Generator], Load] = stack_load,
         **settings,
     ) -> None:
         super().__init__(num_envs, **settings)
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
-        self.stack, self._own = stack, not isinstance(physics, TablePhysics)
+        self.stack, self._own = stack, not isinstance(physics, LocalPhysics)
         if isinstance(physics, TablePhysics):
-            if physics.force < task.PICK_FORCE:
-                wanted = f"expected >= {task.PICK_FORCE} in arrays, where free boxes are lifted"
-                raise ValueError(f"physics.force is {physics.force}; {wanted}")
-            self._physics, self.table = physics, physics.table
-        else:
-            checks.one_of("physics", physics, ("table", "a TablePhysics"))
-            self._physics = TablePhysics()
+            self.table = physics.table
+        elif self._own:
+            checks.one_of("physics", physics, ("table", "a LocalPhysics"))
+            physics = TablePhysics()
+        self._physics: Any = physics
+        # No table, and no compiled loop, knows what another class or a weaker pull does.
+        self._asks = type(physics) is not TablePhysics or physics.force < task.PICK_FORCE
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
@@ -138,19 +141,27 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
-        items, distances = containers.look_up(self._containers, actions, *self.table.slots)
+        state = self._containers
+        items, distances = containers.look_up(state, actions, self._asks, *self.table.slots)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
-            if self._physics.table is not self.table:  # it has been replaced
-                if self._own:
-                    self._physics.close()
-                self._physics, self._own = TablePhysics(self.table), True
-            state = self._containers
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
-            distances[unknown] = self._physics.simulate_all(
-                [situation_in(*(array[env] for array in arrays)) for env in unknown]
-            )
+            situations = [situation_in(*(array[env] for array in arrays)) for env in unknown]
+            distances[unknown] = (self._ask if self._asks else self._simulate)(situations)
         return items, distances
+
+    def _ask(self, situations: list[Situation]) -> list[float]:
+        if self._physics.force < task.PICK_FORCE:
+            pull, mass = (round(1000 * each) for each in (self._physics.force, task.MASS))
+            situations = [replace(s, pull=(pull, *[mass] * s.dynamic)) for s in situations]
+        return [self._physics.simulate(each) for each in situations]
+
+    def _simulate(self, situations: list[Situation]) -> list[float]:
+        if self._physics.table is not self.table:  # it has been replaced
+            if self._own:
+                self._physics.close()
+            self._physics, self._own = TablePhysics(self.table), True
+        return self._physics.simulate_all(situations)
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0

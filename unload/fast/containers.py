@@ -108,10 +108,11 @@ def _show(containers, env, rows, equalize, average, tolerance):
 
 
 @compiled
-def look_up(containers, actions, digests, micrometres):
+def look_up(containers, actions, asks, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
-    Where the row is padded, the item is -1 and moves by 0.
+    Where the row is padded, the item is -1 and moves by 0. With ``asks`` nothing else is known but
+    what has failed and what the ceiling holds.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     capacity = containers.present.shape[1]
@@ -133,6 +134,9 @@ def look_up(containers, actions, digests, micrometres):
         top = geometry[items[env], 2] + geometry[items[env], 5] / 2
         if containers.ceilings[env] - top < task.LIFT_THRESHOLD - OVERLAP:
             distances[env] = 0
+            continue
+        if asks:
+            distances[env] = UNKNOWN
             continue
 
         # Free boxes and those under three others need no table, see TablePhysics.

@@ -18,7 +18,8 @@ INCHES, POUNDS = 1 / 0.0254, 1 / 0.45359237  # in a metre, and in a kilogram
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": INCHES}  # of a unit in a metre
 # Of other units in a metre, a kilogram or a degree.
 UNITS = LENGTHS | {
-    "inch": INCHES, "inches": INCHES, "kg": 1.0, "g": 1000.0, "lb": POUNDS, "lbs": POUNDS,
+    "inch": INCHES, "inches": INCHES, "ft": INCHES / 12,
+    "kg": 1.0, "g": 1000.0, "lb": POUNDS, "lbs": POUNDS,
     "deg": 1.0, "degrees": 1.0, "grad": 1.0, "rad": np.pi / 180,
 }  # fmt: skip
 # The names of a column, in lower case, by what it means: in English, German, French and Spanish.
@@ -26,7 +27,7 @@ UNITS = LENGTHS | {
 NAMES = {
     "id": "id label name box box_id item item_id sscc nve hu hu_id hu_nr handling_unit carton "
     "carton_id carton_no case_id package_id pallet_id karton kartonnummer packstück packstueck "
-    "packstück_nr colis n_colis no_colis palette bulto n_bulto caja",
+    "packstück_nr kolli kolli_nr colis n_colis no_colis palette bulto n_bulto caja",
     "size_x": "size_x dx length l depth d länge laenge tiefe longueur profondeur largo longitud "
     "profundidad",
     "size_y": "size_y dy width w breite b largeur ancho anchura",
@@ -77,7 +78,8 @@ class Columns:
         self._scales = {name: plain(name)[1] for name in names}
         twice = [name for name in names if [*words.values()].count(words[name]) > 1]
         if twice or len(names) < len(table.names):
-            raise ValueError(f"{self._source} has {table.names}; expected each column once")
+            wanted = "expected a line of names, each once"
+            raise ValueError(f"{self._source} has the columns {table.names}; {wanted}")
         ignored = {*ignore}
         for name in ({*renamed} - {*names}) | (ignored - {*names, *words.values()}):
             raise ValueError(f"{self._source} has no column {name!r}; expected one of {names}")
@@ -115,7 +117,7 @@ class Columns:
             for name in found
             if name not in renamed and words[name] != meaning
         ]
-        for how, columns in (("read", understood), ("kept but not used:", rest)):
+        for how, columns in (("read", understood), ("kept as they are:", rest)):
             if columns:
                 LOGGER.warning("%s: %s %s", self._source, how, ", ".join(columns))
         rows = [str(row + 1) for row in range(len(table))]
@@ -133,9 +135,10 @@ class Columns:
         """Columns in m, kg or degrees, (n, k) float64, with ``usual`` where a name says no unit."""
         cells = [[_number(cell) for cell in self._table.with_points(name)] for name in names]
         numbers = np.array(cells).T
-        unreadable = np.flatnonzero(~np.isfinite(numbers).all(axis=1))
-        if unreadable.size:
-            self.refuse(unreadable, "a cell that is no number; expected one", names)
+        unreadable = ~np.isfinite(numbers)
+        if (rows := np.flatnonzero(unreadable.any(axis=1))).size:
+            shown = [name for name, wrong in zip(names, unreadable[rows[0]]) if wrong]
+            self.refuse(rows, "a cell that is no number; expected one", shown)
         return numbers / [self._scales[name] or usual for name in names]
 
     def refuse(self, rows: Sequence[int] | np.ndarray, problem: str, shown: list[str]) -> NoReturn:

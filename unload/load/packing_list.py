@@ -130,24 +130,28 @@ def read_load(
         )
         check_stacked(load)
     except BoxError as error:
+        for start, name in (("a mass", weight), ("the same id", known.first("id"))):
+            if error.problem.startswith(start):
+                known.refuse(error.boxes, error.problem, [name])
         first, problem = error.boxes[0], f"{error.problem}, tolerance {tolerance} m"
         if moves[first].any() or smaller[first].any():  # whose coordinates the list does not hold
             problem = (
                 f"lies from {low[first]} to {high[first]} m; expected a place within {tolerance} m "
                 "on the floor or on others, clear of those beside it and of the walls"
             )
-        if usual == 1 and sizes.max() > container.max():
-            problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
         other = CORNER if place is CENTRE else CENTRE
         outside = [  # whether any box sticks out
             (abs(centres_of(each) - container / 2) + half > container / 2 + tolerance).any()
             for each in (place, other)
         ]
-        if outside[0] and not outside[1]:
+        if usual == 1 and sizes.max() > container.max():
+            problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
+        elif outside[0] and not outside[1]:
             named = dict(zip(shown, other))
             problem += f"; all lie inside if these are {', '.join(other)}: columns={named}"
-        light = masses is not None and "a mass of" in problem
-        known.refuse(error.boxes, problem, [weight] if light else shown)
+        elif outside[0] and (container == task.CONTAINER).all():
+            problem += "; the paper's container, expected container=... of another one"
+        known.refuse(error.boxes, problem, shown)
     if (tipping := uncarried(load)).size:
         known.refuse(tipping, "tips, because nothing carries its centre of mass", shown)
     for changes, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, replace
 from functools import partial
-from itertools import islice
+from itertools import islice, product
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from studies import grid
-from studies.policies import comparison, robustness, variants
+from studies.policies import comparison, robustness, sb3, variants
 from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
@@ -203,6 +203,23 @@ def test_pairs_are_of_boxes_that_are_visible_and_lie_on_one_another():
 
 def test_a_container_ends_after_its_picks():
     assert len(list(containers(policies.highest, seed=0, max_picks=7))) == 7
+
+
+def test_agents_of_another_library_are_trained_and_measured(own_data, monkeypatch):
+    small = replace(TrainConfig(), picks=128, num_envs=4, batch_size=16, replay_size=128)
+    changes = {"CONFIG": small, "ROLLOUT": 64, "SEEDS": [1], "LOADS": 1}
+    for name, value in changes.items():
+        monkeypatch.setattr(sb3, name, value)
+    sb3.sb3_data(n_jobs=1)
+    rows = read_table("policies/sb3")
+    runs = rows[["agent", "seen", "mask"]].itertuples(index=False, name=None)
+    assert [*runs] == [*product(sb3.AGENTS, sb3.SEEN, (True, False))]
+    assert (rows.loc[rows["mask"], "longest_deadlock"] == 0).all()
+    assert (rows.loc[~rows["mask"], "longest_deadlock"] > 0).any()
+    assert (rows.loc[rows["mask"], "msr"] > 0.1).all()
+    assert (rows["cpu_s"] > 0).all() and (rows["seed"] == 1).all()
+    again = sb3.trained("unload", "ranks", 1)[0]
+    assert rows.query("agent == 'unload' and mask")["msr"].iloc[0] == pytest.approx(again["msr"])
 
 
 FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
