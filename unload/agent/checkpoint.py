@@ -5,12 +5,14 @@ import json
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from unload import task
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.identity import identity, unchanged
@@ -47,7 +49,7 @@ def settings_of_run(
     Also the engine, where lifts are decided by another one than PyBullet.
     """
     change = None if change is unchanged else identity(change)
-    own = {"change": change, "stack": stack and identity(stack)}
+    own = {"change": change, "stack": None if stack is None else identity(stack)}
     other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env == ENVS[0] else {}
     return config.plain() | own | other
 
@@ -106,8 +108,10 @@ class RunFolder:
 
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
-        marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
-        files.write_arrays(self._checkpoint, gather(run) | marks)
+        marks = {"format": FORMAT, "version": task.VERSION, "settings": json.dumps(run.settings)}
+        files.write_arrays(
+            self._checkpoint, gather(run) | {name: np.array(mark) for name, mark in marks.items()}
+        )
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -123,6 +127,9 @@ class RunFolder:
             raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
             raise ValueError(f"{self._checkpoint} is not of format {FORMAT}; {OTHER}")
+        # The first ones of this format do not tell it.
+        if (version := str(stored.pop("version", task.VERSION))) != task.VERSION:
+            raise ValueError(f"{self._checkpoint} is of unload {version}; {OTHER}")
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
             put_back(run, stored)
@@ -151,11 +158,12 @@ class RunFolder:
         return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve))
 
     def _check_same(self, stored: dict, settings: dict) -> None:
-        wanted = json.loads(json.dumps(settings))
+        # As text, in which 1, 1.0 and True are told apart, and not-a-number is itself.
+        said = partial(json.dumps, sort_keys=True)
         differing = ", ".join(
-            f"{name} ({stored.get(name)!r}, not {wanted.get(name)!r})"
-            for name in wanted | stored
-            if stored.get(name) != wanted.get(name)
+            f"{name} ({stored.get(name)!r}, not {settings.get(name)!r})"
+            for name in settings | stored
+            if said(stored.get(name)) != said(settings.get(name))
         )
         if differing:
             raise ValueError(
