@@ -9,8 +9,8 @@ import sys
 import textwrap
 import threading
 import time
-from fractions import Fraction
 from collections import defaultdict
+from fractions import Fraction
 from functools import cache, partial, update_wrapper
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -70,7 +70,7 @@ def imported(tmp_path, monkeypatch):
     def write(old: str = "", new: str = "") -> None:
         for name, text in FILES.items():
             path = tmp_path / f"{name}.py"
-            path.write_text(textwrap.dedent(text).replace(old, new))
+            path.write_text(textwrap.dedent(text).replace(old, new), encoding="utf-8")
             os.utime(path, ns=(0, next(clock) * 10**12))
 
     def load(old: str = "", new: str = ""):

@@ -299,15 +299,19 @@ def test_json_holds_records_or_columns(tmp_path, written):
     records = table.to_dict("records")
     columns = table.to_dict("list"), table.to_dict()
     for content in (records, *columns, {"truck": 7, "boxes": records}):
-        (tmp_path / "list.json").write_text(json.dumps(content))
+        (tmp_path / "list.json").write_text(json.dumps(content), encoding="utf-8")
         assert_same(read_load(tmp_path / "list.json"), read_load(written(*STACK)))
     for text, message in (("[1, 2]", "has 2 rows"), ("{", "expected JSON"), ('{"x": 1}', "JSON")):
-        (tmp_path / "list.json").write_text(text)
+        (tmp_path / "list.json").write_text(text, encoding="utf-8")
         with pytest.raises(ValueError, match=message):
             read_load(tmp_path / "list.json")
 
 
 def test_the_first_sheet_of_an_excel_file_is_read(tmp_path, written, monkeypatch):
+    """A text may begin as such a file does, with PK."""
+    columns = f"PK,Kartonnummer,{CORNERS}"
+    load = read_load(written(*(f"{line[0]},{line}" for line in STACK), columns=columns))
+    assert load.ids.tolist() == [line[0] for line in STACK] == load.extras["PK"].tolist()
     path = tmp_path / "list.xlsx"
     path.write_bytes(b"PK")
     boxes = [[line[0], *map(float, line[2:].split(","))] for line in STACK]

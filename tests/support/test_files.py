@@ -138,7 +138,7 @@ def check_arrays(read: dict[str, np.ndarray]) -> None:
     ids=["empty", "too deep", "too many digits", "a list"],
 )
 def test_bad_json_is_refused_by_name(tmp_path, text, message):
-    (tmp_path / "x.json").write_text(text)
+    (tmp_path / "x.json").write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=f"^{tmp_path}/x.json {message}"):
         files.read_json(tmp_path / "x.json")
 
@@ -283,7 +283,7 @@ def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
 @pytest.mark.needs("symlinks")
 def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     (tmp_path / "run").mkdir()
-    (tmp_path / "notes").write_text("precious")
+    (tmp_path / "notes").write_text("precious", encoding="utf-8")
     link(tmp_path / "notes", tmp_path / "run" / name)
     refused = pytest.raises(OSError, match="run/lock")
     allowed = (name, link) != ("lock", os.symlink)
