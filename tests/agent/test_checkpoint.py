@@ -286,5 +286,6 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
     others = [tmp_path / name for name in (*names, f"below/checkpoint.npz.{tail}")]
     for path in (*others, *(tmp_path / f"{name}.{tail}" for name in OWN)):
         path.write_bytes(b"half")
+    (tmp_path / f"owner.{tail}").touch()
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert sorted(tmp_path.rglob("*.partial")) == sorted(others)

@@ -208,6 +208,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         LOGGER.warning("waiting for %s, which uses %s", holder, folder)
         lock.acquire()
     try:
+        remove_partial(owner)
         started = datetime.now().astimezone().isoformat(timespec="seconds")
         write_text(owner, f"process {os.getpid()} on {socket.gethostname()} since {started}\n")
         yield
