@@ -198,11 +198,13 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
         ({"container": (1, 2)}, "container has shape"),
         ({"ignore": ["wight"]}, "has no column 'wight'; expected one of .*'x_min'"),
         ({"columns": {"Tiefe": "size_x"}}, "has no column 'Tiefe'"),
+        ({"columns": "Tiefe"}, "columns is 'Tiefe'; expected a dict"),
+        ({"ignore": 3}, "ignore is 3; expected names of columns"),
         ({"columns": {"size_x": ["id"]}}, r"columns is \['id'\]; expected one of 'id', 'size_x'"),
     ],
 )
 def test_wrong_arguments_are_refused(written, arguments, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((TypeError, ValueError), match=message):
         read_load(written(*STACK), **arguments)
 
 

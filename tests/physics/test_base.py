@@ -213,6 +213,8 @@ def test_arrays_know_ceilings_and_refuse_masses(boxes):
         assert envs.liftable().ravel()[:3].sum() == 1
     with pytest.raises(ValueError, match="holds a box of 2.0 kg; expected 1.0 kg each in arrays"):
         ContainerVectorEnv(1).reset(options={"load": weighed(low, 1, 2, 1)})
+    with pytest.raises(TypeError, match="force is array.*; expected a number >= 0"):
+        TablePhysics(LiftTable(), np.ones(2))
     with pytest.raises(ValueError, match="physics.force is 10.0; expected >= 20.0 in arrays"):
         ContainerVectorEnv(1, physics=TablePhysics(LiftTable(), 10))
     ContainerVectorEnv(1, physics=TablePhysics(LiftTable(), "auto"))

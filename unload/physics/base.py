@@ -42,7 +42,8 @@ class Physics(ABC):
     exact = True
 
     def __init__(self, force: Force = task.PICK_FORCE) -> None:
-        self.force = np.inf if force == "auto" else checks.real("force", force, 0)
+        unlimited = isinstance(force, str) and force == "auto"
+        self.force = np.inf if unlimited else checks.real("force", force, 0)
         self.load: Load | None = None
         self.present = np.zeros(0, dtype=bool)
         self._closed = False
