@@ -64,16 +64,18 @@ class RunFolder:
 
     def __init__(self, run_dir: str | Path) -> None:
         path = checks.path("run_dir", run_dir)
-        if path == Path():
-            raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
+        text = str(path.absolute())  # safetensors opens a name in UTF-8 only
+        if path == Path() or "\0" in text or text.encode(errors="ignore").decode() != text:
+            wanted = "expected a folder of the run's own, with a name in UTF-8"
+            raise ValueError(f"run_dir is {str(run_dir)!r}; {wanted}")
         self.path = path.absolute()
-        paths = [self.path / name for name in FILES]
-        self._checkpoint, self.policy, self._curve, self._config = paths
+        self._paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
+        self._checkpoint, self.policy, self._curve, self._config = self._paths
 
     def check_foreign(self, name: str, value: object) -> Path:
         """Return the absolute path of a file that is an argument; raise if it is one of these."""
         file = checks.file(name, value).absolute()
-        if file.name in FILES and file.parent.resolve() == self.path.resolve():
+        if file.resolve() in [path.resolve() for path in self._paths]:
             raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
         return file
 

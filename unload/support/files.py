@@ -63,7 +63,7 @@ def remove_partial(path: Path, age: float = 0.0) -> None:
     """
     for partial in path.parent.glob(f"{escape(path.name)}.{'[0-9a-f]' * 32}.partial"):
         with suppress(OSError):
-            if time.time() - partial.stat().st_mtime >= age:
+            if not age or time.time() - partial.stat().st_mtime >= age:
                 partial.unlink()
 
 
