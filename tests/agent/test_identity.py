@@ -290,6 +290,13 @@ TYPED = {
         f" def a(self, value): self.b = value * {number}\ndef f(run): K().a = 1"
         for number in (1, 2)
     ),
+    "a value of a class": tuple(
+        f"class K:\n a = {number}\ndef f(run): return K.a" for number in (1, 2)
+    ),
+    "how an object is called": tuple(
+        f"class K:\n def __call__(self): return {number}\ndef f(run): return K()()"
+        for number in (1, 2)
+    ),
     "a class of classes": tuple(
         f"class M(type):\n def a(self): return {number}\nclass K(metaclass=M): pass\n"
         "def f(run): return K.a()"

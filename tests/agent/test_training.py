@@ -1,9 +1,11 @@
+import itertools
 import json
 import os
 import signal
 import warnings
 from contextlib import nullcontext
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -182,11 +184,12 @@ def test_a_run_can_be_watched(tmp_path, monkeypatch):
 
 
 def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
-    written = []
-    monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
-    with at_step(49, runs.crash), pytest.raises(runs.Breakdown):  # after nine points
+    written, clock = [], itertools.count(100, 0.1)  # s: a step, and a point, take a tenth each
+    monkeypatch.setattr("unload.agent.training.time", Mock(monotonic=lambda: next(clock)))
+    monkeypatch.setattr(RunFolder, "save_curve", lambda _, run: written.append(run.rollout.steps))
+    with at_step(49, runs.crash), pytest.raises(runs.Breakdown):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    assert 1 <= len(written) < 9
+    assert written == [5, 15, 25, 35, 45], "at every other point"
     assert not (tmp_path / "checkpoint.npz").exists(), "the step was broken off"
 
 
