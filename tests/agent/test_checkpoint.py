@@ -68,6 +68,11 @@ def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch, fini
     assert "engine" not in settings_of_run(heights), "nothing is lifted there"
 
 
+def test_a_stack_that_counts_as_false_is_known():
+    kind = type("Stack", (list,), {"__call__": lambda stack, rng: few_walls(rng)})
+    assert isinstance(settings_of_run(TrainConfig(**CONTAINER), kind())["stack"], str)
+
+
 def scaled(run, by: float) -> None:
     """A change: what is learned is some times the reward."""
     run.reward = lambda picks, distances: picks["rewards"] * np.nan_to_num(np.float32(by))

@@ -111,9 +111,8 @@ class RunFolder:
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": FORMAT, "version": task.VERSION, "settings": json.dumps(run.settings)}
-        files.write_arrays(
-            self._checkpoint, gather(run) | {name: np.array(mark) for name, mark in marks.items()}
-        )
+        arrays = {name: np.array(mark) for name, mark in marks.items()}
+        files.write_arrays(self._checkpoint, gather(run) | arrays)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""

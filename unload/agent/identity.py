@@ -185,10 +185,7 @@ def _code_of(function: FunctionType) -> Any:
 
 
 def _used(function: FunctionType) -> list[Any]:
-    """What a function encloses, its defaults, and the values of the names that it uses.
-
-    Of one that was typed also the files that it imports when it runs.
-    """
+    """What a function encloses, its defaults, values of names, and, if typed, files it imports."""
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     codes, typed = [*_codes(function.__code__)], function.__module__ in (None, "__main__")
     names = [name for code in codes for name in code.co_names]

@@ -42,8 +42,7 @@ class Physics(ABC):
     exact = True
 
     def __init__(self, force: Force = task.PICK_FORCE) -> None:
-        unlimited = isinstance(force, str) and force == "auto"
-        self.force = np.inf if unlimited else checks.real("force", force, 0)
+        self.force = np.inf if str(force) == "auto" else checks.real("force", force, 0)
         self.load: Load | None = None
         self.present = np.zeros(0, dtype=bool)
         self._closed = False
