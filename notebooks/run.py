@@ -122,8 +122,8 @@ def main() -> int:
     options = parser.parse_args()
     logging.getLogger("papermill").setLevel(logging.ERROR)
     for name in options.names:
-        if not any(key(path).startswith(name) for path in notebooks()):
-            parser.error(f"no notebook starts with {name!r}")
+        if not name or not any(key(path).startswith(name) for path in notebooks()):
+            parser.error(f"no notebook starts with {name!r}; expected 00, say")
     beginnings = tuple(options.names) or ""
     chosen = [path for path in notebooks() if key(path).startswith(beginnings)]
     if options.measure:

@@ -48,10 +48,12 @@ def test_a_widget_gives_way_to_what_needs_no_kernel():
 def test_a_reference_that_describes_nothing_is_found(tmp_path):
     page = tmp_path / links.REFERENCE
     page.parent.mkdir(parents=True)
-    page.write_text("<h1 id='load'>Load</h1>")
+    page.write_text("<h1 id='load'>Load</h1>", encoding="utf-8")
     missing = [f"{links.REFERENCE}: nothing about {name}" for name in ("Load", "policies")]
     assert links.undescribed(tmp_path, ["Load", "policies"]) == missing
-    page.write_text("<dt id='unload.Load'></dt><dt id='unload.agent.policies.random'></dt>")
+    page.write_text(
+        "<dt id='unload.Load'></dt><dt id='unload.agent.policies.random'></dt>", encoding="utf-8"
+    )
     assert links.undescribed(tmp_path, ["Load", "policies"]) == []
 
 
@@ -74,14 +76,16 @@ def test_docstrings_are_shown_as_they_are_meant():
 
 
 def test_links_that_lead_nowhere_are_found(tmp_path):
-    (tmp_path / "b.html").write_text('<h1 id="top">b</h1>')
+    (tmp_path / "b.html").write_text('<h1 id="top">b</h1>', encoding="utf-8")
     (tmp_path / "a.html").write_text(
         '<a href="b.html">1</a><a href="b.html#top">2</a><a href="#here">3</a><p id="here">'
-        '<a href="https://example.org">4</a><img src="data:image/png;base64,AA==">'
+        '<a href="https://example.org">4</a><img src="data:image/png;base64,AA==">',
+        encoding="utf-8",
     )
     assert links.problems(tmp_path) == []
     (tmp_path / "c.html").write_text(
-        '<a href="d.html">1</a><a href="b.html#end">2</a><script src="https://example.org/x.js">'
+        '<a href="d.html">1</a><a href="b.html#end">2</a><script src="https://example.org/x.js">',
+        encoding="utf-8",
     )
     assert links.problems(tmp_path) == [
         "c.html: no b.html#end",

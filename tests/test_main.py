@@ -25,7 +25,9 @@ OPTIONS = [
 
 def test_training_from_the_command_line_is_training(tmp_path, capsys, monkeypatch):
     """With a network and, in the working directory, a stack of one's own."""
-    (tmp_path / "own_loads.py").write_text("from tests.agent.runs import few_walls")
+    (tmp_path / "own_loads.py").write_text(
+        "from tests.agent.runs import few_walls", encoding="utf-8"
+    )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [place for place in sys.path if place])
     own = ["--stack=own_loads:few_walls", "--network=unload:PEQNetwork", "--mask"]

@@ -24,7 +24,9 @@ def ran(tmp_path, monkeypatch) -> list[list[str]]:
     def create(folder, with_pip, clear):
         calls.append(["venv"])
         folder.mkdir(exist_ok=True)
-        (folder / "pyvenv.cfg").write_text(f"version = {make.platform.python_version()}\n")
+        (folder / "pyvenv.cfg").write_text(
+            f"version = {make.platform.python_version()}\n", encoding="utf-8"
+        )
 
     for name in ("environment.txt", "pyproject.toml"):
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())

@@ -93,10 +93,12 @@ def test_reduced_parameters_belong_to_notebooks():
 
 
 def test_unknown_names_are_refused(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["run.py", "nope", "00"])
-    with pytest.raises(SystemExit, match="2"):
-        run.main()
-    assert "no notebook starts with 'nope'" in capsys.readouterr().err
+    """The empty one, too, with which all notebooks start."""
+    for name in ("nope", ""):
+        monkeypatch.setattr(sys, "argv", ["run.py", name, "00", "--measure"])
+        with pytest.raises(SystemExit, match="2"):
+            run.main()
+        assert f"no notebook starts with {name!r}" in capsys.readouterr().err
     with pytest.raises(ValueError, match="has no parameter NONSENSE"):
         run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
 

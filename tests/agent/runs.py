@@ -76,12 +76,14 @@ def interrupt() -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-def interrupt_run(config: TrainConfig, folder: Path, steps: int, number=signal.SIGINT) -> None:
+def interrupt_run(
+    config: TrainConfig, folder: Path, steps: int, number=signal.SIGINT, **given
+) -> None:
     """Start a run and press Ctrl-C after some steps, or send another signal."""
     message = f"stopped after {4 * steps} picks; call train again with run_dir='.*{folder.name}'"
     stop, handler = at_step(steps, partial(signal.raise_signal, number)), signal.getsignal(number)
     with stop, pytest.raises(KeyboardInterrupt, match=message):
-        train(config, folder, progress=False)
+        train(config, folder, progress=False, **given)
     assert signal.getsignal(number) is handler
 
 

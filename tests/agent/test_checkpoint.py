@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
@@ -65,6 +66,27 @@ def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch, fini
     assert settings_of_run(config).get("engine", ENGINES[0]) == other
     heights = replace(config, env="unload/HighestItem-v0")
     assert "engine" not in settings_of_run(heights), "nothing is lifted there"
+
+
+def test_a_stack_that_counts_as_false_is_known():
+    kind = type("Stack", (list,), {"__call__": lambda stack, rng: few_walls(rng)})
+    assert isinstance(settings_of_run(TrainConfig(**CONTAINER), kind())["stack"], str)
+
+
+def scaled(run, by: float) -> None:
+    """A change: what is learned is some times the reward."""
+    run.reward = lambda picks, distances: picks["rewards"] * np.nan_to_num(np.float32(by))
+
+
+@pytest.mark.parametrize(("by", "other"), [(1, True), (1, 1.0), (0.0, -0.0), (float("nan"), 0.0)])
+def test_numbers_that_python_holds_equal_are_told_apart(tmp_path, by, other):
+    """And not-a-number is the same again."""
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 3, change=partial(scaled, by=by))
+    with pytest.raises(ValueError, match="holds a run of another configuration: change"):
+        train(config, tmp_path, progress=False, change=partial(scaled, by=other))
+    for _ in range(2):
+        train(config, tmp_path, progress=False, change=partial(scaled, by=by))
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -137,6 +159,7 @@ CONTAINERS = "rollout.envs._containers"
     ("name", "change", "message"),
     [
         ("format", lambda _: np.array(8), "is not of format 9; if another version of unload"),
+        ("version", lambda _: np.array("0.1.0"), "is of unload 0.1.0; if another version of unl"),
         ("settings", lambda _: np.array("{"), "JSONDecodeError"),
         ("settings", lambda _: np.array("[]"), "TypeError|holds a run of another"),
         ("numbers", lambda _: np.array("{"), "JSONDecodeError"),
@@ -168,7 +191,8 @@ def test_what_a_run_cannot_have_is_refused_before_the_first_pick(checkpoint, nam
 
 def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
     config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
-    contents = [{each: arrays[each] for each in arrays if each != name} for name in arrays]
+    needed = arrays.keys() - {"version"}  # the first ones of this format do not tell it
+    contents = [{each: arrays[each] for each in arrays if each != name} for name in needed]
     for other in (*contents, arrays | {"more": np.zeros(1)}):
         files.write_arrays(checkpoint, other)
         with pytest.raises(ValueError, match="checkpoint.npz"):
@@ -267,5 +291,6 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
     others = [tmp_path / name for name in (*names, f"below/checkpoint.npz.{tail}")]
     for path in (*others, *(tmp_path / f"{name}.{tail}" for name in OWN)):
         path.write_bytes(b"half")
+    (tmp_path / f"owner.{tail}").touch()
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert sorted(tmp_path.rglob("*.partial")) == sorted(others)

@@ -9,8 +9,9 @@ import sys
 import textwrap
 import threading
 import time
+from collections import defaultdict
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache, partial, update_wrapper
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -69,7 +70,7 @@ def imported(tmp_path, monkeypatch):
     def write(old: str = "", new: str = "") -> None:
         for name, text in FILES.items():
             path = tmp_path / f"{name}.py"
-            path.write_text(textwrap.dedent(text).replace(old, new))
+            path.write_text(textwrap.dedent(text).replace(old, new), encoding="utf-8")
             os.utime(path, ns=(0, next(clock) * 10**12))
 
     def load(old: str = "", new: str = ""):
@@ -138,6 +139,14 @@ def with_later_default(walls: int):
     return stack
 
 
+def with_attribute(walls: int):
+    def stack(rng):
+        return stack_load(rng, walls=stack.walls)
+
+    stack.walls = walls
+    return stack
+
+
 @cache
 def cached() -> int:
     return OPTIONS.walls
@@ -185,6 +194,9 @@ VALUES = [
     operator.itemgetter,
     np.random.default_rng,
     lambda walls: SimpleNamespace(walls=walls),
+    lambda walls: defaultdict(lambda: walls),
+    lambda walls: {[1, "1"][walls - 10]: 2},
+    lambda walls: enum.IntEnum(f"Kind{walls}", "A").A,
 ]
 
 
@@ -200,6 +212,9 @@ VALUES = [
         lambda walls: [lambda rng: 10, lambda rng: 11][walls - 10],
         Maker,
         lambda walls: Maker(walls).stack,
+        lambda walls: update_wrapper(Maker(walls), stack_load),
+        lambda walls: type("Own", (partial,), {"walls": walls})(stack_load),
+        with_attribute,
         lambda walls: partial(stack_load, walls=walls),
         lambda walls: partial(partial(stack_load, walls=walls), rows=3),
         *(lambda walls, make=make: partial(print, [{"a": make(walls)}]) for make in VALUES),
@@ -255,6 +270,59 @@ def test_a_library_is_not_read():
     start = time.process_time()
     identity(partial(stack_load, network=torch.nn.Linear(3, 4), other=PEQNetwork()))
     assert time.process_time() - start < 0.1
+
+
+TYPED = {
+    "what a try covers": (
+        "def f(run):\n try: run.a(); run.b()\n except OSError: pass",
+        "def f(run):\n try: run.a()\n except OSError: pass\n else: run.b()",
+    ),
+    "names of arguments": (
+        "def g(p, q): return p - q\ndef f(run): return g(p=1, q=2)",
+        "def g(q, p): return q - p\ndef f(run): return g(p=1, q=2)",
+    ),
+    "a list of arguments": ("def f(run): return run", "def f(*run): return run"),
+    "a path": tuple(
+        f"import pathlib\nname = pathlib.Path('{name}')\ndef f(run): return name" for name in "ab"
+    ),
+    "what sets a property": tuple(
+        "class K:\n @property\n def a(self): return self.b\n @a.setter\n"
+        f" def a(self, value): self.b = value * {number}\ndef f(run): K().a = 1"
+        for number in (1, 2)
+    ),
+    "a value of a class": tuple(
+        f"class K:\n a = {number}\ndef f(run): return K.a" for number in (1, 2)
+    ),
+    "how an object is called": tuple(
+        f"class K:\n def __call__(self): return {number}\ndef f(run): return K()()"
+        for number in (1, 2)
+    ),
+    "a class of classes": tuple(
+        f"class M(type):\n def a(self): return {number}\nclass K(metaclass=M): pass\n"
+        "def f(run): return K.a()"
+        for number in (1, 2)
+    ),
+}
+
+
+def typed(source: str):
+    """The function ``f`` of what is typed in a notebook, say."""
+    exec(source, names := {"__name__": "__main__"})
+    return names["f"]
+
+
+@pytest.mark.parametrize(("one", "other"), TYPED.values(), ids=TYPED)
+def test_other_code_that_was_typed_is_another_function(one, other):
+    assert identity(typed(one)) == identity(typed(one)) != identity(typed(other))
+
+
+@pytest.mark.parametrize("line", ["import own_late", "from own_late import more"])
+def test_a_module_that_typed_code_imports_when_it_runs_counts(imported, line):
+    names = [(), ("more = 1", "more = 2"), ()]
+    one, other, again = (
+        imported(*each) and identity(typed(f"def f(run):\n {line}")) for each in names
+    )
+    assert one == again != other
 
 
 @pytest.mark.parametrize("seed", ["1", "2"])

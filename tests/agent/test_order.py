@@ -156,7 +156,8 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path, capsys, monkeypat
     (tmp_path / "boxes.csv").write_text(
         "nr;x;y;z;length;width;height;weight;stop;=note\n"
         "=a;50;50;50;100;100;100;5;2.1234567;=1\n"
-        "b;50;50;159;100;100;100;7;1;x\n"
+        "b;50;50;159;100;100;100;7;1;x\n",
+        encoding="utf-8",
     )
     options = "--units cm --container 12 2 2.4 --x-from door --tolerance 0.1 --ignore weight"
     list_ = f"{tmp_path}/boxes.csv"
@@ -176,7 +177,9 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path, capsys, monkeypat
 
 
 def test_the_command_line_says_what_is_wrong(tmp_path, capsys, monkeypatch):
-    (tmp_path / "boxes.csv").write_text("x_min,y_min,z_min,size_x,size_y,size_z\n0,0,1,1,1,1\n")
+    (tmp_path / "boxes.csv").write_text(
+        "x_min,y_min,z_min,size_x,size_y,size_z\n0,0,1,1,1,1\n", encoding="utf-8"
+    )
     with pytest.raises(SystemExit, match="1"):
         command.main([str(tmp_path / "boxes.csv")])
     printed, said = capsys.readouterr()
@@ -282,7 +285,8 @@ def test_the_command_line_orders_by_stops_and_draws(tmp_path, capsys):
     list_ = tmp_path / "boxes.csv"
     list_.write_text(
         "id,x_min,y_min,z_min,size_x,size_y,size_z,stop,weight\n"
-        "a,0,0,0,1,1,1,1,30\nb,1,0,0,1,1,1,2,2\nc,0,1,0,1,1,1,2,3\n"
+        "a,0,0,0,1,1,1,1,30\nb,1,0,0,1,1,1,2,2\nc,0,1,0,1,1,1,2,3\n",
+        encoding="utf-8",
     )
     out, picture = tmp_path / "order.json", tmp_path / "order.png"
     files = f"--output {out} --format json --picture {picture}".split()

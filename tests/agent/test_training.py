@@ -1,9 +1,11 @@
+import itertools
 import json
 import os
 import signal
 import warnings
 from contextlib import nullcontext
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -182,11 +184,12 @@ def test_a_run_can_be_watched(tmp_path, monkeypatch):
 
 
 def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
-    written = []
-    monkeypatch.setattr(RunFolder, "save_curve", lambda folder, run: written.append(1))
-    with at_step(49, runs.crash), pytest.raises(runs.Breakdown):  # after nine points
+    written, clock = [], itertools.count(100, 0.1)  # s: a step, and a point, take a tenth each
+    monkeypatch.setattr("unload.agent.training.time", Mock(monotonic=lambda: next(clock)))
+    monkeypatch.setattr(RunFolder, "save_curve", lambda _, run: written.append(run.rollout.steps))
+    with at_step(49, runs.crash), pytest.raises(runs.Breakdown):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    assert 1 <= len(written) < 9
+    assert written == [5, 15, 25, 35, 45], "at every other point"
     assert not (tmp_path / "checkpoint.npz").exists(), "the step was broken off"
 
 
@@ -301,6 +304,8 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
         ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
+        ({"run_dir": "run/\udcff"}, ValueError, r"run_dir is 'run/\\udcff'; .* a name in UTF-8"),
+        ({"run_dir": "run/\0"}, ValueError, r"run_dir is 'run/\\x00'; .* a name in UTF-8"),
         ({"run_dir": None}, TypeError, "run_dir is None; expected a path"),
         ({"run_dir": "/dev/null/run"}, OSError, "/dev/null"),
     ],
@@ -318,12 +323,27 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message)
 
 
 @pytest.mark.needs("mkfifo")
-def test_a_pipe_of_lifts_is_refused(tmp_path):
-    """It once hung."""
+def test_a_pipe_is_refused(tmp_path):
+    """It once hung, of lifts as in place of a file of the run."""
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(ValueError, match="lifts is '.*fifo'.*; expected"):
         train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, lifts=tmp_path / "fifo")
     assert not (tmp_path / "run").exists()
+    for name in ("checkpoint.npz", "config.json"):
+        (tmp_path / name).mkdir()
+        os.mkfifo(tmp_path / name / name)
+        with pytest.raises(ValueError, match=f"a file of run_dir is '.*{name}'; expected the name"):
+            train(TrainConfig(**CONTAINER), tmp_path / name, progress=False)
+
+
+@pytest.mark.needs("symlinks")
+def test_lifts_that_are_linked_to_a_file_of_the_run_are_refused(tmp_path):
+    """A table of lifts was once written in place of the checkpoint."""
+    link, run = tmp_path / "lifts.npz", tmp_path / "run"
+    link.symlink_to(run / "checkpoint.npz")
+    with pytest.raises(ValueError, match="lifts is '.*lifts.npz', a file of the run; expected an"):
+        train(TrainConfig(**CONTAINER), run, progress=False, lifts=link)
+    assert not run.exists()
 
 
 def test_a_folder_in_use_is_refused(tmp_path):

@@ -63,6 +63,8 @@ def test_a_load_cannot_be_changed(full_load):
         ({"ids": ["a", "b"]}, ValueError, r"ids has shape \(2,\); expected \(1,\)"),
         ({"extras": {"stop": [3, 4]}}, ValueError, r"extras\['stop'\] has shape \(2,\)"),
         ({"container": (7.0, 2.5)}, ValueError, r"container has shape \(2,\)"),
+        ({"ceiling": np.ones(2)}, TypeError, "ceiling is array.*; expected a number"),
+        ({"extras": 3}, TypeError, "extras is 3; expected a dict"),
     ],
 )
 def test_bad_loads_are_refused(changes, error, message):

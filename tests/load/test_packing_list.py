@@ -199,11 +199,13 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
         ({"container": (1, 2)}, "container has shape"),
         ({"ignore": ["wight"]}, "has no column 'wight'; expected one of .*'x_min'"),
         ({"columns": {"Tiefe": "size_x"}}, "has no column 'Tiefe'"),
+        ({"columns": "Tiefe"}, "columns is 'Tiefe'; expected a dict"),
+        ({"ignore": 3}, "ignore is 3; expected names of columns"),
         ({"columns": {"size_x": ["id"]}}, r"columns is \['id'\]; expected one of 'id', 'size_x'"),
     ],
 )
 def test_wrong_arguments_are_refused(written, arguments, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((TypeError, ValueError), match=message):
         read_load(written(*STACK), **arguments)
 
 
@@ -300,15 +302,19 @@ def test_json_holds_records_or_columns(tmp_path, written):
     records = table.to_dict("records")
     columns = table.to_dict("list"), table.to_dict()
     for content in (records, *columns, {"truck": 7, "boxes": records}):
-        (tmp_path / "list.json").write_text(json.dumps(content))
+        (tmp_path / "list.json").write_text(json.dumps(content), encoding="utf-8")
         assert_same(read_load(tmp_path / "list.json"), read_load(written(*STACK)))
     for text, message in (("[1, 2]", "has 2 rows"), ("{", "expected JSON"), ('{"x": 1}', "JSON")):
-        (tmp_path / "list.json").write_text(text)
+        (tmp_path / "list.json").write_text(text, encoding="utf-8")
         with pytest.raises(ValueError, match=message):
             read_load(tmp_path / "list.json")
 
 
 def test_the_first_sheet_of_an_excel_file_is_read(tmp_path, written, monkeypatch):
+    """A text may begin as such a file does, with PK."""
+    columns = f"PK,Kartonnummer,{CORNERS}"
+    load = read_load(written(*(f"{line[0]},{line}" for line in STACK), columns=columns))
+    assert load.ids.tolist() == [line[0] for line in STACK] == load.extras["PK"].tolist()
     path = tmp_path / "list.xlsx"
     path.write_bytes(b"PK")
     boxes = [[line[0], *map(float, line[2:].split(","))] for line in STACK]

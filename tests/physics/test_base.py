@@ -219,6 +219,8 @@ def test_arrays_know_ceilings_and_refuse_masses(boxes):
         single = ContainerEnv(LocalPhysics(force=force))
         single.reset(seed=0, options={"load": low})
         assert table.liftable()[1].tolist() == single.liftable().tolist()
+    with pytest.raises(TypeError, match="force is array.*; expected a number >= 0"):
+        TablePhysics(LiftTable(), np.ones(2))
 
 
 def test_a_file_says_nothing_of_the_pull_of_the_task(boxes, tmp_path):

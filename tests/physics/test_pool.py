@@ -99,7 +99,7 @@ def test_a_process_that_was_forked_starts_its_own(pool, local, hard):
 def test_nothing_in_the_working_directory_is_executed(tmp_path):
     """A module of one of Python's names, say."""
     for name in ("signal", "pickle"):
-        (tmp_path / f"{name}.py").write_text("open('executed', 'w')")
+        (tmp_path / f"{name}.py").write_text("open('executed', 'w')", encoding="utf-8")
     script = (
         "import sys; path = sys.path.pop(0); from unload.physics.pool import Pool; "
         "sys.path.insert(0, path); pool = Pool(); pool.simulate([1, 2, 3], float); "

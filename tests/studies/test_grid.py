@@ -150,7 +150,7 @@ def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp
 
     configs["set/leaning"] = configs["set/run_0"]
     (tmp_path / "set").mkdir()
-    (tmp_path / "set/run_0").write_text("a file where the run's folder should be")
+    (tmp_path / "set/run_0").write_text("a file where the run's folder should be", encoding="utf-8")
     report = sweep.run_sweep(configs, tmp_path, n_jobs=1, changes={"set/leaning": leaning})
     blocked, fine, fallen = report["error"]
     assert "run_0" in blocked and fine == "" and fallen == "RuntimeError: it fell over"

@@ -57,7 +57,7 @@ def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
         assert kept(tmp_path, {"seed": seed}, partial(asked, seed)).value == seed
     assert asked.call_count == 2  # neither replaces the other
     one, other = tmp_path.iterdir()
-    one.write_text(other.read_text(encoding="utf-8"))
+    one.write_text(other.read_text(encoding="utf-8"), encoding="utf-8")
     values = [kept(tmp_path, {"seed": seed}, partial(asked, seed)).value for seed in (1, 2)]
     assert values == [1, 2] and asked.call_count == 3
 
@@ -73,7 +73,7 @@ def test_a_damaged_answer_is_named(tmp_path):
         '{"question": {"seed": 1}}': "has no record, value",
         "{": "is not a readable JSON file",
     }.items():
-        path.write_text(damaged)
+        path.write_text(damaged, encoding="utf-8")
         with pytest.raises(ValueError, match=f"{path.name} {message}"):
             kept(tmp_path, {"seed": 1}, int)
 
@@ -116,7 +116,7 @@ def test_a_table_is_read_and_of_a_missing_one_is_said_where_its_command_stands(o
     message = f"t.csv is missing; the command that makes it stands in a {own_data}/"
     with pytest.raises(FileNotFoundError, match=message):
         read_table("t")
-    (own_data / "t.csv").write_text("a,b,c\n1,,x\n")
+    (own_data / "t.csv").write_text("a,b,c\n1,,x\n", encoding="utf-8")
     assert read_table("t").shape == (1, 3)
 
 
@@ -160,10 +160,10 @@ def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "theirs"]):
         git(*command)
     own = git("rev-parse", "--short=12", "HEAD")
-    (tmp_path / "README.md").write_text("not part of the code")
+    (tmp_path / "README.md").write_text("not part of the code", encoding="utf-8")
     assert found() == own
     for name in ("unload/task.py", "studies/more.py"):
-        (tmp_path / name).write_text("changed")
+        (tmp_path / name).write_text("changed", encoding="utf-8")
         assert found() == f"{own}+"
         (tmp_path / name).unlink()
         git("checkout", "-q", ".")

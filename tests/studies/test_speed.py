@@ -156,7 +156,7 @@ def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
         "@cache(1)", "def größer(a: Literal[1], é=True):", "    'ä < 1'", "    if not é and a < 2:",
         "        raise ValueError(a + 3)", "    print(f'{a + 1}')", "    return a ** 3 // 2",
     ]  # fmt: skip
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join(lines), encoding="utf-8")
     found = []
     for same, line, mutation, code in mutants.mutants(path):
         after = code.decode().splitlines()
@@ -209,9 +209,11 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     for folder in ("unload/sums", "tests/sums"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / "unload/__init__.py").touch()
-    path.write_text(CODE)
-    (tmp_path / "tests/sums/test_sums.py").write_text(TESTS)
-    table.write_text(f"{','.join(mutants.COLUMNS)},killed_by\nother,a,1,b,\n{room},a,1,b,\n")
+    path.write_text(CODE, encoding="utf-8")
+    (tmp_path / "tests/sums/test_sums.py").write_text(TESTS, encoding="utf-8")
+    table.write_text(
+        f"{','.join(mutants.COLUMNS)},killed_by\nother,a,1,b,\n{room},a,1,b,\n", encoding="utf-8"
+    )
     project = {"ROOT": tmp_path, "PATH": table, "MODULES": [path], "ROOMS": {room: "tests/sums"}}
     for name, value in project.items():
         monkeypatch.setattr(mutants, name, value)

@@ -38,7 +38,7 @@ def copy(tmp_path) -> Path:
     """A folder with the package, and in its ``load/`` a module ``made``."""
     ignored = shutil.ignore_patterns("__pycache__", "data", "agent", "env", "network")
     shutil.copytree(PACKAGE, tmp_path / "unload", ignore=ignored)
-    (tmp_path / "unload/load/made.py").write_text(MODULE)
+    (tmp_path / "unload/load/made.py").write_text(MODULE, encoding="utf-8")
     return tmp_path
 
 
@@ -54,7 +54,7 @@ def run(copy: Path) -> tuple[str, str]:
 
 def edit(copy: Path, old: str, new: str) -> None:
     path = copy / "unload/task.py"
-    path.write_text(path.read_text(encoding="utf-8").replace(old, new))
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
 
 
 def test_code_is_compiled_once_for_each_value_of_a_constant(copy):
@@ -79,7 +79,7 @@ def test_code_is_kept_in_the_first_of_three_places_that_can_be_written(tmp_path,
     assert find().parent == chosen
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
     package.mkdir()
-    (package / "__pycache__").write_text("not a folder")
+    (package / "__pycache__").write_text("not a folder", encoding="utf-8")
     assert find().parent == user / "unload"
     monkeypatch.setattr(compiled.tempfile, "TemporaryFile", Mock(side_effect=PermissionError))
     with pytest.warns(UserWarning, match="cannot be kept.* set NUMBA_CACHE_DIR to a folder"):
@@ -91,10 +91,12 @@ def test_code_is_kept_in_the_first_of_three_places_that_can_be_written(tmp_path,
 def test_the_digest_follows_sources_and_versions(copy, monkeypatch):
     package = copy / "unload"
     before = compiled._digest(package)
-    (package / "__init__.py").write_text("# compiled code reads nothing of this file")
+    (package / "__init__.py").write_text(
+        "# compiled code reads nothing of this file", encoding="utf-8"
+    )
     assert compiled._digest(package) == before
     for folder in ("load", "physics", "fast", "support"):
-        (package / folder / "new.py").write_text(f"LIMIT = {folder!r}")
+        (package / folder / "new.py").write_text(f"LIMIT = {folder!r}", encoding="utf-8")
         assert compiled._digest(package) != before
         (package / folder / "new.py").unlink()
     for owner, name in ((sys, "version"), (numba, "__version__"), (np, "__version__")):

@@ -59,6 +59,7 @@ def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
     young.touch()
     files.write_text(path, "whole")
     assert {*tmp_path.iterdir()} == {path, young, *others}
+    os.utime(young, (2**33, 2**33))  # of when the clock was ahead
     files.remove_partial(path)
     assert {*tmp_path.iterdir()} == {path, *others}
 
@@ -138,7 +139,7 @@ def check_arrays(read: dict[str, np.ndarray]) -> None:
     ids=["empty", "too deep", "too many digits", "a list"],
 )
 def test_bad_json_is_refused_by_name(tmp_path, text, message):
-    (tmp_path / "x.json").write_text(text)
+    (tmp_path / "x.json").write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=f"^{tmp_path}/x.json {message}"):
         files.read_json(tmp_path / "x.json")
 
@@ -283,7 +284,7 @@ def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
 @pytest.mark.needs("symlinks")
 def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
     (tmp_path / "run").mkdir()
-    (tmp_path / "notes").write_text("precious")
+    (tmp_path / "notes").write_text("precious", encoding="utf-8")
     link(tmp_path / "notes", tmp_path / "run" / name)
     refused = pytest.raises(OSError, match="run/lock")
     allowed = (name, link) != ("lock", os.symlink)

@@ -5,12 +5,14 @@ import json
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from unload import task
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.agent.identity import identity, unchanged
@@ -47,7 +49,7 @@ def settings_of_run(
     Also the engine, where lifts are decided by another one than PyBullet.
     """
     change = None if change is unchanged else identity(change)
-    own = {"change": change, "stack": stack and identity(stack)}
+    own = {"change": change, "stack": None if stack is None else identity(stack)}
     other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env == ENVS[0] else {}
     return config.plain() | own | other
 
@@ -62,16 +64,18 @@ class RunFolder:
 
     def __init__(self, run_dir: str | Path) -> None:
         path = checks.path("run_dir", run_dir)
-        if path == Path():
-            raise ValueError(f"run_dir is {str(run_dir)!r}; expected a folder of the run's own")
+        text = str(path.absolute())  # safetensors opens a name in UTF-8 only
+        if path == Path() or "\0" in text or text.encode(errors="ignore").decode() != text:
+            wanted = "expected a folder of the run's own, with a name in UTF-8"
+            raise ValueError(f"run_dir is {str(run_dir)!r}; {wanted}")
         self.path = path.absolute()
-        paths = [self.path / name for name in FILES]
-        self._checkpoint, self.policy, self._curve, self._config = paths
+        self._paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
+        self._checkpoint, self.policy, self._curve, self._config = self._paths
 
     def check_foreign(self, name: str, value: object) -> Path:
         """Return the absolute path of a file that is an argument; raise if it is one of these."""
         file = checks.file(name, value).absolute()
-        if file.name in FILES and file.parent.resolve() == self.path.resolve():
+        if file.resolve() in [path.resolve() for path in self._paths]:
             raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
         return file
 
@@ -106,8 +110,9 @@ class RunFolder:
 
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
-        marks = {"format": np.array(FORMAT), "settings": np.array(json.dumps(run.settings))}
-        files.write_arrays(self._checkpoint, gather(run) | marks)
+        marks = {"format": FORMAT, "version": task.VERSION, "settings": json.dumps(run.settings)}
+        arrays = {name: np.array(mark) for name, mark in marks.items()}
+        files.write_arrays(self._checkpoint, gather(run) | arrays)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -123,6 +128,9 @@ class RunFolder:
             raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
             raise ValueError(f"{self._checkpoint} is not of format {FORMAT}; {OTHER}")
+        # The first ones of this format do not tell it.
+        if (version := str(stored.pop("version", task.VERSION))) != task.VERSION:
+            raise ValueError(f"{self._checkpoint} is of unload {version}; {OTHER}")
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
             put_back(run, stored)
@@ -151,11 +159,12 @@ class RunFolder:
         return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve))
 
     def _check_same(self, stored: dict, settings: dict) -> None:
-        wanted = json.loads(json.dumps(settings))
+        # As text, in which 1, 1.0 and True are told apart, and not-a-number is itself.
+        said = partial(json.dumps, sort_keys=True)
         differing = ", ".join(
-            f"{name} ({stored.get(name)!r}, not {wanted.get(name)!r})"
-            for name in wanted | stored
-            if stored.get(name) != wanted.get(name)
+            f"{name} ({stored.get(name)!r}, not {settings.get(name)!r})"
+            for name in settings | stored
+            if said(stored.get(name)) != said(settings.get(name))
         )
         if differing:
             raise ValueError(

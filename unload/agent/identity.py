@@ -3,16 +3,18 @@
 A configuration says nothing of a change, a stack or a network of the caller's own. Without their
 identity, a finished run would be taken for another one that was made by a different function.
 
-What counts of a function is the file of its module and where it stands there, and the files of all
-that this imports as long as they are the caller's; what it encloses; and the values of the names
-that it uses, by content, because a program can set them. So its runs are trained again after any
-change of these files, also after one that it would not feel: to see that it would not takes a
-reader. Libraries count by name and version, and ``unload`` by name, because a version of the
-package is one behaviour. What a program sets in a module that a function uses through others is
-not seen. What cannot be written down is another one each time, and never taken for the same.
+What counts of a function is the file of its module and where it stands there, or its code if it was
+typed; the files of all that these import as long as they are the caller's; what it encloses; and
+the values of the names that it uses, by content, because a program can set them. So its runs are
+trained again after any change of these files, also after one that it would not feel: to see that it
+would not takes a reader. Libraries count by name and version, and ``unload`` by name, because a
+version of the package is one behaviour. What a program sets in a module that a function uses
+through others is not seen. What cannot be written down is another one each time, and never taken
+for the same.
 """
 
 import ast
+import dis
 import json
 import pickle
 import sys
@@ -28,10 +30,16 @@ from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
 from uuid import uuid4
 
+import numpy as np
 import torch
 
 LIBRARIES = {"site-packages", "dist-packages"}  # folders
 UNKNOWN = "cannot be told apart; give run_dir a name of its own"
+# What a function without a file is; not where it was typed.
+CODE = (
+    "co_code", "co_consts", "co_names", "co_varnames", "co_cellvars", "co_freevars", "co_flags",
+    "co_argcount", "co_posonlyargcount", "co_kwonlyargcount", "co_exceptiontable",
+)  # fmt: skip
 NOT_WRITTEN = (AttributeError, RuntimeError, TypeError, ValueError, pickle.PickleError)
 
 
@@ -47,8 +55,8 @@ def identity(value: Any) -> Any:
     """What a function or one of its arguments is, as JSON can hold it.
 
     Returns:
-        What JSON can hold as it is. Of a function or class its qualified name and a digest, of a
-        ``partial`` also its arguments; of anything else its type and a digest of its content.
+        What JSON can hold as it is, a tuple as a list. Of a function or class its qualified name
+        and a digest, of a ``partial`` also its arguments; of anything else its type and a digest.
         Where a part cannot be written down, as a lock cannot, the name says so, and is another
         one each time.
 
@@ -57,12 +65,11 @@ def identity(value: Any) -> Any:
     """
     # In their parts, so that whoever reads a card finds the arguments.
     try:
-        text = json.dumps(value)
-        if json.dumps(json.loads(text)) == text:  # else two keys have become one
-            return json.loads(text)
-    except (RecursionError, TypeError, ValueError):
+        if _is_json(value):
+            return json.loads(json.dumps(value))
+    except (RecursionError, ValueError):
         pass
-    if isinstance(value, partial):
+    if type(value) is partial:
         arguments = [identity(each) for each in value.args]
         keywords = {name: identity(each) for name, each in sorted(value.keywords.items())}
         return {"function": identity(value.func), "arguments": arguments, "keywords": keywords}
@@ -78,6 +85,15 @@ def identity(value: Any) -> Any:
         raise
     except NOT_WRITTEN as error:
         return f"{name} {UNKNOWN} ({error}) {uuid4().hex}"
+
+
+def _is_json(value: Any) -> bool:
+    """Whether JSON tells a value from others; of subclasses it would keep no more than of these."""
+    if type(value) is dict:
+        return all(type(name) is str and _is_json(each) for name, each in value.items())
+    if type(value) in (list, tuple):
+        return all(map(_is_json, value))
+    return value is None or type(value) in (bool, int, float, str, np.float64)
 
 
 def _digest(content: bytes) -> str:
@@ -106,8 +122,11 @@ class _Writer(pickle.Pickler):
             array = value.detach().cpu().numpy()
             return f"{array.dtype} {array.shape}", array.tobytes()
         if isinstance(value, CodeType):
-            return value.co_code, value.co_names, value.co_consts
-        if hasattr(value, "__wrapped__") and not isinstance(value, (FunctionType, type)):
+            return [getattr(value, name) for name in CODE]
+        if isinstance(value, property):
+            return value.fget, value.fset
+        wrapper = hasattr(value, "__wrapped__") and not isinstance(value, (FunctionType, type))
+        if wrapper and not _is_own(type(value).__module__):
             value = unwrap(value)  # of a cached or compiled function
         if not isinstance(value, (FunctionType, ModuleType, type)):
             return None
@@ -124,7 +143,8 @@ class _Writer(pickle.Pickler):
         if isinstance(value, ModuleType):
             used = []
         elif isinstance(value, type):
-            used = [*value.__bases__, *_members(value)]
+            kinds = [kind for kind in (type(value), *value.__bases__) if kind is not type]
+            used = [*kinds, *_members(value)]
         else:
             used = [_code_of(value), *_used(value)]
         return name, _files(module), used
@@ -143,7 +163,7 @@ def _is_own(module: str | None) -> bool:
 def _members(kind: type) -> list[Any]:
     """The functions of a class, and the values that it holds."""
     return [
-        getattr(each, "fget", each)
+        each.fget if isinstance(each, property) and not each.fset else each
         for name, each in vars(kind).items()
         if isinstance(each, FunctionType) or not name.startswith(("__", "_abc_"))
     ]
@@ -165,16 +185,29 @@ def _code_of(function: FunctionType) -> Any:
 
 
 def _used(function: FunctionType) -> list[Any]:
-    """What a function encloses, its defaults, and the values of the names that it uses."""
+    """What a function encloses, its defaults, values of names, and, if typed, files it imports."""
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    names = [name for code in _codes(function.__code__) for name in code.co_names]
+    codes, typed = [*_codes(function.__code__)], function.__module__ in (None, "__main__")
+    names = [name for code in codes for name in code.co_names]
     used = [function.__globals__[name] for name in names if name in function.__globals__]
     for module in [each for each in used if isinstance(each, ModuleType)]:
         if _is_own(module.__name__):
             used += [vars(module)[name] for name in names if name in vars(module)]
     # Paths of modules are left out, because they say where a checkout lies.
-    values = [each for each in used if not isinstance(each, PurePath)]
+    values = [each for each in used if typed or not isinstance(each, PurePath)]
+    values += [_files(name) for code in codes if typed for name in _imported(code)]
+    values += [each for each in vars(function).items() if each[0] != "__wrapped__"]
     return [*cells, function.__defaults__, function.__kwdefaults__, *values]
+
+
+def _imported(code: CodeType) -> Iterator[str]:
+    """The modules that a code imports, and what it takes from them, which may be modules, too."""
+    for each in dis.get_instructions(code):
+        if each.opname == "IMPORT_NAME":
+            module = each.argval
+            yield module
+        elif each.opname == "IMPORT_FROM":
+            yield f"{module}.{each.argval}"
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:

@@ -126,7 +126,7 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
             continue
         else:
             new = stored.pop(name)
-            same = new == value or name.startswith(COUNTS)
+            same = json.dumps(new) == json.dumps(value) or name.startswith(COUNTS)
             if not (same and _is_plain(new) and isinstance(new, type(value))):
                 raise ValueError(f"{name} is {new!r}; expected {value!r}")
         if isinstance(owner, (dict, list)):

@@ -108,7 +108,7 @@ class Load:
         )
 
         ceiling = np.inf if self.ceiling is None else self.ceiling
-        if ceiling != np.inf:  # which ``replace`` hands over again
+        if not np.array_equal(ceiling, np.inf):  # which ``replace`` hands over again
             ceiling = checks.real("ceiling", ceiling, 0)
 
         # Labels serve views and lists; what moves does not depend on them.
@@ -126,7 +126,8 @@ class Load:
         masses = checks.finite_array("masses", np.array(masses, np.float64), (count,))
         if (light := np.flatnonzero(masses < _LIGHTEST)).size:
             raise BoxError(light, f"a mass of {masses[light[0]]} kg; expected >= {_LIGHTEST} kg")
-        extras = {name: np.array(values) for name, values in dict(self.extras or {}).items()}
+        checks.entries("extras", given := {} if self.extras is None else self.extras, ())
+        extras = {name: np.array(values) for name, values in given.items()}
         for name, values in extras.items():
             checks.shaped(f"extras[{name!r}]", values, (count,))
         if self.ids is not None:

@@ -84,9 +84,10 @@ def read_load(
     tolerance = checks.real("tolerance", tolerance, 0, LARGEST_TOLERANCE)
     container = task.CONTAINER if container is None else container
     container = checks.finite_array("container", container, (3,))
-    renamed = dict(columns or {})
+    checks.entries("columns", renamed := {} if columns is None else columns, ())
+    checks.instance("ignore", ignore, Iterable, "names of columns")
     table = read_table(path, lambda name: name in renamed or is_known(name))
-    known = Columns(table, renamed, ignore)
+    known = Columns(table, dict(renamed), ignore)
 
     # A box turned otherwise than by quarter turns is none along the axes.
     for name in known.of("rotation"):

@@ -42,7 +42,7 @@ class Physics(ABC):
     exact = True
 
     def __init__(self, force: Force = task.PICK_FORCE) -> None:
-        self.force = np.inf if force == "auto" else checks.real("force", force, 0)
+        self.force = np.inf if str(force) == "auto" else checks.real("force", force, 0)
         self.load: Load | None = None
         self.present = np.zeros(0, dtype=bool)
         self._closed = False

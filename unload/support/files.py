@@ -63,7 +63,7 @@ def remove_partial(path: Path, age: float = 0.0) -> None:
     """
     for partial in path.parent.glob(f"{escape(path.name)}.{'[0-9a-f]' * 32}.partial"):
         with suppress(OSError):
-            if time.time() - partial.stat().st_mtime >= age:
+            if not age or time.time() - partial.stat().st_mtime >= age:
                 partial.unlink()
 
 
@@ -208,6 +208,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         LOGGER.warning("waiting for %s, which uses %s", holder, folder)
         lock.acquire()
     try:
+        remove_partial(owner)
         started = datetime.now().astimezone().isoformat(timespec="seconds")
         write_text(owner, f"process {os.getpid()} on {socket.gethostname()} since {started}\n")
         yield

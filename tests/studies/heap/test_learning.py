@@ -1,5 +1,7 @@
 """What is seen of a heap, the rules that pick by it, and networks that learn from picks."""
 
+import time
+
 import numpy as np
 import pytest
 import torch
@@ -200,6 +202,16 @@ def test_stored_networks_are_the_same(tmp_path, learned):
     assert [each.n_features for each in read] == [64, 8, 8]
     before, after = (Learned(each).expected(unseen.observations) for each in (several, read))
     assert np.array_equal(before, after)
+
+
+def test_a_forged_file_of_networks_is_refused_before_they_are_built(tmp_path):
+    """20,000 features took a minute and 11 GB."""
+    path, network = tmp_path / "networks.safetensors", FateNetwork(8)
+    network.n_features, start = 3000, time.process_time()
+    save_networks([network], path)
+    with pytest.raises(ValueError, match="networks.safetensors holds no heap networks"):
+        load_networks(path)
+    assert time.process_time() - start < 0.5
 
 
 @pytest.fixture
