@@ -130,7 +130,8 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
 def _png(figure: Figure) -> bytes:
     """The file of a figure, in few colours, which take a quarter of the bytes."""
     file = io.BytesIO()
-    Image.fromarray(pixels(figure)).quantize(_FILE_COLOURS).save(file, "PNG", optimize=True)
+    image = Image.fromarray(pixels(figure)).quantize(_FILE_COLOURS, Image.Quantize.MAXCOVERAGE)
+    image.save(file, "PNG", optimize=True)
     return file.getvalue()
 
 
