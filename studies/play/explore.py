@@ -46,12 +46,13 @@ class Explore(widgets.VBox):
         click: Callable[[float, float], dict | str] | None = None,
         **controls: widgets.ValueWidget,
     ) -> None:
-        self._draw, self._click, self._controls = styled(draw), click, controls
-        if click:
-            self.picture = Picture()
-            self.picture.on_msg(self._clicked)
-        else:
+        self._draw, self._controls, self._clickable = styled(draw), controls, click is not None
+        self.picture: widgets.DOMWidget
+        if click is None:
             self.picture = widgets.Image(format="png", layout={"max_width": "100%"})
+        else:
+            self.picture = Picture()
+            self.picture.on_msg(lambda _, place, __: self._tell(click(*self._in_axes(**place))))
         for control in controls.values():
             control.style.description_width = "initial"  # as wide as the text
             if control.has_trait("continuous_update"):
@@ -69,20 +70,24 @@ class Explore(widgets.VBox):
         values = {name: control.value for name, control in self._controls.items()}
         self._figure, content = self._draw(**values), io.BytesIO()
         # Margins stay where the picture is clicked, so that its shares are those of the figure.
-        whole = {"savefig.bbox": "standard"} if self._click else {}
+        whole = {"savefig.bbox": "standard"} if self._clickable else {}
         with plt.style.context([STYLE, whole]):
             self._figure.savefig(content, dpi="figure", format="png", metadata={"Software": None})
         plt.close(self._figure)  # so that no notebook shows it once more
         self.picture.value, self._busy.value = content.getvalue(), ""
 
-    def _clicked(self, _, content: dict, __) -> None:
-        place = content["x"], 1 - content["y"]
-        pixels = self._figure.transFigure.transform(place)
-        found = self._click(*self._figure.axes[0].transData.inverted().transform(pixels))
-        if isinstance(found, str):
-            self._busy.value = found
+    def _in_axes(self, x: float, y: float) -> tuple[float, float]:
+        """A place of the picture in the coordinates of the figure's first axes."""
+        pixels = self._figure.transFigure.transform((x, 1 - y))
+        x, y = self._figure.axes[0].transData.inverted().transform(pixels).tolist()
+        return x, y
+
+    def _tell(self, chosen: dict | str) -> None:
+        """Set the controls that a click has chosen, or say why there are none."""
+        if isinstance(chosen, str):
+            self._busy.value = chosen
         else:
-            for name, value in found.items():
+            for name, value in chosen.items():
                 self._controls[name].value = value
 
     def _repr_mimebundle_(self, **kwargs) -> dict:
