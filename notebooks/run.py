@@ -3,7 +3,7 @@
     python notebooks/run.py                    reduced counts, results in build/notebooks
     python notebooks/run.py --in-place         their own counts, results kept in them
     python notebooks/run.py 03 solutions/08    only those whose names start so
-    python notebooks/run.py --measure          words, figures, exercises and minutes; runs nothing
+    python notebooks/run.py --measure          words, minutes, words per sentence; runs nothing
 
 The reduced counts stand in reduced.toml. A cell that fails ends the run with its error and
 a non-zero exit status.
@@ -27,6 +27,7 @@ from notebooks.checks import REDUCED
 from unload.support import files
 
 HERE = Path(__file__).resolve().parent
+README = HERE.parent / "README.md"
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
@@ -51,10 +52,38 @@ def reduced_parameters(notebook: Path) -> dict:
     return tomllib.loads((HERE / "reduced.toml").read_text(encoding="utf-8")).get(key(notebook), {})
 
 
+def prose(path: Path) -> str:
+    """The Markdown of a notebook or of the README."""
+    if path == README:
+        return path.read_text(encoding="utf-8")
+    cells = nbformat.read(path, as_version=4).cells
+    return "\n\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+
+
+def opening(path: Path) -> str:
+    """What decides whether one reads on: the first section of a chapter, all of other texts."""
+    text = prose(path)
+    return text.partition("\n## ")[0] if path.parent == HERE else text
+
+
+def rendered(text: str) -> str:
+    """Markdown without pictures, the addresses of links and the lines between rows of a table."""
+    text = re.sub(r"!\[[^\]]*\]\([^)]*\)|^\|[-|]+\|$", "", text, flags=re.M)
+    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
+
+
+def sentences(text: str) -> list[str]:
+    """The sentences of Markdown, those of lists included; code, tables and headings left out."""
+    text = rendered(re.sub(r"```.*?```|\$\$.*?\$\$", "", text, flags=re.DOTALL))
+    blocks = re.split(r"\n\s*\n|\n(?=[-*] |\d+\. |\||#)", text)
+    prose = [" ".join(block.split()) for block in blocks if block.lstrip()[:1] not in ("|", "#")]
+    parts = [re.split(r"(?<=[.!?])[”)*]*\s+(?=[“(*A-Z0-9`])", block) for block in prose]
+    return [sentence for block in parts for sentence in block if len(sentence.split()) > 2]
+
+
 def measured(notebook: Path) -> dict[str, float]:
     """Count ``words``, ``figures``, ``long cells``, ``exercises`` and the ``minutes`` they take."""
-    cells = nbformat.read(notebook, as_version=4).cells
-    text = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
+    cells, text = nbformat.read(notebook, as_version=4).cells, prose(notebook)
     code = [cell for cell in cells if cell.cell_type == "code"]
     counts = {
         "words": len(text.split()),
@@ -69,6 +98,28 @@ def measured(notebook: Path) -> dict[str, float]:
     }
     minutes = counts["words"] / WORDS_A_MINUTE + EXERCISE * counts["exercises"]
     return counts | {"minutes": minutes + FIGURE * (counts["figures"] + counts["long cells"])}
+
+
+def measures(chosen: list[Path], readme: Path | None) -> str:
+    """A table of what is measured, with the core and the course as a whole.
+
+    Sentences are those of ``opening``: ``a sentence`` is their mean number of words.
+    """
+    table = pd.DataFrame({key(path): measured(path) for path in chosen}).T
+    course = ~table.index.str.contains("/")
+    sums = {"core": table[table.index.str.startswith("0")], "course": table[course]}
+    texts = {key(path): path for path in chosen} | ({"README": readme} if readme else {})
+    for name, rows in sums.items():
+        table.loc[name] = rows.sum()
+    for name, path in texts.items():
+        counts = [len(sentence.split()) for sentence in sentences(opening(path))]
+        table.loc[name, "a sentence"] = sum(counts) / len(counts)
+        table.loc[name, "longest"] = max(counts)
+    if readme:
+        table.loc["README", "words"] = len(re.findall(r"\b\w\S*", rendered(prose(readme))))
+    return table.to_string(
+        na_rep="", float_format="{:.0f}".format, formatters={"a sentence": "{:.1f}".format}
+    )
 
 
 def run(notebook: Path, output: Path, parameters: dict) -> None:
@@ -127,9 +178,7 @@ def main() -> int:
     beginnings = tuple(options.names) or ""
     chosen = [path for path in notebooks() if key(path).startswith(beginnings)]
     if options.measure:
-        table = pd.DataFrame({key(path): measured(path) for path in chosen}).T
-        table.loc["all"] = table.sum()
-        print(table.round().astype(int).to_string())
+        print(measures(chosen, README if not options.names else None))
         return 0
     for number, path in enumerate(chosen, start=1):
         label = path.relative_to(HERE)

@@ -1,11 +1,12 @@
 """The README's example does what its comments say; its links and commands lead somewhere."""
 
-import json
 import re
 from pathlib import Path
 
+import pytest
 from scipy.stats import t
 
+from notebooks import run
 from studies.falls.long import LONG
 from studies.grid import read_grid
 from studies.paper.training import PAPER, PAPER_CELLS
@@ -59,11 +60,11 @@ def test_the_answer_is_that_of_the_data():
     assert f"The {len(runs)} of its configuration here start at 26–27 %" in text
     assert runs["start"].between(0.255, 0.276).all()
     ends = 100 * by_cell(runs)["end"]
-    assert f"by batch and mask, at {ends.min():.0f} to {ends.max():.0f} % on average" in text
+    assert f"by batch and *mask*, at {ends.min():.0f} to {ends.max():.0f} % on average" in text
     masked = runs[runs["cell"].str.endswith("_mask") & ~runs["cell"].str.endswith("_no_mask")]
     assert f"{masked['fell'].sum()} of {len(masked)} reach 95–100 % and fall below 80 %" in text
     published = read_table("falls/published").query("cell in @PAPER_CELLS")
-    assert f"With x and y hidden, none of the {len(published)} fails" in text
+    assert f"With x and y hidden, all {len(published)} pick without a miss" in text
     assert (published["judged_place"] == 1).all()
     shared = paper[paper["cell"].isin(["averaged_mask", "averaged_b2048_mask"])]
     ordered = read_table("ties/earlier").query("cell == 'ties_by_order_mask'")
@@ -132,32 +133,75 @@ def test_the_agents_of_another_library_are_those_of_the_data():
     assert f"{picks:,} picks each" in " ".join(text.split())
 
 
-def prose(path: Path) -> str:
-    """The Markdown of a notebook."""
-    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-    return "\n\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "markdown")
+def text_name(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
 
 
-def sentences(text: str) -> list[str]:
-    """The sentences of Markdown, those of lists included; code, tables and headings left out."""
-    text = re.sub(r"```.*?```|\$\$.*?\$\$|!\[[^\]]*\]\([^)]*\)", "", text, flags=re.DOTALL)
-    text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
-    blocks = re.split(r"\n\s*\n|\n(?=[-*] |\d+\. |\||#)", text)
-    prose = [" ".join(block.split()) for block in blocks if block.lstrip()[:1] not in ("|", "#")]
-    parts = [re.split(r"(?<=[.!?])[”)*]*\s+(?=[“(*A-Z0-9`])", block) for block in prose]
-    return [sentence for block in parts for sentence in block if len(sentence.split()) > 2]
+TEXTS = [path for path in (run.README, *run.notebooks()) if path.parent.name != "solutions"]
 
 
-def test_sentences_are_short():
+@pytest.mark.parametrize("path", TEXTS, ids=text_name)
+def test_sentences_are_short(path):
     """On average 15 words in README and first cells, 18 in the reports: long ones are named."""
-    texts = {"README.md": README}
-    for path in sorted((ROOT / "notebooks").glob("*.ipynb")):
-        texts[path.name] = prose(path).partition("\n## ")[0]
-    for path in sorted((ROOT / "notebooks/report").glob("*.ipynb")):
-        texts[f"report/{path.name}"] = prose(path)
-    for name, text in texts.items():
-        lengths = {sentence: len(sentence.split()) for sentence in sentences(text)}
-        longest = max(lengths, key=lengths.get)
-        most = 18 if name.startswith("report") else 15
-        average = sum(lengths.values()) / len(lengths)
-        assert average <= most and lengths[longest] <= 3 * most, (name, longest)
+    lengths = {each: len(each.split()) for each in run.sentences(run.opening(path))}
+    longest = max(lengths, key=lengths.get)
+    most = 18 if path.parent.name == "report" else 15
+    average = sum(lengths.values()) / len(lengths)
+    assert average <= most and lengths[longest] <= 3 * most, longest
+
+
+GLOSSARY = (ROOT / "notebooks/glossary.md").read_text(encoding="utf-8")
+# Words of the glossary that are read rightly by who knows only what they mean everywhere.
+EVERYDAY = {
+    "box", "item", "package", "wall", "load", "lift", "row", "place", "pick", "step", "value",
+    "score", "run", "seed", "cell", "pair", "falls", "update", "visible", "on top", "gap", "replay",
+}  # fmt: skip
+
+
+def terms() -> dict[str, list[int]]:
+    """The other words of the glossary, longest first, and the notebooks that introduce them."""
+    rows = re.findall(r"^\| \*\*(.+?)\*\* \| .* \| (.*) \|$", GLOSSARY, re.M)
+    found = {
+        re.sub(r" \(.*\)", "", term): [int(number) for number in re.findall(r"\[(\d+)\]", places)]
+        for names, places in rows
+        for term in names.split(", ")
+    }
+    assert EVERYDAY < set(found)
+    return {name: found[name] for name in sorted(set(found) - EVERYDAY, key=len, reverse=True)}
+
+
+def unexplained(text: str, number: int) -> list[tuple[str, str]]:
+    """Terms that a text does not explain, and the sentence of each.
+
+    A term is explained where it is first used, in italics, in bold or in a link; or a notebook of
+    at most this number introduces it; or the text links the glossary.
+    """
+    if "glossary.md" in text:
+        return []
+    text, found = re.sub(r"```.*?```|`[^`]*`|!\[.*?\)", "", text, flags=re.DOTALL), []
+    marked = re.compile(r"\*+[^*\n]+\*+|\[[^\]]*\]\([^)]*\)")
+    for term, introduced in terms().items():
+        case = re.I if term.islower() else 0
+        word = re.compile(rf"(?<![\w-]){re.escape(term)}s?(?![\w-])", case)
+        use = word.search(text)
+        if use and min(introduced, default=99) > number:
+            spans = (mark.span() for mark in marked.finditer(text))
+            if not any(start <= use.start() < end for start, end in spans):
+                found.append((term, text[text.rfind(".", 0, use.start()) + 1 :].partition(".")[0]))
+        text = word.sub(lambda match: "_" * len(match[0]), text)
+    return found
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=text_name)
+def test_terms_are_explained_where_they_are_met(path):
+    """In the README's first screen, the first cells of the course, and the reports."""
+    text = run.opening(path).partition("\n## Look\n")[0]
+    assert not unexplained(text, int(path.stem[:2]) if path.parent == run.HERE else -1)
+
+
+def test_an_unexplained_term_is_named_with_its_sentence():
+    text = "Some *tilt* is met. A tilt is a slope. Without the mask, MSR is low."
+    assert [term for term, _ in unexplained(text, -1)] == ["mask", "MSR"]
+    assert unexplained(text, 0) == []
+    assert unexplained("Boxes. A deadlock ends.", -1) == [("deadlock", " A deadlock ends")]
+    assert unexplained(text + " See [terms](../glossary.md).", -1) == []

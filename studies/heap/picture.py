@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.path import Path
 
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.rake import Outcome
@@ -40,18 +41,13 @@ def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray | None = None, title: 
     """
     for line in _room(heap.edge()):
         axes.plot(*project(line).T, color="0.6", lw=0.8, zorder=0)
-    faces = corners(heap)[:, FACES].reshape(-1, 4, 3)
-    middle, turns = faces.mean(axis=1), heap.axes().transpose(0, 2, 1)
-    normals = np.stack([-turns, turns], axis=2).reshape(-1, 3)  # in the order of FACES
-    towards = ((EYE - middle) * normals).sum(axis=1) > 0
-    order = np.argsort(-np.linalg.norm(middle - EYE, axis=1), kind="stable")
-    order = order[towards[order]]
-    shade = 0.72 + 0.28 * (normals[order] @ LIGHT)
+    boxes, faces, normals = _faces(heap)
+    shade = 0.72 + 0.28 * (normals @ LIGHT)
     colours = np.tile(MEANINGS["stays"], (len(heap), 1)) if colours is None else colours
-    colours = np.repeat(colours, len(FACES), axis=0)[order] * shade[:, None]
+    colours = colours[boxes] * shade[:, None]
     axes.add_collection(
         PolyCollection(
-            project(faces[order]),
+            faces,
             facecolors=np.clip(colours, 0, 1),
             edgecolors=0.5 * np.clip(colours, 0, 1),
             linewidths=0.4,
@@ -67,6 +63,13 @@ def draw_heap(axes: Axes, heap: Heap, colours: np.ndarray | None = None, title: 
         title=title,
     )
     axes.axis("off")
+
+
+def box_at(heap: Heap, x: float, y: float) -> int | None:
+    """The box that ``draw_heap`` shows at a point of its axes; None if there is none."""
+    boxes, faces, _ = _faces(heap)
+    here = [box for box, face in zip(boxes, faces) if Path(face).contains_point((x, y))]
+    return int(here[-1]) if here else None
 
 
 def outcome_colours(outcome: Outcome, box: int) -> np.ndarray:
@@ -89,6 +92,22 @@ def picture(heap: Heap) -> np.ndarray:
     figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")
     draw_heap(figure.add_axes((0, 0, 1, 1)), heap)
     return pixels(figure)
+
+
+def _faces(heap: Heap) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The faces that point to the eye, the farthest first.
+
+    Returns:
+        (k,) int, the box of each; (k, 4, 2) float64, its corners in the picture; (k, 3) float64,
+        its outward normal.
+    """
+    faces = corners(heap)[:, FACES].reshape(-1, 4, 3)
+    middle, turns = faces.mean(axis=1), heap.axes().transpose(0, 2, 1)
+    normals = np.stack([-turns, turns], axis=2).reshape(-1, 3)  # in the order of FACES
+    towards = ((EYE - middle) * normals).sum(axis=1) > 0
+    order = np.argsort(-np.linalg.norm(middle - EYE, axis=1), kind="stable")
+    order = order[towards[order]]
+    return order // len(FACES), project(faces[order]), normals[order]
 
 
 def _room(edge: float) -> list[np.ndarray]:

@@ -50,8 +50,9 @@ ENDS = "", "_low", "_high"  # of a mean and its interval
 LINES = {REFERENCE: COLOURS["highest"], LEARNED: "C0", ORACLE: "0.2"}
 # Where the names of rules stand that lie close together: offset in points, and alignment.
 NAME_PLACES = {
-    "clear above": ((-2, 9), "center"), "nearest": ((0, -13), "center"),
+    "clear above": ((8, 13), "right"), "nearest": ((0, -13), "center"),
     "highest": ((5, -12), "left"), "random": ((5, -12), "left"),
+    "λ = 0.25": ((4, 8), "left"), "λ = 0.5": ((6, -11), "left"),
 }  # fmt: skip
 UNITS = {"boxes": "boxes a pick", "falls": "falls a pick", "net": "boxes − λ falls a pick"}
 

@@ -3,6 +3,7 @@
 ``data/ties/PLAN.md`` fixed it before its runs; it is applied to all runs of this repository.
 """
 
+import numpy as np
 import pandas as pd
 
 from studies.statistics import END, WINDOW_PICKS, end_msr, fell, steady, windows
@@ -13,6 +14,15 @@ FALL, RISE = 0.02, 0.1  # of the loss, as shares of what it was before
 SLOWER = 0.5  # the slope of the last decrease, at most, as a share of that of the rise
 FIG12 = ["starts", "steady", "slower", "noisier", "ends"]
 FIG11 = ["loss_falls", "loss_rises", "loss_sinks"]
+# The paper's words for each part, and what a run has to do; those for the loss are one row.
+WORDS = {
+    "starts": ("−0.7", "12.5–17.5 % in the first episode"),
+    "steady": ("a steady increase", "no window is 5 points below an earlier one"),
+    "slower": ("slower after the loss's peak", "a smaller mean change from then on"),
+    "noisier": ("more noisy after it", "changes vary more from then on"),
+    "ends": ("around 0.2", "55–65 % over the last tenth"),
+    "fig11": ("decreases, increases, a lower slope", "it falls, rises, sinks at most half as fast"),
+}
 
 
 def likeness(curve: pd.DataFrame) -> dict:
@@ -45,6 +55,18 @@ def likeness(curve: pd.DataFrame) -> dict:
     measures = {"start": start, "end": end, "best": float(means["success_rate"].max())}
     verdicts = {"fig12": fig12, "fig11": fig11, "both": fig12 and fig11}
     return measures | {"fell": fell(curve)} | parts | verdicts
+
+
+def open_course(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest MSR that the paper's words leave open during a run.
+
+    A steady rise that becomes slower lies above a straight one, and below where it ends.
+
+    Args:
+        share: (n,) float in [0, 1], of the run's picks.
+    """
+    low = STARTS[0] + (ENDS[0] - STARTS[0]) * share
+    return low, np.where(share > 0, ENDS[1], STARTS[1])
 
 
 def loss_parts(curve: pd.DataFrame, peak: float, at: float) -> dict:

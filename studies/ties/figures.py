@@ -1,21 +1,25 @@
 """Where runs end, by how ties are broken, and the README's answer in one figure."""
 
+from collections.abc import Callable
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
 from studies.paper.training import PAPER, SMOOTH
-from studies.statistics import PAPER_MSR, PAPER_START, by_run
+from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
 from studies.style import COLOURS, WITHOUT_MASK, styled
-from studies.ties.criterion import likeness
+from studies.ties.criterion import WORDS, likeness, open_course
 from studies.ties.earlier import read_earlier
 from studies.ties.laboratory import RHOS
 from studies.ties.training import TIES
 
+PICKS = 20_000_000  # of a run
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
 # the ending that says whether the mask is on in training.
 KINDS: dict[str, list[tuple[Grid | None, str]]] = {
@@ -75,6 +79,48 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
         axes.set_xticks(range(len(KINDS)), labels, fontsize=7)
         axes.set(title=f"{'with' if mask else 'without'} the mask", ylim=(0, 103))
     panels[0].set_ylabel("MSR over the last tenth of the picks (%)")
+    return figure
+
+
+def draw_words(axes: Axes, scale: Callable = lambda msr: msr) -> None:
+    """Draw what the paper says of its Fig. 12: its two numbers, and what its words leave open.
+
+    Args:
+        axes: over picks.
+        scale: of an MSR.
+    """
+    share = np.array([0, 1e-9, 1])
+    low, high = map(scale, open_course(share))
+    axes.fill_between(PICKS * share, low, high, color="#f5eed6", zorder=0)
+    ends = scale(np.array([PAPER_START, PAPER_MSR]))
+    axes.plot([0, PICKS], ends, "k*", markersize=11, clip_on=False, zorder=4)
+
+
+@styled
+def draw_run(curve: pd.DataFrame) -> Figure:
+    """A run beside what the paper says of its own, and which parts of the criterion hold.
+
+    Args:
+        curve: of one run, with ``cell`` and ``seed``.
+    """
+    means, holds = windows(curve), likeness(curve)
+    middle = (means.index + 0.5) * WINDOW_PICKS
+    figure, axes = plt.subplots(figsize=(6.4, 3.6))
+    draw_words(axes)
+    colour = COLOURS["ranks"]
+    axes.plot(curve["picks"], curve["success_rate"], color=colour, linewidth=0.6, alpha=0.5)
+    axes.plot(middle, means["success_rate"], "o-", color=colour, markersize=3)
+    axes.axvline(middle[means["loss"].argmax()], color="0.4", linestyle=":")
+    first = curve.iloc[0]
+    said = [
+        f"{mark} {', '.join(part for part in WORDS if holds[part] == wanted) or 'none'}"
+        for mark, wanted in (("holds:", True), ("missed:", False))
+    ]
+    title = f"{first['cell']}, seed {first['seed']}\n{'; '.join(said)}"
+    axes.set(xlim=(0, PICKS), xticks=np.arange(5) * 5e6, xlabel="picks")
+    axes.set(ylim=(0, 1.02), ylabel="MSR while training")
+    axes.set_title(title, loc="left", fontsize=9)
+    axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
     return figure
 
 

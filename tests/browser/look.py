@@ -6,9 +6,9 @@
 
 Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
 nothing on stderr; formulas are typeset; 3D views hold pixels; figures under sliders change when
-one is moved; in 00 a click changes the score, and an agent who is watched plays, with a kernel and
-without. On the page a reader takes the five steps, picks, trains and shares a setting. Pictures of
-all are kept in build/browser/.
+one is moved, and the heap of 21 when it is clicked; in 00 a click changes the score, and an agent
+who is watched plays, with a kernel and without. On the page a reader takes the five steps, picks,
+trains and shares a setting. Pictures of all are kept in build/browser/.
 """
 
 import argparse
@@ -154,6 +154,8 @@ def look_at(page: Page, name: str) -> Iterator[str]:
     yield from typeset(page, name)
     yield from drawn(page, name)
     yield from sliders_answer(page, name)
+    if name.startswith("21"):
+        yield from heap_answers(page)
     if name == PLAYGROUND:
         yield from clicks_count(page)
         yield from play_moves(page)
@@ -238,6 +240,19 @@ def sliders_answer(page: Page, name: str) -> Iterator[str]:
         if not wait_until(lambda image=image, old=before: image.get_attribute("src") != old):
             yield f"{name}: a slider does not change figure {number}"
         shot(figure, BUILD / f"{name}-slider-{number}.png")
+
+
+def heap_answers(page: Page) -> Iterator[str]:
+    """Yield whether no click in the foreground of a heap shows the pick of another box."""
+    image = page.locator("img.widget-image").first
+    image.scroll_into_view_if_needed()
+    before, box = image.get_attribute("src"), image.bounding_box()
+    for x, y in ((0.5, 0.75), (0.4, 0.7), (0.6, 0.6), (0.3, 0.6)):
+        image.click(position={"x": x * box["width"], "y": y * box["height"]})
+        if wait_until(lambda: image.get_attribute("src") != before, 5):
+            shot(image, BUILD / "heap-clicked.png")
+            return
+    yield "21: no click on the heap changes its picture"
 
 
 def replay_moves(page: Page) -> Iterator[str]:

@@ -53,7 +53,7 @@ TRIANGLES = np.array([(a, b, c, a, c, d) for a, b, c, d in _RINGS]).reshape(12, 
 _EDGE = 0.55  # brightness of the edge of a face, as a share of that of the face
 _WIDTH = 8.0  # inches, at 100 pixels each
 _LEGEND = 0.15  # share of the width at the left
-_FILE_COLOURS = 128  # of a still picture
+_FILE_COLOURS = 128, Image.Quantize.MAXCOVERAGE  # of a still picture; a legend keeps its own
 _NUMBERED = 50  # picks in a picture of an order
 
 
@@ -130,7 +130,7 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
 def _png(figure: Figure) -> bytes:
     """The file of a figure, in few colours, which take a quarter of the bytes."""
     file = io.BytesIO()
-    Image.fromarray(pixels(figure)).quantize(_FILE_COLOURS).save(file, "PNG", optimize=True)
+    Image.fromarray(pixels(figure)).quantize(*_FILE_COLOURS).save(file, "PNG", optimize=True)
     return file.getvalue()
 
 

@@ -17,7 +17,7 @@ from studies.heap.recording import HEAPS, make_heaps, make_networks
 from studies.heap.table import best_rule, family, plan
 from studies.results import read_provenance, read_table
 from unload.agent.identity import identity
-from unload.load.picture import COLOURS
+from unload.load.picture import COLOURS, project
 
 
 def test_the_best_rule_depends_on_the_weight_of_falls():
@@ -123,6 +123,17 @@ def test_a_box_is_drawn_in_the_colour_of_what_a_pick_does_to_it(cubes):
     along, dragged = (np.array(COLOURS[name]) for name in ("liftable", "tried"))
     for face, colour in zip(painted, [along] * 3 + [dragged] * 3):
         assert face / face.max() == pytest.approx(colour / colour.max(), abs=0.02)
+
+
+def test_a_click_on_the_picture_of_a_heap_finds_the_box_that_is_seen_there(cubes):
+    """Of a box behind another the part that stands out is found, and the nearer one elsewhere."""
+    heap = cubes((5, 1, 0), (5, 1, 1), (6, 1, 0))
+    seen = {box: project(heap.positions[[box]])[0] for box in range(3)}
+    assert picture.box_at(heap, *seen[1]) == 1 and picture.box_at(heap, *seen[2]) == 2
+    one_behind = cubes((5, 1, 0), (5.5, 1, 0))
+    middle, top = (project(np.array([[5.2, 1, z]]))[0] for z in (0.1, 0.35))
+    assert picture.box_at(one_behind, *middle) == 1 and picture.box_at(one_behind, *top) == 0
+    assert picture.box_at(heap, 9.0, 9.0) is None
 
 
 def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):

@@ -5,6 +5,7 @@
 
 import base64
 import html
+import io
 import logging
 import re
 from dataclasses import replace
@@ -200,6 +201,31 @@ def test_a_figure_under_sliders_is_drawn_at_each_change():
     assert WIDGET in bundle and base64.b64decode(bundle["image/png"]) == before
     assert before.startswith(b"\x89PNG")
     assert not plt.get_fignums(), "a figure that is open is shown twice"
+
+
+def test_a_click_on_a_figure_sets_a_control_or_says_why_not():
+    """Its place is given in the coordinates of the axes, which fill the middle of the figure."""
+    clicked = []
+
+    def draw(end):
+        figure = plt.figure(figsize=(4, 2), layout="none")
+        figure.add_axes((0.25, 0.25, 0.5, 0.5)).set(xlim=(0, 10), ylim=(0, end))
+        return figure
+
+    def chosen(x, y):
+        clicked.append((x, y))
+        return {"end": 7} if x < 10 else "outside"
+
+    end = widgets.IntSlider(4, max=9)
+    view = Explore(draw, click=chosen, end=end)
+    before = bytes(view.picture.value)
+    height, width = plt.imread(io.BytesIO(before)).shape[:2]
+    assert (width, height) == (440, 220), "the whole figure, with its margins"
+    view.picture._handle_custom_msg({"x": 0.5, "y": 0.375}, [])
+    assert end.value == 7 and view.picture.value != before
+    view.picture._handle_custom_msg({"x": 0.875, "y": 0.75}, [])
+    assert end.value == 7 and view._busy.value == "outside"
+    assert np.allclose(clicked, [(5, 3), (12.5, 0)])
 
 
 def test_the_canvas_holds_the_load_and_a_pick_is_one_small_message(full_load, monkeypatch):

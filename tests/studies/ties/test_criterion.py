@@ -11,7 +11,7 @@ from studies import paths
 from studies.grid import read_grid
 from studies.results import read_provenance, read_table
 from studies.ties import creep, earlier, leak, training
-from studies.ties.criterion import FIG11, FIG12, likeness
+from studies.ties.criterion import ENDS, FIG11, FIG12, STARTS, likeness, open_course
 from studies.ties.figures import KINDS, draw_ends, read_by_ties
 from studies.ties.laboratory import CELLS, mirrored_load
 from tests.studies.curves import course
@@ -43,6 +43,15 @@ def test_each_part_of_the_criterion_is_missed_by_a_run_of_its_own(part, rates, l
     assert [name for name in FIG12 + FIG11 if not found[name]] == ([part] if part else [])
     assert found["fig12"] == (part not in FIG12) and found["fig11"] == (part not in FIG11)
     assert found["both"] == (part is None)
+
+
+def test_a_run_like_the_papers_keeps_to_what_its_words_leave_open():
+    """A straight rise marks one side, where it may end the other; a late rise leaves both."""
+    share = np.linspace(0, 1, len(RATES))
+    low, high = open_course(share)
+    assert (low <= RATES).all() and (RATES <= high).all()
+    assert np.allclose([low[0], high[0], low[-1], high[-1]], [*STARTS, *ENDS])
+    assert np.allclose(np.diff(low, 2), 0) and (0.15 + 0.45 * share**3 < low).any()
 
 
 def test_the_cells_are_those_of_the_plan():
