@@ -51,7 +51,16 @@ def best_weight(weight):
 
 
 def seldom_succeeds(policy):
-    return unload.evaluate(policy, 2, 1, max_picks=100)["success_rate"].mean() < 0.05
+    """Whether a policy obeys the masks, and hardly ever succeeds."""
+    obeys = []
+
+    def noted(observations, masks, rng):
+        actions = np.asarray(call(policy, observations, masks, rng))
+        obeys.extend(masks[np.arange(len(actions)), actions] == 1)
+        return actions
+
+    msr = unload.evaluate(noted, 2, 1, max_picks=100)["success_rate"].mean()
+    return msr < 0.05 if all(obeys) else "it picks boxes that the mask forbids"
 
 
 # Notebook 02
@@ -150,7 +159,7 @@ def msr(along_x, along_y, ties="noise"):
 
 EXERCISES = {
     "00/1": Exercise(number, successes, "load and run have the same seed, 0 to 19"),
-    "00/2": Exercise(number, deadlocks, "did you give mask=False?"),
+    "00/2": Exercise(number, deadlocks, "did you give mask=False, and the seed of the load?"),
     "01/1": Exercise(number, best_weight, "move the slider"),
     "01/2": Exercise(
         function, seldom_succeeds, "observations[..., 2] is the height; obey the masks"

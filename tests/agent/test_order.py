@@ -306,7 +306,8 @@ def test_the_command_line_orders_by_stops_and_draws(tmp_path, capsys):
         command.main([str(list_), "--by", "town", "--output", str(out)])
     assert "by is 'town'; expected one of 'stop', 'weight'" in capsys.readouterr().err
     assert len(pd.read_json(out)) == 3, "nothing is written"
-    list_.write_text(list_.read_text().replace("1,2,3", "1,,3"))
+    text = list_.read_text(encoding="utf-8").replace("1,2,3", "1,,3")
+    list_.write_text(text, encoding="utf-8")
     with pytest.raises(SystemExit):
         command.main([str(list_), "--by", "stop"])
     wanted = "1 of 3 boxes have no 'stop'; expected one for each box: c\n"

@@ -13,7 +13,7 @@ const colourOf = (p) => [68 - 200 * p + 385 * p ** 2, 5 + 225 * p, 84 + 250 * p 
 
 export class Drawing {
   constructor(canvas, task) {
-    Object.assign(this, { canvas, task, pen: canvas.getContext("2d") });
+    Object.assign(this, { canvas, task, pen: canvas.getContext("2d"), faces: [] });
   }
 
   /**

@@ -158,6 +158,13 @@ def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):
 
 
 @pytest.mark.pybullet
+class Notes(list):
+    """A list that does not tell what it holds, so that it is no part of an identity."""
+
+    def __reduce__(self):
+        return Notes, ()
+
+
 def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pile):
     for name, value in {
         "stored_heaps": lambda split: [pile, pile.only(np.arange(8))],
@@ -170,19 +177,17 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pi
     monkeypatch.setattr("studies.heap.env.stored_heaps", recording.stored_heaps)
     fit, policy = recording.fit, recording.Learned
 
-    # Noted on the functions themselves: what they enclosed would be a part of their identity.
+    learned, explorers, explored = Notes(), Notes(), Notes()
+
     def noted_fit(picks, seed, steps):
-        noted_fit.learned.append(picks)
+        learned.append(picks)
         return fit(picks, seed, steps)
 
     def noted_policy(networks, weight):
-        noted_policy.explorers.append(weight)
+        explorers.append(weight)
         explorer = policy(networks, weight)
-        return lambda *given: noted_policy.explored.append(weight) or explorer(*given)
+        return lambda *given: explored.append(weight) or explorer(*given)
 
-    learned, explorers, explored = [], [], []
-    noted_fit.learned = learned
-    noted_policy.explorers, noted_policy.explored = explorers, explored
     monkeypatch.setattr(recording, "fit", noted_fit)
     monkeypatch.setattr(recording, "Learned", noted_policy)
     make_networks()
