@@ -181,7 +181,8 @@ def _code_of(function: FunctionType) -> Any:
             f"{file} was changed after {function.__qualname__} was imported from it; expected the "
             "same file. Start Python again"
         )
-    return max(filter(all, code.co_positions()), default=None)  # one line may hold several
+    # One line may hold several; Python 3.12 says of none that returns a constant where it stands.
+    return max(filter(all, code.co_positions()), default=code)
 
 
 def _used(function: FunctionType) -> list[Any]:

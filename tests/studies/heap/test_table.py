@@ -157,7 +157,6 @@ def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):
     assert made["more", "train"][0] != made["more", "test"][0]
 
 
-@pytest.mark.pybullet
 class Notes(list):
     """A list that does not tell what it holds, so that it is no part of an identity."""
 
@@ -165,6 +164,7 @@ class Notes(list):
         return Notes, ()
 
 
+@pytest.mark.pybullet
 def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pile):
     for name, value in {
         "stored_heaps": lambda split: [pile, pile.only(np.arange(8))],
