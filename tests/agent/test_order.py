@@ -261,7 +261,7 @@ def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog, monk
     assert "1 of 4 boxes have less than 0.2 m above them: d\n" in caplog.text
     heavy = Load(load.positions, load.sizes, masses=[3, 1, 25, 0.5])
     assert picking_order(heavy)["item"].tolist() == [3, 1, 0, 2]
-    assert "2 of 4 boxes are too heavy for 20 N; force='auto' lifts each: 0, 2\n" in caplog.text
+    assert "2 of 4 boxes are too heavy for 20 N; a force of 'auto' lifts each: 0, 2\n" in caplog.text
     assert picking_order(heavy, force=60)["unloaded"].tolist() == [True, True, True, False]
     caplog.clear()
     assert (picking_order(heavy, force="auto")["distance"] == FREE_LIFT).all()

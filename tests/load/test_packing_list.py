@@ -215,8 +215,8 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,0,0.5,0,1,1,1"], r"row 1 \(id 'a'\), row 2 \(id 'b'\): overlap by"),
         ([UNIT, "b,0,0,1.01,1,1,1"], r"row 2 .*: floats in load, .* at 1.01 m; .* z_min '1.01'"),
         ([UNIT, "b,0.6,0,1,1,1,1"], r": row 2 \(id 'b'\): tips, because nothing"),
-        (["a,0,0,0,350,450,300"], "; in m, expected units='cm'"),
-        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m; .* container="),
+        (["a,0,0,0,350,450,300"], "; in m, expected cm"),
+        ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .*, tolerance 0.005 m; .* its size as container"),
         ([UNIT, "a,1,0,0,1,1,1"], r"1 \(id 'a'\), row 2 \(id 'a'\): the same .* box \(.* id 'a'\)"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is .*has size_z 'wide'\)"),
         (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
@@ -238,7 +238,7 @@ def test_files_that_are_no_lists_are_refused(written, tmp_path):
         ("X,x (cm)", r"the columns \['X', 'x \(cm\)'\]; expected a line of names, each once"),
         ("x,x", r"has the columns \['x', 'x'\]; expected a line of names"),
         (f"x,y,z,{CORNERS},id", "expected boxes with either x, y, z or x_min, y_min, z_min"),
-        (f"{CORNERS},depth", "size_z, each once; columns={...} says"),
+        (f"{CORNERS},depth", "size_z, each once; columns can say"),
         ("x,y_min", "columns x, y_min; expected boxes with either x, y, z or x_min"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -13,6 +13,7 @@ from unload.load.picture import (
     COLOURS,
     CORNERS,
     EYE,
+    TARGET,
     back_to_front,
     package_colour,
     project,
@@ -130,3 +131,8 @@ def test_numbers_stand_on_the_first_picks_that_are_seen(boxes, monkeypatch):
     wall = Load.from_corners([[0, 1, 0], [3, 0, 0]], [[1, 0.3, 0.3], [1, 2.4, 2.4]])
     picture.numbered(wall, np.array([0, 1]))
     assert [*written] == ["2"]
+
+
+def test_what_stands_upright_is_drawn_upright():
+    seen = project(TARGET + np.outer([-1, 0, 1], [0, 0, 1]))
+    assert seen[:, 0] == pytest.approx(0) and (np.diff(seen[:, 1]) > 0).all()

@@ -203,7 +203,7 @@ def _hopeless(load: Load, force: float) -> np.ndarray:
     low, heavy = low_ceiling(load), too_heavy(load, force)
     for boxes, problem in (
         (low, f"have less than {task.LIFT_THRESHOLD} m above them"),
-        (heavy, f"are too heavy for {force:g} N; force='auto' lifts each"),
+        (heavy, f"are too heavy for {force:g} N; a force of 'auto' lifts each"),
     ):
         if boxes.any():
             LOGGER.warning("%s", _named(load, np.flatnonzero(boxes), problem))

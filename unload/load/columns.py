@@ -109,7 +109,7 @@ class Columns:
             raise ValueError(
                 f"{self._source} has {len(table)} rows and the columns {', '.join(names)}; "
                 "expected boxes with either x, y, z or x_min, y_min, z_min, and with size_x, "
-                "size_y, size_z, each once; columns={...} says what other names mean"
+                "size_y, size_z, each once; columns can say what other names mean"
             )
         understood = [
             f"{name} as {meaning}"
@@ -154,7 +154,7 @@ class Columns:
         stated = {self._scales[name] for name in lengths} - {None}
         if silent and units is None and stated:
             if len(stated) > 1:
-                wanted = "expected units=..."
+                wanted = "expected units"
                 raise ValueError(f"{self._source} says no unit of {', '.join(silent)}; {wanted}")
             found = ", ".join(silent)
             LOGGER.warning("%s: in the unit of the other lengths: %s", self._source, found)

@@ -146,12 +146,12 @@ def read_load(
             for each in (place, other)
         ]
         if usual == 1 and sizes.max() > container.max():
-            problem += "; in m, expected units='cm', 'mm' or 'in' otherwise"
+            problem += "; in m, expected cm, mm or in as units otherwise"
         elif outside[0] and not outside[1]:
             named = dict(zip(shown, other))
-            problem += f"; all lie inside if these are {', '.join(other)}: columns={named}"
+            problem += f"; all lie inside if these are {', '.join(other)}, as columns can say: {named}"
         elif outside[0] and (container == task.CONTAINER).all():
-            problem += "; the paper's container, expected container=... of another one"
+            problem += "; if it is not the paper's container, expected its size as container"
         known.refuse(error.boxes, problem, shown)
     if (tipping := uncarried(load)).size:
         known.refuse(tipping, "tips, because nothing carries its centre of mass", shown)
