@@ -80,7 +80,7 @@ def picking_order(
 
         by: instead of a rule, a name in ``load.extras``, such as ``"stop"``: what can be reached,
             the lowest value first, or with ``"-stop"`` the highest. Boxes of later stops come out
-            early only where they stand in the way.
+            early only where they stand in the way of what can come out.
         physics: ``"table"``, ``"local"``, ``"full"`` or a ``Physics``, see ``ContainerEnv``.
         force: N, the strongest pull, see ``Physics``; ``"auto"``: as much as each box needs.
 
@@ -122,7 +122,7 @@ def picking_order(
         own.reset(load)
         hopeless = _hopeless(load, own.force)
         if policy == "reachable":
-            ruled = rule or (reachable if by is None else _by_stop(load, by))
+            ruled = rule or (reachable if by is None else _by_stop(load, by, hopeless))
             choose = partial(_by_rule, ruled, hopeless)
         else:
             choose = partial(_by_policy, policy, rng)  # type: ignore[arg-type]
@@ -189,13 +189,19 @@ def _by_rule(
             f"what rule returned is {returned!r}; expected arrays of numbers"
         ) from error
     keys = checks.finite_array("what rule returned", keys, (None, len(load)))
-    stuck, (lower, upper) = hopeless & present, load.covers
-    while not stuck[lower[stuck[upper]]].all():
-        stuck[lower[stuck[upper]]] = True
+    stuck = _stuck(load, hopeless & present)
     for worth in (allowed & ~stuck, allowed & hopeless):
         if (items := np.flatnonzero(worth)).size:
             return int(items[np.lexsort(-keys[::-1, items])[0]])
     return None
+
+
+def _stuck(load: Load, hopeless: np.ndarray) -> np.ndarray:
+    """(n,) bool, boxes that nobody can lift, and all that lies under them."""
+    stuck, (lower, upper) = hopeless.copy(), load.covers
+    while not stuck[lower[stuck[upper]]].all():
+        stuck[lower[stuck[upper]]] = True
+    return stuck
 
 
 def _hopeless(load: Load, force: float) -> np.ndarray:
@@ -217,13 +223,15 @@ def _named(load: Load, items: np.ndarray, problem: str) -> str:
     return f"{len(items)} of {len(load)} boxes {problem}: {ids}{more}"
 
 
-def _by_stop(load: Load, by: str) -> Rule:
+def _by_stop(load: Load, by: str, hopeless: np.ndarray) -> Rule:
     """The rule of an order by stops that can be carried out.
 
     A box is due at the first of the stops of all that it stands in front of, lies on, or keeps
-    from coming out over others; so no box comes out before its stop that need not.
+    from coming out over others; so no box comes out before its stop that need not. What stays in
+    the container at any rate has no stop.
     """
-    due = stop_numbers(load, by)[1]
+    stops, numbers = stop_numbers(load, by)
+    due = np.where(_stuck(load, hopeless), len(stops), numbers)
     blocked, blocking = np.hstack([load.fronts, load.covers])
     while True:
         sooner = due.copy()

@@ -149,7 +149,7 @@ def read_load(
             problem += "; in m, expected cm, mm or in as units otherwise"
         elif outside[0] and not outside[1]:
             named = dict(zip(shown, other))
-            problem += f"; all lie inside if these are {', '.join(other)}, as columns can say: {named}"
+            problem += f"; all lie inside if these are {', '.join(other)}: columns {named}"
         elif outside[0] and (container == task.CONTAINER).all():
             problem += "; if it is not the paper's container, expected its size as container"
         known.refuse(error.boxes, problem, shown)
