@@ -57,14 +57,16 @@ export class Container {
     const places = boxes.map(({ wall, left, lower, width, height }) => {
       const x = ((wall + 0.5) * task.container[0]) / task.walls;
       const [y, z] = [(left + width / 2) * task.cell, (lower + height / 2) * task.cell];
-      const sunk = task.position_noise ? [x, y, z - task.sink] : [x, y, z];
-      return sunk.map((value) => value + task.position_noise * generator.normal());
+      return task.position_noise ? [x, y, z - task.sink] : [x, y, z];
     });
+    const noise = () => task.position_noise * generator.normal();
+    const blurred = places.map((place) => place.map((value) => value + noise()));
     const square = (value, axis) => task.distance_weights[axis] * (task.viewpoint[axis] - value) ** 2;
-    const distances = places.map((place) => place.map(square).reduce((a, b) => a + b));
+    const distances = blurred.map((place) => place.map(square).reduce((a, b) => a + b));
     // From -1 to 1 between the container's sides, in single precision as in Python.
     const scaled = (value, axis) => Math.fround((2 / task.container[axis]) * value - 1);
-    this.seen = places.map((place) => place.map(scaled));
+    this.seen = blurred.map((place) => place.map(scaled));
+    this.exact = places.map((place) => place.map(scaled));
     // Sorted once, because no box moves: an observation picks out what is left.
     this.byDistance = items.toSorted((a, b) => distances[a] - distances[b]);
     const along = (axis) => this.byDistance.toSorted((a, b) => this.seen[a][axis] - this.seen[b][axis]);
@@ -72,7 +74,7 @@ export class Container {
   }
 
   /**
-   * Choose what is observed: positions, or ranks (`equalize`) with `ties` of either kind; and
+   * Choose what is observed: positions, or ranks (`equalize`) with `ties` of a kind; and
    * whether walls are `seamless`, so that a free box jams with probability `jam`.
    */
   show({ equalize, ties, seamless, jam }) {
@@ -91,11 +93,21 @@ export class Container {
     const rows = new Int16Array(present.length).fill(-1);
     this.visible.forEach((item, row) => (rows[item] = row));
     this.byAxis.forEach((order, axis) => {
-      const sorted = order.filter((item) => rows[item] >= 0);
+      const visible = order.filter((item) => rows[item] >= 0);
+      const sorted = this.equalize && this.ties === "anew" ? this.sortAnew(visible, axis) : visible;
       const positions = sorted.map((item) => this.seen[item][axis]);
       const values = this.equalize ? this.ranks(positions) : positions;
       sorted.forEach((item, i) => (this.observation[3 * rows[item] + axis] = values[i]));
     });
+  }
+
+  /** Items sorted along an axis with noise that is drawn for this once. */
+  sortAnew(items, axis) {
+    const width = (2 * this.task.position_noise) / this.task.container[axis];
+    const blurred = new Map(
+      items.map((item) => [item, this.exact[item][axis] + width * this.generator.normal()]),
+    );
+    return items.toSorted((a, b) => blurred.get(a) - blurred.get(b));
   }
 
   /** Ranks of sorted values, even from -1 to 1; those in a tie may share their mean. */
@@ -119,8 +131,8 @@ export class Container {
     if (success) {
       this.present[item] = 0;
       this.failed.clear();
-      this.look();
     }
+    if (success || this.ties === "anew") this.look();
     return success;
   }
 

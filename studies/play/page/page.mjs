@@ -126,6 +126,7 @@ function showSteps() {
   const next = nextStep(done);
   for (const { firstChild: button } of steps.children) {
     button.ariaCurrent = button.value === step ? "step" : null;
+    button.disabled = button.value === "blank" && run.running; // of weights that have settled
     button.className = done.has(button.value) ? "done" : button.value === next ? "next" : "";
   }
   element("sentence").textContent = SENTENCES[step];

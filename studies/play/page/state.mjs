@@ -11,8 +11,9 @@ export const CHOICES = {
     { "as it is": "as_is", mirrored: "mirrored", "shuffled places": "shuffled" },
     "What is remembered of a pick. Mirrored: x and y get random signs. Shuffled places: the boxes " +
     "exchange their places, left – right and rear – front, at random"],
-  ties: ["Equal coordinates", { "noise decides": "noise", averaged: "average" },
-    "Boxes of equal coordinates are ranked by noise of half a millimetre, or share a rank"],
+  ties: ["Equal coordinates", { "noise decides": "noise", "noise drawn anew": "anew", averaged: "average" },
+    "Boxes of equal coordinates are ranked by noise of half a millimetre, drawn once for a load or " +
+    "anew at each pick, or share a rank"],
   blank: ["Chooses by", { "x, y, z": false, "height only": true },
     "With height only, x and y count as 0 when the agent chooses; the weights stay as they are"],
   picks: ["Picks",
@@ -22,7 +23,7 @@ export const CHOICES = {
   batch_size: ["Batch", { "64 picks": 64, "16 picks": 16, "256 picks": 256 },
     "Remembered picks from which each update learns"],
   seamless: ["Walls", { "with a gap": false, seamless: true },
-    "In seamless walls, a free box jams with a probability, drawn anew at each attempt"],
+    "Seamless: boxes touch. A free box jams between others with a probability, drawn anew each time"],
 };
 
 /** Numbers: default, highest, form, and what a valid one is called. */

@@ -167,6 +167,35 @@ def test_observations_are_those_of_the_environment(seen, rng):
 
 
 @needs_node
+def test_noise_drawn_anew_exchanges_equal_boxes_alone():
+    """At each pick, also at one that fails; boxes at different places keep their order."""
+    got = run_js(
+        """
+        const generator = new Generator(0);
+        const container = new Container(stackLoad(generator, given.task), given.task, generator);
+        container.show({ equalize: true, ties: "anew", seamless: false });
+        result.exact = container.visible.map((item) => container.exact[item]);
+        const fails = (item) => !container.liftable(item);
+        result.seen = [0, 1, 2].map(() => {
+          const { observation } = container;
+          container.pick(container.visible.find(fails));
+          return [...observation];
+        });
+        """
+    )
+    exact, seen = np.array(got["exact"]), np.array(got["seen"]).reshape(3, -1, 3)
+    count = len(exact)
+    levels = np.linspace(-1, 1, count)
+    apart = 2 * 10 * POSITION_NOISE / task.CONTAINER
+    for axis in range(3):
+        for ranks in seen[..., axis]:
+            assert np.sort(ranks) == pytest.approx(levels, abs=1e-6)
+            order = exact[np.argsort(ranks), axis]
+            assert (np.maximum.accumulate(order) - order).max() < apart[axis]
+        assert (seen[0, :, axis] != seen[1, :, axis]).mean() > 0.5
+
+
+@needs_node
 def test_lifts_agree_with_the_table_of_lifts_but_for_boxes_that_tip_aside():
     got = run_js(
         """
