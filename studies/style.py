@@ -1,8 +1,6 @@
 """The look of the figures, and where they are kept."""
 
 import logging
-from collections.abc import Callable
-from functools import wraps
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -22,17 +20,7 @@ COLOURS = {
     "random": "C5", "highest": "C4", "nearest": "#8c564b",
 }  # fmt: skip
 WITHOUT_MASK = "0.6"
-
-
-def styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """Let a figure function draw in the repository's style."""
-
-    @wraps(draw)
-    def styled_draw(*args, **kwargs) -> Figure:
-        with plt.style.context(STYLE):
-            return draw(*args, **kwargs)
-
-    return styled_draw
+styled = plt.style.context(STYLE)  # lets a function draw in the repository's style
 
 
 def save(figure: Figure, name: str, folder: Path = paths.FIGURES) -> None:

@@ -161,7 +161,7 @@ def train_by(arguments: list[str]) -> None:
     given = vars(parser.parse_args(arguments))
     run_dir, stack, lifts = (given.pop(name) for name in ("run_dir", "stack", "lifts"))
 
-    from unload import train  # not before, because it takes long
+    from unload import train  # not before, because it takes a second more
 
     try:
         train(TrainConfig(**given), run_dir, stack=stack, lifts=lifts)

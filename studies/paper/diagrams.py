@@ -19,7 +19,6 @@ from unload.load.substacks import (
     PACKAGES,
     RIGHT,
     ROWS_HIGH,
-    build_load,
 )
 
 INK = "#333333"
@@ -40,9 +39,9 @@ ENVIRONMENT = (
     ("lift", "PyBullet: 20 N, 0.3 s"),
 )
 SUBSTACKS = {"left": LEFT, "mid": MID, "right": RIGHT}
-ROWS, FEATURES = 7, 6  # of Fig. 7: items and features that are drawn, of 128 and n
+DRAWN, FEATURES = 7, 6  # of Fig. 7: items and features that are drawn, of 128 and n
 TOP, CELL_HEIGHT = 6.2, 0.36  # of the tensors
-MIDDLE = TOP - ROWS * CELL_HEIGHT / 2  # height of the main line of arrows
+MIDDLE = TOP - DRAWN * CELL_HEIGHT / 2  # height of the main line of arrows
 BLUE, GREEN, RED, OCHRE, PURPLE = "#2878b5", "#45a661", "#de5638", "#c98a1b", "#9467bd"
 
 
@@ -93,8 +92,8 @@ def fig03_substacks() -> Figure:
     figure, axes = plt.subplots(figsize=(8.2, 6.6))
     across, down, gap = 0.0, 0.88, 0.3  # m
     for name, variants in SUBSTACKS.items():
-        boxes = np.concatenate(variants)
-        width = (boxes[:, 1] + PACKAGES[boxes[:, 0], 0]).max() * CELL
+        every = np.concatenate(variants)
+        width = (every[:, 1] + PACKAGES[every[:, 0], 0]).max() * CELL
         for variant, boxes in enumerate(variants):
             _draw_substack(axes, boxes, across, (3 - variant) * down)
         axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
@@ -105,17 +104,13 @@ def fig03_substacks() -> Figure:
     bar = across - gap + 0.14
     axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
     axes.text(bar + 0.05, down + 0.25, "0.5 m", va="center")
-    # The row as a load places it: the items of its first substack, of its second, and so on.
-    row, lift = (0, 1, 2, 0), -0.12
-    load = build_load(np.array([[row]]))
-    corners = np.rint((load.positions - load.sizes / 2)[:, 1:] / CELL).astype(int)
-    counts = [len(variants[number]) for (_, variants), number in zip(COLUMNS, row)]
-    boxes = np.column_stack([load.packages, corners])
-    for substack in np.split(boxes, np.cumsum(counts)[:-1]):
-        _draw_substack(axes, substack, 0, lift)
+    # One row of a wall: a variant in each column.
+    low = -0.12
+    for (left, variants), number in zip(COLUMNS, (0, 1, 2, 0)):
+        _draw_substack(axes, variants[number], left * CELL, low)
     label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
-    axes.text(CELLS_WIDE * CELL + 0.08, lift + ROWS_HIGH * CELL / 2, label, va="center")
-    axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(lift - 0.02, 4 * down + 0.02))
+    axes.text(CELLS_WIDE * CELL + 0.08, low + ROWS_HIGH * CELL / 2, label, va="center")
+    axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(low - 0.02, 4 * down + 0.02))
     axes.set_aspect("equal")
     axes.axis("off")
     return figure
@@ -147,7 +142,7 @@ def fig07_network(n_features: int) -> Figure:
     for block, (name, colour) in enumerate(
         (("own", BLUE), ("min", GREEN), ("max", RED), ("mean", OCHRE))
     ):
-        cells = features if name == "own" else np.tile(pooled[block - 1], (ROWS, 1))
+        cells = features if name == "own" else np.tile(pooled[block - 1], (DRAWN, 1))
         left = own_left + block * FEATURES * width
         _tensor(axes, left, cells, width, colour)
         centre = left + FEATURES * width / 2
@@ -160,7 +155,7 @@ def fig07_network(n_features: int) -> Figure:
     # The branch over all items.
     _operation(axes, 8.3, 1.75, "global relation\nextractor $f_2$", width=3.3, height=1.5)
     down, up = 6.88, own_left + 2.5 * FEATURES * width
-    shapes_low = TOP - ROWS * CELL_HEIGHT - 0.75
+    shapes_low = TOP - DRAWN * CELL_HEIGHT - 0.75
     _path(axes, [(down, shapes_low), (down, 1.75), (8.3, 1.75)])
     _path(axes, [(11.6, 1.75), (up, 1.75), (up, shapes_low)])
     axes.text(11.75, 1.9, r"$x_{\mathrm{GC}}$  [3n], to each item", size=9, color=INK)
@@ -188,7 +183,7 @@ def _rounded(
 def _forward_pass() -> tuple[np.ndarray, ...]:
     """Shades in [0, 1]: observations, features, (min, max, mean) of the features, values."""
     rng = np.random.default_rng(3)
-    observed = rng.uniform(-1, 1, (ROWS, 3))
+    observed = rng.uniform(-1, 1, (DRAWN, 3))
     features = np.maximum(observed @ rng.normal(size=(3, FEATURES)) + 1, 0)
     features /= features.max()
     pooled = np.array([features.min(axis=0), features.max(axis=0), features.mean(axis=0)])
@@ -209,7 +204,7 @@ def _tensor(axes: Axes, left: float, shades: np.ndarray, width: float, colour: s
 def _label(axes: Axes, centre: float, name: str, shape: str, lift: float = 0.2) -> None:
     """The name of a tensor above it and its shape below it."""
     axes.text(centre, TOP + lift, name, ha="center", size=10.5)
-    axes.text(centre, TOP - ROWS * CELL_HEIGHT - 0.2, shape, ha="center", va="top", size=9.5)
+    axes.text(centre, TOP - DRAWN * CELL_HEIGHT - 0.2, shape, ha="center", va="top", size=9.5)
 
 
 def _operation(

@@ -284,7 +284,7 @@ def _points(
                 keep_lifts()
                 saved = time.monotonic()
 
-            if not run.curve.sums["picks"]:
+            if not run.curve.sums["picks"]:  # a point has just ended
                 point = run.curve.points[-1]
                 shares = {"MSR": f"{point.success_rate:.1%}", "loss": f"{point.loss:.3f}"}
                 bar.set_postfix(shares, refresh=False)

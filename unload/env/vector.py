@@ -32,7 +32,7 @@ class ContainerVectorEnv(PickingVectorEnv):
             ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
 
     Attributes:
-        table: the lifts that are known, filled by unknown ones; it may be replaced.
+        table: the lifts that this process knows, filled by unknown ones; it may be replaced.
         visible: (num_envs, 128) int32, the item in each row of the observations, -1 in rows
             without.
     """
@@ -157,7 +157,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         return [self._physics.simulate(each) for each in situations]
 
     def _simulate(self, situations: list[Situation]) -> list[float]:
-        if self._physics.table is not self.table:  # it has been replaced
+        if self._physics.table is not self.table:  # at first the process's, later perhaps another
             if self._own:
                 self._physics.close()
             self._physics, self._own = TablePhysics(self.table), True

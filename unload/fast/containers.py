@@ -13,7 +13,7 @@ from unload import task
 from unload.fast.ranking import features, rank, remove, replace
 from unload.load.boxes import OVERLAP
 from unload.physics.situation import find_movers, key_length, write_key
-from unload.physics.table import EMPTY, FREE_LIFT, HELD_DOWN, digest_of, slot_of
+from unload.physics.table import FREE_LIFT, HELD_DOWN, digest_of, slot_of
 from unload.support.compiled import compiled
 
 _N_VISIBLE = task.N_VISIBLE
@@ -150,7 +150,7 @@ def look_up(containers, actions, asks, digests, micrometres):
         words = write_key(starts, links, present, geometry, right, members, dynamic, key)
         digest = digest_of(key[:words])
         slot = slot_of(digests, digest)
-        known = digests[slot] != EMPTY
+        known = digests[slot] == digest  # see LiftTable.find
         distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
     return items, distances
 

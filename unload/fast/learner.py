@@ -9,7 +9,7 @@ from unload.network.peq import PEQNetwork
 from unload.support.compiled import compiled
 
 # Of Adam, PyTorch's defaults; a step is divided by the root mean square of gradients plus epsilon.
-_BETAS, _EPSILON = (0.9, 0.999), 1e-8
+_DECAYS, _EPSILON = (0.9, 0.999), 1e-8
 
 
 class FusedLearner:
@@ -49,7 +49,7 @@ class FusedLearner:
     def step(self, gradients: np.ndarray) -> None:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
-        corrections = [1 - beta**self.steps for beta in _BETAS]
+        corrections = [1 - decay**self.steps for decay in _DECAYS]
         _step(self._rows, gradients, self.moments, self.learning_rate, *corrections)
 
 
@@ -61,8 +61,8 @@ def _step(weights, gradients, moments, learning_rate, correction, correction2):
     for part in weights:
         for place in range(len(part)):
             gradient = gradients[i]
-            mean[i] += (1 - _BETAS[0]) * (gradient - mean[i])
-            square[i] += (1 - _BETAS[1]) * (gradient * gradient - square[i])
+            mean[i] += (1 - _DECAYS[0]) * (gradient - mean[i])
+            square[i] += (1 - _DECAYS[1]) * (gradient * gradient - square[i])
             size = np.sqrt(square[i] / correction2) + _EPSILON
             part[place] -= learning_rate * (mean[i] / correction) / size
             i += 1

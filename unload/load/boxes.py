@@ -1,6 +1,6 @@
 """The boxes of one container: their places, sizes and contacts.
 
-Overlaps and contacts are those of axis-aligned boxes, given by their lower and upper corners,
+A ``Load`` holds centres and sizes. Overlaps and contacts are computed from lower and upper corners,
 ``low`` and ``high``, (n, 3) float64 in m.
 """
 
