@@ -2,13 +2,12 @@ import errno
 import json
 import os
 import re
-import stat
 import subprocess
 import sys
 from contextlib import nullcontext
 from io import BytesIO
 from pathlib import Path
-from unittest.mock import Mock
+from unittest.mock import DEFAULT, Mock
 from zipfile import ZipFile
 
 import numpy as np
@@ -23,15 +22,8 @@ ALONE = os.path.dirname(files.__file__)
 ARRAYS = {"a": np.arange(6).reshape(2, 3), "b": np.array("text"), "c": np.array([True, False])}
 
 
-@pytest.mark.parametrize(
-    ("error", "message"),
-    [
-        (RuntimeError("power cut"), "power cut"),
-        (OSError(errno.ENOSPC, "disk full"), "cannot write this file: disk full: '.*/file'$"),
-    ],
-)
-def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
-    """Until it ends, the new content stands beside it, where git ignores what a kill leaves."""
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    """Until it ends, the new content stands beside it."""
     path = tmp_path / "file"
     files.write_text(path, "old")
 
@@ -40,12 +32,11 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
         (partial,) = {*tmp_path.iterdir()} - {path}
         assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", partial.name)
         assert path.read_text(encoding="utf-8") == "old"
-        raise error
+        raise OSError(errno.ENOSPC, "disk full")
 
-    with pytest.raises(type(error), match=message):
+    with pytest.raises(OSError, match="cannot write this file: disk full: '.*/file'$"):
         files.write_atomically(path, write)
     assert path.read_text(encoding="utf-8") == "old" and [path] == [*tmp_path.iterdir()]
-    assert "*.partial" in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
 
 
 def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
@@ -64,14 +55,19 @@ def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
     assert {*tmp_path.iterdir()} == {path, *others}
 
 
-def test_an_array_that_is_shorter_than_it_was_is_refused(tmp_path):
-    """NumPy reads what its shape says, and then compares no checksum of the file's format."""
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        # NumPy reads what a shape says, and then compares no checksum of the file's format.
+        (b"'shape': (9000,)", b"'shape': (1000,)", "was changed or damaged: its digest is"),
+        (b"<i8", b"<m8", "is not a readable .npz file"),  # which has no bytes to compare
+    ],
+)
+def test_an_array_of_another_header_is_refused(tmp_path, old, new, message):
     path = tmp_path / "arrays.npz"
     files.write_arrays(path, {"long": np.arange(9000)})
-    path.write_bytes(path.read_bytes().replace(b"'shape': (9000,)", b"'shape': (1000,)"))
-    with np.load(path) as read:
-        assert read["long"].tolist() == [*range(1000)]
-    with pytest.raises(ValueError, match="arrays.npz was changed or damaged: its digest is"):
+    path.write_bytes(path.read_bytes().replace(old, new))
+    with pytest.raises(ValueError, match=f"arrays.npz {message}"):
         files.read_arrays(path)
 
 
@@ -90,8 +86,6 @@ def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
         path.write_bytes(content)
         with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
             files.read_arrays(path)
-    with pytest.raises(FileNotFoundError, match="missing.npz"):
-        files.read_arrays(tmp_path / "missing.npz")
 
 
 def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
@@ -113,14 +107,6 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
         files.read_arrays(path, checked=True)
 
 
-def test_a_dtype_that_has_no_bytes_to_compare_is_refused_by_name(tmp_path):
-    path = tmp_path / "arrays.npz"
-    files.write_arrays(path, {"long": np.arange(9000)})
-    path.write_bytes(path.read_bytes().replace(b"<i8", b"<m8"))
-    with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
-        files.read_arrays(path)
-
-
 def check_arrays(read: dict[str, np.ndarray]) -> None:
     assert read.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():
@@ -131,12 +117,10 @@ def check_arrays(read: dict[str, np.ndarray]) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "is not a readable JSON file"),
         ("[" * 100_000, "is not a readable JSON file: maximum recursion depth"),
-        ('{"a": ' + "1" * 5_000 + "}", "is not a readable JSON file: Exceeds the limit"),
         ("[1, 2]", "holds a list; expected an object"),
     ],
-    ids=["empty", "too deep", "too many digits", "a list"],
+    ids=["too deep", "a list"],
 )
 def test_bad_json_is_refused_by_name(tmp_path, text, message):
     (tmp_path / "x.json").write_text(text, encoding="utf-8")
@@ -168,8 +152,6 @@ def test_digest_is_that_of_the_content(tmp_path):
     path.write_bytes(b"abd")
     with pytest.raises(ValueError, match=f"{path} was changed or damaged: .*, expected {digest}"):
         files.check_digest(path, digest)
-    with pytest.raises(FileNotFoundError, match="missing"):
-        files.digest(tmp_path / "missing")
 
 
 def hold(folder, then):
@@ -251,74 +233,29 @@ def test_the_package_can_be_imported_where_windows_lacks_something():
     assert done.stdout.endswith("True\n"), done.stderr
 
 
-@pytest.mark.parametrize(
-    ("system", "times", "written"),
-    [("win32", 10, True), ("win32", 10**6, False), ("linux", 1, False)],
-)
+@pytest.mark.parametrize(("system", "written"), [("win32", "new"), ("linux", "old")])
 def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
-    tmp_path, monkeypatch, system, times, written
+    tmp_path, monkeypatch, system, written
 ):
     """Windows refuses while a spreadsheet holds it open, which is awaited for a second."""
-    path, replace, refused = tmp_path / "curve.csv", os.replace, []
+    path, held = tmp_path / "curve.csv", PermissionError(errno.EACCES, "held by a reader")
     files.write_text(path, "old")
-
-    def held(source: Path, target: Path) -> None:
-        if len(refused) < times:
-            refused.append(target)
-            raise PermissionError(errno.EACCES, "held by a reader")
-        replace(source, target)
-
+    replace = Mock(side_effect=[held, held, DEFAULT], wraps=os.replace)
     monkeypatch.setattr(files.sys, "platform", system)
-    monkeypatch.setattr(files.os, "replace", held)
-    monkeypatch.setattr(files, "HELD", 0.5)
-    with nullcontext() if written else pytest.raises(OSError, match="held by a reader"):
+    monkeypatch.setattr(files.os, "replace", replace)
+    refused = pytest.raises(OSError, match="held by a reader")
+    with nullcontext() if written == "new" else refused:
         files.write_text(path, "new")
-    assert path.read_text(encoding="utf-8") == ("new" if written else "old") and [
-        *tmp_path.iterdir()
-    ] == [path]
-    assert len(refused) == times or times == 10**6
+    assert path.read_text(encoding="utf-8") == written and [*tmp_path.iterdir()] == [path]
 
 
 @pytest.mark.parametrize("name", ["lock", "owner"])
-@pytest.mark.parametrize("link", [os.symlink, os.link])
 @pytest.mark.needs("symlinks")
-def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
+def test_what_a_lock_is_linked_to_is_kept(tmp_path, name):
     (tmp_path / "run").mkdir()
     (tmp_path / "notes").write_text("precious", encoding="utf-8")
-    link(tmp_path / "notes", tmp_path / "run" / name)
+    os.symlink(tmp_path / "notes", tmp_path / "run" / name)
     refused = pytest.raises(OSError, match="run/lock")
-    allowed = (name, link) != ("lock", os.symlink)
-    with nullcontext() if allowed else refused, files.locked(tmp_path / "run"):
-        assert allowed
+    with refused if name == "lock" else nullcontext(), files.locked(tmp_path / "run"):
+        assert name == "owner"
     assert (tmp_path / "notes").read_text(encoding="utf-8") == "precious"
-
-
-@pytest.mark.needs("fcntl")
-def test_without_locks_of_the_file_system_nothing_is_locked(tmp_path, monkeypatch):
-    """A file in their place would outlast a killed process."""
-    missing = OSError(errno.ENOSYS, "it has no locks")
-    monkeypatch.setattr("fcntl.flock", Mock(side_effect=missing))
-    with pytest.raises(OSError, match="it has no locks"), files.locked(tmp_path):
-        pytest.fail("it is not locked")
-
-
-@pytest.mark.parametrize("refused", [False, True])
-@pytest.mark.needs("/proc")
-def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
-    synced, fsync, opened = [], os.fsync, os.listdir("/proc/self/fd")
-
-    def sync(descriptor: int) -> None:
-        status = os.fstat(descriptor)
-        is_folder = stat.S_ISDIR(status.st_mode)
-        synced.append("folder" if is_folder else status.st_size)
-        if is_folder and refused:
-            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
-        fsync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", sync)
-    files.write_text(tmp_path / "x", "whole")
-    assert (tmp_path / "x").read_text(encoding="utf-8") == "whole" and synced == [
-        len("whole"),
-        "folder",
-    ]
-    assert os.listdir("/proc/self/fd") == opened
