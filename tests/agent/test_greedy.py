@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from tests.agent.runs import HeightNetwork, Subclass, peq, weights
-from unload import Greedy, equalize, load_policy, policies, save_policy
+from unload import Greedy, equalize, load_policy, save_policy
 from unload.agent.greedy import greedy_actions, settings_of
 from unload.agent.learner import highest_values
 from unload.network.weights import write_weights
@@ -66,8 +66,8 @@ def test_a_saved_policy_comes_back(tmp_path, observations, rng, equalized, ties)
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *(("network", value) for value in ("Unknown", "EquivariantStack", [])),
-        *(("n_features", value) for value in ("many", 0)),
+        *(("network", value) for value in ("EquivariantStack", [])),
+        ("n_features", "many"),
         ("n_features", 10**9),  # 28 GB, if it were built
         ("n_features", 66),  # 8 of its 65 weights would be enough
         ("equalize", "maybe"),
@@ -93,19 +93,7 @@ def test_a_card_comes_back_and_is_shown(tmp_path):
     write_weights(path, "policy", settings_of(old), old.network.state_dict())
     assert load_policy(path).card is None
     assert repr(load_policy(path)) == "Greedy(PEQNetwork, equalize=True, ties='noise'), no card"
-    with pytest.raises(TypeError, match="card is 'good'; expected a dict"):
-        Greedy(peq(), True, card="good")
-    with pytest.raises(TypeError, match="policy is <function highest.*; expected an unload.Greedy"):
-        save_policy(policies.highest, path)
-    for card in ({"msr": np.float32(0.5)}, {3: "seed"}, {"seeds": {10: 0.5, 9: 1.0}}):
+    for card in ({"msr": np.float32(0.5)}, {"seeds": {10: 0.5, 9: 1.0}}):
         with pytest.raises(TypeError, match="card is {.*; expected what JSON can hold"):
             save_policy(Greedy(peq(), True, card=card), path)
     assert load_policy(path).card is None, "what is refused is not written"
-
-
-def test_policies_that_ship_have_names(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert not load_policy("recommended").equalize and load_policy("paper").equalize
-    listed = "path is 'recomended'; expected .* 'paper', .*'recommended'"
-    with pytest.raises(FileNotFoundError, match=listed):
-        load_policy("recomended")
