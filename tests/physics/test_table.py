@@ -137,20 +137,6 @@ def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng, tm
     assert len(read) == 51 and all(read.find(free_box(k)) == k / 1000 for k in range(51))
 
 
-def test_threads_add_at_the_same_time():
-    """While the arrays grow several times: no distance is wrong or lost."""
-    table = LiftTable()
-
-    def work(first: int) -> None:
-        for number in range(first, 6000, 4):
-            table.add(free_box(number), number / 1000)
-
-    with ThreadPoolExecutor(4) as pool:
-        list(pool.map(work, range(4)))
-    assert len(table) == 6000
-    assert all(table.find(free_box(number)) == number / 1000 for number in range(6000))
-
-
 def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(monkeypatch):
     table, find_slot = LiftTable(), unload.physics.table.slot_of
 

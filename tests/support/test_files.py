@@ -154,47 +154,33 @@ def test_digest_is_that_of_the_content(tmp_path):
         files.check_digest(path, digest)
 
 
-def hold(folder, then):
-    """Start a process that locks a folder, says so, and goes on with ``then``."""
-    script = f"""if True:
+def test_a_second_process_is_told_whose_the_folder_is_or_waits(tmp_path, monkeypatch, caplog):
+    """After a while it says for whom, and goes on when the folder is free."""
+    script = """if True:
         import sys, time
         import files
 
         with files.locked(sys.argv[1]):
             print("locked", flush=True)
-            {then}
+            sys.stdin.readline()
+            time.sleep(1)
     """
+    folder = tmp_path / "new" / "run"
     process = subprocess.Popen(
         [sys.executable, "-c", script, folder],
         cwd=ALONE, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
-    assert process.stdout.readline() == "locked\n"
-    return process
-
-
-def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
-    folder = tmp_path / "new" / "run"
-    with hold(folder, "sys.stdin.read()") as owner:
+    with process as owner:
+        assert owner.stdout.readline() == "locked\n"
         for _ in range(2):  # the lock survives the first refusal
             message = f"{folder} is in use by process {owner.pid} on .+ since 20.*; wait, or take"
             with pytest.raises(RuntimeError, match=message), files.locked(folder):
                 pytest.fail("two processes hold one lock")
-        with files.locked(tmp_path / "another"):
-            pass
-        owner.communicate("")  # it leaves the block
-    with files.locked(folder):
-        pass
-
-
-def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
-    """After a while, and then goes on when the folder is free."""
-    monkeypatch.setattr(files, "PATIENCE", 0.1)
-    then = "time.sleep(1); open(sys.argv[1] + '/end', 'x')"
-    with hold(tmp_path, then) as owner, files.locked(tmp_path, wait=True):
-        assert (tmp_path / "end").exists()
-        assert caplog.messages == [
-            f"waiting for process {owner.pid} on {caplog.messages[0].split(' on ')[1]}"
-        ]
+        owner.stdin.write("\n")
+        owner.stdin.flush()
+        monkeypatch.setattr(files, "PATIENCE", 0.1)
+        with files.locked(folder, wait=True):
+            assert caplog.messages[0].startswith(f"waiting for process {owner.pid} on ")
 
 
 @pytest.mark.needs("fork")
