@@ -74,28 +74,17 @@ def test_numpy_values_make_the_same_configuration():
     assert type(config.mask) is bool and type(config.ties) is str
 
 
-class Constant(ContainerVectorEnv):
-    """A task with a reward of its own."""
-
-    def step(self, actions):
-        observations, rewards, *rest = super().step(actions)
-        return observations, np.full_like(rewards, 0.5), *rest
-
-
 class Fewer(ContainerVectorEnv):
     def __init__(self, num_envs, **settings):
         super().__init__(num_envs, **settings)
         self.single_action_space = gymnasium.spaces.Discrete(7)
 
 
-def test_an_environment_of_ones_own_trains(tmp_path):
-    for kind in (Constant, Fewer):
-        gymnasium.register(f"tests/{kind.__name__}-v0", vector_entry_point=kind)
-    size = {"num_envs": 4, "picks": 80, "batch_size": 16, "n_features": 4, "log_interval": 5}
-    result = train(TrainConfig("tests/Constant-v0", **size), tmp_path / "a", progress=False)
-    assert (result.curve["mean_reward"] == 0.5).all()
+def test_an_environment_of_other_spaces_or_that_is_not_registered_is_refused(tmp_path):
+    gymnasium.register("tests/Fewer-v0", vector_entry_point=Fewer)
+    config = TrainConfig("tests/Fewer-v0", num_envs=4, picks=80, batch_size=16)
     with pytest.raises(ValueError, match=r"env='tests/Fewer-v0' has Discrete\(7\); expected"):
-        train(TrainConfig("tests/Fewer-v0", **size), tmp_path / "b", progress=False)
+        train(config, tmp_path, progress=False)
     for env in ("tests/Missing-v0", "Acrobot-v1", 3):
         with pytest.raises(ValueError, match="env is .*; expected 'unload/Container-v0', .*, or"):
             TrainConfig(env)

@@ -142,19 +142,6 @@ def test_a_reward_of_ones_own_gets_the_distance():
     assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()
 
 
-def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
-    config = TrainConfig(**CONTAINER)
-    runs.interrupt_run(config, tmp_path / "resumed", 20)
-    with open(tmp_path / "log.txt", "w", encoding="utf-8") as log:
-        train(config, tmp_path / "logged", progress=log)
-    assert "200/200" in (tmp_path / "log.txt").read_text(encoding="utf-8")
-    assert capsys.readouterr() == ("", "")
-    train(config, tmp_path / "resumed")
-    shown, said = capsys.readouterr()
-    assert said == "" and "80.0/200" in shown and "0.00/200" not in shown and "200/200" in shown
-    assert "MSR=" in shown and "loss=" in shown and "pick/s" in shown
-
-
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
 def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
     copied = []

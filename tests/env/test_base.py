@@ -76,23 +76,6 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
 
 
-@pytest.mark.parametrize("make", [container, HighestItemEnv])
-def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
-    env, same = make(), make()
-    env.reset(seed=0)
-
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        interrupted = Mock(side_effect=KeyboardInterrupt)
-        patch.setattr("unload.fast.containers.pick", interrupted)
-        patch.setattr("unload.env.highest_item.drift", interrupted)
-        env.step(0)
-    for call in (lambda: env.step(0), env.action_masks):
-        with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
-            call()
-    assert_same(env.reset(seed=4), same.reset(seed=4))
-    assert_same(env.step(0), same.step(0))
-
-
 def clients() -> int:
     import pybullet
 

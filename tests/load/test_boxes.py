@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.load.walls import corners, crossed_bars
+from tests.load.walls import corners
 from unload import task
 from unload.load.boxes import (
     _SMALLEST_EDGE,
@@ -133,14 +133,6 @@ def test_the_two_that_overlap_are_named_in_their_order():
         with pytest.raises(BoxError, match="overlap by 0.4 m") as error:
             _find_contacts(low[order], low[order] + (1, 1, 0.4))
         assert pickle.loads(pickle.dumps(error.value)).boxes == pair
-
-
-def test_crossed_boxes_have_more_contacts_than_expected():
-    found, count = crossed_bars(20).contacts, 20
-    assert len(found.boxes) == 2 * (count**2 + count - 1) > 2 * 8 * 2 * count
-    for bar in range(count):
-        assert sorted(found.of(ABOVE, bar)) == list(range(count, 2 * count))
-        assert sorted(found.of(BELOW, count + bar)) == list(range(count))
 
 
 def test_packages_and_walls_follow_from_the_boxes(full_load):

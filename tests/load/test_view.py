@@ -65,15 +65,6 @@ def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
         assert trace.color == to_hex(colours[trace.name])
 
 
-def test_an_order_shows_its_first_ten_picks(full_load):
-    order = np.arange(880, 860, -1)
-    figure = view(full_load, order=order)
-    names = [f"pick {number}" for number in range(1, 11)] + ["picked later"]
-    assert [trace.name for trace in figure.data] == names
-    assert [items(trace) for trace in figure.data[:10]] == [[item] for item in order[:10]]
-    assert len({trace.color for trace in figure.data}) == 11
-
-
 def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_network(full_load):
     bundle, _ = DisplayFormatter().format(view(full_load, height=300))
     assert set(bundle) == {"image/png", "text/plain", _PLOTLY_MIMETYPE}
