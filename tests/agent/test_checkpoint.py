@@ -1,14 +1,11 @@
 """What is kept of a run on disk, and how it goes on from there."""
 
-import errno
 import json
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -174,35 +171,6 @@ def test_a_change_may_not_replace_a_part_of_a_run():
         Training(TrainConfig(**CONTAINER), change=lambda run: setattr(run, "replay", None))
 
 
-def test_a_disk_without_room_is_refused_before_training(tmp_path, monkeypatch):
-    """Two versions of the checkpoint must fit, one of which may be there already."""
-    config = TrainConfig(**CONTAINER)
-    interrupt_run(config, tmp_path, 40)  # the memory is full
-    there = (tmp_path / "checkpoint.npz").stat().st_size
-    monkeypatch.setattr("shutil.disk_usage", lambda path: Mock(free=there // 2))
-    with pytest.raises(OSError, match="GB for checkpoints; expected .* that repl") as full:
-        train(config, tmp_path, progress=False)
-    assert full.value.errno == errno.ENOSPC
-    monkeypatch.setattr("shutil.disk_usage", lambda path: Mock(free=there))
-    train(config, tmp_path, progress=False)
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory) -> Path:
-    """The folder of a finished run; tests bring back what they change."""
-    folder = tmp_path_factory.mktemp("finished") / "run"
-    train(TrainConfig(**CONTAINER), folder, progress=False)
-    return folder
-
-
-def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypatch):
-    """Not even a lock, or the checkpoint that a killed process has left."""
-    refused = OSError(errno.EROFS, os.strerror(errno.EROFS))
-    with files.locked(finished):
-        monkeypatch.setattr(Path, "unlink", Mock(side_effect=refused))
-        assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
-
-
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
@@ -211,13 +179,12 @@ def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypat
         ("config.json", b'"digest"', b'"other"'),
     ],
 )
-def test_a_damaged_file_of_a_finished_run_is_refused_by_name(finished, name, old, new):
-    path = finished / name
-    whole = path.read_bytes()
-    path.write_bytes(whole.replace(old, new, 1))
+def test_a_damaged_file_of_a_finished_run_is_refused_by_name(tmp_path, name, old, new):
+    config, path = TrainConfig(**CONTAINER), tmp_path / name
+    train(config, tmp_path, progress=False)
+    path.write_bytes(path.read_bytes().replace(old, new, 1))
     with pytest.raises(ValueError, match=f"{name} was changed or damaged"):
-        train(TrainConfig(**CONTAINER), finished, progress=False)
-    path.write_bytes(whole)
+        train(config, tmp_path, progress=False)
 
 
 def test_what_a_killed_process_left_half_written_is_removed(tmp_path):

@@ -1,10 +1,7 @@
-from unittest.mock import Mock
-
 import numpy as np
 import pytest
 
 from unload import task
-from unload.load import picture
 from unload.load.picture import (
     CORNERS,
     EYE,
@@ -47,16 +44,3 @@ def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
     assert 100 < lower < (picture != empty).any(axis=2).sum()
     assert (snapshot(load, both, moved.positions) == snapshot(moved, both, moved.positions)).all()
     assert (snapshot(load, both, moved.positions) != picture).any()
-
-
-def test_numbers_stand_on_the_first_picks(boxes, monkeypatch):
-    written = Mock()
-    monkeypatch.setattr("matplotlib.axes.Axes.text", written)
-    monkeypatch.setattr(picture, "_NUMBERED", 3)
-    load = boxes((0.3, 0.2), (0.3, 0.6), (1.0, 0.2), (1.6, 0.2))
-    assert picture.numbered(load, np.array([1, 0, 2, 3])).startswith(b"\x89PNG")
-    faces = picture._faces(*picture.corners(load, np.arange(4)), load.container).mean(axis=2)
-    for number, (item, call) in enumerate(zip((1, 0, 2), written.call_args_list), 1):
-        x, y, text = call.args
-        assert text == str(number) and any(np.allclose((x, y), face) for face in faces[item])
-    assert written.call_count == 3

@@ -8,7 +8,6 @@ import pytest
 from tests.physics.kinds import EACH, KINDS, ONE_BOX, TWO_BOXES, lifts, make
 from unload import ContainerEnv, Load, evaluate, picking_order, policies
 from unload.env.vector import ContainerVectorEnv
-from unload.load.boxes import _SMALLEST_EDGE
 from unload.load.substacks import build_load
 from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
@@ -36,15 +35,6 @@ def test_free_boxes_of_a_neat_row_do_not_jam(kind):
     free = np.flatnonzero(~load.covered(physics.present))
     assert len(free) >= 8
     assert lifts(physics, free[:8]) == pytest.approx([ONE_BOX] * 8, rel=0.02)
-
-
-@pytest.mark.parametrize("kind", EACH)
-def test_the_smallest_boxes_of_a_load_are_simulated(kind):
-    """Physics takes the gap off their edges, of which something must be left."""
-    edge = _SMALLEST_EDGE
-    positions = [[3.5, 1.2 + edge * column, edge * (row + 0.5)] for column, row in np.ndindex(2, 2)]
-    physics = make(kind, Load(positions, np.full((4, 3), edge)))
-    assert (np.array(lifts(physics, range(4))) >= 0).all()
 
 
 @pytest.mark.parametrize("kind", EACH)

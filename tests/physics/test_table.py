@@ -1,8 +1,6 @@
 """Local physics with a memory."""
 
-import errno
 import json
-import os
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -11,7 +9,6 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-import unload.physics.table
 from tests.load.walls import KINDS, own_load
 from tests.physics.kinds import make
 from unload import task
@@ -137,19 +134,6 @@ def test_entries_are_sorted_whatever_the_order_in_which_they_came(table, rng, tm
     assert len(read) == 51 and all(read.find(free_box(k)) == k / 1000 for k in range(51))
 
 
-def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(monkeypatch):
-    table, find_slot = LiftTable(), unload.physics.table.slot_of
-
-    def then_filled(digests, digest):
-        slot = find_slot(digests, digest)
-        monkeypatch.undo()
-        digests[slot], table.slots[1][slot] = digest + np.uint64(1), 400_000
-        return slot
-
-    monkeypatch.setattr(unload.physics.table, "slot_of", then_filled)
-    assert table.find(free_box(0)) is None
-
-
 def true_table(numbers: Iterable[int]) -> LiftTable:
     """A table of free boxes that will be found true."""
     table, local = LiftTable(), LocalPhysics()
@@ -184,19 +168,6 @@ def test_of_many_that_share_a_file_none_loses_a_lift(tmp_path):
     with ThreadPoolExecutor(3) as pool:
         list(pool.map(exchange_some, (0, 10, 20)))
     assert entries_of(LiftTable.load(path)) == entries_of(true_table(range(30)))
-
-
-def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatch, caplog):
-    table, path = true_table([1]), tmp_path / "lifts.npz"
-    true_table([2]).exchange(path)
-    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    monkeypatch.setattr(files, "write_arrays", Mock(side_effect=full))
-    table.exchange(path)
-    assert len(table) == 2 and len(LiftTable.load(path)) == 1
-    assert "lifts are kept in memory only" in caplog.text and str(path) in caplog.text
-    monkeypatch.undo()
-    table.exchange(path)
-    assert len(LiftTable.load(path)) == 2
 
 
 def changed(path: Path, **changes: np.ndarray) -> None:
