@@ -67,14 +67,10 @@ def test_a_loss_that_is_not_finite_leaves_the_weights(rng, fused, name):
     agent.update(batch)
     before = weights(agent.network)
     broken = batch | {name: batch[name].copy()}
-    broken[name].flat[5] = np.nan
-    if name == "observations":  # of the chosen item too, whatever it is
-        broken[name][0] = np.nan
+    broken[name][0] = np.nan  # of the chosen item too, whatever it is
     with pytest.raises(FloatingPointError, match="the loss is nan.*expected"):
         agent.update(broken)
     assert all(torch.equal(a, b) for a, b in zip(weights(agent.network), before))
-    agent.update(batch)
-    agent.check_finite()
     torch.nn.init.constant_(agent.network.scorer.bias, torch.inf)
     with pytest.raises(FloatingPointError, match="scorer.bias is not finite; expected"):
         agent.check_finite()

@@ -37,18 +37,17 @@ def test_a_weight_that_is_not_finite_chooses_nothing(observations, layer, value)
             choose(network, observations, allowed)
 
 
-def test_a_policy_of_ones_own_network_comes_back_into_one_of_its_kind(tmp_path, observations, rng):
-    path, masks = tmp_path / "policy.safetensors", np.ones(observations.shape[:2])
-    for network, fresh in ((HeightNetwork(-2.0), HeightNetwork()), (Subclass(8), Subclass(8))):
-        policy = Greedy(network, equalize=True)
-        save_policy(policy, path)
-        loaded = load_policy(path, fresh)
-        assert loaded.network is fresh and torch.equal(*(weights(n)[0] for n in (fresh, network)))
-        assert (loaded(observations, masks, rng) == policy(observations, masks, rng)).all()
-        message = "holds no policy .* it is of a tests.*(Subclass|HeightNetwork); expected one"
-        for other in (None, peq()):
-            with pytest.raises(ValueError, match=message):
-                load_policy(path, other)
+@pytest.mark.parametrize(
+    ("network", "fresh"), [(HeightNetwork(-2.0), HeightNetwork()), (Subclass(8), Subclass(8))]
+)
+def test_a_policy_of_ones_own_network_comes_back_into_one_of_its_kind(tmp_path, network, fresh):
+    save_policy(Greedy(network, equalize=True), tmp_path / "policy.safetensors")
+    loaded = load_policy(tmp_path / "policy.safetensors", fresh)
+    assert loaded.network is fresh and torch.equal(*(weights(n)[0] for n in (fresh, network)))
+    message = "holds no policy .* it is of a tests.*(Subclass|HeightNetwork); expected one"
+    for other in (None, peq()):
+        with pytest.raises(ValueError, match=message):
+            load_policy(tmp_path / "policy.safetensors", other)
 
 
 @pytest.mark.parametrize(("equalized", "ties"), [(True, "average"), (False, "noise")])

@@ -251,14 +251,10 @@ def test_a_point_holds_the_means_since_the_last_one():
     curve.add(np.array([1.0, 1.0]), np.array([False, False]), [0.5, 0.25])
     curve.add(np.array([1.0, -1.0]), np.array([True, True]), [0.0])
     curve.end_point(6, 0.5)
-    table = curve.table()
-    assert table["picks"].tolist() == [2, 6]
-    assert table["mean_reward"].tolist() == [0, 0.5]
-    assert table["success_rate"].tolist() == [0.5, 0.75]
-    assert table["deadlocked"].tolist() == [0.5, 0.5]
-    assert np.isnan(table["loss"][0]) and table["loss"][1] == pytest.approx(0.25)
-    assert table["epsilon"].tolist() == [1.0, 0.5]
-    assert table["wall_time"].is_monotonic_increasing
+    first, second = curve.points
+    assert first[:4] == (2, 0, 0.5, 0.5) and np.isnan(first.loss) and first.epsilon == 1
+    assert second[:4] == (6, 0.5, 0.75, 0.5) and (second.loss, second.epsilon) == (0.25, 0.5)
+    assert first.wall_time <= second.wall_time
 
 
 @pytest.mark.parametrize("stop", [False, np.False_])
@@ -295,6 +291,7 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
     usual = {"progress": False, "lifts": "lifts.npz", "callback": callback}
     with pytest.raises(OSError, match="no more"):
         train(config, "run", **usual)
+    assert (tmp_path / "lifts.npz").exists()
     monkeypatch.chdir(tmp_path)
     train(config, "run", **usual)
     assert steps == list(range(20, 201, 20))

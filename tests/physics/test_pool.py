@@ -9,7 +9,6 @@ import sys
 import time
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
 
 from tests.agent.runs import ROOT
@@ -137,20 +136,12 @@ def test_what_pybullet_says_is_no_answer():
     assert pickle.loads(done.stdout) == [2, 4] and done.stderr.endswith(b"noisenoise")
 
 
-def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
-    shared = []
-
-    def simulate(pool, situations, own):
-        shared.append(len(situations))
-        return [1 + own(each) for each in situations]
-
-    monkeypatch.setattr(Pool, "simulate", simulate)
+def test_a_table_shares_lifts_where_many_are_new(pool, local, hard, monkeypatch):
+    shared = Mock(wraps=pool.simulate)
+    monkeypatch.setattr(Pool, "simulate", lambda _, *given: shared(*given))
     monkeypatch.setattr(table, "_PATIENCE", 15)
-    alone = [local.simulate(each) for each in hard]
     physics = TablePhysics(LiftTable())
-    for first, last in ((0, 6), (6, 12), (12, 15)):  # three are too few to count
-        assert physics.simulate_all(hard[first:last]) == alone[first:last]
-    assert shared == []
-    physics.table = LiftTable()
-    assert np.allclose(physics.simulate_all(hard), 1 + np.array(alone)), "as they were shared"
-    assert shared == [16]
+    for lifts, calls in ((hard[:15], 0), (hard, 1)):  # 15 are not enough
+        physics.table = LiftTable()
+        assert physics.simulate_all(lifts) == [local.simulate(each) for each in lifts]
+        assert shared.call_count == calls and len(physics.table) == len(lifts)

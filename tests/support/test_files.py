@@ -233,15 +233,3 @@ def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
     with nullcontext() if written == "new" else refused:
         files.write_text(path, "new")
     assert path.read_text(encoding="utf-8") == written and [*tmp_path.iterdir()] == [path]
-
-
-@pytest.mark.parametrize("name", ["lock", "owner"])
-@pytest.mark.needs("symlinks")
-def test_what_a_lock_is_linked_to_is_kept(tmp_path, name):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "notes").write_text("precious", encoding="utf-8")
-    os.symlink(tmp_path / "notes", tmp_path / "run" / name)
-    refused = pytest.raises(OSError, match="run/lock")
-    with refused if name == "lock" else nullcontext(), files.locked(tmp_path / "run"):
-        assert name == "owner"
-    assert (tmp_path / "notes").read_text(encoding="utf-8") == "precious"
