@@ -17,7 +17,6 @@ from unload.load.boxes import (
     BELOW,
     BESIDE,
     CONTACT_TOLERANCE,
-    BoxError,
     Load,
     _find_contacts,
 )
@@ -124,14 +123,6 @@ def test_boxes_above_one_another_touch_up_to_the_tolerance_of_their_load(toleran
         load = Load.from_corners(corners, np.ones((3, 3)), contact_tolerance=tolerance)
         assert load.contacts.of(ABOVE, 0).tolist() == [1] * touches
         assert load.contacts.of(BESIDE, 0).tolist() == [2] * touches
-
-
-def test_the_two_that_overlap_are_named_in_their_order():
-    low = np.array([[0, 0, 0], [0, 0.5, 0], [0, 2, 0]])
-    for order, pair in (([0, 1, 2], [0, 1]), ([1, 2, 0], [0, 2])):
-        with pytest.raises(BoxError, match="overlap by 0.4 m") as error:
-            _find_contacts(low[order], low[order] + (1, 1, 0.4))
-        assert error.value.boxes == pair
 
 
 def test_packages_and_walls_follow_from_the_boxes(full_load):

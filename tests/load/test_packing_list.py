@@ -26,13 +26,6 @@ def written(tmp_path):
     return write
 
 
-def test_the_example_is_a_load_of_three_walls():
-    load = read_load()
-    assert len(load) == 136 and len(np.unique(load.walls)) == 3
-    assert len(np.unique(load.packages)) == len(np.unique(load.sizes, axis=0))
-    assert load.ids[0] == "M-046" and load.positions[0] == pytest.approx([6.1, 0.15, 0.15])
-
-
 def test_ids_stay_as_they_are_written_and_are_else_the_rows(written):
     rows = [f"{row},0,0,1,1,1" for row in range(3)]
     for ids in (["007", "NA", "7"], ["1", "2", "3"]):
@@ -274,12 +267,6 @@ def test_the_first_sheet_of_an_excel_file_is_read(tmp_path, written, monkeypatch
     assert_same(read_load(path), read_load(written(*STACK)))
     with pytest.raises(ImportError, match=r'expected openpyxl: pip install "unload\[excel\]"'):
         read_load(path)
-
-
-def test_corners_under_the_names_of_centres_are_noticed(written):
-    lines = UNIT, "b,1,0,0,1,1,1"
-    with pytest.raises(ValueError, match="all lie inside if these are x_min, .*{'x': 'x_min', "):
-        read_load(written(*lines, columns=f"id,{CORNERS.replace('_min', '')}"))
 
 
 def test_a_row_that_is_too_long_becomes_smaller(written, caplog):

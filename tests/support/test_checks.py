@@ -72,7 +72,6 @@ def test_finite_array_returns_a_float64_copy():
     [
         ([[1.0, 2.0]], ValueError, r"a has shape \(1, 2\); expected \(any, 3\)"),
         ([[1, -np.inf, np.nan]], ValueError, r"a holds -inf at index \(0, 1\)"),
-        ([["1", "2", "3"]], TypeError, "a has dtype <U1"),
         ([[True, True, True]], TypeError, "a has dtype bool; expected real numbers"),
         (torch.ones(1, 3, requires_grad=True), TypeError, "a cannot be read as an array"),
     ],
@@ -88,8 +87,6 @@ def test_integer_array():
     for value in ([1.0, 2.0], [True, False]):
         with pytest.raises(TypeError, match="a has dtype .*; expected integers"):
             checks.integer_array("a", value, (2,))
-    with pytest.raises(ValueError, match=r"a has shape \(1,\); expected \(2,\)"):
-        checks.integer_array("a", [1], (2,))
     assert checks.integer_array("a", [0, 3], (2,), high=3).tolist() == [0, 3]
     for value in ([-1, 3], [0, 4]):
         with pytest.raises(ValueError, match=f"a holds {value[0]} to {value[1]}; expected 0 to 3"):
@@ -110,5 +107,3 @@ def test_flag_array():
     for value in ([2, 0], [np.nan, 0]):
         with pytest.raises(ValueError, match="a holds .*; expected bool, or 0 and 1"):
             checks.flag_array("a", value, (2,))
-    with pytest.raises(TypeError, match="a has dtype <U1"):
-        checks.flag_array("a", ["1", "0"], (2,))
