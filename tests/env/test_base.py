@@ -1,6 +1,5 @@
 """What all environments have in common: settings, and the order of calls."""
 
-import gc
 from functools import partial
 from unittest.mock import DEFAULT, Mock
 
@@ -73,25 +72,6 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     env = make(position_noise=10.0)
     seen, _ = env.reset(seed=0)
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
-
-
-def clients() -> int:
-    import pybullet
-
-    return sum(pybullet.isConnected(number) for number in range(1024))
-
-
-@pytest.mark.pybullet
-def test_an_environment_to_which_nothing_refers_frees_its_simulators():
-    """28 MB each. By counting references: the garbage collector may come too late."""
-    before = clients()
-    gc.disable()
-    env = ContainerEnv("full", stack=lambda rng: stack_load(rng, walls=1))
-    env.reset(seed=0)
-    assert clients() > before
-    del env
-    assert clients() == before
-    gc.enable()
 
 
 def test_spaces_and_metadata():

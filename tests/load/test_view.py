@@ -77,11 +77,9 @@ def test_ipython_displays_a_figure_and_a_picture_in_little_room_and_without_a_ne
 @pytest.mark.parametrize(
     ("kwargs", "error", "message"),
     [
-        ({"present": np.ones(3, dtype=bool)}, ValueError, r"present has shape \(3,\)"),
         ({"groups": {"a": [-1, 3]}}, ValueError, r"groups\['a'\] holds -1 to 3; expected 0 to 90$"),
         ({"groups": dict.fromkeys("abcde", [0])}, ValueError, "groups has the names"),
         ({"groups": {}, "order": [0]}, ValueError, "groups and order are given; expected one"),
-        ({"order": [91]}, ValueError, "order holds 91 to 91; expected 0 to 90"),
         ({"height": 49}, ValueError, "height is 49; expected an integer >= 50 and <= 5000"),
     ],
 )

@@ -86,11 +86,6 @@ def test_without_pybullet_it_answers_what_no_table_knows(no_pybullet, hard, monk
     assert known and TablePhysics(table).simulate(known[0]) != 0.123, "PyBullet's answers ship"
 
 
-def test_what_needs_pybullet_says_what_to_do_instead(no_pybullet, boxes):
-    with pytest.raises(ModuleNotFoundError, match="for physics='local' and 'table'"):
-        make("full", boxes((1.2, 0.2)))
-
-
 def test_the_lifts_that_ship_are_never_written_as_its_own(no_pybullet, hard, tmp_path):
     """They stay PyBullet's; the file holds what MuJoCo has added, and all that it held before."""
     path, shipped = tmp_path / "lifts.npz", len(shared_table())

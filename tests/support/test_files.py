@@ -8,7 +8,6 @@ from contextlib import nullcontext
 from io import BytesIO
 from pathlib import Path
 from unittest.mock import DEFAULT, Mock
-from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -74,15 +73,13 @@ def test_an_array_of_another_header_is_refused(tmp_path, old, new, message):
 def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
     path, objects = tmp_path / "arrays.npz", {"a": np.array([{"x": 1}], dtype=object)}
     files.write_arrays(path, ARRAYS)
-    whole, single, pickled, more = path.read_bytes(), BytesIO(), BytesIO(), BytesIO()
+    whole, single, pickled = path.read_bytes(), BytesIO(), BytesIO()
     with pytest.raises(ValueError):
         files.write_arrays(path, objects)
     assert path.read_bytes() == whole
     np.save(single, np.arange(3))  # which NumPy reads, too
     np.savez(pickled, **objects)
-    with ZipFile(more, "w") as stored:
-        stored.writestr("readme.txt", "text")  # which NumPy gives as bytes
-    for content in (whole[:-1], *(file.getvalue() for file in (single, pickled, more))):
+    for content in (whole[:-1], single.getvalue(), pickled.getvalue()):
         path.write_bytes(content)
         with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
             files.read_arrays(path)
@@ -114,17 +111,10 @@ def check_arrays(read: dict[str, np.ndarray]) -> None:
         np.testing.assert_array_equal(read[name], array)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[" * 100_000, "is not a readable JSON file: maximum recursion depth"),
-        ("[1, 2]", "holds a list; expected an object"),
-    ],
-    ids=["too deep", "a list"],
-)
-def test_bad_json_is_refused_by_name(tmp_path, text, message):
+@pytest.mark.parametrize("text", ["[" * 100_000, "[1, 2]"], ids=["too deep", "a list"])
+def test_bad_json_is_refused_by_name(tmp_path, text):
     (tmp_path / "x.json").write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=f"^{tmp_path}/x.json {message}"):
+    with pytest.raises(ValueError, match=f"^{tmp_path}/x.json (is not a readable|holds a list)"):
         files.read_json(tmp_path / "x.json")
 
 
