@@ -1,7 +1,5 @@
-import json
 import os
 import signal
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +13,7 @@ from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, train
 from unload.agent.curve import Curve, Point
 from unload.agent.identity import identity
-from unload.agent.training import Training, warn_of_other_bits
+from unload.agent.training import Training
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import LiftTable
 from unload.support import files
@@ -34,26 +32,19 @@ LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
 def test_what_a_run_leaves(tmp_path, fields):
     config = TrainConfig(**fields, epsilon_final=0.9)  # so that its points differ to the end
-    folder = tmp_path / "new" / "run"
-    result = train(config, folder, progress=False)
-    assert {path.name for path in folder.iterdir()} == LEFT
-    curve = result.curve
+    curve = train(config, tmp_path, progress=False).curve
+    assert {path.name for path in tmp_path.iterdir()} == LEFT
     assert tuple(curve.columns) == Point._fields
     interval = config.log_interval * config.num_envs
     assert curve["picks"].tolist() == list(range(interval, config.picks + 1, interval))
-    assert curve["loss"].iloc[1:].between(0, 2).all()
+    assert curve["loss"].iloc[1:].between(0, 2).all() and curve["success_rate"].nunique() > 2
     epsilons = [config.epsilon(picks - config.num_envs) for picks in curve["picks"]]
     assert curve["epsilon"].tolist() == pytest.approx(epsilons)
-    loaded = load_policy(folder / "policy.safetensors")
+    loaded = load_policy(tmp_path / "policy.safetensors")
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
-    assert loaded.card["loads"] == "the paper's" and curve["success_rate"].nunique() > 2
+    assert loaded.card["loads"] == "the paper's"
     assert loaded.card["msr"] == {"at the end of its training": curve["success_rate"].iloc[-1]}
-    stored = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-    assert stored.pop("marks").keys() == {"policy.safetensors", "curve.csv"}
-    assert stored.pop("change") is None and stored.pop("stack") is None and stored.pop("digest")
-    stored.pop("engine", None)  # where it is not the reference
-    assert TrainConfig(**stored) == config
-    assert loaded.card["configuration"] == stored
+    assert TrainConfig(**loaded.card["configuration"]) == config
 
 
 def test_loads_choices_and_weights_have_each_their_seed():
@@ -77,18 +68,6 @@ def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
     assert 0 < (rewards[:-1] < 0).sum() < 29
     assert point.deadlocked == pytest.approx((rewards[:-1] < 0).sum() / 30)
     assert point.mean_reward == pytest.approx(rewards.mean()) and np.isnan(point.loss)
-
-
-def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch):
-    warn_of_other_bits.cache_clear()
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        for found in ("AVX2", "AVX512", "DEFAULT", "DEFAULT"):
-            monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda name=found: name)
-            Training(TrainConfig(**CONTAINER))
-    (warning,) = said
-    assert "PyTorch uses DEFAULT instructions" in str(warning.message)
-    assert warning.filename == __file__, "where the run was asked for"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """Packing lists: what they may hold, and what is refused by row and id."""
 
 import json
-from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -255,18 +254,6 @@ def test_a_text_may_begin_as_an_excel_file_does(written):
     columns = f"PK,Kartonnummer,{CORNERS}"
     load = read_load(written(*(f"{line[0]},{line}" for line in STACK), columns=columns))
     assert load.ids.tolist() == [line[0] for line in STACK] == load.extras["PK"].tolist()
-
-
-def test_the_first_sheet_of_an_excel_file_is_read(tmp_path, written, monkeypatch):
-    path = tmp_path / "list.xlsx"
-    path.write_bytes(b"PK")
-    boxes = [[line[0], *map(float, line[2:].split(","))] for line in STACK]
-    sheet = pd.DataFrame([["Title", *[None] * 6], ["id", *CORNERS.split(",")], *boxes])
-    excel = Mock(side_effect=[sheet, ImportError("`Import openpyxl` failed.")])
-    monkeypatch.setattr(pd, "read_excel", excel)
-    assert_same(read_load(path), read_load(written(*STACK)))
-    with pytest.raises(ImportError, match=r'expected openpyxl: pip install "unload\[excel\]"'):
-        read_load(path)
 
 
 def test_a_row_that_is_too_long_becomes_smaller(written, caplog):

@@ -47,18 +47,13 @@ def test_the_container_has_its_true_proportions(boxes, length):
     assert scene.camera.eye.x * drawn[0] / 2.8 > drawn[0] / 2, "from outside"
 
 
-def test_present_chooses_what_is_drawn(small_load):
-    present = np.isin(np.arange(len(small_load)), [3, 7])
-    assert sorted(sum(map(items, view(small_load, present=present).data), [])) == [3, 7]
-    assert len(view(small_load, present=np.zeros_like(present)).data) == 0
-
-
 def test_of_two_groups_the_later_one_wins_and_one_may_be_empty(small_load):
     groups = {"visible": [0, 1, 2], "tried": [2, 3], "failed": []}
     others = dict(zip("abcd", ([4], [5], [6], [7])))
-    figure = view(small_load, groups=groups | others)
+    present = np.arange(len(small_load)) != 20
+    figure = view(small_load, present, groups=groups | others)
     shown = {trace.name: items(trace) for trace in figure.data}
-    rest = list(range(8, len(small_load)))
+    rest = [item for item in range(8, len(small_load)) if item != 20]
     assert shown == {"visible": [0, 1], "tried": [2, 3], "failed": [], **others, "unseen": rest}
     colours = COLOURS | dict(zip(others, _OTHER_COLOURS))
     for trace in figure.data:

@@ -42,9 +42,6 @@ def test_settling_moves_boxes_a_little_and_restore_keeps_to_it():
     assert 0 < drift.max() < 0.01
     physics.lift(0)
     assert (physics.positions() == settled).all()
-    for seconds in (-1.0, float("nan")):
-        with pytest.raises(ValueError, match="seconds is"):
-            physics.settle(seconds)
 
 
 @pytest.mark.parametrize("container", [task.CONTAINER, (6.0, 2.2, 2.7)])

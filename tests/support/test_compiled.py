@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 
@@ -61,14 +60,6 @@ def test_code_is_compiled_once_for_each_value_of_a_constant(copy):
     assert printed == "0.6 0" and "compiling" in said
     edit(copy, "LIFT_THRESHOLD = 0.5", "LIFT_THRESHOLD = 0.2")
     assert run(copy) == ("0.3 1", "")
-
-
-def test_code_is_kept_in_memory_where_no_folder_can_be_written(monkeypatch):
-    monkeypatch.setattr(compiled.tempfile, "TemporaryFile", Mock(side_effect=PermissionError))
-    with pytest.warns(UserWarning, match="cannot be kept.* set NUMBA_CACHE_DIR to a folder"):
-        assert compiled._folder.__wrapped__() is None
-    monkeypatch.setattr(compiled, "_folder", lambda: None)
-    assert compiled.compiled(lambda number: number + 1)(1) == 2
 
 
 def test_all_that_compiled_functions_read_is_among_the_sources():
