@@ -150,6 +150,16 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     assert_same(tmp_path / "first", tmp_path / "second")
 
 
+def test_lifts_are_kept_when_a_run_is_stopped(tmp_path, monkeypatch):
+    table, lifts = LiftTable(), tmp_path / "lifts.npz"
+    for place in ("unload.agent.training", "unload.env.vector"):
+        monkeypatch.setattr(f"{place}.shared_table", lambda: table)
+    with at_step(5, interrupt), pytest.raises(KeyboardInterrupt):
+        config, stack = TrainConfig(**CONTAINER), lambda rng: own_load(rng, "continuous sizes")
+        train(config, tmp_path / "run", progress=False, lifts=lifts, stack=stack)
+    assert len(LiftTable.load(lifts)) == len(table) > 0
+
+
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
 def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
     fields = {"replay_size": replay_size, "picks": picks, "gradient_steps": 3}
