@@ -154,7 +154,7 @@ def test_lifts_are_kept_when_a_run_is_stopped(tmp_path, monkeypatch):
     table, lifts = LiftTable(), tmp_path / "lifts.npz"
     for place in ("unload.agent.training", "unload.env.vector"):
         monkeypatch.setattr(f"{place}.shared_table", lambda: table)
-    with at_step(5, interrupt), pytest.raises(KeyboardInterrupt):
+    with at_step(5, runs.interrupt), pytest.raises(KeyboardInterrupt):
         config, stack = TrainConfig(**CONTAINER), lambda rng: own_load(rng, "continuous sizes")
         train(config, tmp_path / "run", progress=False, lifts=lifts, stack=stack)
     assert len(LiftTable.load(lifts)) == len(table) > 0
