@@ -77,6 +77,21 @@ def test_an_episode_is_given_up_1280_failures_after_its_last_success():
     assert frame["longest_deadlock"].item() == 1279 and not frame["emptied"].item()
 
 
+@pytest.mark.parametrize("max_picks", [200, None])
+def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, max_picks):
+    monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, *given: fail(envs, given[0]))
+
+    def fail(envs, actions):
+        envs._containers.masks[np.arange(len(actions)), actions] = 0
+        infos = {"item": np.zeros(len(actions)), "distance": np.zeros(len(actions))}
+        return np.full(len(actions), -1.0), infos
+
+    frame = evaluate(policies.random, 2, max_picks=max_picks, stack=lambda rng: few_items(rng, 40))
+    assert (frame["unloaded"] == 0).all() and (frame["deadlocked"] == 0).all()
+    if max_picks is None:
+        assert (frame["picks"] == 40).all() and not frame["emptied"].any()
+
+
 @pytest.mark.parametrize(
     ("kwargs", "error", "message"),
     [

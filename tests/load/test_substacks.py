@@ -81,6 +81,7 @@ BAD_INPUT = {
     "variants holds 3 to 3; expected 0 to 2": lambda rng: build_load(np.full((1, 3, 4), 3)),
     "inside the container": lambda rng: build_load(np.zeros((1, 4, 4), int)),
     "rng is 0; expected a numpy.random.Generator": lambda rng: stack_load(0),
+    "walls is 0": lambda rng: stack_load(rng, walls=0),
     r"scale is 0.1; expected .*\[0.5, 1.5\]": lambda rng: stack_load(rng, scale=0.1),
 }
 
