@@ -1,27 +1,19 @@
 """What is kept of a run on disk, and how it goes on from there."""
 
-import errno
 import json
-import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from itertools import product
 from pathlib import Path
-from types import SimpleNamespace
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from tests.agent.runs import (
     CONTAINER,
-    Breakdown,
     assert_same,
-    at,
     at_step,
-    content,
     crash,
     few_walls,
     interrupt_run,
@@ -30,10 +22,9 @@ from tests.agent.runs import (
 )
 from unload import TrainConfig, stack_load, train
 from unload.agent.checkpoint import RunFolder, settings_of_run
+from unload.agent.training import Training
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
-
-OWN = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz")
 
 
 @pytest.mark.needs("fork")
@@ -54,39 +45,16 @@ def test_a_run_that_ends_soon_writes_no_checkpoint(tmp_path, monkeypatch):
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
-@pytest.mark.parametrize("finished", [True, False])
-def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch, finished):
+def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch):
     """Its name stands in the run's settings and on the card, unless it is the reference."""
     config = TrainConfig(**CONTAINER)
-    train(config, tmp_path, progress=False) if finished else interrupt_run(config, tmp_path, 3)
+    interrupt_run(config, tmp_path, 3)
     (other,) = {*ENGINES} - {engine_of()}
     monkeypatch.setattr("unload.agent.checkpoint.engine_of", lambda: other)
     with pytest.raises(ValueError, match=r"engine \(.* not .*\)"):
         train(config, tmp_path, progress=False)
-    assert settings_of_run(config).get("engine", ENGINES[0]) == other
     heights = replace(config, env="unload/HighestItem-v0")
     assert "engine" not in settings_of_run(heights), "nothing is lifted there"
-
-
-def test_a_stack_that_counts_as_false_is_known():
-    kind = type("Stack", (list,), {"__call__": lambda stack, rng: few_walls(rng)})
-    assert isinstance(settings_of_run(TrainConfig(**CONTAINER), kind())["stack"], str)
-
-
-def scaled(run, by: float) -> None:
-    """A change: what is learned is some times the reward."""
-    run.reward = lambda picks, distances: picks["rewards"] * np.nan_to_num(np.float32(by))
-
-
-@pytest.mark.parametrize(("by", "other"), [(1, True), (1, 1.0), (0.0, -0.0), (float("nan"), 0.0)])
-def test_numbers_that_python_holds_equal_are_told_apart(tmp_path, by, other):
-    """And not-a-number is the same again."""
-    config = TrainConfig(**CONTAINER)
-    interrupt_run(config, tmp_path, 3, change=partial(scaled, by=by))
-    with pytest.raises(ValueError, match="holds a run of another configuration: change"):
-        train(config, tmp_path, progress=False, change=partial(scaled, by=other))
-    for _ in range(2):
-        train(config, tmp_path, progress=False, change=partial(scaled, by=by))
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -161,23 +129,18 @@ CONTAINERS = "rollout.envs._containers"
         ("format", lambda _: np.array(8), "is not of format 9; if another version of unload"),
         ("version", lambda _: np.array("0.1.0"), "is of unload 0.1.0; if another version of unl"),
         ("settings", lambda _: np.array("{"), "JSONDecodeError"),
-        ("settings", lambda _: np.array("[]"), "TypeError|holds a run of another"),
-        ("numbers", lambda _: np.array("{"), "JSONDecodeError"),
         ("rollout.steps", lambda _: 1000, "rollout.steps is 1000; expected .* <= 50"),
         ("rollout.steps", lambda _: -1, "rollout.steps is -1; expected"),
         ("rollout.steps", lambda steps: steps - 5, "the curve has other points than"),
-        ("curve.points", lambda _: [], "the curve has other points than"),
         ("curve.points", lambda points: [each[:3] for each in points], "TypeError"),
         ("replay.total", lambda total: total - 1, "replay.arrays.observations has shape"),
         ("rollout.envs.max_picks", lambda _: 10**9, "max_picks is 1000000000; expected 12"),
-        ("rollout.envs._rngs.0", lambda _: {}, "(Key|Type|Value)Error"),
         ("rollout.envs._picks", lambda picks: picks + 13, "picks holds"),
         ("replay.arrays.actions", lambda actions: actions + 10**9, "actions holds"),
         ("replay.arrays.rewards", lambda rewards: rewards.astype(float), "dtype float64"),
         ("agent.network.scorer.bias", lambda bias: bias * np.nan, "scorer.bias is not finite"),
         (f"{CONTAINERS}.links", lambda links: links + 10**9, "links holds"),
         (f"{CONTAINERS}.visible", lambda visible: visible + 10**9, "visible holds"),
-        (f"{CONTAINERS}.visible", lambda visible: visible[:, 1:], "visible has shape"),
         (f"{CONTAINERS}.present", lambda present: present[:, :9], "has shape"),
     ],
 )
@@ -202,67 +165,10 @@ def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
         train(config, checkpoint.parent, progress=False)
 
 
-def test_what_a_change_puts_on_a_run_is_left_out_and_put_there_again(tmp_path):
-    """Methods, numbers and circles; a part that it replaces could not be put back."""
-
-    def change(run):
-        step, run.replay.owner, run.counted = run.step, run, 0
-
-        def counting():
-            step()
-            run.counted += 1
-
-        run.step = counting
-
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path / "plain", progress=False)
-    with at(RunFolder, "save_curve", 1, crash), pytest.raises(Breakdown):
-        train(config, tmp_path / "changed", progress=False, change=change)
-    train(config, tmp_path / "changed", progress=False, change=change)
-    assert content(tmp_path / "plain")[1].equals(content(tmp_path / "changed")[1])
-
-    def replace_envs(run):
-        run.rollout.envs = SimpleNamespace(close=lambda: None)
-
-    with pytest.raises(ValueError, match=r"change has replaced .*envs\.\S+.*; expected m"):
-        train(config, tmp_path / "replaced", progress=False, change=replace_envs)
-
-
-def test_a_disk_without_room_is_refused_before_training(tmp_path, monkeypatch):
-    """Two versions of the checkpoint must fit, one of which may be there already."""
-    config, wider = (TrainConfig(**CONTAINER | {"replay_size": size}) for size in (100, 200))
-    interrupt_run(config, tmp_path, 40)  # the memory is full
-    there = (tmp_path / "checkpoint.npz").stat().st_size
-    for free, run, folder in ((there // 2, config, tmp_path), (2 * there, wider, tmp_path / "2")):
-        monkeypatch.setattr("shutil.disk_usage", lambda path, free=free: Mock(free=free))
-        with pytest.raises(OSError, match="GB for checkpoints; expected .* that repl") as full:
-            train(run, folder, progress=False)
-        assert full.value.errno == errno.ENOSPC
-    monkeypatch.setattr("shutil.disk_usage", lambda path: Mock(free=there))
-    train(config, tmp_path, progress=False)
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory) -> Path:
-    """The folder of a finished run; tests bring back what they change."""
-    folder = tmp_path_factory.mktemp("finished") / "run"
-    train(TrainConfig(**CONTAINER), folder, progress=False)
-    return folder
-
-
-def test_a_finished_run_is_read_where_nothing_can_be_written(finished, monkeypatch):
-    """Not even a lock, or the checkpoint that a killed process has left."""
-    refused = OSError(errno.EROFS, os.strerror(errno.EROFS))
-    with files.locked(finished):
-        monkeypatch.setattr(Path, "unlink", Mock(side_effect=refused))
-        assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
-
-
-def test_a_run_that_another_process_finishes_meanwhile_is_read(finished, monkeypatch):
-    answers = iter([False, True])
-    monkeypatch.setattr(RunFolder, "finished", property(lambda folder: next(answers)))
-    monkeypatch.setattr("unload.agent.training.Training", None)
-    assert len(train(TrainConfig(**CONTAINER), finished, progress=False).curve) == 10
+def test_a_change_may_not_replace_a_part_of_a_run():
+    """It could not be put back."""
+    with pytest.raises(ValueError, match=r"change has replaced replay.\S+.*; expected m"):
+        Training(TrainConfig(**CONTAINER), change=lambda run: setattr(run, "replay", None))
 
 
 @pytest.mark.parametrize(
@@ -270,27 +176,22 @@ def test_a_run_that_another_process_finishes_meanwhile_is_read(finished, monkeyp
     [
         ("policy.safetensors", b"0.", b"1."),
         ("curve.csv", b"0.", b"1."),
-        ("config.json", b'"digest": "', b'"digest": "0'),
         ("config.json", b'"digest"', b'"other"'),
     ],
 )
-def test_a_damaged_file_of_a_finished_run_is_refused_by_name(finished, name, old, new):
-    path = finished / name
-    whole = path.read_bytes()
-    path.write_bytes(whole.replace(old, new, 1))
+def test_a_damaged_file_of_a_finished_run_is_refused_by_name(tmp_path, name, old, new):
+    config, path = TrainConfig(**CONTAINER), tmp_path / name
+    train(config, tmp_path, progress=False)
+    path.write_bytes(path.read_bytes().replace(old, new, 1))
     with pytest.raises(ValueError, match=f"{name} was changed or damaged"):
-        train(TrainConfig(**CONTAINER), finished, progress=False)
-    path.write_bytes(whole)
+        train(config, tmp_path, progress=False)
 
 
 def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
-    """Of the run's own files; what others write beside them or below stays."""
-    (tmp_path / "below").mkdir()
+    """Of the run's own files; what others write beside them stays."""
     tail = f"{'0123456789abcdef' * 2}.partial"
-    names = ("curve.csv.bak.partial", "curve.csv.0123.partial", f"notes.{tail}")
-    others = [tmp_path / name for name in (*names, f"below/checkpoint.npz.{tail}")]
-    for path in (*others, *(tmp_path / f"{name}.{tail}" for name in OWN)):
-        path.write_bytes(b"half")
-    (tmp_path / f"owner.{tail}").touch()
+    own = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz", "owner")
+    for name in ("notes", *own):
+        (tmp_path / f"{name}.{tail}").write_bytes(b"half")
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    assert sorted(tmp_path.rglob("*.partial")) == sorted(others)
+    assert [*tmp_path.glob("*.partial")] == [tmp_path / f"notes.{tail}"]

@@ -25,14 +25,9 @@ def test_the_papers_configuration_is_the_default():
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 
 
-@pytest.mark.parametrize(
-    "picks, interval",
-    [(2112, 1), (64_000, 10), (1_000_000, 156), (3_200_000, 500), (20_000_000, 500)],
-)
+@pytest.mark.parametrize(("picks", "interval"), [(2112, 1), (1_000_000, 156), (20_000_000, 500)])
 def test_a_curve_has_a_hundred_points_or_more(picks, interval):
-    config = TrainConfig(picks=picks)
-    assert config.log_interval == interval
-    assert config.plain() == TrainConfig(picks=picks, log_interval=interval).plain()
+    assert TrainConfig(picks=picks).log_interval == interval
     assert TrainConfig(picks=picks, log_interval=7).log_interval == 7
 
 
@@ -42,10 +37,8 @@ def test_epsilon_falls_linearly_and_stays():
     assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
 
 
-def test_values_at_the_edge_are_taken_and_seeds_stay_as_they_were():
-    for given in ({"gamma": 0.9}, {"replay_size": 64, "picks": 128}):
-        seeds = TrainConfig(seed=3, **given).seeds()
-        assert seeds == (1645421708, 4294262074, 3363538554)
+def test_seeds_stay_as_they_were():
+    assert TrainConfig(seed=3).seeds() == (1645421708, 4294262074, 3363538554)
 
 
 COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interval", "max_picks")
@@ -59,10 +52,8 @@ COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interv
         *((f"epsilon_{name}", 1.1) for name in ("init", "final")),
         ("picks", 100),  # no multiple of 64
         ("picks", 2048),  # not enough for an update by 2048
-        ("learning_rate", 10**400),  # beyond the largest float
         ("replay_size", 63),  # less than a step of all environments
-        ("gamma", float("nan")),
-        ("beta", float("inf")),
+        ("gamma", 1.1),
         ("network", "mlp"),
     ],
 )
@@ -83,29 +74,18 @@ def test_numpy_values_make_the_same_configuration():
     assert type(config.mask) is bool and type(config.ties) is str
 
 
-class Constant(ContainerVectorEnv):
-    """A task with a reward of its own."""
-
-    def step(self, actions):
-        observations, rewards, *rest = super().step(actions)
-        return observations, np.full_like(rewards, 0.5), *rest
-
-
 class Fewer(ContainerVectorEnv):
     def __init__(self, num_envs, **settings):
         super().__init__(num_envs, **settings)
         self.single_action_space = gymnasium.spaces.Discrete(7)
 
 
-def test_an_environment_of_ones_own_trains(tmp_path):
-    for kind in (Constant, Fewer):
-        gymnasium.register(f"tests/{kind.__name__}-v0", vector_entry_point=kind)
-    size = {"num_envs": 4, "picks": 80, "batch_size": 16, "n_features": 4, "log_interval": 5}
-    result = train(TrainConfig("tests/Constant-v0", **size), tmp_path / "a", progress=False)
-    assert (result.curve["mean_reward"] == 0.5).all()
+def test_an_environment_of_other_spaces_or_that_is_not_registered_is_refused(tmp_path):
+    gymnasium.register("tests/Fewer-v0", vector_entry_point=Fewer)
+    config = TrainConfig("tests/Fewer-v0", num_envs=4, picks=80, batch_size=16)
     with pytest.raises(ValueError, match=r"env='tests/Fewer-v0' has Discrete\(7\); expected"):
-        train(TrainConfig("tests/Fewer-v0", **size), tmp_path / "b", progress=False)
-    for env in ("tests/Missing-v0", "CartPole-v1-v1", "Acrobot-v1", 3):
+        train(config, tmp_path, progress=False)
+    for env in ("tests/Missing-v0", "Acrobot-v1", 3):
         with pytest.raises(ValueError, match="env is .*; expected 'unload/Container-v0', .*, or"):
             TrainConfig(env)
 

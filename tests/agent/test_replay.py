@@ -47,21 +47,3 @@ def test_the_oldest_picks_are_overwritten(rng):
     assert len(replay) == 11 and replay.total == 24
     kept = sample(replay, 300, rng)["observations"][:, 0, 0]
     assert set(kept.tolist()) == set(range(13, 24))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"masks": np.ones(2)}, "batch has .*expected"),
-        ({"actions": np.zeros(3, int)}, r"observations has shape .*expected \(3, 4, 3\)"),
-        ({"observations": np.zeros((2, 5, 3))}, r"observations has shape \(2, 5, 3\)"),
-        ({"rewards": 1.0}, r"rewards has shape \(\); expected \(2,\)"),
-    ],
-)
-def test_a_batch_that_does_not_fit_is_refused(change, message):
-    ReplayBuffer(1, 1)  # the smallest
-    replay = ReplayBuffer(2, 4)
-    replay.add(**picks(0, 2))
-    with pytest.raises(ValueError, match=message):
-        replay.add(**picks(5, 2) | change)
-    assert replay.total == 2 and replay.arrays["observations"].max() == 1

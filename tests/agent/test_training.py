@@ -1,11 +1,6 @@
-import itertools
-import json
 import os
 import signal
-import warnings
-from contextlib import nullcontext
 from dataclasses import replace
-from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -13,15 +8,14 @@ import pytest
 import torch
 
 from tests.agent import runs
-from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
+from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, metres
 from tests.load.walls import own_load
-from unload import TrainConfig, evaluate, load_policy, stack_load, train
-from unload.agent.checkpoint import RunFolder
+from unload import TrainConfig, evaluate, load_policy, train
 from unload.agent.curve import Curve, Point
 from unload.agent.identity import identity
-from unload.agent.training import Training, warn_of_other_bits
+from unload.agent.training import Training
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.table import LiftTable, shared_table
+from unload.physics.table import LiftTable
 from unload.support import files
 
 
@@ -38,27 +32,19 @@ LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
 def test_what_a_run_leaves(tmp_path, fields):
     config = TrainConfig(**fields, epsilon_final=0.9)  # so that its points differ to the end
-    folder = tmp_path / "new" / "run"
-    result = train(config, folder, progress=False)
-    assert {path.name for path in folder.iterdir()} == LEFT
-    curve = result.curve
+    curve = train(config, tmp_path, progress=False).curve
+    assert {path.name for path in tmp_path.iterdir()} == LEFT
     assert tuple(curve.columns) == Point._fields
     interval = config.log_interval * config.num_envs
     assert curve["picks"].tolist() == list(range(interval, config.picks + 1, interval))
-    assert curve["loss"].iloc[1:].between(0, 2).all()
+    assert curve["loss"].iloc[1:].between(0, 2).all() and curve["success_rate"].nunique() > 2
     epsilons = [config.epsilon(picks - config.num_envs) for picks in curve["picks"]]
     assert curve["epsilon"].tolist() == pytest.approx(epsilons)
-    loaded = load_policy(folder / "policy.safetensors")
+    loaded = load_policy(tmp_path / "policy.safetensors")
     assert (loaded.equalize, loaded.ties) == (config.equalize, config.ties)
-    assert curve["success_rate"].nunique() > 2
     assert loaded.card["loads"] == "the paper's"
     assert loaded.card["msr"] == {"at the end of its training": curve["success_rate"].iloc[-1]}
-    stored = json.loads((folder / "config.json").read_text(encoding="utf-8"))
-    assert stored.pop("marks").keys() == {"policy.safetensors", "curve.csv"}
-    assert stored.pop("change") is None and stored.pop("stack") is None and stored.pop("digest")
-    stored.pop("engine", None)  # where it is not the reference
-    assert TrainConfig(**stored) == config
-    assert loaded.card["configuration"] == stored
+    assert TrainConfig(**loaded.card["configuration"]) == config
 
 
 def test_loads_choices_and_weights_have_each_their_seed():
@@ -82,19 +68,6 @@ def test_deadlocked_is_the_share_of_picks_that_had_failed_before():
     assert 0 < (rewards[:-1] < 0).sum() < 29
     assert point.deadlocked == pytest.approx((rewards[:-1] < 0).sum() / 30)
     assert point.mean_reward == pytest.approx(rewards.mean()) and np.isnan(point.loss)
-
-
-@pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])
-def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, count):
-    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: found)
-    warn_of_other_bits.cache_clear()
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        for seed in (0, 1):
-            Training(TrainConfig(**CONTAINER, seed=seed))
-    assert len(said) == count
-    assert all(f"PyTorch uses {found} instructions" in str(each.message) for each in said)
-    assert all(each.filename == __file__ for each in said), "where the run was asked for"
 
 
 @pytest.mark.parametrize(
@@ -127,12 +100,8 @@ def test_a_network_and_a_change_of_ones_own_are_trained_with_and_known(tmp_path)
     config = TrainConfig(**CONTAINER | {"network": own_network, "epsilon_init": 0.1})
     result = train(config, tmp_path, progress=False, change=metres)
     assert result.policy.network.weight.item() > 0.12  # it was 0.1: to pick high ones pays
-    name = result.policy.card["configuration"]["network"]
-    assert name.startswith("tests.agent.test_training.own_network ")
+    assert result.policy.card["configuration"]["network"] == identity(own_network)
     assert result.policy.card["change"] == identity(metres)
-    message = r"another configuration: network .*own_network .* not 'peq.*metres \w+', not None"
-    with pytest.raises(ValueError, match=message):
-        train(replace(config, network="peq"), tmp_path, progress=False)
 
 
 def test_a_reward_of_ones_own_gets_the_distance():
@@ -149,48 +118,6 @@ def test_a_reward_of_ones_own_gets_the_distance():
     assert successes == pytest.approx((learned >= 0.2).mean(axis=1).tolist())
     run = Training(HIGHEST)
     assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()
-
-
-def test_progress_shows_speed_msr_and_loss(tmp_path, capsys):
-    train(TrainConfig(**CONTAINER), tmp_path, progress=True)
-    shown = capsys.readouterr()
-    assert "MSR=" in shown.out and "loss=" in shown.out and "pick/s" in shown.out
-    assert shown.err == "" and max(map(len, shown.out.splitlines())) <= 100
-    with open(tmp_path / "log.txt", "w", encoding="utf-8") as log:
-        train(TrainConfig(**CONTAINER), tmp_path / "logged", progress=log)
-    assert "200/200" in (tmp_path / "log.txt").read_text(encoding="utf-8")
-    runs.interrupt_run(TrainConfig(**CONTAINER), tmp_path / "resumed", 20)
-    train(TrainConfig(**CONTAINER), tmp_path / "resumed")
-    shown = capsys.readouterr().out
-    assert "80.0/200" in shown and "0.00/200" not in shown and "200/200" in shown
-    train(TrainConfig(**CONTAINER), tmp_path / "quiet", progress=False)
-    assert capsys.readouterr() == ("", "")
-
-
-def test_a_run_can_be_watched(tmp_path, monkeypatch):
-    """At each point, by a callback and on disk."""
-    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
-    config, points, on_disk = TrainConfig(**CONTAINER), [], []
-
-    def callback(point):
-        points.append(point)
-        on_disk.append(len(pd.read_csv(tmp_path / "curve.csv")))
-
-    result = train(config, tmp_path, progress=False, callback=callback)
-    pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
-    assert on_disk == list(range(1, 11))
-    train(config, tmp_path, progress=False, callback=callback)  # it is finished
-    assert len(points) == 10
-
-
-def test_the_curve_is_written_once_a_second_at_most(tmp_path, monkeypatch):
-    written, clock = [], itertools.count(100, 0.1)  # s: a step, and a point, take a tenth each
-    monkeypatch.setattr("unload.agent.training.time", Mock(monotonic=lambda: next(clock)))
-    monkeypatch.setattr(RunFolder, "save_curve", lambda _, run: written.append(run.rollout.steps))
-    with at_step(49, runs.crash), pytest.raises(runs.Breakdown):
-        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    assert written == [5, 15, 25, 35, 45], "at every other point"
-    assert not (tmp_path / "checkpoint.npz").exists(), "the step was broken off"
 
 
 @pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
@@ -223,23 +150,14 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     assert_same(tmp_path / "first", tmp_path / "second")
 
 
-@pytest.mark.pybullet
-def test_lifts_are_kept_when_a_run_is_stopped_and_refused_where_they_are_damaged(tmp_path):
-    """Before a run begins; at its end it counts as finished, and is read back without them."""
-    config, lifts = TrainConfig(**CONTAINER), tmp_path / "lifts.npz"
-    usual = {"progress": False, "lifts": lifts}
-    with at_step(20, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path / "run", **usual)
-    assert len(LiftTable.load(lifts)) >= len(shared_table()) > 0
-    message = "lifts: .*lifts.npz is not a readable"
-    damage = at_step(30, lambda: lifts.write_bytes(b"no table"))
-    with damage, pytest.raises(ValueError, match=message):
-        train(config, tmp_path / "run", **usual)
-    with at_step(1, runs.crash):
-        assert len(train(config, tmp_path / "run", **usual).curve) == 10
-    with pytest.raises(ValueError, match=message):
-        train(config, tmp_path / "other", **usual)
-    assert not (tmp_path / "other").exists()
+def test_lifts_are_kept_when_a_run_is_stopped(tmp_path, monkeypatch):
+    table, lifts = LiftTable(), tmp_path / "lifts.npz"
+    for place in ("unload.agent.training", "unload.env.vector"):
+        monkeypatch.setattr(f"{place}.shared_table", lambda: table)
+    with at_step(5, runs.interrupt), pytest.raises(KeyboardInterrupt):
+        config, stack = TrainConfig(**CONTAINER), lambda rng: own_load(rng, "continuous sizes")
+        train(config, tmp_path / "run", progress=False, lifts=lifts, stack=stack)
+    assert len(LiftTable.load(lifts)) == len(table) > 0
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
@@ -251,63 +169,39 @@ def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
         before = run.agent.learner.steps
         run.step()
     assert (before, run.agent.learner.steps) == (0, 3)
-    assert np.isfinite(run.curve.points[-1].loss)
     with pytest.raises(ValueError, match=f"picks is {picks - 4}; expected at least {picks}, bec"):
         replace(config, picks=picks - 4)
 
 
-@pytest.mark.parametrize("interval", [0, 60.0])
-def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, interval, monkeypatch):
+def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     """It once wrote infinite weights and counted as finished."""
-    monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", interval)
+    monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)
     config = TrainConfig(**CONTAINER, learning_rate=1e39)
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
     left = {"checkpoint.npz", "curve.csv", "lock", "owner"}
     assert {path.name for path in tmp_path.iterdir()} <= left
-    if interval == 0:
-        stored = files.read_arrays(tmp_path / "checkpoint.npz")
-        assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
-
-
-@pytest.mark.parametrize("stop", [lambda: False, lambda: 1 / 0])
-def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
-    """Whether it ends the run or raises; and the environments are closed."""
-    started = []
-
-    def callback(point):
-        torch.nn.init.constant_(started[0].agent.network.scorer.bias, torch.inf)
-        return stop()
-
-    with pytest.raises(FloatingPointError, match="scorer.bias is not finite"):
-        train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
-    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock", "owner"}
-    assert started[0].rollout.envs.closed
+    stored = files.read_arrays(tmp_path / "checkpoint.npz")
+    assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
 
 
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
         ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
-        ({"config": replace(HIGHEST, network=lambda *_: None)}, TypeError, "returned is None; exp"),
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
         ({"change": None}, TypeError, "change is None; expected a function of a Training"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": 3}, TypeError, "lifts is 3; expected a path"),
-        ({"config": replace(HIGHEST, network=int)}, TypeError, "network is <class 'int'>; expect"),
         ({"config": ADAM}, ValueError, r"learning_rate is 1e\+39; expected one that PyTorch's Ada"),
-        ({"lifts": ""}, ValueError, "lifts is ''; expected the name of a file"),
         ({"lifts": "run/checkpoint.npz"}, ValueError, "lifts is 'run/checkpoint.npz', a file of"),
         ({"lifts": "run/../run/config.json"}, ValueError, "lifts is .*, a file of the run; expec"),
         ({"stack": 3}, TypeError, "stack is 3; expected"),
-        ({"config": HIGHEST, "stack": stack_load}, ValueError, "stack is given; expected None"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
         ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
         ({"run_dir": "run/\udcff"}, ValueError, r"run_dir is 'run/\\udcff'; .* a name in UTF-8"),
         ({"run_dir": "run/\0"}, ValueError, r"run_dir is 'run/\\x00'; .* a name in UTF-8"),
-        ({"run_dir": None}, TypeError, "run_dir is None; expected a path"),
-        ({"run_dir": "/dev/null/run"}, OSError, "/dev/null"),
     ],
 )
 def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message):
@@ -315,35 +209,22 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message)
     usual = {"config": TrainConfig(**CONTAINER), "run_dir": tmp_path / "run", "progress": False}
     with pytest.raises(error, match=message):
         train(**usual | given)
-    # What a function returns is known only when it has been called.
-    assert (tmp_path / "run").exists() == any(
-        word in message for word in ("returned", "class", "learning_rate")
-    )
+    assert (tmp_path / "run").exists() == ("learning_rate" in message), "known when it is asked for"
     assert not list(tmp_path.glob("*/*.*"))
 
 
 @pytest.mark.needs("mkfifo")
 def test_a_pipe_is_refused(tmp_path):
     """It once hung, of lifts as in place of a file of the run."""
+    config, run = TrainConfig(**CONTAINER), tmp_path / "run"
     os.mkfifo(tmp_path / "fifo")
     with pytest.raises(ValueError, match="lifts is '.*fifo'.*; expected"):
-        train(TrainConfig(**CONTAINER), tmp_path / "run", progress=False, lifts=tmp_path / "fifo")
-    assert not (tmp_path / "run").exists()
-    for name in ("checkpoint.npz", "config.json"):
-        (tmp_path / name).mkdir()
-        os.mkfifo(tmp_path / name / name)
-        with pytest.raises(ValueError, match=f"a file of run_dir is '.*{name}'; expected the name"):
-            train(TrainConfig(**CONTAINER), tmp_path / name, progress=False)
-
-
-@pytest.mark.needs("symlinks")
-def test_lifts_that_are_linked_to_a_file_of_the_run_are_refused(tmp_path):
-    """A table of lifts was once written in place of the checkpoint."""
-    link, run = tmp_path / "lifts.npz", tmp_path / "run"
-    link.symlink_to(run / "checkpoint.npz")
-    with pytest.raises(ValueError, match="lifts is '.*lifts.npz', a file of the run; expected an"):
-        train(TrainConfig(**CONTAINER), run, progress=False, lifts=link)
+        train(config, run, progress=False, lifts=tmp_path / "fifo")
     assert not run.exists()
+    run.mkdir()
+    os.mkfifo(run / "config.json")
+    with pytest.raises(ValueError, match="a file of run_dir is '.*config.json'; expected the name"):
+        train(config, run, progress=False)
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
@@ -359,59 +240,32 @@ def test_a_point_holds_the_means_since_the_last_one():
     curve.add(np.array([1.0, 1.0]), np.array([False, False]), [0.5, 0.25])
     curve.add(np.array([1.0, -1.0]), np.array([True, True]), [0.0])
     curve.end_point(6, 0.5)
-    table = curve.table()
-    assert table["picks"].tolist() == [2, 6]
-    assert table["mean_reward"].tolist() == [0, 0.5]
-    assert table["success_rate"].tolist() == [0.5, 0.75]
-    assert table["deadlocked"].tolist() == [0.5, 0.5]
-    assert np.isnan(table["loss"][0]) and table["loss"][1] == pytest.approx(0.25)
-    assert table["epsilon"].tolist() == [1.0, 0.5]
-    assert table["wall_time"].is_monotonic_increasing
+    first, second = curve.points
+    assert first[:4] == (2, 0, 0.5, 0.5) and np.isnan(first.loss) and first.epsilon == 1
+    assert second[:4] == (6, 0.5, 0.75, 0.5) and (second.loss, second.epsilon) == (0.25, 0.5)
+    assert first.wall_time <= second.wall_time
 
 
 @pytest.mark.parametrize("stop", [False, np.False_])
-def test_a_callback_may_end_a_run(tmp_path, stop):
+def test_a_callback_watches_a_run_and_may_end_it(tmp_path, monkeypatch, stop):
     """By False, NumPy's, too, not by None or 0; policy and curve until then are its result."""
+    monkeypatch.setattr("unload.agent.training.CURVE_INTERVAL", -1.0)
     config, points = TrainConfig(**CONTAINER), []
 
     def callback(point):
         points.append(point)
+        assert len(pd.read_csv(tmp_path / "curve.csv")) == len(points)
         return stop if len(points) == 4 else 0 if len(points) == 3 else None
 
     result = train(config, tmp_path, progress=False, callback=callback)
     pd.testing.assert_frame_equal(pd.DataFrame(points), result.curve)
-    assert len(points) == 4
     assert result.policy.card["picks"] == points[-1]["picks"] < config.picks
     again = train(config, tmp_path, progress=False, callback=callback)
-    assert len(points) == 4 and len(again.curve) == 4 and not (tmp_path / "checkpoint.npz").exists()
+    assert len(points) == len(again.curve) == 4
 
 
-@pytest.mark.parametrize("where", ["step", "callback"])
-def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
-    """Nothing is written any more; the run goes on from the checkpoint before."""
-    config = TrainConfig(**CONTAINER)
-    train(config, tmp_path / "straight", progress=False)
-    runs.interrupt_run(config, tmp_path / "broken", 10)
-
-    def twice(point=None) -> None:
-        interrupt()
-        interrupt()
-        pytest.fail("still running")
-
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt, match="^$"):
-        patch.setattr(RunFolder, "save", lambda *_: pytest.fail("it was written"))
-        with at_step(7, twice) if where == "step" else nullcontext():
-            train(
-                config, tmp_path / "broken", progress=False,
-                callback=twice if where == "callback" else None,
-            )  # fmt: skip
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-
-
-@pytest.mark.parametrize("raised", [OSError, GeneratorExit])
 @pytest.mark.parametrize("picks", [100, 200])
-def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
+def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
     """Nor is it called twice for one; also after the last, and wherever it has gone meanwhile."""
     config, steps = TrainConfig(**CONTAINER), []
 
@@ -419,31 +273,20 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, raised, picks):
         os.chdir(tmp_path / "elsewhere")
         steps.append(point["picks"])
         if len(steps) == picks // 20:
-            raise raised("no more")
+            raise OSError("no more")
 
     (tmp_path / "elsewhere").mkdir()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(tmp_path)
-        usual = {"progress": False, "lifts": "lifts.npz", "callback": callback}
-        with pytest.raises(raised, match="no more"):
-            train(config, "run", **usual)
-        patch.chdir(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    usual = {"progress": False, "lifts": "lifts.npz", "callback": callback}
+    with pytest.raises(OSError, match="no more"):
         train(config, "run", **usual)
+    assert (tmp_path / "lifts.npz").exists()
+    monkeypatch.chdir(tmp_path)
+    train(config, "run", **usual)
     assert steps == list(range(20, 201, 20))
     assert not list((tmp_path / "elsewhere").iterdir())
-    assert {path.name for path in (tmp_path / "run").iterdir()} == LEFT
     train(config, tmp_path / "straight", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "run")
-
-
-@pytest.mark.parametrize("method", ["finish", "result"])
-def test_ctrl_c_in_the_last_moments_is_not_swallowed(tmp_path, method):
-    config, handler = TrainConfig(**CONTAINER), signal.getsignal(signal.SIGINT)
-    with runs.at(RunFolder, method, 1, interrupt), pytest.raises(KeyboardInterrupt):
-        train(config, tmp_path, progress=False)
-    assert signal.getsignal(signal.SIGINT) is handler
-    with at_step(1, runs.crash):  # it is finished
-        assert len(train(config, tmp_path, progress=False).curve) == 10
 
 
 @pytest.mark.parametrize("mask", [False, True])

@@ -1,12 +1,7 @@
 """What all environments have in common: settings, and the order of calls."""
 
-import copy
-import gc
-import importlib
-import pickle
 from functools import partial
-from itertools import count
-from unittest.mock import Mock
+from unittest.mock import DEFAULT, Mock
 
 import gymnasium
 import numpy as np
@@ -18,7 +13,6 @@ from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_env
 from unload import ContainerEnv, HighestItemEnv, stack_load
 from unload.env.highest_item import HighestItemVectorEnv
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.table import LiftTable
 
 
 def container(**kwargs) -> ContainerEnv:
@@ -29,7 +23,6 @@ ALL = [container, HighestItemEnv, ContainerVectorEnv, HighestItemVectorEnv]
 BAD_EVERYWHERE = [
     ({"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
     ({"ties": "coin"}, ValueError, "ties is 'coin'"),
-    ({"max_picks": 0}, ValueError, "max_picks is 0"),
     ({"max_picks": 2**63}, ValueError, "max_picks is 9223372036854775808; .* <= "),
     ({"position_noise": 1e300}, ValueError, r"position_noise is 1e\+300; .*\[0, 10.0\]"),
     ({"render_mode": "human"}, ValueError, "render_mode is 'human'"),
@@ -41,13 +34,11 @@ BAD_EVERYWHERE = [
     [
         *((make, *row) for make in ALL for row in BAD_EVERYWHERE),
         (ContainerEnv, {"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
-        (ContainerEnv, {"physics": "full", "after_pick": "x"}, ValueError, "after_pick is 'x'"),
         (ContainerEnv, {"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected 'rest"),
         (ContainerVectorEnv, {"num_envs": 0}, ValueError, "num_envs is 0"),
-        (ContainerVectorEnv, {"num_envs": 2**16 + 1}, ValueError, "num_envs is 65537"),
-        (HighestItemVectorEnv, {"num_envs": 2.5}, TypeError, "num_envs is 2.5"),
+        (HighestItemVectorEnv, {"num_envs": 2**16 + 1}, ValueError, "num_envs is 65537"),
         (ContainerVectorEnv, {"physics": "local"}, ValueError, "physics is 'local'; expected"),
-        *((make, {"stack": 3}, TypeError, "stack is 3") for make in (ContainerEnv, ALL[2])),
+        (ContainerEnv, {"stack": 3}, TypeError, "stack is 3"),
         (ContainerVectorEnv, {"render_mode": "rgb_array"}, ValueError, "expected one of None"),
     ],
 )
@@ -83,76 +74,11 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
 
 
-@pytest.mark.parametrize("make", [container, HighestItemEnv])
-def test_a_step_that_is_interrupted_half_way_needs_a_reset(make, monkeypatch):
-    env, same = make(), make()
-    env.reset(seed=0)
-
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        interrupted = Mock(side_effect=KeyboardInterrupt)
-        patch.setattr("unload.fast.containers.pick", interrupted)
-        patch.setattr("unload.env.highest_item.drift", interrupted)
-        env.step(0)
-    for call in (lambda: env.step(0), env.action_masks):
-        with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
-            call()
-    assert_same(env.reset(seed=4), same.reset(seed=4))
-    assert_same(env.step(0), same.step(0))
-
-
-@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, pickle.dumps])
-def test_a_copy_that_would_share_the_simulator_is_refused(again):
-    with pytest.raises(TypeError, match="a ContainerEnv cannot be copied or pickled; make another"):
-        again(ContainerEnv("local"))
-
-
-def clients() -> int:
-    import pybullet
-
-    return sum(pybullet.isConnected(number) for number in range(1024))
-
-
-@pytest.mark.pybullet
-@pytest.mark.parametrize(
-    "make",
-    [
-        partial(ContainerEnv, "local", render_mode="rgb_array"),
-        partial(ContainerEnv, "full", max_picks=1),
-        container,
-        ContainerVectorEnv,
-    ],
-    ids=["local", "full", "table", "vector"],
-)
-def test_an_environment_to_which_nothing_refers_frees_its_simulators(make, monkeypatch, boxes):
-    """28 MB each. By counting references: the garbage collector may come too late."""
-    load = boxes((0.3, 0.2), (0.3, 0.6))
-    monkeypatch.setattr("unload.physics.full.shared_table", LiftTable)
-    monkeypatch.setattr("unload.env.vector.shared_table", LiftTable)
-    # Imports leave cycles behind, whose frames refer to the environment that draws first.
-    importlib.import_module("unload.load.picture")
-    before = clients()
-    gc.disable()
-    for closed in (False, False, True):
-        env = make(stack=lambda rng: load)
-        env.reset(seed=0)
-        env.step(np.ones(64, int) if make is ContainerVectorEnv else 1)  # the lower box
-        if getattr(env, "render_mode", None) == "rgb_array":
-            env.render()
-        assert clients() > before
-        if closed:
-            env.close()
-        else:
-            del env
-        assert clients() == before
-    gc.enable()
-
-
 def test_spaces_and_metadata():
     envs, single = gymnasium.make_vec(CONTAINER, 5), make_env()
     assert envs.single_observation_space == single.observation_space
     assert envs.single_action_space == single.action_space
     assert single.observation_space == gymnasium.spaces.Box(-1, 1, (128, 3), np.float32)
-    assert single.metadata == {"render_modes": ["rgb_array"], "render_fps": 4}
     assert envs.observation_space.shape == (5, 128, 3) and envs.num_envs == 5
     assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
     assert envs.spec.max_episode_steps is None  # but max_picks
@@ -184,9 +110,7 @@ BAD_OPTIONS = [
         (ARRAY, CONTAINER, [0, 128], ValueError, "actions holds 0 to 128; expected 0 to 127"),
         (ARRAY, CONTAINER, [0], ValueError, r"actions has shape \(1,\); expected \(2,\)"),
         (make_env, CONTAINER, 128, ValueError, "action is 128; .* >= 0 and <= 127"),
-        (make_env, CONTAINER, -1, ValueError, "action is -1"),
         (make_env, CONTAINER, np.array([3]), TypeError, r"action is array\(\[3\]\)"),
-        (ARRAY, CONTAINER, {"seed": -1}, ValueError, "seed is -1"),
         (ARRAY, CONTAINER, {"seed": [1, 2, 3]}, ValueError, "seed holds 3 seeds; expected 2"),
         (ARRAY, CONTAINER, {"seed": [1, -1]}, ValueError, "seed is -1; expected an integer >= 0"),
         *(
@@ -217,16 +141,10 @@ def test_bad_input_changes_nothing(make, env_id, given, error, message):
 )
 def test_a_call_whose_stack_fails_needs_a_reset(make, action, failing):
     """The first reset, the second one, and the next one, which an array makes in a step."""
-    calls = count(1)
-
-    def stack(rng):
-        load = stack_load(rng)
-        if next(calls) == failing:
-            raise OSError("the stack failed")
-        return load
-
+    outcomes = [*[DEFAULT] * (failing - 1), OSError("full"), *[DEFAULT] * 9]
+    stack = Mock(wraps=stack_load, side_effect=outcomes)
     env, other = make(max_picks=1, stack=stack), make(max_picks=1)
-    with pytest.raises(OSError, match="the stack failed"):
+    with pytest.raises(OSError, match="full"):
         env.reset(seed=0)
         env.reset(seed=0)
         env.step(action)
@@ -239,14 +157,11 @@ def test_a_call_whose_stack_fails_needs_a_reset(make, action, failing):
 
 
 def test_results_are_no_views_of_what_the_environments_hold():
-    """Whatever is returned stays as it was."""
     envs = ContainerVectorEnv(2)
     seen, infos = envs.reset(seed=0)
     kept = [seen, infos["action_mask"], infos["unloaded"], envs.action_masks(), envs.visible]
     before = [array.copy() for array in kept]
-    rows = np.array([seen[0, :, 2].argmax(), seen[1, :, 2].argmin()])
     for _ in range(3):
-        envs.step(rows)
-    envs.reset(seed=5)
+        envs.step(np.array([seen[0, :, 2].argmax(), seen[1, :, 2].argmin()]))
     for array, then in zip(kept, before):
         assert (array == then).all()

@@ -3,7 +3,6 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium import wrappers
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from hypothesis import given, settings
@@ -140,16 +139,3 @@ def test_an_episode_that_is_over_waits_for_its_reset():
         envs.reset(options={"reset_mask": np.ones(3, bool)})
     assert envs.reset(options={"reset_mask": np.array([False, True])})[1]["_action_mask"].tolist()
     envs.step(np.zeros(2, int))
-
-
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED])
-@pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])
-def test_gymnasiums_wrappers(env_id, mode):
-    envs = gymnasium.make_vec(env_id, 2, autoreset_mode=mode, max_picks=2)
-    if mode is AutoresetMode.NEXT_STEP:  # the only one that it takes
-        envs = wrappers.vector.NormalizeObservation(envs)
-    envs = wrappers.vector.RecordEpisodeStatistics(wrappers.vector.FlattenObservation(envs))
-    seen, _ = envs.reset(seed=0)
-    for _ in range(2):
-        seen, *_, infos = envs.step(np.zeros(2, int))
-    assert seen.shape == (2, 384) and infos["episode"]["l"].tolist() == [2, 2]

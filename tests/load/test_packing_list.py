@@ -1,8 +1,6 @@
 """Packing lists: what they may hold, and what is refused by row and id."""
 
 import json
-import logging
-from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -12,7 +10,6 @@ from unload import Load, read_load, stack_load
 from unload.load.boxes import _SMALLEST_EDGE
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
-LENGTHS = "length_cm,width_cm,height_cm"
 UNIT = "a,0,0,0,1,1,1"
 STACK = "a,6,0.1,0,0.5,0.4,0.3", "b,6,0.1,0.3,0.5,0.4,0.2"
 
@@ -26,13 +23,6 @@ def written(tmp_path):
         return tmp_path / "boxes.csv"
 
     return write
-
-
-def test_the_example_is_a_load_of_three_walls():
-    load = read_load()
-    assert len(load) == 136 and len(np.unique(load.walls)) == 3
-    assert len(np.unique(load.packages)) == len(np.unique(load.sizes, axis=0))
-    assert load.ids[0] == "M-046" and load.positions[0] == pytest.approx([6.1, 0.15, 0.15])
 
 
 def test_ids_stay_as_they_are_written_and_are_else_the_rows(written):
@@ -76,14 +66,13 @@ def test_separators_decimals_and_encodings(written, tmp_path, separator, mark, e
 @pytest.mark.parametrize(
     ("columns", "factor", "arguments"),
     [
-        (f"id,{CORNERS}", 1000, {"units": "mm"}),
         (f"id,{CORNERS}", 1 / 0.0254, {"units": "in"}),
-        (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {}),
-        (f"label,pos_x,pos_y,pos_z,{LENGTHS}", 100, {"units": "cm"}),
+        ("label,pos_x,pos_y,pos_z,length_cm,width_cm,height_cm", 100, {}),
         ('Box ID,X Min (mm),Y min [mm],z-min in mm,"L (mm)",W mm,H_mm', 1000, {"units": "m"}),
         ('id,x_min inch,y_min,z_min,"depth ("")",width inches,height in', 1 / 0.0254, {}),
         ("Kolli-Nr.,x_min (ft),y_min,z_min,l,b,h (ft)", 1 / 0.3048, {}),
         ("nr,u,v,w,a,b,c", 1, {"columns": dict(zip("uvwabc", CORNERS.split(","))) | {"nr": "id"}}),
+        ("N° colis,pos_x,pos_y,pos_z,Longueur,Largeur,Hauteur", 1, {}),
     ],
 )  # fmt: skip
 def test_names_and_units(written, columns, factor, arguments):
@@ -99,13 +88,10 @@ def test_a_table_is_a_list_too(written):
     assert_same(read_load(table), read_load(written(*STACK)))
     assert not read_load(table).extras
     stops = {"stop": [1, np.nan], "share": [0.5, 1e-5]}
-    renamed = table.assign(**stops, note="a").rename(columns={"size_x": "Tiefe"})
-    kept = read_load(renamed, columns={"Tiefe": "depth"}).extras
+    kept = read_load(table.assign(**stops, note="a")).extras
     assert all(np.array_equal(kept[name], stops[name], equal_nan=True) for name in stops)
     with pytest.raises(ValueError, match=r"the table: row 2 \(id 'b'\): a cell that is no number"):
         read_load(table.assign(size_x=[0.5, None]))
-    with pytest.raises(TypeError, match="path is 3; expected a path"):
-        read_load(3)
 
 
 def test_x_may_count_from_the_entrance_of_a_container_of_ones_own(written):
@@ -117,10 +103,7 @@ def test_x_may_count_from_the_entrance_of_a_container_of_ones_own(written):
         load = read_load(written(*lines, columns=columns), x_from="door")
         assert_same(load, read_load(written(*STACK)))
     path = written("a,11,0.1,0,0.5,0.4,0.3")
-    load = read_load(path, container=(12.03, 2.35, 2.39))
-    assert load.container.tolist() == [12.03, 2.35, 2.39] and load.positions[0, 0] == 11.25
-    with pytest.raises(ValueError, match=r"reaches .*inside the container, \[0 0"):
-        read_load(path)
+    assert read_load(path, container=(12.03, 2.35, 2.39)).positions[0, 0] == 11.25
     assert read_load(path, container=(12, 2, 2), x_from="door").positions[0, 0] == 0.75
 
 
@@ -136,9 +119,6 @@ def test_small_faults_are_settled_and_logged(written, caplog):
     bridge = "e,0,0,1.001,1,2,1"  # stands on the higher of two boxes, and holds down both
     load = read_load(written("a,0,0,0,1,1,1", "d,0,1,0,1,1,1.001", bridge))
     assert load.covered(np.ones(3, bool)).tolist() == [True, True, False]
-    caplog.clear()
-    read_load(written(*(f"{line},1,0" for line in STACK), columns=f"id,{CORNERS},weight,rotation"))
-    assert not caplog.text
 
 
 def test_other_columns_are_kept_and_named(written, caplog):
@@ -153,7 +133,6 @@ def test_other_columns_are_kept_and_named(written, caplog):
     }  # fmt: skip
     assert "kept as they are: stop, code, note, name\n" in caplog.text
     assert "sizes are taken for those after the turns" in caplog.text
-    assert {record.levelno for record in caplog.records} == {logging.WARNING}
 
 
 @pytest.mark.parametrize(
@@ -161,11 +140,8 @@ def test_other_columns_are_kept_and_named(written, caplog):
     [
         ("weight", "1", "0", r"a mass of 0.0 kg; expected >= 0.001 kg.* has weight '0'"),
         ("mass_kg", "1.0", "", "a cell that is no number; .*mass_kg ''"),
-        ("yaw", "-90", "15", "a rotation that is no quarter turn; .* 'yaw' in ignore"),
         ("pitch deg", "180", "179", "a rotation that is no quarter turn; .* 'pitch deg' in ignore"),
-        ("roll degrees", "270", "45", "a rotation that is no quarter turn"),
         ("rotation (rad)", "3.1415926536", "1.5", "a rotation that is no quarter turn"),
-        ("tilt", "0", "up", "a cell that is no number; .*tilt 'up'"),
     ],
 )
 def test_what_the_task_leaves_out_is_refused_unless_ignored(written, name, good, bad, message):
@@ -174,8 +150,6 @@ def test_what_the_task_leaves_out_is_refused_unless_ignored(written, name, good,
         read_load(path)
     for ignored in (name, name.lower().split(" ")[0].removesuffix("_kg")):
         assert str(read_load(path, ignore=[ignored]).extras[name][1]) == bad
-    path = written(f"{STACK[0]},{good}", f"{STACK[1]},{good}", columns=f"id,{CORNERS},{name}")
-    assert len(read_load(path)) == 2
 
 
 def test_two_units_leave_that_of_a_third_column_open(written, caplog):
@@ -198,9 +172,6 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
         ({"x_from": "front"}, "x_from is 'front'; expected one of 'rear', 'door'"),
         ({"container": (1, 2)}, "container has shape"),
         ({"ignore": ["wight"]}, "has no column 'wight'; expected one of .*'x_min'"),
-        ({"columns": {"Tiefe": "size_x"}}, "has no column 'Tiefe'"),
-        ({"columns": "Tiefe"}, "columns is 'Tiefe'; expected a dict"),
-        ({"ignore": 3}, "ignore is 3; expected names of columns"),
         ({"columns": {"size_x": ["id"]}}, r"columns is \['id'\]; expected one of 'id', 'size_x'"),
     ],
 )
@@ -219,10 +190,9 @@ def test_wrong_arguments_are_refused(written, arguments, message):
         ([UNIT, "b,6.5,0,0,1,1,1"], r"'b'\): reaches from .* 0.005 m; .* its size as container"),
         ([UNIT, "a,1,0,0,1,1,1"], r"1 \(id 'a'\), row 2 \(id 'a'\): the same .* box \(.* id 'a'\)"),
         (["a,0,0,0,1,1,wide"], r": row 1 \(id 'a'\): a cell that is .*has size_z 'wide'\)"),
-        (["a,0,0,inf,1,1,1"], r": row 1 \(id 'a'\): a cell that is no number; .* z_min 'inf'"),
         ([f"a,0,0,0,1,1,{_SMALLEST_EDGE / 2}"], r"'a'\): edges of .* m; .* size_z '0.001'"),
-        ([f"{n},0,0,{n},1,1,1" for n in range(2, 7)], r"row 5 \(id '6'\): reaches from"),
         ([f"{n},0,0,{n},1,1,1" for n in range(2, 8)], r"row 5 \(id '6'\) and 1 more: reaches"),
+        ([f"{n},0,{n / 2},0,1,0.51,1" for n in range(5)], r"5 \(id '4'\): lies .* to \[1.*2.51 "),
         ([], "has 0 rows and the columns id, x_min, .*; expected boxes with either"),
         (["a,0,0,0,1,1,1,5,5"], "is not a readable list: line 2 has 9 cells; expected 7"),
     ],
@@ -234,53 +204,24 @@ def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, messag
 
 def test_files_that_are_no_lists_are_refused(written, tmp_path):
     for columns, message in (
-        ("id,x", "has 1 rows and the columns id, x; expected boxes"),
         ("X,x (cm)", r"the columns \['X', 'x \(cm\)'\]; expected a line of names, each once"),
-        ("x,x", r"has the columns \['x', 'x'\]; expected a line of names"),
         (f"x,y,z,{CORNERS},id", "expected boxes with either x, y, z or x_min, y_min, z_min"),
         (f"{CORNERS},depth", "size_z, each once; columns can say"),
-        ("x,y_min", "columns x, y_min; expected boxes with either x, y, z or x_min"),
     ):
         with pytest.raises(ValueError, match=message):
             read_load(written("a,1", columns=columns))
-    for name, content in (("boxes.csv.gz", b"\x1f\x8b"), ("empty.csv", b"")):
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(ValueError, match=f"{name} is not a readable list: it is empty, or no"):
-            read_load(tmp_path / name)
-    with pytest.raises(FileNotFoundError):
-        read_load(tmp_path / "missing.csv")
+    (tmp_path / "boxes.csv.gz").write_bytes(b"\x1f\x8b")
+    with pytest.raises(ValueError, match="boxes.csv.gz is not a readable list: it is empty, or no"):
+        read_load(tmp_path / "boxes.csv.gz")
 
 
 @pytest.mark.parametrize(
-    ("name", "cells", "masses"),
-    [
-        ("Gewicht (kg)", ["2.5", "7"], [2.5, 7]),
-        ("Bruttogewicht", ["2.5", "7"], [2.5, 7]),
-        ("Poids brut g", ["250", "1000"], [0.25, 1]),
-        ("mass [lbs]", ["2.2046226218", "22.046226218"], [1, 10]),
-    ],
+    ("name", "cells"), [("Bruttogewicht", "0.25 1"), ("Poids brut g", "250 1000")]
 )
-def test_weights_are_masses_in_kg(written, name, cells, masses):
-    lines = [f"{line},{cell},9" for line, cell in zip(STACK, cells)]
+def test_weights_are_masses_in_kg(written, name, cells):
+    lines = [f"{line},{cell},9" for line, cell in zip(STACK, cells.split())]
     load = read_load(written(*lines, columns=f"id,{CORNERS},{name},net weight"))
-    assert load.masses == pytest.approx(masses) and load.extras["net weight"].tolist() == [9, 9]
-    assert read_load(written(*STACK)).masses.tolist() == [1, 1]
-
-
-@pytest.mark.parametrize(
-    "columns",
-    [
-        "Kartonnummer,pos_x,pos_y,pos_z,Länge,Breite,Höhe",
-        "HU,x_min,y_min,z_min,Tiefe,Breite,Hoehe",
-        "N° colis,pos_x,pos_y,pos_z,Longueur,Largeur,Hauteur",
-        "SSCC,pos_x,pos_y,pos_z,Largo,Ancho,Alto",
-        "Carton ID,x_min,y_min,z_min,Profundidad,Anchura,Altura",
-    ],
-)
-def test_names_in_other_languages_are_understood_and_said(written, caplog, columns):
-    assert_same(read_load(written(*STACK, columns=columns)), read_load(written(*STACK)))
-    first, *_, last = columns.split(",")
-    assert f"read {first} as id, " in caplog.text and f"{last} as size_z\n" in caplog.text
+    assert load.masses.tolist() == [0.25, 1] and load.extras["net weight"].tolist() == [9, 9]
 
 
 def test_what_stands_around_the_boxes_of_a_sheet_is_left_out_and_said(tmp_path, written, caplog):
@@ -298,72 +239,27 @@ def test_what_stands_around_the_boxes_of_a_sheet_is_left_out_and_said(tmp_path, 
 
 
 def test_json_holds_records_or_columns(tmp_path, written):
-    table = pd.read_csv(written(*STACK))
+    table, path = pd.read_csv(written(*STACK)), tmp_path / "list.json"
     records = table.to_dict("records")
-    columns = table.to_dict("list"), table.to_dict()
-    for content in (records, *columns, {"truck": 7, "boxes": records}):
-        (tmp_path / "list.json").write_text(json.dumps(content), encoding="utf-8")
-        assert_same(read_load(tmp_path / "list.json"), read_load(written(*STACK)))
-    for text, message in (("[1, 2]", "has 2 rows"), ("{", "expected JSON"), ('{"x": 1}', "JSON")):
-        (tmp_path / "list.json").write_text(text, encoding="utf-8")
-        with pytest.raises(ValueError, match=message):
-            read_load(tmp_path / "list.json")
+    for content in (records, table.to_dict("list"), {"truck": 7, "boxes": records}):
+        path.write_text(json.dumps(content), encoding="utf-8")
+        assert_same(read_load(path), read_load(written(*STACK)))
+    path.write_text('{"x": 1}', encoding="utf-8")
+    with pytest.raises(ValueError, match="expected JSON records, or columns of equal length"):
+        read_load(path)
 
 
-def test_the_first_sheet_of_an_excel_file_is_read(tmp_path, written, monkeypatch):
-    """A text may begin as such a file does, with PK."""
+def test_a_text_may_begin_as_an_excel_file_does(written):
+    """With PK."""
     columns = f"PK,Kartonnummer,{CORNERS}"
     load = read_load(written(*(f"{line[0]},{line}" for line in STACK), columns=columns))
     assert load.ids.tolist() == [line[0] for line in STACK] == load.extras["PK"].tolist()
-    path = tmp_path / "list.xlsx"
-    path.write_bytes(b"PK")
-    boxes = [[line[0], *map(float, line[2:].split(","))] for line in STACK]
-    sheet = pd.DataFrame([["Title", *[None] * 6], ["id", *CORNERS.split(",")], *boxes])
-    with monkeypatch.context() as patch:
-        patch.setattr(pd, "read_excel", lambda *given, **named: sheet)
-        assert_same(read_load(path), read_load(written(*STACK)))
-        patch.setattr(pd, "read_excel", lambda *given, **named: 1 / 0)
-        with pytest.raises(ValueError, match="list.xlsx is not a readable Excel file: division"):
-            read_load(path)
-        missing = Mock(side_effect=ImportError("`Import openpyxl` failed."))
-        patch.setattr(pd, "read_excel", missing)
-        with pytest.raises(ImportError, match=r'expected openpyxl: pip install "unload\[excel\]"'):
-            read_load(path)
 
 
-def test_corners_under_the_names_of_centres_are_noticed(written):
-    lines = UNIT, "b,1,0,0,1,1,1"
-    with pytest.raises(ValueError, match="all lie inside if these are x_min, .*{'x': 'x_min', "):
-        read_load(written(*lines, columns=f"id,{CORNERS.replace('_min', '')}"))
-    with pytest.raises(ValueError) as error:  # wrong either way
-        read_load(written(UNIT, "b,7,0,0,1,1,1", columns=f"id,{CORNERS.replace('_min', '')}"))
-    assert "all lie inside" not in str(error.value)
-
-
-@pytest.mark.parametrize("noise", [0.0001, 0.003])
-@pytest.mark.parametrize("width", [0.25, 0.5])
-def test_measured_rows_from_wall_to_wall_are_read(rng, noise, width, caplog):
-    """Sizes off by up to 1 mm, in rows that are full along x and y, every second one shifted."""
-    edges = np.array([0.5, width, 0.4])
-    low = np.array([
-        (x * 0.5, max(0, y * width - shift), z * 0.4)
-        for z, shift in enumerate((0, width / 2, 0)) for x in range(14)
-        for y in range(round(2.5 / width) + (shift > 0))
-    ])  # fmt: skip
-    high = np.minimum(low + edges, [7, 2.5, 9])
-    high[:, 1] = np.where(low[:, 1] == 0, np.where(low[:, 2] == 0.4, width / 2, width), high[:, 1])
-    sizes = high - low
-    places = low + rng.uniform(-noise, noise, low.shape)
-    measured = sizes + rng.uniform(-min(noise, 0.001), min(noise, 0.001), sizes.shape)
-    table = pd.DataFrame(np.hstack([places, measured]), columns=CORNERS.split(","))
-    load = read_load(table)
-    assert abs(load.positions - load.sizes / 2 - low).max() < 0.015
-    assert (measured - load.sizes).max() < 0.005 and "taken for smaller, by up to" in caplog.text
-
-
-def test_a_row_that_is_too_long_is_refused_in_the_lists_own_numbers(written):
-    lines = [f"{n},0,{0.5 * n},0,1,0.51,1" for n in range(5)]  # 10 mm each
-    with pytest.raises(ValueError) as error:
-        read_load(written(*lines))
-    assert "row 5 (id '4'): " in str(error.value) and "(the first has x_min '0'" in str(error.value)
-    assert "2.0" in str(error.value) and "2.51" in str(error.value)
+def test_a_row_that_is_too_long_becomes_smaller(written, caplog):
+    """Two rows, each 4 mm longer than the container is wide."""
+    lines = [f"{n},{x},{0.5 * n},0,1,0.5008,1" for x in (0, 1) for n in range(5)]
+    load = read_load(written(*(line.replace(",", f"-{row},", 1) for row, line in enumerate(lines))))
+    assert (load.positions + load.sizes / 2)[:, 1].max() <= 2.5
+    assert 0 < (0.5008 - load.sizes[:, 1]).max() < 0.005
+    assert "boxes taken for smaller, by up to" in caplog.text

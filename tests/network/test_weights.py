@@ -59,10 +59,9 @@ def test_files_without_a_digest_or_of_another_kind_or_not_finite_are_refused(pat
         save_file(load_file(path), path, metadata)
         with pytest.raises(ValueError, match="w.safetensors holds no pair of unload"):
             read_weights(path, "pair", print)
-    for value in (float("nan"), float("inf")):
-        write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, value])})
-        with pytest.raises(ValueError, match="w.safetensors holds no pair .* is not finite"):
-            read_weights(path, "pair", print)
+    write_weights(path, "pair", {}, WEIGHTS | {"a.bias": torch.tensor([0, float("inf")])})
+    with pytest.raises(ValueError, match="w.safetensors holds no pair .* is not finite"):
+        read_weights(path, "pair", print)
 
 
 def test_a_file_of_another_dtype_is_refused(path, monkeypatch):
@@ -74,12 +73,3 @@ def test_a_file_of_another_dtype_is_refused(path, monkeypatch):
         write_weights(path, "pair", {}, halves)
     with pytest.raises(ValueError, match="holds no pair .* a.bias of dtype torch.float16"):
         read_weights(path, "pair", print)
-
-
-def test_what_is_no_path_is_refused(tmp_path):
-    with pytest.raises(TypeError, match="path is None; expected a path"):
-        read_weights(None, "pair", print)
-    with pytest.raises(ValueError, match="path is ''; expected the name of a file"):
-        write_weights("", "pair", {}, WEIGHTS)
-    with pytest.raises(FileNotFoundError, match=r"expected a .safetensors file \(pair\)"):
-        read_weights(tmp_path, "pair", print)

@@ -1,7 +1,5 @@
 """What all three physics have in common: lifts, masses, forces, ceilings, and one's own."""
 
-import os
-from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
@@ -10,12 +8,12 @@ import pytest
 from tests.physics.kinds import EACH, KINDS, ONE_BOX, TWO_BOXES, lifts, make
 from unload import ContainerEnv, Load, evaluate, picking_order, policies
 from unload.env.vector import ContainerVectorEnv
-from unload.load.boxes import _SMALLEST_EDGE
 from unload.load.substacks import build_load
 from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
-from unload.physics.situation import Situation, Surroundings
+from unload.physics.situation import Surroundings
 from unload.physics.table import FREE_LIFT, LiftTable, TablePhysics, free_lift
+from unload.support import files
 
 
 @pytest.mark.parametrize("kind", EACH)
@@ -40,29 +38,13 @@ def test_free_boxes_of_a_neat_row_do_not_jam(kind):
 
 
 @pytest.mark.parametrize("kind", EACH)
-def test_the_smallest_boxes_of_a_load_are_simulated(kind):
-    """Physics takes the gap off their edges, of which something must be left."""
-    edge = _SMALLEST_EDGE
-    positions = [[3.5, 1.2 + edge * column, edge * (row + 0.5)] for column, row in np.ndindex(2, 2)]
-    physics = make(kind, Load(positions, np.full((4, 3), edge)))
-    assert (np.array(lifts(physics, range(4))) >= 0).all()
-
-
-@pytest.mark.parametrize("kind", EACH)
 @pytest.mark.parametrize("call", ["lift", "remove"])
-@pytest.mark.parametrize(
-    ("item", "error", "message"),
-    [
-        (1, ValueError, "item 1 has been removed"),
-        (2, ValueError, "item is 2; expected an integer >= 0 and <= 1"),
-        (-1, ValueError, "item is -1"),
-    ],
-)
-def test_bad_items_are_refused(boxes, kind, call, item, error, message):
+def test_bad_items_are_refused(boxes, kind, call):
     physics = make(kind, boxes((1.2, 0.2), (2.0, 0.2)))
     physics.remove(1)
-    with pytest.raises(error, match=message):
-        getattr(physics, call)(item)
+    for item, message in ((1, "item 1 has been removed"), (2, "item is 2; .* >= 0 and <= 1")):
+        with pytest.raises(ValueError, match=message):
+            getattr(physics, call)(item)
     assert physics.present.tolist() == [True, False]
 
 
@@ -83,22 +65,6 @@ def test_calls_out_of_order_are_refused(boxes, kind):
     for call in (*calls, lambda: physics.reset(load)):
         with pytest.raises(RuntimeError, match="the physics is closed; make a new one"):
             call()
-
-
-@pytest.mark.parametrize("kind", EACH)
-def test_an_interrupted_reset_needs_another_one(boxes, kind, monkeypatch):
-    physics, load = make(kind, boxes((1.2, 0.2))), boxes((1.2, 0.2), (1.2, 0.6))
-    interrupted = Mock(side_effect=KeyboardInterrupt)
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("unload.physics.bullet.World.add_box", interrupted)
-        patch.setattr("unload.physics.local.Surroundings", interrupted)
-        physics.reset(load)
-    with pytest.raises(RuntimeError, match="the physics holds no load; call reset first"):
-        physics.lift(0)
-    physics.reset(load)
-    with pytest.raises(TypeError, match="load is 'walls'; expected an unload.Load"):
-        physics.reset("walls")
-    assert physics.lift(0) == make(kind, load).lift(0)
 
 
 @pytest.mark.parametrize("kind", ["local", "table"])
@@ -129,23 +95,6 @@ def test_a_world_that_is_cleared_gives_the_same(situations, monkeypatch):
         assert physics.simulate(situation) == distance
         assert physics._world.bodies <= len(situation.boxes) + 6
     assert fresh._world.bodies > 30
-
-
-@pytest.mark.pybullet
-@pytest.mark.needs("/proc")
-def test_the_memory_of_many_lifts_is_flat(monkeypatch):
-    """Of boxes of ever new sizes; without a pull, which takes nearly all of the time."""
-    monkeypatch.setattr(World, "pull", lambda *_: 0.0)
-    monkeypatch.setattr("unload.physics.local._MOST_BODIES", 1_500)
-    physics, resident = LocalPhysics(), []
-    for number in range(6_001):
-        boxes = np.array([(0, 0, 0, 500_000, 400_000, 300_000 + number)] * 2)
-        boxes[:, 2] = 350_000 * np.arange(2)
-        physics.simulate(Situation(boxes, 1, -200_000, ()))
-        if number % 1_500 == 0:
-            pages = int(Path("/proc/self/statm").read_text(encoding="utf-8").split()[1])
-            resident.append(pages * os.sysconf("SC_PAGE_SIZE") / 2**20)
-    assert max(resident[2:]) - resident[1] < 5, "MiB"
 
 
 class Half(LocalPhysics):
@@ -213,29 +162,23 @@ def test_arrays_know_ceilings_and_refuse_masses(boxes):
         assert envs.liftable().ravel()[:3].sum() == 1
     with pytest.raises(ValueError, match="holds a box of 2.0 kg; expected 1.0 kg each in arrays"):
         ContainerVectorEnv(1).reset(options={"load": weighed(low, 1, 2, 1)})
-    for force in (9, 10, 16, "auto"):  # of which two lift nothing, because a box weighs 9.8 N
+    for force in (9, 16, "auto"):  # of which the first lifts nothing: a box weighs 9.8 N
         table = ContainerVectorEnv(2, physics=TablePhysics(LiftTable(), force))
         table.reset(seed=0, options={"load": low})
         single = ContainerEnv(LocalPhysics(force=force))
         single.reset(seed=0, options={"load": low})
         assert table.liftable()[1].tolist() == single.liftable().tolist()
-    with pytest.raises(TypeError, match="force is array.*; expected a number >= 0"):
-        TablePhysics(LiftTable(), np.ones(2))
 
 
 def test_a_file_says_nothing_of_the_pull_of_the_task(boxes, tmp_path):
     """So that it has the bytes that it had before there were others."""
-    load, table = boxes((0.3, 0.2), (0.3, 0.6)), LiftTable()
-    path, pulls = tmp_path / "lifts.npz", [(), (20_000, 1000, 2000)]
-    for masses, pull, written in (((), pulls[0], False), ((1, 2), pulls[1], True)):
-        situation = Surroundings(weighed(load, *masses), np.ones(2, bool)).situation(0)
-        assert situation.pull == pull
-        table.add(situation, 0.1)
+    load, table, path = boxes((0.3, 0.2), (0.3, 0.6)), LiftTable(), tmp_path / "lifts.npz"
+    for masses, written in (((), False), ((1, 2), True)):
+        table.add(Surroundings(weighed(load, *masses), np.ones(2, bool)).situation(0), 0.1)
         table.save(path)
-        with np.load(path) as arrays:
-            assert ("pull" in str(arrays["samples"])) == written
-    assert [*LiftTable.load(path).samples] == [*table.samples]
-    assert {tuple(each.pull) for each in LiftTable.load(path).samples.values()} == {*pulls}
+        assert ("pull" in str(files.read_arrays(path)["samples"])) == written
+    pulls = [tuple(each.pull) for each in LiftTable.load(path).samples.values()]
+    assert {*pulls} == {(), (20_000, 1000, 2000)}
 
 
 def test_a_physics_of_ones_own_stays_open(boxes):
@@ -248,16 +191,8 @@ def test_a_physics_of_ones_own_stays_open(boxes):
         table = evaluate(policies.random, 2, physics=own, stack=lambda rng: load, max_picks=2)
         assert (table["success_rate"] == 1).all()
         assert (picking_order(load, physics=own)["distance"] == 0.5).all()
-    table = TablePhysics(LiftTable())
-    envs = ContainerVectorEnv(1, physics=table)
-    envs.reset(options={"load": load})
-    envs.step(np.array([np.argmin(envs.liftable())]))
-    envs.close()
-    assert len(table.table) == 1 and not table._closed
     envs = ContainerVectorEnv(2, physics=own)  # which no table answers for
     envs.reset(options={"load": load})
     assert envs.step(np.array([1, 0]))[4]["distance"].tolist() == [0.5, 0.5]
     envs.close()
     assert not own._closed
-    with pytest.raises(ValueError, match="expected one of 'table', 'a LocalPhysics'"):
-        ContainerVectorEnv(1, physics="local")

@@ -6,7 +6,6 @@ import pytest
 from tests.physics.kinds import lifts, make
 from unload import Load, task
 from unload.load.substacks import build_load
-from unload.physics.bullet import World
 
 pytestmark = pytest.mark.pybullet
 
@@ -43,24 +42,6 @@ def test_settling_moves_boxes_a_little_and_restore_keeps_to_it():
     assert 0 < drift.max() < 0.01
     physics.lift(0)
     assert (physics.positions() == settled).all()
-    for seconds in (-1.0, float("nan")):
-        with pytest.raises(ValueError, match="seconds is"):
-            physics.settle(seconds)
-
-
-@pytest.mark.parametrize("after_pick", ["restore", "keep"])
-def test_an_interrupted_lift_moves_no_box(boxes, after_pick, monkeypatch):
-    load = boxes(*BRIDGE)
-    physics, pull = make("full", load, after_pick=after_pick), World.pull
-
-    def interrupted(*given):
-        pull(*given)
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(World, "pull", interrupted)
-        physics.lift(0)
-    assert physics.lift(0) == pytest.approx(make("full", load).lift(0), abs=0.002)
 
 
 @pytest.mark.parametrize("container", [task.CONTAINER, (6.0, 2.2, 2.7)])

@@ -9,7 +9,6 @@ import sys
 import time
 from unittest.mock import Mock
 
-import numpy as np
 import pytest
 
 from tests.agent.runs import ROOT
@@ -110,18 +109,6 @@ def test_nothing_in_the_working_directory_is_executed(tmp_path):
     assert not (tmp_path / "executed").exists()
 
 
-@pytest.mark.needs("SIGKILL")
-def test_they_end_with_the_pool_or_its_physics():
-    pool, physics = Pool(), TablePhysics(LiftTable())
-    for each in (pool, physics._pool):
-        each.simulate([], None)
-    workers = pool._workers + physics._pool._workers
-    assert [worker.poll() for worker in workers] == [None] * 4
-    del pool
-    physics.close()
-    assert [worker.returncode for worker in workers] == [-signal.SIGKILL] * 4
-
-
 @pytest.mark.needs("/proc")
 def test_they_end_with_a_process_that_is_killed():
     script = (
@@ -149,20 +136,12 @@ def test_what_pybullet_says_is_no_answer():
     assert pickle.loads(done.stdout) == [2, 4] and done.stderr.endswith(b"noisenoise")
 
 
-def test_a_table_shares_lifts_where_many_are_new(local, hard, monkeypatch):
-    shared = []
-
-    def simulate(pool, situations, own):
-        shared.append(len(situations))
-        return [1 + own(each) for each in situations]
-
-    monkeypatch.setattr(Pool, "simulate", simulate)
+def test_a_table_shares_lifts_where_many_are_new(pool, local, hard, monkeypatch):
+    shared = Mock(wraps=pool.simulate)
+    monkeypatch.setattr(Pool, "simulate", lambda _, *given: shared(*given))
     monkeypatch.setattr(table, "_PATIENCE", 15)
-    alone = [local.simulate(each) for each in hard]
     physics = TablePhysics(LiftTable())
-    for first, last in ((0, 6), (6, 12), (12, 15)):  # three are too few to count
-        assert physics.simulate_all(hard[first:last]) == alone[first:last]
-    assert shared == [] and len(physics.table) == 15
-    physics.table = LiftTable()
-    assert np.allclose(physics.simulate_all(hard), 1 + np.array(alone)), "as they were shared"
-    assert shared == [16] and len(physics.table) == 16
+    for lifts, calls in ((hard[:15], 0), (hard, 1)):  # 15 are not enough
+        physics.table = LiftTable()
+        assert physics.simulate_all(lifts) == [local.simulate(each) for each in lifts]
+        assert shared.call_count == calls and len(physics.table) == len(lifts)

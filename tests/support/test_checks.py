@@ -1,5 +1,4 @@
 from decimal import Decimal
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,8 @@ from unload.support import checks
     ("check", "value", "arguments"),
     [
         *((checks.integer, value, (0, 5)) for value in (0, 5, np.int64(2), np.uint8(2))),
-        *((checks.integer, value, (1,)) for value in (10**12, np.uint64(2**63 - 1))),
-        *((checks.real, value, (0, 1)) for value in (0, 1, 0.25, np.float32(0.25), np.int8(1))),
+        (checks.integer, np.uint64(2**63 - 1), (1,)),
+        *((checks.real, value, (0, 1)) for value in (0, 1, np.float32(0.25), np.int8(1))),
         *((checks.boolean, value, ()) for value in (True, False, np.True_)),
         *((checks.one_of, value, (("red", None),)) for value in ("red", None)),
         *((check, Path("a/b"), ()) for check in (checks.path, checks.file)),
@@ -34,10 +33,8 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
         (checks.integer, 6, (0, 5), ValueError, "an integer >= 0 and <= 5"),
         (checks.integer, 0, (1,), ValueError, "an integer >= 1"),
         (checks.integer, 2**63, (1,), ValueError, "an integer >= 1"),  # negative in an array
-        *(
-            (checks.real, value, (0, 1), TypeError, "a number in [0, 1]")
-            for value in (True, "1", Fraction(1, 3), Decimal("0.5"))
-        ),
+        (checks.real, True, (0, 1), TypeError, "a number in [0, 1]"),
+        (checks.real, Decimal("0.5"), (0, 1), TypeError, "a number in [0, 1]"),
         (checks.real, -0.1, (0, 1), ValueError, "a number in [0, 1]"),
         (checks.real, 1.1, (0, 1), ValueError, "a number in [0, 1]"),
         (checks.real, np.inf, (0,), ValueError, "a number >= 0"),
@@ -45,11 +42,9 @@ def test_numbers_are_returned_as_pythons_own(check, value, arguments):
         (checks.boolean, 1, (), TypeError, "True or False"),
         (checks.path, 3, (), TypeError, "a path"),
         (checks.entries, ["a"], ((),), TypeError, "a dict"),
-        *((checks.file, value, (), ValueError, "the name of a file") for value in ("", "/")),
-        *(
-            (checks.one_of, value, (("red", None, 1),), ValueError, "one of 'red', None, 1")
-            for value in ("blue", torch.ones(2), ["red"])
-        ),
+        (checks.file, "/", (), ValueError, "the name of a file"),
+        (checks.one_of, "blue", (("red", None, 1),), ValueError, "one of 'red', None, 1"),
+        (checks.one_of, torch.ones(2), (("red", 1),), ValueError, "one of 'red', 1"),
     ],
 )
 def test_what_does_not_fit_is_refused_by_name_and_value(check, value, arguments, error, wanted):
@@ -76,14 +71,8 @@ def test_finite_array_returns_a_float64_copy():
     ("value", "error", "message"),
     [
         ([[1.0, 2.0]], ValueError, r"a has shape \(1, 2\); expected \(any, 3\)"),
-        ([1.0, 2.0, 3.0], ValueError, r"a has shape \(3,\)"),
         ([[1, -np.inf, np.nan]], ValueError, r"a holds -inf at index \(0, 1\)"),
-        ([["1", "2", "3"]], TypeError, "a has dtype <U1"),
-        ([[True, True, True]], TypeError, "a has dtype bool"),
-        ([[1j, 0, 0]], TypeError, "a has dtype complex128"),
-        ([[1.0], [1.0, 2.0]], TypeError, "a cannot be read as an array"),
-        ([], ValueError, r"a has shape \(0,\); expected \(any, 3\)"),
-        ([[Fraction(1, 3), 0, 0]], TypeError, "a has dtype object; expected real numbers"),
+        ([[True, True, True]], TypeError, "a has dtype bool; expected real numbers"),
         (torch.ones(1, 3, requires_grad=True), TypeError, "a cannot be read as an array"),
     ],
 )
@@ -98,8 +87,6 @@ def test_integer_array():
     for value in ([1.0, 2.0], [True, False]):
         with pytest.raises(TypeError, match="a has dtype .*; expected integers"):
             checks.integer_array("a", value, (2,))
-    with pytest.raises(ValueError, match=r"a has shape \(1,\); expected \(2,\)"):
-        checks.integer_array("a", [1], (2,))
     assert checks.integer_array("a", [0, 3], (2,), high=3).tolist() == [0, 3]
     for value in ([-1, 3], [0, 4]):
         with pytest.raises(ValueError, match=f"a holds {value[0]} to {value[1]}; expected 0 to 3"):
@@ -120,5 +107,3 @@ def test_flag_array():
     for value in ([2, 0], [np.nan, 0]):
         with pytest.raises(ValueError, match="a holds .*; expected bool, or 0 and 1"):
             checks.flag_array("a", value, (2,))
-    with pytest.raises(TypeError, match="a has dtype <U1"):
-        checks.flag_array("a", ["1", "0"], (2,))

@@ -2,14 +2,12 @@ import errno
 import json
 import os
 import re
-import stat
 import subprocess
 import sys
 from contextlib import nullcontext
 from io import BytesIO
 from pathlib import Path
-from unittest.mock import Mock
-from zipfile import ZipFile
+from unittest.mock import DEFAULT, Mock
 
 import numpy as np
 import pytest
@@ -23,15 +21,8 @@ ALONE = os.path.dirname(files.__file__)
 ARRAYS = {"a": np.arange(6).reshape(2, 3), "b": np.array("text"), "c": np.array([True, False])}
 
 
-@pytest.mark.parametrize(
-    ("error", "message"),
-    [
-        (RuntimeError("power cut"), "power cut"),
-        (OSError(errno.ENOSPC, "disk full"), "cannot write this file: disk full: '.*/file'$"),
-    ],
-)
-def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
-    """Until it ends, the new content stands beside it, where git ignores what a kill leaves."""
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    """Until it ends, the new content stands beside it."""
     path = tmp_path / "file"
     files.write_text(path, "old")
 
@@ -40,12 +31,11 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, error, message):
         (partial,) = {*tmp_path.iterdir()} - {path}
         assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", partial.name)
         assert path.read_text(encoding="utf-8") == "old"
-        raise error
+        raise OSError(errno.ENOSPC, "disk full")
 
-    with pytest.raises(type(error), match=message):
+    with pytest.raises(OSError, match="cannot write this file: disk full: '.*/file'$"):
         files.write_atomically(path, write)
     assert path.read_text(encoding="utf-8") == "old" and [path] == [*tmp_path.iterdir()]
-    assert "*.partial" in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
 
 
 def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
@@ -64,34 +54,35 @@ def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
     assert {*tmp_path.iterdir()} == {path, *others}
 
 
-def test_an_array_that_is_shorter_than_it_was_is_refused(tmp_path):
-    """NumPy reads what its shape says, and then compares no checksum of the file's format."""
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        # NumPy reads what a shape says, and then compares no checksum of the file's format.
+        (b"'shape': (9000,)", b"'shape': (1000,)", "was changed or damaged: its digest is"),
+        (b"<i8", b"<m8", "is not a readable .npz file"),  # which has no bytes to compare
+    ],
+)
+def test_an_array_of_another_header_is_refused(tmp_path, old, new, message):
     path = tmp_path / "arrays.npz"
     files.write_arrays(path, {"long": np.arange(9000)})
-    path.write_bytes(path.read_bytes().replace(b"'shape': (9000,)", b"'shape': (1000,)"))
-    with np.load(path) as read:
-        assert read["long"].tolist() == [*range(1000)]
-    with pytest.raises(ValueError, match="arrays.npz was changed or damaged: its digest is"):
+    path.write_bytes(path.read_bytes().replace(old, new))
+    with pytest.raises(ValueError, match=f"arrays.npz {message}"):
         files.read_arrays(path)
 
 
 def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
     path, objects = tmp_path / "arrays.npz", {"a": np.array([{"x": 1}], dtype=object)}
     files.write_arrays(path, ARRAYS)
-    whole, single, pickled, more = path.read_bytes(), BytesIO(), BytesIO(), BytesIO()
+    whole, single, pickled = path.read_bytes(), BytesIO(), BytesIO()
     with pytest.raises(ValueError):
         files.write_arrays(path, objects)
     assert path.read_bytes() == whole
     np.save(single, np.arange(3))  # which NumPy reads, too
     np.savez(pickled, **objects)
-    with ZipFile(more, "w") as stored:
-        stored.writestr("readme.txt", "text")  # which NumPy gives as bytes
-    for content in (whole[:-1], *(file.getvalue() for file in (single, pickled, more))):
+    for content in (whole[:-1], single.getvalue(), pickled.getvalue()):
         path.write_bytes(content)
         with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
             files.read_arrays(path)
-    with pytest.raises(FileNotFoundError, match="missing.npz"):
-        files.read_arrays(tmp_path / "missing.npz")
 
 
 def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
@@ -113,14 +104,6 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
         files.read_arrays(path, checked=True)
 
 
-def test_a_dtype_that_has_no_bytes_to_compare_is_refused_by_name(tmp_path):
-    path = tmp_path / "arrays.npz"
-    files.write_arrays(path, {"long": np.arange(9000)})
-    path.write_bytes(path.read_bytes().replace(b"<i8", b"<m8"))
-    with pytest.raises(ValueError, match="arrays.npz is not a readable .npz file"):
-        files.read_arrays(path)
-
-
 def check_arrays(read: dict[str, np.ndarray]) -> None:
     assert read.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():
@@ -128,19 +111,10 @@ def check_arrays(read: dict[str, np.ndarray]) -> None:
         np.testing.assert_array_equal(read[name], array)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("", "is not a readable JSON file"),
-        ("[" * 100_000, "is not a readable JSON file: maximum recursion depth"),
-        ('{"a": ' + "1" * 5_000 + "}", "is not a readable JSON file: Exceeds the limit"),
-        ("[1, 2]", "holds a list; expected an object"),
-    ],
-    ids=["empty", "too deep", "too many digits", "a list"],
-)
-def test_bad_json_is_refused_by_name(tmp_path, text, message):
+@pytest.mark.parametrize("text", ["[" * 100_000, "[1, 2]"], ids=["too deep", "a list"])
+def test_bad_json_is_refused_by_name(tmp_path, text):
     (tmp_path / "x.json").write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=f"^{tmp_path}/x.json {message}"):
+    with pytest.raises(ValueError, match=f"^{tmp_path}/x.json (is not a readable|holds a list)"):
         files.read_json(tmp_path / "x.json")
 
 
@@ -168,51 +142,35 @@ def test_digest_is_that_of_the_content(tmp_path):
     path.write_bytes(b"abd")
     with pytest.raises(ValueError, match=f"{path} was changed or damaged: .*, expected {digest}"):
         files.check_digest(path, digest)
-    with pytest.raises(FileNotFoundError, match="missing"):
-        files.digest(tmp_path / "missing")
 
 
-def hold(folder, then):
-    """Start a process that locks a folder, says so, and goes on with ``then``."""
-    script = f"""if True:
+def test_a_second_process_is_told_whose_the_folder_is_or_waits(tmp_path, monkeypatch, caplog):
+    """After a while it says for whom, and goes on when the folder is free."""
+    script = """if True:
         import sys, time
         import files
 
         with files.locked(sys.argv[1]):
             print("locked", flush=True)
-            {then}
+            sys.stdin.readline()
+            time.sleep(1)
     """
+    folder = tmp_path / "new" / "run"
     process = subprocess.Popen(
         [sys.executable, "-c", script, folder],
         cwd=ALONE, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
-    assert process.stdout.readline() == "locked\n"
-    return process
-
-
-def test_a_second_process_is_told_whose_the_folder_is(tmp_path):
-    folder = tmp_path / "new" / "run"
-    with hold(folder, "sys.stdin.read()") as owner:
+    with process as owner:
+        assert owner.stdout.readline() == "locked\n"
         for _ in range(2):  # the lock survives the first refusal
             message = f"{folder} is in use by process {owner.pid} on .+ since 20.*; wait, or take"
             with pytest.raises(RuntimeError, match=message), files.locked(folder):
                 pytest.fail("two processes hold one lock")
-        with files.locked(tmp_path / "another"):
-            pass
-        owner.communicate("")  # it leaves the block
-    with files.locked(folder):
-        pass
-
-
-def test_who_waits_says_for_whom(tmp_path, monkeypatch, caplog):
-    """After a while, and then goes on when the folder is free."""
-    monkeypatch.setattr(files, "PATIENCE", 0.1)
-    then = "time.sleep(1); open(sys.argv[1] + '/end', 'x')"
-    with hold(tmp_path, then) as owner, files.locked(tmp_path, wait=True):
-        assert (tmp_path / "end").exists()
-        assert caplog.messages == [
-            f"waiting for process {owner.pid} on {caplog.messages[0].split(' on ')[1]}"
-        ]
+        owner.stdin.write("\n")
+        owner.stdin.flush()
+        monkeypatch.setattr(files, "PATIENCE", 0.1)
+        with files.locked(folder, wait=True):
+            assert caplog.messages[0].startswith(f"waiting for process {owner.pid} on ")
 
 
 @pytest.mark.needs("fork")
@@ -251,74 +209,17 @@ def test_the_package_can_be_imported_where_windows_lacks_something():
     assert done.stdout.endswith("True\n"), done.stderr
 
 
-@pytest.mark.parametrize(
-    ("system", "times", "written"),
-    [("win32", 10, True), ("win32", 10**6, False), ("linux", 1, False)],
-)
+@pytest.mark.parametrize(("system", "written"), [("win32", "new"), ("linux", "old")])
 def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
-    tmp_path, monkeypatch, system, times, written
+    tmp_path, monkeypatch, system, written
 ):
     """Windows refuses while a spreadsheet holds it open, which is awaited for a second."""
-    path, replace, refused = tmp_path / "curve.csv", os.replace, []
+    path, held = tmp_path / "curve.csv", PermissionError(errno.EACCES, "held by a reader")
     files.write_text(path, "old")
-
-    def held(source: Path, target: Path) -> None:
-        if len(refused) < times:
-            refused.append(target)
-            raise PermissionError(errno.EACCES, "held by a reader")
-        replace(source, target)
-
+    replace = Mock(side_effect=[held, held, DEFAULT], wraps=os.replace)
     monkeypatch.setattr(files.sys, "platform", system)
-    monkeypatch.setattr(files.os, "replace", held)
-    monkeypatch.setattr(files, "HELD", 0.5)
-    with nullcontext() if written else pytest.raises(OSError, match="held by a reader"):
+    monkeypatch.setattr(files.os, "replace", replace)
+    refused = pytest.raises(OSError, match="held by a reader")
+    with nullcontext() if written == "new" else refused:
         files.write_text(path, "new")
-    assert path.read_text(encoding="utf-8") == ("new" if written else "old") and [
-        *tmp_path.iterdir()
-    ] == [path]
-    assert len(refused) == times or times == 10**6
-
-
-@pytest.mark.parametrize("name", ["lock", "owner"])
-@pytest.mark.parametrize("link", [os.symlink, os.link])
-@pytest.mark.needs("symlinks")
-def test_what_a_lock_is_linked_to_is_kept(tmp_path, name, link):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "notes").write_text("precious", encoding="utf-8")
-    link(tmp_path / "notes", tmp_path / "run" / name)
-    refused = pytest.raises(OSError, match="run/lock")
-    allowed = (name, link) != ("lock", os.symlink)
-    with nullcontext() if allowed else refused, files.locked(tmp_path / "run"):
-        assert allowed
-    assert (tmp_path / "notes").read_text(encoding="utf-8") == "precious"
-
-
-@pytest.mark.needs("fcntl")
-def test_without_locks_of_the_file_system_nothing_is_locked(tmp_path, monkeypatch):
-    """A file in their place would outlast a killed process."""
-    missing = OSError(errno.ENOSYS, "it has no locks")
-    monkeypatch.setattr("fcntl.flock", Mock(side_effect=missing))
-    with pytest.raises(OSError, match="it has no locks"), files.locked(tmp_path):
-        pytest.fail("it is not locked")
-
-
-@pytest.mark.parametrize("refused", [False, True])
-@pytest.mark.needs("/proc")
-def test_the_folder_is_synced_too_where_that_is_possible(tmp_path, monkeypatch, refused):
-    synced, fsync, opened = [], os.fsync, os.listdir("/proc/self/fd")
-
-    def sync(descriptor: int) -> None:
-        status = os.fstat(descriptor)
-        is_folder = stat.S_ISDIR(status.st_mode)
-        synced.append("folder" if is_folder else status.st_size)
-        if is_folder and refused:
-            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
-        fsync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", sync)
-    files.write_text(tmp_path / "x", "whole")
-    assert (tmp_path / "x").read_text(encoding="utf-8") == "whole" and synced == [
-        len("whole"),
-        "folder",
-    ]
-    assert os.listdir("/proc/self/fd") == opened
+    assert path.read_text(encoding="utf-8") == written and [*tmp_path.iterdir()] == [path]
