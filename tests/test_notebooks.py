@@ -141,15 +141,3 @@ def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(
     with pytest.raises(KeyboardInterrupt) if stopped else nullcontext():
         assert run.main() == 0
     assert (path.read_text(encoding="utf-8") == before) == stopped
-
-
-def test_a_widget_leaves_what_stands_beside_it(tmp_path):
-    new = run.nbformat.v4
-    data = {run.WIDGET_MIMETYPE: {"model_id": "1"}, "image/png": "iVBORw0KGgo="}
-    cell = new.new_code_cell("x", outputs=[new.new_output("display_data", data)])
-    path = tmp_path / "widget.ipynb"
-    run.nbformat.write(new.new_notebook(metadata={"widgets": {}}, cells=[cell]), path)
-    run.tidy(path)
-    content = run.nbformat.read(path, as_version=4)
-    assert list(content.cells[0].outputs[0].data) == ["image/png"]
-    assert "widgets" not in content.metadata
