@@ -11,8 +11,6 @@ from functools import cache
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
-import pytest
-
 from tests import wheels
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -45,8 +43,6 @@ RUN_ONLY = {
 def normal(name: str) -> str:
     """A distribution's name as indexes compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
-
-
 
 
 def wanted_here() -> set[str]:
@@ -88,9 +84,7 @@ def distributions(folder: str) -> set[str]:
     return {normal(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or not installed
 
 
-
-
-def test_each_library_is_named_once_and_PINNED:
+def test_each_library_is_named_once_and_pinned():
     extras = {name: EXTRAS[name] for name in EXTRAS.keys() - {*OF_THE_PACKAGE, *ASIDE}}
     for extra in ON_DEMAND:
         assert all("==" in library for library in extras.pop(extra)), f"{extra} is not pinned"
@@ -121,15 +115,13 @@ def test_a_line_without_a_wheel_is_found(monkeypatch):
     assert ("pybullet", "Linux x86-64", 11) not in found and ("numpy", "Windows", 13) in found
 
 
-
-
 def test_what_is_pinned_is_not_below_the_lowest_version():
     for name, lowest in LOWEST.items():
         parts = [[int(part) for part in each.split(".")] for each in (lowest, PINNED[name])]
         assert parts[0] <= parts[1], name
 
 
-def test_what_is_installed_is_what_is_PINNED:
+def test_what_is_installed_is_what_is_pinned():
     """PyTorch's version may have a suffix that names its build, such as +cpu."""
     found = {name: version(name).split("+")[0] for name in wanted_here()}
     assert found == {name: each for name, each in PINNED.items() if name in found}

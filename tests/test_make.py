@@ -58,8 +58,6 @@ def test_the_first_command_installs_and_the_next_ones_do_not(ran, monkeypatch):
     assert ran[5] == ["venv"], "for another Python all is made anew"
 
 
-
-
 def test_an_installation_that_was_broken_off_is_done_again(ran, monkeypatch):
     monkeypatch.setattr(make, "PIP", ("broken",))
     with pytest.raises(SystemExit) as stopped:
@@ -67,10 +65,6 @@ def test_an_installation_that_was_broken_off_is_done_again(ran, monkeypatch):
     assert stopped.value.code == 3 and not (make.VENV / "ready").exists()
     monkeypatch.undo()
     assert [call[0] for call in ran] == ["venv", "broken"]
-
-
-
-
 
 
 def test_other_pythons_are_refused_before_anything_is_made(ran, monkeypatch):
