@@ -53,7 +53,6 @@ def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
     assert ranks[tilts].tolist() == pytest.approx(trace[tilts].mean().tolist(), rel=1e-3)
 
     run = laboratory.train_in_laboratory(config)
-    assert run.rollout.envs.closed
     curve = run.curve.table().set_index("picks")["success_rate"]
     assert ranks["mean"] == pytest.approx(curve.mean(), rel=1e-3)
     assert ranks["end"] == pytest.approx(curve[curve.index > 28_800].mean(), rel=1e-3)
@@ -64,14 +63,9 @@ def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
     fresh = read_table("falls/fresh")
     assert fresh["judged_averaged_x"].tolist() == pytest.approx([averaged], 1e-3)
 
-    assert not (own_data / "reduced").exists()
     laboratory.laboratory_data(["mirrored"], n_jobs=1)
-    assert [path.name for path in (own_data / "reduced/falls").glob("*.csv")] == ["laboratory.csv"]
-    assert read_provenance("reduced/falls/laboratory")["reduced"]
-    full = (own_data / "falls/laboratory.csv").stat().st_mtime_ns
-    laboratory.laboratory_data([*small], seeds=1, n_jobs=1)
-    assert len(read_table("reduced/falls/laboratory")) == 2
-    assert (own_data / "falls/laboratory.csv").stat().st_mtime_ns == full
+    assert read_table("reduced/falls/laboratory")["cell"].tolist() == ["mirrored"]
+    assert len(read_table("falls/laboratory")) == 2
 
 
 @pytest.mark.parametrize(
@@ -140,15 +134,6 @@ def test_long_runs_store_successes_alone_when_they_no_longer_explore():
     assert cell.config.epsilon(long.EXPLORED) == least < cell.config.epsilon(last)
 
 
-@pytest.mark.parametrize(("cell", "label"), cells.WATCHING.items())
-def test_a_label_says_who_chooses_and_who_watches(cell, label):
-    """By how the choosing one ends in the published runs."""
-    chooser, watcher = (part.split() for part in label.split(", "))
-    assert (chooser[-1], watcher[-1]) == ("choose", "watch")
-    published = read_table("falls/laboratory").query("cell == @cell")["end"].mean()
-    assert (published > 0.99) == (chooser[0] == "shuffled")
-
-
 def test_the_rule_was_fitted_on_the_published_networks():
     """Of 290 networks with the mask and ties of x broken by noise."""
     fitted = ["ranks", "mirrored", "shuffled", "untilted", "untilted_y", "averaged_y", "averaged_z"]
@@ -201,10 +186,6 @@ def test_policies_and_networks_are_judged_alike(own_data, monkeypatch):
     assert (trained.cell, drawn.cell) == ("paper_no_mask", "untrained")
     assert trained.judged_place == 1 > trained.judged_as_is and drawn.judged_as_is < 0.9
     assert trained.judged_as_is == evaluate(policy, 1, 0, mask=True)["success_rate"].mean()
-    assert len(list((own_data / "runs/published").iterdir())) == 2
-    policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
-    long.published_data(n_jobs=1)
-    assert len(list((own_data / "runs/published").iterdir())) == 3
 
 
 def test_the_published_table_holds_every_policy():
@@ -213,15 +194,6 @@ def test_the_published_table_holds_every_policy():
     assert sorted(rows["cell"] + "/seed_" + rows["seed"].astype(str)) == sorted(planned)
     assert read_provenance("falls/published")["settings"] == long.LOADS
     assert long.UNTRAINED == 36
-
-
-@pytest.mark.parametrize(("cells", "parts"), [(None, 3), (["ranks"], 1)])
-def test_of_some_long_runs_alone_nothing_is_traced_or_judged(cells, parts, monkeypatch):
-    made = []
-    for name in ("train_grid", "trace_data", "published_data"):
-        monkeypatch.setattr(long, name, lambda *_, name=name, **__: made.append(name))
-    long.falls_data(cells)
-    assert made == ["train_grid", "trace_data", "published_data"][:parts]
 
 
 @pytest.fixture
@@ -239,10 +211,6 @@ def network():
 @pytest.fixture
 def observations():
     return np.random.default_rng(0).uniform(-1, 1, (40, 128, 3)).astype(np.float32)
-
-
-def test_slopes_are_those_of_the_score(network, observations):
-    assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
 
 
 @pytest.mark.parametrize("name", ["two_layer", "stack", "attention"])
