@@ -9,14 +9,12 @@ import torch
 from studies import paths
 from studies.heap import generate, picture, recording
 from studies.heap import table as study
-from studies.heap.generate import stored_heaps
 from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.rake import Outcome
-from studies.heap.recording import HEAPS, make_heaps, make_networks
+from studies.heap.recording import HEAPS, make_networks
 from studies.heap.table import best_rule, family, plan
 from studies.results import read_provenance, read_table
-from unload.agent.identity import identity
 from unload.load.picture import COLOURS, project
 
 
@@ -67,17 +65,6 @@ def test_all_policies_play_the_same_heaps_and_are_kept(own_data, monkeypatch, pi
     assert by.loc[("oracle", 1.0), "net"] >= by.loc[("random", 1.0), "net"]
     assert read_provenance("heap/table")["settings"]["heaps"] == 2
     pd.testing.assert_frame_equal(read_table("heap/table"), table, check_dtype=False)
-    players = []
-
-    def made_up(player, split, number, physics):
-        players.append(player)
-        return {"boxes": 2.0 + number, "falls": 0.5}
-
-    monkeypatch.setattr(study, "_play", made_up)
-    table = study.compare()
-    assert table["net"].tolist() == (2.5 - table["falls_weight"] * 0.5).tolist()
-    weights = [player["falls_weight"] for player in players if "networks" in player]
-    assert weights == [0.0, 0.0, 1.0, 1.0]
 
 
 def test_data_of_heaps_are_those_that_are_read():
@@ -136,27 +123,6 @@ def test_a_click_on_the_picture_of_a_heap_finds_the_box_that_is_seen_there(cubes
     assert picture.box_at(heap, 9.0, 9.0) is None
 
 
-def test_heaps_are_those_of_their_seeds(own_data, monkeypatch):
-    """The generator is replaced by parts of a stored heap, which the seed chooses."""
-    whole = stored_heaps("train")[0]
-    monkeypatch.setattr(
-        recording, "settled_heap", lambda rng: whole.only(np.sort(rng.permutation(len(whole))[:5]))
-    )
-    made = {}
-    for name, counts in {"few": {"train": 2, "test": 1}, "more": {"train": 3, "test": 2}}.items():
-        monkeypatch.setattr(recording, "HEAPS", counts)
-        monkeypatch.setattr(paths, "DATA", own_data / name)
-        make_heaps()
-        path = paths.DATA / "heap/heaps.npz"
-        assert read_provenance("heap/heaps")["settings"]["heaps"] == counts
-        for split, count in counts.items():
-            made[name, split] = [identity(heap) for heap in stored_heaps(split, path)]
-            assert len(set(made[name, split])) == count
-    for split, count in (("train", 2), ("test", 1)):
-        assert made["few", split] == made["more", split][:count]
-    assert made["more", "train"][0] != made["more", "test"][0]
-
-
 class Notes(list):
     """A list that does not tell what it holds, so that it is no part of an identity."""
 
@@ -175,25 +141,15 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pi
     }.items():
         monkeypatch.setattr(recording, name, value)
     monkeypatch.setattr("studies.heap.env.stored_heaps", recording.stored_heaps)
-    fit, policy = recording.fit, recording.Learned
-
-    learned, explorers, explored = Notes(), Notes(), Notes()
+    fit, learned = recording.fit, Notes()
 
     def noted_fit(picks, seed, steps):
         learned.append(picks)
         return fit(picks, seed, steps)
 
-    def noted_policy(networks, weight):
-        explorers.append(weight)
-        explorer = policy(networks, weight)
-        return lambda *given: explored.append(weight) or explorer(*given)
-
     monkeypatch.setattr(recording, "fit", noted_fit)
-    monkeypatch.setattr(recording, "Learned", noted_policy)
     make_networks()
     assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
-    assert len(explorers) == 2 and set(explorers) <= set(recording.WEIGHTS)
-    assert 0 < len(explored) < 6, "some picks of the second round are random"
     picks = learned[-1]
     assert np.isfinite(picks.observations).all() and picks.unloaded.sum() > 0
     came = picks.fates[np.arange(12), picks.actions] & 1
@@ -204,8 +160,3 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pi
     written = published.read_bytes()
     make_networks()
     assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
-    monkeypatch.setattr(recording, "STEPS", 3)
-    make_networks()
-    assert len(learned) == 8 and published.read_bytes() != written, "another question"
-    picks = list((own_data / "runs" / "heap" / "picks").glob("*.json"))
-    assert len(picks) == 6, "other explorers, too"
