@@ -55,12 +55,7 @@ def test_runs_agree_with_the_paper_by_the_plan(name, monkeypatch):
 
 @pytest.mark.parametrize(
     ("cells", "picks", "written"),
-    [
-        (None, None, True),
-        (["paper_mask", training.DEFAULTS], None, True),
-        (["paper_mask"], None, False),
-        (None, 64_000, False),
-    ],
+    [(None, None, True), (["paper_mask"], None, False), (None, 64_000, False)],
 )
 def test_policies_play_elsewhere_once_their_cell_is_trained(
     cells, picks, written, tmp_path, monkeypatch
@@ -112,14 +107,10 @@ def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch)
     curves = tuning.read_curves("success_rate", 8, 1e-3)
     assert np.array_equal(curves[1], table["b8/with_fe_lr_0.001/seed_1"])
     summary = tuning.tuning_summary().set_index("batch_size")
-    assert summary["runs"].tolist() == [2, 2]
     mean = np.mean([run.mean() for run in curves.values()])
     assert summary.loc[8, "final_msr"] == pytest.approx(mean)
     (path,) = (own_data / "dummy_sim_with_hist_equal").iterdir()
     assert path.name == "loss_curve_bz_8_lr_0.001_agent_1.csv"
-    lines = path.read_text(encoding="utf-8").splitlines()
-    losses = tuning.read_curves("loss", 8, 1e-3)[1]
-    assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
 
 
 def test_committed_files_of_the_papers_plots_are_those_of_the_tables(own_data):
