@@ -14,7 +14,7 @@ from studies.policies import comparison, robustness, sb3, variants
 from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
-from studies.policies.variants import GRIDS, PARTS, REWARDS, judged, read_variants, variants_data
+from studies.policies.variants import GRIDS, PARTS, REWARDS, judged, variants_data
 from studies.results import read_provenance, read_table
 from tests.agent.runs import lowest
 from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
@@ -88,13 +88,6 @@ def test_cards_are_measured_and_written(tmp_path, monkeypatch):
         expected = evaluate(load_policy("paper"), 2, comparison.CARD_SEED, mask=mask)
         assert known[name] == pytest.approx(expected["success_rate"].mean(), abs=1e-5)
     assert comparison.measure(policies.random, 1.0)["picks"] == 1000
-
-
-def test_a_policy_that_unloads_nothing_has_missed_with_every_pick(monkeypatch):
-    nothing = pd.DataFrame({"success_rate": [0.0, 0.5], "unloaded": [0, 250]})
-    monkeypatch.setattr(comparison, "evaluate", lambda *_, **__: nothing)
-    card = comparison.measure(policies.random, 1.0)
-    assert (card["picks"], card["misses"]) == (1000, 750)
 
 
 @pytest.mark.parametrize("name", comparison.ORIGINS)
@@ -201,10 +194,6 @@ def test_pairs_are_of_boxes_that_are_visible_and_lie_on_one_another():
         assert observation[high, 2] > observation[low, 2]
 
 
-def test_a_container_ends_after_its_picks():
-    assert len(list(containers(policies.highest, seed=0, max_picks=7))) == 7
-
-
 def test_agents_of_another_library_are_trained_and_measured(own_data, monkeypatch):
     small = replace(TrainConfig(), picks=128, num_envs=4, batch_size=16, replay_size=128)
     changes = {"CONFIG": small, "ROLLOUT": 64, "SEEDS": [1], "LOADS": 1}
@@ -237,11 +226,6 @@ def test_each_cell_differs_from_the_paper_in_little():
         assert len(set(map(repr, cells.values()))) == len(cells)
 
 
-def test_an_unknown_part_is_refused():
-    with pytest.raises(ValueError, match="part is 'loss'; expected one of 'networks', "):
-        read_variants("loss")
-
-
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
     monkeypatch.setattr(variants, "LOADS", {"episodes": 3, "seed": 1000})
     policy = load_policy("paper_seed_2")
@@ -249,12 +233,6 @@ def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
         evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
     ]
     assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
-
-
-def test_the_recommended_policy_is_judged_as_the_data_say():
-    policy = load_policy("recommended")
-    first = read_table("variants/recommended").iloc[0]
-    assert judged(policy, variants.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
 
 
 def test_grids_are_trained_and_read_back(own_data, monkeypatch):

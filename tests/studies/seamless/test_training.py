@@ -115,11 +115,6 @@ def test_a_full_grid_leaves_what_the_papers_plots_read(own_data, monkeypatch):
         assert table["Step"].tolist() == curve["picks"].tolist()
     reward = table["Value"] / 500
     assert ((reward + 1) / 2).tolist() == pytest.approx(curve["success_rate"].tolist(), abs=1e-5)
-    # Neither of other cells nor of shorter runs.
-    monkeypatch.setattr(training, "train_grid", lambda *_: own_data)
-    monkeypatch.setattr(training, "export", lambda *_: pytest.fail("exported"))
-    training.seamless_data(["mask_order"])
-    training.seamless_data(None, 64_000)
 
 
 def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path, monkeypatch):
