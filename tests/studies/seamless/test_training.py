@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies import grid, paths
+from studies import paths
 from studies.falls.laboratory import CONFIG
-from studies.grid import Cell, Grid, read_grid
+from studies.grid import read_grid
 from studies.results import read_table
 from studies.seamless import training
 from studies.seamless.jamming import jam, neighbours
@@ -20,7 +20,7 @@ from studies.seamless.jams import place
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
 from tests.studies.curves import curve
-from unload import TrainConfig, task
+from unload import task
 from unload.agent.training import Training
 from unload.load.boxes import Load
 
@@ -98,23 +98,6 @@ def test_the_first_episode_of_a_published_run_is_trained_again(name):
     assert published["seed"] == FIRST_SEED
     for column in ("picks", "success_rate", "loss"):
         assert found[column] == pytest.approx(published[column], rel=1e-4)
-
-
-def test_a_full_grid_leaves_what_the_papers_plots_read(own_data, monkeypatch):
-    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
-    config = TrainConfig(picks=64 * 500, batch_size=64, n_features=4, log_interval=500)
-    cells = {EXPORTED[0]: Cell(config, [EXPORTED[1]], training.ANEW)}
-    small = Grid("seamless/runs", "make it", cells)
-    for name, value in (("SEAMLESS", small), ("CELLS", cells)):
-        monkeypatch.setattr(training, name, value)
-    training.seamless_data(n_jobs=1)
-    curve = read_grid(small)
-    for name in NAMES:
-        table = pd.read_csv(own_data / name)
-        assert list(table.columns) == ["Wall time", "Step", "Value"]
-        assert table["Step"].tolist() == curve["picks"].tolist()
-    reward = table["Value"] / 500
-    assert ((reward + 1) / 2).tolist() == pytest.approx(curve["success_rate"].tolist(), abs=1e-5)
 
 
 def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path, monkeypatch):
