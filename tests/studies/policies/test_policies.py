@@ -9,12 +9,11 @@ import pandas as pd
 import pytest
 import torch
 
-from studies import grid
 from studies.policies import comparison, robustness, sb3, variants
 from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
-from studies.policies.variants import GRIDS, PARTS, REWARDS, judged, variants_data
+from studies.policies.variants import GRIDS, PARTS, judged
 from studies.results import read_provenance, read_table
 from tests.agent.runs import lowest
 from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
@@ -104,23 +103,11 @@ def test_the_recommended_policy_does_not_miss():
     assert measured[0]["picks"] == 500 * comparison.CARD_LOADS
 
 
-def two_walls(rng: np.random.Generator) -> Load:
-    return front_walls(stack_load(rng), 2)
-
-
 def piles(rng: np.random.Generator) -> Load:
     """140 piles of two cubes each."""
     x, y, z = np.meshgrid(0.5 * np.arange(14) + 0.25, 0.25 * np.arange(10) + 0.125, (0.1, 0.3))
     positions = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
     return Load(positions, np.full((len(positions), 3), 0.2))
-
-
-@pytest.mark.pybullet
-def test_play_agrees_with_evaluate():
-    seed = np.random.SeedSequence(4).generate_state(1).tolist()[0]
-    row = robustness.play(policies.random, "keep", seed, 4, two_walls)
-    settings = {"physics": "full", "after_pick": "keep", "max_picks": 4, "stack": two_walls}
-    assert row["success_rate"] == evaluate(policies.random, 1, 4, **settings)["success_rate"][0]
 
 
 @pytest.mark.pybullet
@@ -155,13 +142,6 @@ def test_all_play_the_same_containers(own_data, monkeypatch):
     again = small["play"](policies.highest, "restore", seeds[1], 2)
     assert table.iloc[-1][[*again]].tolist() == pytest.approx([*again.values()])
     assert read_provenance("policies/robustness")["settings"]["episodes"] == 2
-
-
-def test_front_walls_keep_their_place(full_load):
-    front, kept = front_walls(full_load, 3), full_load.walls >= 9
-    for name in ("positions", "sizes", "packages", "walls"):
-        assert (getattr(front, name) == getattr(full_load, name)[kept]).all()
-    assert (front_walls(front, 2).positions == front_walls(full_load, 2).positions).all()
 
 
 def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
@@ -233,21 +213,3 @@ def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
         evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
     ]
     assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
-
-
-def test_grids_are_trained_and_read_back(own_data, monkeypatch):
-    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
-    small = TrainConfig(num_envs=4, batch_size=16, n_features=4, log_interval=5, picks=200)
-    for name, cells in (("variants", REWARDS), ("recommended", GRIDS["recommended"].cells)):
-        cells = {
-            cell: one._replace(config=replace(small, equalize=one.config.equalize), seeds=[0])
-            for cell, one in cells.items()
-        }
-        monkeypatch.setitem(GRIDS, name, GRIDS[name]._replace(cells=cells))
-    monkeypatch.setattr(variants, "LOADS", {"episodes": 1, "seed": 1000})
-    monkeypatch.setattr(files, "SHIPPED", own_data)
-    variants_data(n_jobs=1)
-    rows = read_table("variants/variants")
-    assert rows["cell"].tolist() == [*REWARDS] and rows["msr_mask"].between(0, 1).all()
-    assert read_provenance("variants/recommended")["fingerprint"] == "f"
-    assert not load_policy(own_data / "policies/recommended.safetensors").equalize
