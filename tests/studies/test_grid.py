@@ -14,7 +14,7 @@ from joblib import parallel_config
 from studies import grid, paths, sweep
 from studies.changes import shuffled
 from studies.paper import tuning
-from studies.results import read_provenance
+from studies.results import read_provenance, read_table
 from tests.agent.runs import assert_same
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
@@ -81,6 +81,18 @@ def test_published_runs_are_not_replaced_by_fewer_or_shorter_ones(trained, monke
     assert (provenance["runs"], provenance["planned"], provenance["reduced"]) == (4, 4, False)
     assert provenance["settings"]["averaged_mask"]["mask"] is True
     assert read_provenance(f"reduced/{SMALL.name}")["reduced"]
+
+
+def test_what_is_measured_of_policies_is_published_with_them(trained):
+    cells = {"plain": SMALL.cells["plain"]}
+    measured = SMALL._replace(name="some/measured", cells=cells, measure=policy_size)
+    grid.train_grid(measured, n_jobs=1)
+    rows = [["plain", 0, 4, 640], ["plain", 1, 4, 640]]
+    assert read_table("some/measured").to_numpy().tolist() == rows
+
+
+def policy_size(policy, config) -> dict:
+    return {"n_features": policy.network.n_features, "picks": config.picks}
 
 
 @pytest.fixture
