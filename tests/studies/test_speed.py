@@ -97,40 +97,16 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
     }
 
 
-def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
-    """Not in annotations, decorators, raised errors or texts."""
-    path = tmp_path / "module.py"
-    lines = [
-        "@cache(1)", "def größer(a: Literal[1], é=True):", "    'ä < 1'", "    if not é and a < 2:",
-        "        raise ValueError(a + 3)", "    print(f'{a + 1}')", "    return a ** 3 // 2",
-    ]  # fmt: skip
-    path.write_text("\n".join(lines), encoding="utf-8")
-    found = []
-    for same, line, mutation, code in mutants.mutants(path):
-        after = code.decode().splitlines()
-        assert same == path
-        assert [n for n, (one, other) in enumerate(zip(lines, after), 1) if one != other] == [line]
-        found.append((mutation, after[line - 1].strip()))
-    assert sorted(found) == [
-        ("2 -> 5", "if not é and a < (5):"),
-        ("2 -> 5", "return a ** 3 // (5)"),
-        ("3 -> 7", "return a ** (7) // 2"),
-        ("True -> False", "def größer(a: Literal[1], é=(False)):"),
-        ("a ** 3 -> a * 3", "return (a * 3) // 2"),
-        ("a ** 3 // 2 -> a ** 3 * 2", "return (a ** 3 * 2)"),
-        ("a < 2 -> a <= 2", "if not é and (a <= 2):"),
-        ("not é -> é", "if (é) and a < 2:"),
-        ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
-        ("print(f'{a + 1}') -> pass", "pass"),
-    ]
-
-
 CODE = """
 compiled = staticmethod
 
 @compiled
 def total(a, b):
     return a + b
+
+def refuse(a: Literal[1]):
+    "1 < 2"
+    raise ValueError(1 + 2)
 
 UNUSED = 1 * 2
 """
@@ -152,7 +128,7 @@ def test_in_vain():
 
 
 def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys):
-    """In a project of one room."""
+    """In a project of one room; annotations, texts and raised errors are not changed."""
     room, path, table = "unload/sums", tmp_path / "unload/sums/sums.py", tmp_path / "mutants.csv"
     for folder in ("unload/sums", "tests/sums"):
         (tmp_path / folder).mkdir(parents=True)
@@ -171,9 +147,9 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     assert pd.read_csv(table, keep_default_na=False).to_numpy().tolist() == [
         ["other", "a", 1, "b", ""],
         [room, "sums", 6, "a + b -> a - b", "tests/sums/test_sums.py::test_total"],
-        [room, "sums", 8, "1 * 2 -> 1 / 2", ""],
-        [room, "sums", 8, "1 -> 3", ""],
-        [room, "sums", 8, "2 -> 5", ""],
+        [room, "sums", 12, "1 * 2 -> 1 / 2", ""],
+        [room, "sums", 12, "1 -> 3", ""],
+        [room, "sums", 12, "2 -> 5", ""],
     ]
     trees: SimpleQueue = SimpleQueue()
     trees.put(tmp_path)

@@ -24,13 +24,15 @@ from unload.network.peq import PEQNetwork
 
 
 @pytest.mark.slow
-def test_a_published_run_is_trained_and_measured_again():
-    """The first one that falls."""
+@pytest.mark.parametrize(
+    "cell", ["ranks", "perfect_successes", "level_taught_0.4", "shuffled_watching_ranks"]
+)
+def test_a_published_run_is_trained_and_measured_again(cell):
+    """The first one that falls, and runs with most of the changes on the way."""
     published = read_table("falls/laboratory").set_index(["cell", "seed"])
-    expected = published.loc["ranks", cells.FIRST_SEED].to_dict()
-    row = laboratory.run_cell("ranks", cells.CELLS["ranks"], cells.FIRST_SEED)["row"]
+    expected = published.loc[cell, cells.FIRST_SEED].to_dict()
+    row = laboratory.run_cell(cell, cells.CELLS[cell], cells.FIRST_SEED)["row"]
     assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
-    assert row["end"] < 0.9 and row["judged_place"] == 1
 
 
 def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
