@@ -104,7 +104,7 @@ compiled = staticmethod
 def total(a, b):
     return a + b
 
-def refuse(a: Literal[1]):
+def refuse(a: list[1]):
     "1 < 2"
     raise ValueError(1 + 2)
 
