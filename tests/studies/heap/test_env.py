@@ -20,16 +20,6 @@ def test_gymnasium_finds_nothing_wrong(make_heap_env, pile, cubes):
     check_env(make_heap_env(*heaps, render_mode="rgb_array"))
 
 
-def test_a_picture_shows_what_a_pick_has_left(make_heap_env, cubes):
-    env = make_heap_env(cubes((5, 1, 0)), render_mode="rgb_array")
-    env.reset(seed=0)
-    first = env.render()
-    assert first.shape == (480, 640, 3) and first.dtype == np.uint8
-    env.step(0)
-    empty = env.render()  # the conveyor's edge is at the rear wall then
-    assert not len(env.heap) and (empty != first).any() and (empty < 255).any()
-
-
 def test_the_stored_heaps_can_be_played():
     envs = [gymnasium.make("unload/Heap-v0", split=split, physics="coarse") for split in SPLITS]
     assert [len(env.unwrapped.heaps) for env in envs] == [70, 30]
