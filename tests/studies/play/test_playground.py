@@ -4,7 +4,6 @@
 """
 
 import base64
-import html
 import re
 from dataclasses import replace
 
@@ -70,14 +69,6 @@ def test_a_click_lifts_a_box_and_undo_takes_it_back(game):
     assert score(game) == [0, 0] and bytes(game.canvas.colours) == start
 
 
-def test_a_playground_opens_no_simulator(monkeypatch):
-    """Of 30 MiB each, which nobody would close: notebooks make one after the other."""
-    monkeypatch.setattr("unload.physics.local.World", None)
-    game = Playground(seed=4)
-    click(game, game.you.visible[0])
-    assert score(game)[1] == 1
-
-
 def test_the_seed_is_that_of_the_load_the_noise_and_random_picks(game):
     load, run = stack_load(np.random.default_rng(4)), game.runs["random"]
     alone, other = (Run("random", load, seed) for seed in (4, 0))
@@ -86,23 +77,6 @@ def test_the_seed_is_that_of_the_load_the_noise_and_random_picks(game):
     for each in (run, alone, other):
         each.play_to(5)
     assert run.picks == alone.picks != other.picks
-
-
-def test_all_players_have_as_many_picks_as_you(game):
-    for item in game.you.visible[:3]:
-        click(game, item)
-    expected = [("you", 3, game.you.unloaded())]
-    for name in game.runs:
-        alone = Run(name, game.you.load, 4)
-        expected.append((name, alone.play_to(3), alone.unloaded(3)))
-    assert game.standings() == expected
-    for name, picks, unloaded in expected:
-        row = f"<td align=right>{unloaded}</td><td align=right>{picks}</td>"
-        assert f"<td>{html.escape(name)}</td>" in game.board.value and row in game.board.value
-    game.player.value = "highest"
-    game.slider.value = 2
-    assert game.standings()[0] == ("you", 2, game.you.unloaded(2))
-    assert [row[1] for row in game.standings()] == [2] * 7
 
 
 def test_a_player_is_watched_by_the_slider(game):
