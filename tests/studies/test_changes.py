@@ -96,16 +96,6 @@ def test_failures_are_replaced_by_successes_of_the_same_step():
     assert arrays["actions"][320:384].tolist() == ([0, 20, 40, 60] * 16), "each success in turn"
 
 
-def test_a_teacher_chooses_by_height_and_its_preference(asking):
-    run, _ = asking
-    changes.taught(run, preference=0.5)
-    seen = np.array([[[0, 0, 0.5], [0, 1, 0.1], [1, 1, 0.2]]], np.float32)
-    best = run.agent.learner.best_actions
-    assert best(seen, np.array([[True, True, True]])) == 2
-    assert best(seen, np.array([[True, True, False]])) == 1
-    assert changes.best_actions(seen, np.array([[True, True, True]])) == 0
-
-
 @pytest.mark.parametrize(("given", "axes"), [({"axes": (1,)}, [1]), ({}, [0, 1])])
 def test_choices_see_other_signs_than_the_memory_holds(asking, given, axes):
     run, asked = asking

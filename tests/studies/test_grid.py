@@ -185,13 +185,3 @@ def test_dask_cluster_of_two_processes_equals_a_single_one(tmp_path, capfd):
         assert_same(tmp_path / "dask" / name, tmp_path / "one" / name)
         used.add(files.read_json(tmp_path / "dask" / name / "record.json")["process"])
     assert used == workers and len(used) == 2
-
-
-def test_runs_that_do_not_fit_the_memory_are_warned_of(monkeypatch):
-    config = TrainConfig()  # 1.6 GB each
-    pages = {"SC_PHYS_PAGES": 4 * 2**20, "SC_PAGE_SIZE": 1000}
-    monkeypatch.setattr(os, "sysconf", pages.get)
-    sweep._warn_of_memory({"one": config, "other": config}, 1)
-    message = "2 runs at once need 4.3 GB of memory, and this machine has 4.2 GB; take a smaller"
-    with pytest.warns(UserWarning, match=message):
-        sweep._warn_of_memory({"one": config, "other": config}, 8)

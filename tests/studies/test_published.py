@@ -16,7 +16,6 @@ import pytest
 from PIL import Image
 
 from studies import paths, style
-from studies.falls import figures as falls
 from studies.heap.table import compared
 from studies.paper import diagrams
 from studies.play import animation
@@ -206,5 +205,3 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
             assert found.info == published.info
             both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
             assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
-
-

@@ -111,14 +111,6 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     assert not more["reduced"]
 
 
-def test_a_table_is_read_and_of_a_missing_one_is_said_where_its_command_stands(own_data):
-    message = f"t.csv is missing; the command that makes it stands in a {own_data}/"
-    with pytest.raises(FileNotFoundError, match=message):
-        read_table("t")
-    (own_data / "t.csv").write_text("a,b,c\n1,,x\n", encoding="utf-8")
-    assert read_table("t").shape == (1, 3)
-
-
 def test_records_are_joined(monkeypatch):
     first = results.run_record(9.96)
     assert first["engine"] == engine_of() and first["wall_time_s"] == 10.0

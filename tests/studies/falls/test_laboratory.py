@@ -122,20 +122,6 @@ def test_teachers_and_loads_have_the_preferences_of_the_plan():
     assert cells.SHORT["max_picks"] + changes.DEEPEST == TrainConfig().max_picks
 
 
-@pytest.mark.parametrize("planned", [cells.CELLS, cells.FRESH])
-def test_names_of_cells_tell_the_mask_and_the_batch(planned):
-    for name, cell in planned.items():
-        assert cell.config.mask is ("no_mask" not in name), name
-        assert (cell.config.batch_size == 2048) is ("b2048" in name), name
-
-
-def test_long_runs_store_successes_alone_when_they_no_longer_explore():
-    cell, last = long.LONG.cells["successes"], long.EXPLORED - long.CONFIG.num_envs
-    assert cell.change.keywords == {"start": long.EXPLORED}
-    least = long.CONFIG.epsilon(long.CONFIG.picks)
-    assert cell.config.epsilon(long.EXPLORED) == least < cell.config.epsilon(last)
-
-
 def test_the_rule_was_fitted_on_the_published_networks():
     """Of 290 networks with the mask and ties of x broken by noise."""
     fitted = ["ranks", "mirrored", "shuffled", "untilted", "untilted_y", "averaged_y", "averaged_z"]
@@ -162,16 +148,6 @@ def test_a_slope_is_kept_from_sinking(cell, scaled):
     # What is learned in eleven steps in between differs a little, too.
     ratio = (weights["held"] / weights["plain"]).numpy()
     assert ratio == pytest.approx(1 + 0.05 * np.array(scaled), abs=0.02)
-
-
-def test_runs_are_traced(own_data, monkeypatch):
-    monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
-    monkeypatch.setattr(long, "CONFIG", replace(long.CONFIG, picks=64_000))
-    long.trace_data(1)
-    table = read_table("falls/long_trace")
-    assert list(table["seed"]) == [20, 20, 21, 21]
-    assert list(table["picks"]) == [31_936, 63_936] * 2
-    assert read_provenance("falls/long_trace")["settings"]["picks"] == 64_000
 
 
 def test_policies_and_networks_are_judged_alike(own_data, monkeypatch):

@@ -1,6 +1,6 @@
 """Policies compared, by the table and with all boxes simulated; cards, margin, and the outlook."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import partial
 from itertools import islice, product
 
@@ -13,7 +13,7 @@ from studies.policies import comparison, robustness, sb3, variants
 from studies.policies.comparison import PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.robustness import FRONT_WALLS, front_walls
-from studies.policies.variants import GRIDS, PARTS, judged
+from studies.policies.variants import judged
 from studies.results import read_provenance, read_table
 from tests.agent.runs import lowest
 from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
@@ -103,28 +103,15 @@ def test_the_recommended_policy_does_not_miss():
     assert measured[0]["picks"] == 500 * comparison.CARD_LOADS
 
 
-def piles(rng: np.random.Generator) -> Load:
-    """140 piles of two cubes each."""
-    x, y, z = np.meshgrid(0.5 * np.arange(14) + 0.25, 0.25 * np.arange(10) + 0.125, (0.1, 0.3))
-    positions = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
-    return Load(positions, np.full((len(positions), 3), 0.2))
-
-
 @pytest.mark.pybullet
-@pytest.mark.parametrize(
-    ("policy", "distance", "free", "jammed"),
-    [
-        (policies.highest, 0.4, 1.0, 0.0),
-        (policies.highest, 0.1, 1.0, 1.0),
-        (lowest, 0.1, 0.0, 0.0),
-        (lowest, 0.4, 0.0, 0.0),
-    ],
-)
-def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, distance, free, jammed):
-    monkeypatch.setattr(World, "pull", lambda *_: distance)
-    row = robustness.play(policy, "restore", 0, 20, piles)
-    assert row["free"] == free and row["jammed"] == jammed
-    assert row["success_rate"] == (distance > 0.2)
+@pytest.mark.parametrize(("policy", "free"), [(policies.highest, 1.0), (lowest, 0.0)])
+def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, free):
+    """In 140 piles of two cubes each, none of which is lifted far."""
+    x, y, z = np.meshgrid(0.5 * np.arange(14) + 0.25, 0.25 * np.arange(10) + 0.125, (0.1, 0.3))
+    piles = Load(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), np.full((280, 3), 0.2))
+    monkeypatch.setattr(World, "pull", lambda *_: 0.1)
+    row = robustness.play(policy, "restore", 0, 20, lambda rng: piles)
+    assert row == {"success_rate": 0, "free": free, "jammed": free}
 
 
 @pytest.mark.pybullet
@@ -189,21 +176,6 @@ def test_agents_of_another_library_are_trained_and_measured(own_data, monkeypatc
     assert (rows["cpu_s"] > 0).all() and (rows["seed"] == 1).all()
     again = sb3.trained("unload", "ranks", 1)[0]
     assert rows.query("agent == 'unload' and mask")["msr"].iloc[0] == pytest.approx(again["msr"])
-
-
-FREE = {"picks", "batch_size", "n_features", "seed"}  # what makes a grid affordable
-
-
-def test_each_cell_differs_from_the_paper_in_little():
-    varied = {"networks": {"network"}, "rewards": set()}
-    varied |= {"settings": {"learning_rate", "gradient_steps"}, "recommended": {"equalize"}}
-    paper = asdict(TrainConfig())
-    for name, cells in {**PARTS, "recommended": GRIDS["recommended"].cells}.items():
-        for cell in cells.values():
-            config = asdict(cell.config)
-            differing = {field for field in paper if paper[field] != config[field]}
-            assert differing <= varied[name] | FREE
-        assert len(set(map(repr, cells.values()))) == len(cells)
 
 
 def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
