@@ -198,27 +198,6 @@ def test_lifts_agree_with_the_table_of_lifts_but_for_boxes_that_tip_aside():
     assert tipped <= 20, "the page says 0.4 % of whole episodes"
 
 
-@needs_node
-def test_slopes_are_those_of_derivatives():
-    got = run_js(
-        """
-        const { config } = fromText("equalize=true");
-        const run = new Training(config, { ...given.task, num_envs: 8 });
-        for (let step = 0; step < 100; step++) run.step();
-        const { network, containers } = run;
-        result.parameters = [...network.parameters];
-        result.seen = containers.map(({ observation }) => [...observation]);
-        result.slopes = slopes(network, containers);
-        """
-    )
-    seen = np.array(got["seen"]).reshape(-1, 128, 3)
-    extractor = np.array(got["parameters"][:64]).reshape(16, 4)
-    upper = seen[seen[..., 2] >= np.median(seen[0, :, 2])]
-    opened = upper @ extractor[:, :3].T + extractor[:, 3] > 0
-    slopes = (opened * np.array(got["parameters"][64:80])) @ extractor[:, :3]
-    assert np.allclose(got["slopes"], slopes.mean(axis=0), atol=0.01)
-
-
 # What a preset's name says of its frozen weights at the end, and at their best.
 ENDS = {
     "positions": lambda end, best: end >= 0.999,
