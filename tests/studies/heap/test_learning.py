@@ -16,11 +16,7 @@ from studies.heap.learning import (
     save_networks,
 )
 from studies.heap.network import FateNetwork
-from studies.heap.observation import (
-    COLUMN,
-    COLUMNS,
-    ROWS,
-)
+from studies.heap.observation import COLUMN, COLUMNS, ROWS, SEEN, visible_boxes
 from studies.heap.policies import RULES, Oracle, best, linear, play
 
 
@@ -64,6 +60,15 @@ def test_the_oracle_believes_the_physics_of_the_environment(make_heap_env, cubes
     monkeypatch.setattr(oracle._rakes[0], "pick", lambda heap, box: nothing)
     episode = play(env, oracle, heap, 0)
     assert int(episode.boxes[0]) == 1 and episode.unloaded[0] == 3
+
+
+def test_few_pixels_show_no_box_unless_there_are_no_others_and_the_foremost_get_rows(cubes):
+    heap = cubes((5, 1, 0), (6, 1, 0), (4.5, 1, 0))
+    assert visible_boxes(heap, np.array([SEEN, SEEN - 1, 0])).tolist() == [0]
+    assert visible_boxes(heap, np.array([SEEN - 1, 0, 0])).tolist() == [1, 0, 2]
+    count = ROWS + 10
+    heap = cubes(*((x, 1, 0) for x in np.linspace(4, 7, count)))
+    assert visible_boxes(heap, np.full(count, 9)).tolist() == list(range(count - 1, 9, -1))
 
 
 BOXES = 6
