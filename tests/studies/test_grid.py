@@ -87,12 +87,12 @@ def test_what_is_measured_of_policies_is_published_with_them(trained):
     cells = {"plain": SMALL.cells["plain"]}
     measured = SMALL._replace(name="some/measured", cells=cells, measure=policy_size)
     grid.train_grid(measured, n_jobs=1)
-    rows = [["plain", 0, 4, 640], ["plain", 1, 4, 640]]
+    rows = [["plain", 0, 4, 0], ["plain", 1, 4, 1]]
     assert read_table("some/measured").to_numpy().tolist() == rows
 
 
 def policy_size(policy, config) -> dict:
-    return {"n_features": policy.network.n_features, "picks": config.picks}
+    return {"n_features": policy.network.n_features, "own_seed": config.seed}
 
 
 @pytest.fixture
