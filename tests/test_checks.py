@@ -74,11 +74,6 @@ def test_small_mistakes_in_the_algorithm_are_noticed():
     def ignores_the_mask(network, observations, allowed, epsilon, rng):
         return masked_dqn.choose(network, observations, np.ones_like(allowed), epsilon, rng)
 
-    def draws_once_more(network, observations, allowed, epsilon, rng):
-        actions = masked_dqn.choose(network, observations, allowed, epsilon, rng)
-        rng.random()
-        return actions
-
     def forgets_the_end(network, target, optimizer, picks, gamma):
         picks = [(*pick[:5], np.False_) for pick in picks]
         return masked_dqn.update(network, target, optimizer, picks, gamma)
@@ -88,7 +83,6 @@ def test_small_mistakes_in_the_algorithm_are_noticed():
 
     for number, wrong, line in (
         ("1", ignores_the_mask, "an item that the mask excludes"),
-        ("1", draws_once_more, "random numbers drawn"),
         ("2", forgets_the_end, "the loss of update 1 with γ = 0.5"),
         ("2", no_target, "the loss of update 1 with γ = 0.5"),
     ):

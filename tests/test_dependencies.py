@@ -11,8 +11,6 @@ from functools import cache
 from importlib.metadata import packages_distributions, version
 from pathlib import Path
 
-import pytest
-
 from tests import wheels
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -22,6 +20,7 @@ OF_THE_PACKAGE = ("train", "view")
 EXTRAS = PROJECT["optional-dependencies"]
 NEEDED = [*PROJECT["dependencies"], *(name for extra in OF_THE_PACKAGE for name in EXTRAS[extra])]
 LOWEST = dict(library.split(">=") for library in NEEDED)  # versions by name
+PINNED = {name: version for name, (version, _) in wheels.lines().items()}
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"make", "notebooks", "studies", "tests", "unload"}
 WITH_PYTHON = {"pip"}
@@ -44,11 +43,6 @@ RUN_ONLY = {
 def normal(name: str) -> str:
     """A distribution's name as indexes compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
-
-
-def pinned() -> dict[str, str]:
-    """Versions by name, as environment.txt gives them."""
-    return {name: version for name, (version, _) in wheels.lines().items()}
 
 
 def wanted_here() -> set[str]:
@@ -90,11 +84,6 @@ def distributions(folder: str) -> set[str]:
     return {normal(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or not installed
 
 
-def on_demand() -> set[str]:
-    """The names of the libraries that make targets of their own install."""
-    return {library.split("==")[0] for extra in ON_DEMAND for library in EXTRAS[extra]}
-
-
 def test_each_library_is_named_once_and_pinned():
     extras = {name: EXTRAS[name] for name in EXTRAS.keys() - {*OF_THE_PACKAGE, *ASIDE}}
     for extra in ON_DEMAND:
@@ -102,7 +91,7 @@ def test_each_library_is_named_once_and_pinned():
     engines = [line.partition("; ") for line in extras.pop("physics")]
     named = [*LOWEST, *(name for extra in extras.values() for name in extra)]
     assert all(name == normal(name) for name in named), "extras are names only"
-    assert sorted(named) == sorted(pinned())
+    assert sorted(named) == sorted(PINNED)
     # The reference where environment.txt has it, the other one elsewhere.
     assert [name for name, *_ in engines] == extras["mujoco"] + extras["pybullet"]
     there = engines[1][2].replace("'", '"')
@@ -126,42 +115,22 @@ def test_a_line_without_a_wheel_is_found(monkeypatch):
     assert ("pybullet", "Linux x86-64", 11) not in found and ("numpy", "Windows", 13) in found
 
 
-@pytest.mark.parametrize(
-    ("wheel", "fitting"),
-    [
-        ("x-1-py3-none-any.whl", 16),
-        ("x-1-cp312-cp312-win_amd64.whl", 1),
-        ("x-1-cp312-abi3-macosx_11_0_arm64.whl", 3),
-        ("x-1-cp311-cp311-macosx_15_0_arm64.whl", 0),  # a later macOS
-        ("x-1-cp311-cp311-macosx_10_9_universal2.whl", 1),
-        ("x-1-cp311-cp311-macosx_11_0_x86_64.whl", 0),
-        ("x-1-cp314-cp314t-win_amd64.whl", 0),  # without a global lock
-        ("x-1-cp314-cp314-manylinux_2_27_aarch64.manylinux_2_28_aarch64.whl", 1),
-        ("x-1-cp314-cp314-manylinux_2_34_x86_64.whl", 0),  # a later glibc
-        ("x-1-py3-none-musllinux_1_1_x86_64.whl", 0),
-    ],
-)
-def test_which_wheels_fit(wheel, fitting):
-    fits = [wheels.fits(wheel, system, m) for system in wheels.SYSTEMS for m in wheels.PYTHONS]
-    assert sum(fits) == fitting
-
-
 def test_what_is_pinned_is_not_below_the_lowest_version():
     for name, lowest in LOWEST.items():
-        parts = [[int(part) for part in each.split(".")] for each in (lowest, pinned()[name])]
+        parts = [[int(part) for part in each.split(".")] for each in (lowest, PINNED[name])]
         assert parts[0] <= parts[1], name
 
 
 def test_what_is_installed_is_what_is_pinned():
     """PyTorch's version may have a suffix that names its build, such as +cpu."""
     found = {name: version(name).split("+")[0] for name in wanted_here()}
-    assert found == {name: each for name, each in pinned().items() if name in found}
+    assert found == {name: each for name, each in PINNED.items() if name in found}
 
 
 def test_what_is_imported_is_named():
     engines = {*EXTRAS["pybullet"], *EXTRAS["mujoco"]}
     assert distributions("unload") == set(LOWEST) | engines
-    others = distributions("studies") - on_demand()
-    assert set(EXTRAS["studies"]) <= others
-    others |= (distributions("tests") | distributions("notebooks")) - on_demand()
-    assert distributions("unload") | others | set(RUN_ONLY) == set(pinned())
+    assert set(EXTRAS["studies"]) <= distributions("studies")
+    found = set().union(*map(distributions, ("unload", "studies", "tests", "notebooks")))
+    on_demand = {library.split("==")[0] for extra in ON_DEMAND for library in EXTRAS[extra]}
+    assert found - on_demand | set(RUN_ONLY) == set(PINNED)

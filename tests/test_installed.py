@@ -94,11 +94,6 @@ def test_a_wheel_holds_the_package_alone_and_needs_no_checkout(installed, tmp_pa
     assert [path.name for path in work.iterdir()] == ["run"]
 
 
-def test_the_checkout_is_found_from_anywhere(tmp_path):
-    """Notebooks, which run in their own folder, import the studies and are read by the tests."""
-    run("import notebooks.book.links, studies.paths", tmp_path, tmp_path)
-
-
 @pytest.mark.parametrize(
     ("used", "absent"),
     [

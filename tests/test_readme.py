@@ -197,11 +197,3 @@ def test_terms_are_explained_where_they_are_met(path):
     """In the README's first screen, the first cells of the course, and the reports."""
     text = run.opening(path).partition("\n## Look\n")[0]
     assert not unexplained(text, int(path.stem[:2]) if path.parent == run.HERE else -1)
-
-
-def test_an_unexplained_term_is_named_with_its_sentence():
-    text = "Some *tilt* is met. A tilt is a slope. Without the mask, MSR is low."
-    assert [term for term, _ in unexplained(text, -1)] == ["mask", "MSR"]
-    assert unexplained(text, 0) == []
-    assert unexplained("Boxes. A deadlock ends.", -1) == [("deadlock", " A deadlock ends")]
-    assert unexplained(text + " See [terms](../glossary.md).", -1) == []

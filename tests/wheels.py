@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 
+from pip._vendor.packaging.markers import Marker
+
 ROOT = Path(__file__).resolve().parents[1]
 LIST = Path(__file__).with_name("wheels.txt")
 PYTHONS = (11, 12, 13, 14)  # 3.x
@@ -33,15 +35,8 @@ def lines() -> dict[str, tuple[str, str]]:
 def is_wanted(marker: str, system: str, minor: int) -> bool:
     """Whether a marker lets a line be installed."""
     platform, machine, _ = SYSTEMS[system]
-    values = {"sys_platform": platform, "platform_machine": machine}
-    for name, operator, value in re.findall(r'(\w+) (==|<) "([\w.]+)"', marker):
-        if operator == "<":
-            allowed = minor < int(value.removeprefix("3."))
-        else:
-            allowed = values[name] == value
-        if not allowed:
-            return False
-    return True
+    place = {"sys_platform": platform, "platform_machine": machine}
+    return not marker or Marker(marker).evaluate(place | {"python_version": f"3.{minor}"})
 
 
 def fits(wheel: str, system: str, minor: int) -> bool:

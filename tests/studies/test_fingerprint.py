@@ -9,7 +9,6 @@ import torch
 
 from studies import fingerprint, paths
 from studies.fingerprint import short_runs, training_fingerprint
-from studies.networks import NETWORKS
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork, TrainConfig
 from unload.agent.training import INSTRUCTIONS
@@ -99,16 +98,3 @@ def test_only_what_changes_training_changes_the_fingerprint(monkeypatch):
     assert today != changed(TrainConfig, "epsilon", lambda self, picks: epsilon(self, picks + 64))
     seeds = TrainConfig.seeds
     assert today != changed(TrainConfig, "seeds", lambda self: seeds(self)[::-1])
-
-
-def test_each_network_has_its_fingerprint(monkeypatch):
-    with pytest.raises(ValueError, match="network is 'mlp'; expected one of 'peq'"):
-        training_fingerprint(["mlp"])
-    monkeypatch.setattr(fingerprint, "_curves", lambda network: f"curves of {network}")
-    kinds = NETWORKS | {"peq": "peq"}
-    single = {name: training_fingerprint([kind]) for name, kind in kinds.items()}
-    assert len(set(single.values())) == len(kinds)
-    both = training_fingerprint([kinds["stack"], "peq", kinds["stack"]])
-    assert both == training_fingerprint(["peq", kinds["stack"]])
-    assert both not in single.values()
-    assert single["peq"] == training_fingerprint()

@@ -1,6 +1,5 @@
 """The command line, and the files it has made in ``data/``."""
 
-import runpy
 import sys
 from functools import partial
 from importlib.util import find_spec
@@ -52,9 +51,7 @@ def test_paper_makes_every_part(called):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "the following arguments are required: part"),
         (["training", "--cells", "none"], "argument --cells: invalid choice: 'none'"),
-        (["observation", "--jobs", "1"], "unrecognized arguments: --jobs 1"),
         (["seamless", "--picks", "128"], "picks is 128; expected at least 2112"),
         (["paper", "--jobs", "0"], "--jobs is 0; expected a number of processes"),
         (["laboratory", "--seeds", "0"], "--seeds is 0; expected an integer >= 1"),
@@ -65,14 +62,6 @@ def test_what_nothing_can_run_with_is_refused_in_one_line(called, arguments, mes
         called(*arguments)
     last = capsys.readouterr().err.splitlines()[-1]
     assert last.startswith("python -m studies") and f" error: {message}" in last
-
-
-def test_help_names_every_part(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["studies", "--help"])
-    with pytest.raises(SystemExit):
-        runpy.run_path(command.__file__, run_name="__main__")
-    shown = " ".join(capsys.readouterr().out.split())
-    assert all(f" {name} {text} " in shown for name, (text, *_) in command.PARTS.items())
 
 
 def test_every_provenance_names_a_command_of_today():

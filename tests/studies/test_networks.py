@@ -83,8 +83,3 @@ def test_the_attention_network_is_two_blocks_with_normalization_first(items):
     values = torch.tanh(network.scorer(network.norm(own))).squeeze(2)
     assert len(network.blocks) == 2
     torch.testing.assert_close(network(batch), values)
-
-
-def test_an_odd_number_of_features_has_no_two_heads():
-    with pytest.raises(ValueError, match="n_features is 5; expected a multiple of 2"):
-        AttentionNetwork(5)

@@ -1,6 +1,5 @@
 """Results: kept, published, read back; and the records of where they come from."""
 
-import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -112,40 +111,20 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     assert not more["reduced"]
 
 
-def test_a_table_is_read_and_of_a_missing_one_is_said_where_its_command_stands(own_data):
-    message = f"t.csv is missing; the command that makes it stands in a {own_data}/"
-    with pytest.raises(FileNotFoundError, match=message):
-        read_table("t")
-    (own_data / "t.csv").write_text("a,b,c\n1,,x\n", encoding="utf-8")
-    assert read_table("t").shape == (1, 3)
-
-
 def test_records_are_joined(monkeypatch):
     first = results.run_record(9.96)
-    assert {"numba", "joblib", "torch", "mujoco-core", "numpy"} <= set(first["versions"])
     assert first["engine"] == engine_of() and first["wall_time_s"] == 10.0
-    resource = pytest.importorskip("resource")
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10
-    assert first["peak_memory_mib"] == pytest.approx(peak, rel=0.1)
     monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
-    assert results.run_record(1.0)["peak_memory_mib"] is None
-    nowhere = first | {"peak_memory_mib": None}
-    assert results.joined([nowhere, first])["peak_memory_mib"] == first["peak_memory_mib"]
-    assert results.joined([nowhere])["peak_memory_mib"] is None
-    kept_before = {name: value for name, value in first.items() if name != "engine"}
-    assert results.joined([kept_before])["engine"] == "pybullet"
+    nowhere = results.run_record(10.0)
+    assert nowhere["peak_memory_mib"] is results.joined([nowhere])["peak_memory_mib"] is None
     second = first | {"wall_time_s": 20.54, "peak_memory_mib": 10**6, "revision": "another"}
-    together = results.joined([first, second, first])
-    assert together["runs"] == 3
-    assert together["wall_time_s"] == 40.5
+    together = results.joined([first, second, nowhere])
+    assert (together["runs"], together["wall_time_s"]) == (3, 40.5)
     assert together["peak_memory_mib"] == 10**6
     assert together["revision"] == [first["revision"], "another"]
-    assert together["machine"] == first["machine"]
 
 
 def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
-    for name in [name for name in os.environ if name.startswith("GIT_")]:
-        monkeypatch.delenv(name)  # git sets them for its hooks; they lead to another repository
     found = revision.__wrapped__  # what it says is kept for a process
     monkeypatch.setattr(paths, "ROOT", tmp_path)
 
@@ -154,19 +133,16 @@ def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
         return subprocess.check_output(["git", *who, *command], cwd=tmp_path, text=True).strip()
 
     assert found() == "unknown"
-    for name in ("unload/task.py", "studies/grid.py"):
-        (tmp_path / name).parent.mkdir()
-        (tmp_path / name).touch()
+    for name in ("unload", "studies"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "more.py").touch()
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "theirs"]):
         git(*command)
     own = git("rev-parse", "--short=12", "HEAD")
     (tmp_path / "README.md").write_text("not part of the code", encoding="utf-8")
     assert found() == own
-    for name in ("unload/task.py", "studies/more.py"):
-        (tmp_path / name).write_text("changed", encoding="utf-8")
-        assert found() == f"{own}+"
-        (tmp_path / name).unlink()
-        git("checkout", "-q", ".")
+    (tmp_path / "unload/more.py").write_text("changed", encoding="utf-8")
+    assert found() == f"{own}+"
     monkeypatch.setattr(paths, "ROOT", tmp_path / "studies")
     assert found() == "unknown", "the enclosing repository is another one"
 

@@ -8,59 +8,22 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from sb3_contrib import MaskablePPO
-from stable_baselines3.common.env_util import make_vec_env
 
 import unload
 from studies.policies.sb3 import containers, dqn
-from studies.results import read_provenance, read_table
 from studies.speed import mutants, parts, run
-from studies.speed.parts import best_times, lift_rates, pick_rates, update_times
+from studies.speed.parts import lift_rates, pick_rates, update_times
 from unload.agent import learner
 from unload.fast import fused
 
 
-def test_best_times_takes_the_least_and_leaves_the_first_call_out(monkeypatch):
-    clock = iter([0.0, 3.0, 10.0, 12.0, 20.0, 25.0])
-    monkeypatch.setattr("time.perf_counter", lambda: next(clock))
-    monkeypatch.setattr(parts, "ROUNDS", 3)
-    calls = []
-    assert best_times({"call": lambda: calls.append(1)}) == {"call": 2.0}
-    assert len(calls) == 4
-
-
 def test_stable_baselines_trains_the_papers_network():
-    small = {"num_envs": 4, "batch_size": 8, "replay_size": 64, "n_features": 6, "max_picks": 3}
-    config = unload.TrainConfig(picks=32, **small)
+    config = unload.TrainConfig(num_envs=4, replay_size=64, n_features=6)
     model = dqn(config, containers(config))
     network = model.q_net.q_net
-    assert type(network) is unload.PEQNetwork
-    assert network.n_features == 6
+    assert type(network) is unload.PEQNetwork and network.n_features == 6
     assert len(list(model.q_net.parameters())) == 4  # nothing beside the network
-    before = [parameter.detach().clone() for parameter in network.parameters()]
-    model.learn(32)
-    assert not any(torch.equal(old, new) for old, new in zip(before, network.parameters()))
-    observations = model.env.reset()
-    values = network(torch.from_numpy(observations))
-    chosen, _ = model.predict(observations, deterministic=True)
-    assert np.array_equal(chosen, values.argmax(dim=1))
     model.env.close()
-
-
-def test_maskable_ppo_learns_on_64_containers():
-    envs = make_vec_env("unload/Container-v0", 64, env_kwargs={"physics": "table", "max_picks": 50})
-    model = MaskablePPO(
-        "MlpPolicy", envs, n_steps=16, batch_size=256, gamma=0, learning_rate=1e-3, seed=0,
-        device="cpu",
-    )  # fmt: skip
-    model.learn(10_000)
-    assert model.ep_info_buffer[0]["l"] == 50
-
-    def policy(observations, masks, rng):
-        return model.predict(observations, action_masks=masks, deterministic=True)[0]
-
-    assert unload.evaluate(policy, 10, max_picks=50)["success_rate"].mean() > 0.98
-    envs.close()
 
 
 @pytest.mark.pybullet
@@ -112,21 +75,6 @@ def test_no_box_of_new_loads_repeats(rng):
     assert len({tuple(size) for load in loads for size in load.sizes.round(6)}) == 2 * 672
 
 
-def test_speeds_are_printed_and_published_with_ratios(own_data, monkeypatch, capsys):
-    for name, rates in {
-        "lift_rates": {"full": 2.0, "table": 12345.0},
-        "pick_rates": {"one": 4.0},
-        "update_times": {"PyTorch": 8.0, "fused": 2.0},
-        "training_rates": {"theirs": 5.0, "here": 4.0},
-    }.items():
-        monkeypatch.setattr(run, name, lambda *load, rates=rates: rates)
-    run.main()
-    assert read_table("benchmarks/speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
-    said = capsys.readouterr()
-    assert "12,300 lifts/s 6,170 ×" in said.out and "measuring: training" in said.err
-    assert read_provenance("benchmarks/benchmarks")["runs"] == 1
-
-
 def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
     seen = {}
 
@@ -149,40 +97,16 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
     }
 
 
-def test_a_mutant_is_one_small_change_in_one_line(tmp_path):
-    """Not in annotations, decorators, raised errors or texts."""
-    path = tmp_path / "module.py"
-    lines = [
-        "@cache(1)", "def größer(a: Literal[1], é=True):", "    'ä < 1'", "    if not é and a < 2:",
-        "        raise ValueError(a + 3)", "    print(f'{a + 1}')", "    return a ** 3 // 2",
-    ]  # fmt: skip
-    path.write_text("\n".join(lines), encoding="utf-8")
-    found = []
-    for same, line, mutation, code in mutants.mutants(path):
-        after = code.decode().splitlines()
-        assert same == path
-        assert [n for n, (one, other) in enumerate(zip(lines, after), 1) if one != other] == [line]
-        found.append((mutation, after[line - 1].strip()))
-    assert sorted(found) == [
-        ("2 -> 5", "if not é and a < (5):"),
-        ("2 -> 5", "return a ** 3 // (5)"),
-        ("3 -> 7", "return a ** (7) // 2"),
-        ("True -> False", "def größer(a: Literal[1], é=(False)):"),
-        ("a ** 3 -> a * 3", "return (a * 3) // 2"),
-        ("a ** 3 // 2 -> a ** 3 * 2", "return (a ** 3 * 2)"),
-        ("a < 2 -> a <= 2", "if not é and (a <= 2):"),
-        ("not é -> é", "if (é) and a < 2:"),
-        ("not é and a < 2 -> not é or a < 2", "if (not é or a < 2):"),
-        ("print(f'{a + 1}') -> pass", "pass"),
-    ]
-
-
 CODE = """
 compiled = staticmethod
 
 @compiled
 def total(a, b):
     return a + b
+
+def refuse(a: list[1]):
+    "1 < 2"
+    raise ValueError(1 + 2)
 
 UNUSED = 1 * 2
 """
@@ -204,7 +128,7 @@ def test_in_vain():
 
 
 def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys):
-    """In a project of one room."""
+    """In a project of one room; annotations, texts and raised errors are not changed."""
     room, path, table = "unload/sums", tmp_path / "unload/sums/sums.py", tmp_path / "mutants.csv"
     for folder in ("unload/sums", "tests/sums"):
         (tmp_path / folder).mkdir(parents=True)
@@ -223,9 +147,9 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     assert pd.read_csv(table, keep_default_na=False).to_numpy().tolist() == [
         ["other", "a", 1, "b", ""],
         [room, "sums", 6, "a + b -> a - b", "tests/sums/test_sums.py::test_total"],
-        [room, "sums", 8, "1 * 2 -> 1 / 2", ""],
-        [room, "sums", 8, "1 -> 3", ""],
-        [room, "sums", 8, "2 -> 5", ""],
+        [room, "sums", 12, "1 * 2 -> 1 / 2", ""],
+        [room, "sums", 12, "1 -> 3", ""],
+        [room, "sums", 12, "2 -> 5", ""],
     ]
     trees: SimpleQueue = SimpleQueue()
     trees.put(tmp_path)

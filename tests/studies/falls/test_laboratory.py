@@ -24,13 +24,15 @@ from unload.network.peq import PEQNetwork
 
 
 @pytest.mark.slow
-def test_a_published_run_is_trained_and_measured_again():
-    """The first one that falls."""
+@pytest.mark.parametrize(
+    "cell", ["ranks", "perfect_successes", "level_taught_0.4", "shuffled_watching_ranks"]
+)
+def test_a_published_run_is_trained_and_measured_again(cell):
+    """The first one that falls, and runs with most of the changes on the way."""
     published = read_table("falls/laboratory").set_index(["cell", "seed"])
-    expected = published.loc["ranks", cells.FIRST_SEED].to_dict()
-    row = laboratory.run_cell("ranks", cells.CELLS["ranks"], cells.FIRST_SEED)["row"]
+    expected = published.loc[cell, cells.FIRST_SEED].to_dict()
+    row = laboratory.run_cell(cell, cells.CELLS[cell], cells.FIRST_SEED)["row"]
     assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
-    assert row["end"] < 0.9 and row["judged_place"] == 1
 
 
 def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
@@ -53,7 +55,6 @@ def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
     assert ranks[tilts].tolist() == pytest.approx(trace[tilts].mean().tolist(), rel=1e-3)
 
     run = laboratory.train_in_laboratory(config)
-    assert run.rollout.envs.closed
     curve = run.curve.table().set_index("picks")["success_rate"]
     assert ranks["mean"] == pytest.approx(curve.mean(), rel=1e-3)
     assert ranks["end"] == pytest.approx(curve[curve.index > 28_800].mean(), rel=1e-3)
@@ -64,14 +65,9 @@ def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
     fresh = read_table("falls/fresh")
     assert fresh["judged_averaged_x"].tolist() == pytest.approx([averaged], 1e-3)
 
-    assert not (own_data / "reduced").exists()
     laboratory.laboratory_data(["mirrored"], n_jobs=1)
-    assert [path.name for path in (own_data / "reduced/falls").glob("*.csv")] == ["laboratory.csv"]
-    assert read_provenance("reduced/falls/laboratory")["reduced"]
-    full = (own_data / "falls/laboratory.csv").stat().st_mtime_ns
-    laboratory.laboratory_data([*small], seeds=1, n_jobs=1)
-    assert len(read_table("reduced/falls/laboratory")) == 2
-    assert (own_data / "falls/laboratory.csv").stat().st_mtime_ns == full
+    assert read_table("reduced/falls/laboratory")["cell"].tolist() == ["mirrored"]
+    assert len(read_table("falls/laboratory")) == 2
 
 
 @pytest.mark.parametrize(
@@ -126,29 +122,6 @@ def test_teachers_and_loads_have_the_preferences_of_the_plan():
     assert cells.SHORT["max_picks"] + changes.DEEPEST == TrainConfig().max_picks
 
 
-@pytest.mark.parametrize("planned", [cells.CELLS, cells.FRESH])
-def test_names_of_cells_tell_the_mask_and_the_batch(planned):
-    for name, cell in planned.items():
-        assert cell.config.mask is ("no_mask" not in name), name
-        assert (cell.config.batch_size == 2048) is ("b2048" in name), name
-
-
-def test_long_runs_store_successes_alone_when_they_no_longer_explore():
-    cell, last = long.LONG.cells["successes"], long.EXPLORED - long.CONFIG.num_envs
-    assert cell.change.keywords == {"start": long.EXPLORED}
-    least = long.CONFIG.epsilon(long.CONFIG.picks)
-    assert cell.config.epsilon(long.EXPLORED) == least < cell.config.epsilon(last)
-
-
-@pytest.mark.parametrize(("cell", "label"), cells.WATCHING.items())
-def test_a_label_says_who_chooses_and_who_watches(cell, label):
-    """By how the choosing one ends in the published runs."""
-    chooser, watcher = (part.split() for part in label.split(", "))
-    assert (chooser[-1], watcher[-1]) == ("choose", "watch")
-    published = read_table("falls/laboratory").query("cell == @cell")["end"].mean()
-    assert (published > 0.99) == (chooser[0] == "shuffled")
-
-
 def test_the_rule_was_fitted_on_the_published_networks():
     """Of 290 networks with the mask and ties of x broken by noise."""
     fitted = ["ranks", "mirrored", "shuffled", "untilted", "untilted_y", "averaged_y", "averaged_z"]
@@ -177,16 +150,6 @@ def test_a_slope_is_kept_from_sinking(cell, scaled):
     assert ratio == pytest.approx(1 + 0.05 * np.array(scaled), abs=0.02)
 
 
-def test_runs_are_traced(own_data, monkeypatch):
-    monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
-    monkeypatch.setattr(long, "CONFIG", replace(long.CONFIG, picks=64_000))
-    long.trace_data(1)
-    table = read_table("falls/long_trace")
-    assert list(table["seed"]) == [20, 20, 21, 21]
-    assert list(table["picks"]) == [31_936, 63_936] * 2
-    assert read_provenance("falls/long_trace")["settings"]["picks"] == 64_000
-
-
 def test_policies_and_networks_are_judged_alike(own_data, monkeypatch):
     """One published policy and one network without training, in one container with the mask."""
     monkeypatch.setattr(long, "UNTRAINED", 1)
@@ -201,7 +164,6 @@ def test_policies_and_networks_are_judged_alike(own_data, monkeypatch):
     assert (trained.cell, drawn.cell) == ("paper_no_mask", "untrained")
     assert trained.judged_place == 1 > trained.judged_as_is and drawn.judged_as_is < 0.9
     assert trained.judged_as_is == evaluate(policy, 1, 0, mask=True)["success_rate"].mean()
-    assert len(list((own_data / "runs/published").iterdir())) == 2
     policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
     long.published_data(n_jobs=1)
     assert len(list((own_data / "runs/published").iterdir())) == 3
@@ -213,15 +175,6 @@ def test_the_published_table_holds_every_policy():
     assert sorted(rows["cell"] + "/seed_" + rows["seed"].astype(str)) == sorted(planned)
     assert read_provenance("falls/published")["settings"] == long.LOADS
     assert long.UNTRAINED == 36
-
-
-@pytest.mark.parametrize(("cells", "parts"), [(None, 3), (["ranks"], 1)])
-def test_of_some_long_runs_alone_nothing_is_traced_or_judged(cells, parts, monkeypatch):
-    made = []
-    for name in ("train_grid", "trace_data", "published_data"):
-        monkeypatch.setattr(long, name, lambda *_, name=name, **__: made.append(name))
-    long.falls_data(cells)
-    assert made == ["train_grid", "trace_data", "published_data"][:parts]
 
 
 @pytest.fixture
@@ -239,10 +192,6 @@ def network():
 @pytest.fixture
 def observations():
     return np.random.default_rng(0).uniform(-1, 1, (40, 128, 3)).astype(np.float32)
-
-
-def test_slopes_are_those_of_the_score(network, observations):
-    assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
 
 
 @pytest.mark.parametrize("name", ["two_layer", "stack", "attention"])

@@ -1,14 +1,12 @@
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from studies.heap.generate import SPLITS, settled_heap, stored_heaps
-from studies.heap.learning import Learned, fit
-from studies.heap.network import FateNetwork
+from studies.heap.generate import SPLITS
 from studies.heap.observation import ROWS
-from studies.heap.policies import Oracle, Picks, linear
+from studies.heap.policies import Oracle, linear
 from studies.heap.rake import Rake
 from unload import task
 
@@ -20,20 +18,6 @@ def test_gymnasium_finds_nothing_wrong(make_heap_env, pile, cubes):
     """The seed decides which heap it is, too."""
     heaps = pile, cubes((5, 1, 0)), cubes((5, 1, 0), (5, 1, 1))
     check_env(make_heap_env(*heaps, render_mode="rgb_array"))
-
-
-def test_a_picture_shows_what_a_pick_has_left(make_heap_env, cubes):
-    env, plain = make_heap_env(cubes((5, 1, 0)), render_mode="rgb_array"), make_heap_env()
-    with pytest.raises(ResetNeeded):
-        env.render()
-    plain.reset(seed=0)
-    assert plain.render() is None
-    env.reset(seed=0)
-    first = env.render()
-    assert first.shape == (480, 640, 3) and first.dtype == np.uint8
-    env.step(0)
-    empty = env.render()  # the conveyor's edge is at the rear wall then
-    assert not len(env.heap) and (empty != first).any() and (empty < 255).any()
 
 
 def test_the_stored_heaps_can_be_played():
@@ -98,24 +82,17 @@ def test_bad_actions_and_rows_without_a_box_change_nothing(make_heap_env):
         env.step(0)
     observation, _ = env.reset(seed=0)
     before = env.heap
-    for action, error in ((-1, ValueError), (ROWS, ValueError), (0.5, TypeError)):
-        with pytest.raises(error, match=f"action is {action}"):
-            env.step(action)
+    with pytest.raises(ValueError, match=f"action is {ROWS}"):
+        env.step(ROWS)
     after, reward, terminated, truncated, info = env.step(np.array(ROWS - 1))
     assert env.heap is before and (after == observation).all()
     assert reward == 0 and not terminated and not truncated
     assert info["box"] == -1 and info["moved"] == 0 and not info["came"]
-    for _ in range(2):
-        env.close()
-    with pytest.raises(ClosedEnvironmentError):
-        env.reset()
 
 
 BAD_INPUT = {
     "physics is 'full'; expected one of 'whole'": lambda make, pile: Rake("full"),
     "box is 9; expected an integer >= 0 and <= 8": lambda make, pile: Rake("coarse").pick(pile, 9),
-    "rng is 0; expected a numpy.random.Generator": lambda make, pile: settled_heap(0),
-    "split is 'all'; expected one of 'train'": lambda make, pile: stored_heaps("all"),
     "max_picks is 0; expected an integer >= 1": lambda make, pile: make(max_picks=0),
     "render_mode is 'human'": lambda make, pile: make(render_mode="human"),
     "expected a Heap that holds a box": lambda make, pile: make().reset(
@@ -123,12 +100,6 @@ BAD_INPUT = {
     ),
     "a column is 'colour'; expected one of 'behind'": lambda make, pile: linear({"colour": 1}),
     "falls_weight is -2; expected a number >= 0": lambda make, pile: Oracle(make(), -2),
-    "n_features is 0; expected an integer >= 1": lambda make, pile: FateNetwork(0),
-    "steps is 0; expected an integer >= 1": lambda make, pile: fit(
-        Picks(*np.zeros((5, 1))), 0, steps=0
-    ),
-    "picks is empty": lambda make, pile: fit(Picks(*np.zeros((5, 0))), 0),
-    "networks is empty": lambda make, pile: Learned([]),
 }
 
 

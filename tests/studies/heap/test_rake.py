@@ -79,12 +79,6 @@ def test_the_shipped_heaps_are_what_the_generator_makes(real_heap):
     assert identity(real_heap) == identity(stored_heaps("train")[60])
 
 
-def test_a_heap_is_disordered_and_of_the_packages_of_neat_loads(real_heap):
-    assert (real_heap.tilts() > np.radians(10)).mean() > 0.3
-    package = [7 / 12, 25 / 36, 15 / 36]  # m
-    assert package_sizes(np.array([0]))[0] == pytest.approx(package)
-
-
 def test_heaps_that_are_small_or_stick_out_or_move_are_rejected(real_heap):
     assert _accepted(real_heap.only(np.arange(80)), fastest=0.1)
     assert not _accepted(real_heap.only(np.arange(79)), fastest=0.1)

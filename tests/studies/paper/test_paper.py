@@ -14,7 +14,6 @@ from studies.paper import numbers, training, tuning
 from studies.paper.training import PAPER
 from studies.paper.tuning import tuning_grid
 from studies.results import read_table
-from tests.studies.curves import course
 from unload import TrainConfig, load_policy, task
 from unload.support import files
 
@@ -29,54 +28,18 @@ def test_what_differs_does_not_agree(monkeypatch):
     assert agrees.tolist()[1:4] == ["no"] * 3 and agrees["MSR of random picks"] == "yes"
 
 
-# Of ten million picks: it falls, rises and falls.
-LOSS = np.r_[np.linspace(1, 0.1, 7), np.linspace(0.1, 0.8, 7), np.linspace(0.8, 0.2, 6)]
-RISE, WAVES = np.linspace(0.15, 0.5, 14), 0.02 * np.resize([1, -1], 6)
-COURSES = {  # of three runs, and what agrees
-    "like the paper's": (
-        [np.r_[RISE, np.linspace(0.55, end, 6) + WAVES] for end in (0.61, 0.62, 0.63)],
-        ["yes"] * 6,
-    ),
-    "of a higher mean": (
-        [np.linspace(0.15, end, 20) for end in (0.67, 0.68, 0.69)],
-        ["yes", "no", "yes", "no", "yes", "yes"],
-    ),
-}
-
-
-@pytest.mark.parametrize("name", COURSES)
-def test_runs_agree_with_the_paper_by_the_plan(name, monkeypatch):
-    rates, agree = COURSES[name]
-    runs = [course(msr, LOSS).assign(cell="paper_mask", seed=i) for i, msr in enumerate(rates)]
-    monkeypatch.setattr(numbers, "read_grid", lambda *_, **__: pd.concat(runs))
-    found = numbers.training()["with the mask, b = 256"]
-    assert [text.rpartition(": ")[2] for text in found] == agree
-
-
-@pytest.mark.parametrize(
-    ("cells", "picks", "written"),
-    [
-        (None, None, True),
-        (["paper_mask", training.DEFAULTS], None, True),
-        (["paper_mask"], None, False),
-        (None, 64_000, False),
-    ],
-)
-def test_policies_play_elsewhere_once_their_cell_is_trained(
-    cells, picks, written, tmp_path, monkeypatch
-):
-    trained = []
-    monkeypatch.setattr(training, "train_grid", lambda *given: trained.append(given))
+def test_policies_play_elsewhere_once_their_cell_is_trained(tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "train_grid", lambda *given: None)
     monkeypatch.setattr(files, "SHIPPED", tmp_path)
-    training.training_data(cells, picks)
-    assert trained == [(PAPER, cells, picks, -1)]
+    for cells, picks in ((["paper_mask"], None), (None, 64_000)):
+        training.training_data(cells, picks)
+        assert not list(tmp_path.iterdir())
+    training.training_data()
     policies = read_policies(paths.DATA / "falls/paper.safetensors")
     assert [*policies] == [*PAPER.configs()]
     for seed, name in {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}.items():
         weights = policies[f"{training.DEFAULTS}/seed_{seed}"].network.state_dict()
-        file = tmp_path / "policies" / f"{name}.safetensors"
-        assert file.exists() == written
-        for each in (name, file)[: 1 + written]:  # what ships is the same
+        for each in (name, tmp_path / f"policies/{name}.safetensors"):  # what ships is the same
             stored = load_policy(each).network.state_dict()
             assert all(stored[key].equal(weights[key]) for key in weights)
 
@@ -112,14 +75,10 @@ def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch)
     curves = tuning.read_curves("success_rate", 8, 1e-3)
     assert np.array_equal(curves[1], table["b8/with_fe_lr_0.001/seed_1"])
     summary = tuning.tuning_summary().set_index("batch_size")
-    assert summary["runs"].tolist() == [2, 2]
     mean = np.mean([run.mean() for run in curves.values()])
     assert summary.loc[8, "final_msr"] == pytest.approx(mean)
     (path,) = (own_data / "dummy_sim_with_hist_equal").iterdir()
     assert path.name == "loss_curve_bz_8_lr_0.001_agent_1.csv"
-    lines = path.read_text(encoding="utf-8").splitlines()
-    losses = tuning.read_curves("loss", 8, 1e-3)[1]
-    assert lines[0] == "nan" and np.array_equal(np.array(lines, float), losses, equal_nan=True)
 
 
 def test_committed_files_of_the_papers_plots_are_those_of_the_tables(own_data):

@@ -5,7 +5,7 @@ import pytest
 
 import unload
 from studies.play import animation
-from studies.play.episode import PLAYERS, Episode, Pick, Run, explain, policy_of
+from studies.play.episode import Episode, Run
 from tests.agent.runs import lowest
 from tests.env.comparing import make_env
 from unload import policies
@@ -69,41 +69,6 @@ def test_moments_are_remembered_and_picks_can_be_taken_back(episode):
         assert episode.picks == picks[:count]
         assert all(map(np.array_equal, now(), seen[count]))
     assert [episode.pick(pick.item) for pick in picks] == picks
-
-
-def test_what_can_be_lifted_is_lifted(episode):
-    liftable = episode.liftable()
-    assert 0 < len(liftable) < len(episode.visible)
-    for item in episode.visible:
-        assert episode.pick(int(item)).success == (item in liftable)
-        episode.back_to(0)
-    episode.pick(int(liftable[0]))
-    assert np.array_equal(episode.liftable(0), liftable)
-    assert liftable[0] not in episode.liftable()
-
-
-@pytest.mark.parametrize(
-    ("pick", "words"),
-    [
-        (Pick(7, 0.46, True, (), False), "Item 7 moved by 0.46 m, because nothing rests on it"),
-        (Pick(7, 0.24, True, (8,), False), "1 box rests on it, but tipped aside"),
-        (Pick(7, 0.009, False, (8, 9), False), "moved by 9 mm, because 2 boxes rest on it"),
-        (Pick(7, 0.0, False, (8,), True), "this is a deadlock"),
-    ],
-)
-def test_a_pick_is_explained(pick, words):
-    assert words in explain(pick)
-    assert ("failed" in explain(pick)) == (not pick.success)
-
-
-def test_each_player_picks_as_evaluate_lets_it(full_load):
-    """Random numbers are drawn otherwise, therefore the random player is left out."""
-    for player in set(PLAYERS) - {"random"}:
-        run = Run(player, full_load, seed=5, mask=False)
-        assert run.play_to(40) == 40
-        envs = {"stack": lambda rng: full_load, "position_noise": 0.0}
-        table = unload.evaluate(policy_of(player), 1, max_picks=40, mask=False, **envs)
-        assert abs(run.unloaded() - table["unloaded"][0]) <= 2  # the noise differs
 
 
 def test_a_run_is_the_same_however_it_is_played(full_load):

@@ -10,17 +10,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from studies import grid, paths
+from studies import paths
 from studies.falls.laboratory import CONFIG
-from studies.grid import Cell, Grid, read_grid
+from studies.grid import read_grid
 from studies.results import read_table
 from studies.seamless import training
 from studies.seamless.jamming import jam, neighbours
 from studies.seamless.jams import place
 from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
 from studies.statistics import seamless_plan
-from tests.studies.curves import curve
-from unload import TrainConfig, task
+from unload import task
 from unload.agent.training import Training
 from unload.load.boxes import Load
 
@@ -38,18 +37,6 @@ def test_the_jams_of_the_next_episode_are_others():
     run.rollout.close()
     free = np.maximum(*found) >= task.LIFT_THRESHOLD
     assert (found[0] != found[1])[free].mean() == pytest.approx(2 / 3, abs=0.1)
-
-
-def test_a_masked_box_is_tried_again_and_its_mask_is_kept():
-    """Which no run does but where all boxes are masked."""
-    run = Training(replace(CONFIG, seed=3), change=partial(jam, share=0.0))
-    envs, actions = run.rollout.envs.unwrapped, np.full(run.config.num_envs, 5)
-    before = envs._look_up(actions)[1].copy()
-    envs._containers.masks[:, 5] = 0
-    envs._containers.failed[:, 5] = 0.123
-    assert (envs._look_up(actions)[1] == before).all()
-    assert (envs._containers.masks[:, 5] == 0).all()
-    run.rollout.close()
 
 
 def test_neighbours_are_those_of_the_measured_places():
@@ -100,28 +87,6 @@ def test_the_first_episode_of_a_published_run_is_trained_again(name):
         assert found[column] == pytest.approx(published[column], rel=1e-4)
 
 
-def test_a_full_grid_leaves_what_the_papers_plots_read(own_data, monkeypatch):
-    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
-    config = TrainConfig(picks=64 * 500, batch_size=64, n_features=4, log_interval=500)
-    cells = {EXPORTED[0]: Cell(config, [EXPORTED[1]], training.ANEW)}
-    small = Grid("seamless/runs", "make it", cells)
-    for name, value in (("SEAMLESS", small), ("CELLS", cells)):
-        monkeypatch.setattr(training, name, value)
-    training.seamless_data(n_jobs=1)
-    curve = read_grid(small)
-    for name in NAMES:
-        table = pd.read_csv(own_data / name)
-        assert list(table.columns) == ["Wall time", "Step", "Value"]
-        assert table["Step"].tolist() == curve["picks"].tolist()
-    reward = table["Value"] / 500
-    assert ((reward + 1) / 2).tolist() == pytest.approx(curve["success_rate"].tolist(), abs=1e-5)
-    # Neither of other cells nor of shorter runs.
-    monkeypatch.setattr(training, "train_grid", lambda *_: own_data)
-    monkeypatch.setattr(training, "export", lambda *_: pytest.fail("exported"))
-    training.seamless_data(["mask_order"])
-    training.seamless_data(None, 64_000)
-
-
 def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path, monkeypatch):
     curves = read_grid(training.SEAMLESS, cells=[EXPORTED[0]])
     found = seamless_plan(curves[curves["seed"] == EXPORTED[1]])
@@ -142,26 +107,3 @@ def test_measured_jams_are_those_of_the_published_table():
         found = table.pivot(index="covered", columns="beside", values="share")
         # Three of the twenty episodes had not been played when the plan was written.
         assert found.to_numpy() == pytest.approx(shares, abs=0.1)
-
-
-RISE = np.linspace(0.2, 0.5, 20)
-
-
-@pytest.mark.parametrize(
-    ("figure", "run", "like"),
-    [
-        ("fig12", curve([0.15, 0.6, 0.6]), True),
-        ("fig12", curve([0.26, 0.6, 0.6]), False),  # the start
-        ("fig12", curve([0.15, 0.6, 0.75]), False),  # the end
-        ("fig12", curve([0.15, 0.6, 0.45]), False),
-        ("fig12", curve([0.15, 0.6, 0.56, 0.6]), True),  # four points down
-        ("fig12", curve([0.15, 0.6, 0.53, 0.6]), False),
-        ("fig11", curve([0.5], loss=[0.3, 0.2, *RISE, 0.45]), True),
-        ("fig11", curve([0.5], loss=[0.2, *RISE, 0.45]), False),  # does not fall first
-        ("fig11", curve([0.5], loss=[0.3, 0.2, *RISE, *[0.3] * 8]), False),  # sinks by over half
-        ("fig11", curve([0.5], loss=[0.3, 0.2, *RISE]), True),
-        ("fig11", curve([0.5], loss=[0.5, 0.4, 0.3, 0.2]), False),  # does not rise
-    ],
-)
-def test_a_run_is_like_fig_12_by_its_msr_and_like_fig_11_by_its_loss(figure, run, like):
-    assert seamless_plan(run)[figure] is like

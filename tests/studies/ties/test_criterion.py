@@ -11,11 +11,10 @@ from studies import paths
 from studies.grid import read_grid
 from studies.results import read_provenance, read_table
 from studies.ties import creep, earlier, leak, training
-from studies.ties.criterion import ENDS, FIG11, FIG12, STARTS, likeness, open_course
-from studies.ties.figures import KINDS, draw_ends, read_by_ties
-from studies.ties.laboratory import CELLS, mirrored_load
+from studies.ties.criterion import FIG11, FIG12, likeness
+from studies.ties.figures import draw_ends, read_by_ties
+from studies.ties.laboratory import CELLS
 from tests.studies.curves import course
-from unload import stack_load, task
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
 # noisier after the loss's peak.
@@ -43,15 +42,6 @@ def test_each_part_of_the_criterion_is_missed_by_a_run_of_its_own(part, rates, l
     assert [name for name in FIG12 + FIG11 if not found[name]] == ([part] if part else [])
     assert found["fig12"] == (part not in FIG12) and found["fig11"] == (part not in FIG11)
     assert found["both"] == (part is None)
-
-
-def test_a_run_like_the_papers_keeps_to_what_its_words_leave_open():
-    """A straight rise marks one side, where it may end the other; a late rise leaves both."""
-    share = np.linspace(0, 1, len(RATES))
-    low, high = open_course(share)
-    assert (low <= RATES).all() and (RATES <= high).all()
-    assert np.allclose([low[0], high[0], low[-1], high[-1]], [*STARTS, *ENDS])
-    assert np.allclose(np.diff(low, 2), 0) and (0.15 + 0.45 * share**3 < low).any()
 
 
 def test_the_cells_are_those_of_the_plan():
@@ -84,10 +74,8 @@ def test_the_runs_of_the_first_plan_are_all_there():
 
 def test_ends_are_drawn_by_mask_and_ties():
     runs = read_by_ties()
-    figure = draw_ends(runs)
-    dots = [sum(len(line.get_xdata()) for line in axes.lines[:-1]) for axes in figure.axes]
+    dots = [sum(len(line.get_xdata()) for line in axes.lines[:-1]) for axes in draw_ends(runs).axes]
     assert dots == [runs["mask"].sum(), (~runs["mask"]).sum()]
-    assert {label.replace("\n", " ") for label in KINDS} >= {*runs["ties"]}
 
 
 @pytest.mark.parametrize("ties", ["order", "noise"])
@@ -99,13 +87,6 @@ def test_order_tells_which_box_is_the_upper_one(ties):
         assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
     else:
         assert told["upper"] == pytest.approx(told["pairs"] / 2, rel=0.3)
-
-
-def test_a_mirrored_load_exchanges_left_and_right():
-    load, mirrored = (make(np.random.default_rng(1)) for make in (stack_load, mirrored_load))
-    assert np.allclose(load.positions[:, 1] + mirrored.positions[:, 1], task.CONTAINER[1])
-    assert np.allclose(load.positions[:, ::2], mirrored.positions[:, ::2])
-    assert (load.sizes == mirrored.sizes).all()
 
 
 def test_the_order_of_equals_is_followed_among_untouched_boxes():
