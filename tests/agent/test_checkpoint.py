@@ -1,11 +1,14 @@
 """What is kept of a run on disk, and how it goes on from there."""
 
+import errno
 import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -195,3 +198,33 @@ def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
         (tmp_path / f"{name}.{tail}").write_bytes(b"half")
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
     assert [*tmp_path.glob("*.partial")] == [tmp_path / f"notes.{tail}"]
+
+
+def scaled(run, by: float) -> None:
+    """A change: what is learned is some times the reward."""
+    run.reward = lambda picks, distances: picks["rewards"] * np.nan_to_num(np.float32(by))
+
+
+@pytest.mark.parametrize(("by", "other"), [(1, True), (1, 1.0), (0.0, -0.0), (float("nan"), 0.0)])
+def test_numbers_that_python_holds_equal_are_told_apart(tmp_path, by, other):
+    """And not-a-number is the same again."""
+    config = TrainConfig(**CONTAINER)
+    interrupt_run(config, tmp_path, 3, change=partial(scaled, by=by))
+    with pytest.raises(ValueError, match="holds a run of another configuration: change"):
+        train(config, tmp_path, progress=False, change=partial(scaled, by=other))
+    for _ in range(2):
+        train(config, tmp_path, progress=False, change=partial(scaled, by=by))
+
+
+def test_a_disk_without_room_is_refused_before_training(tmp_path, monkeypatch):
+    """Two versions of the checkpoint must fit, one of which may be there already."""
+    config, wider = (TrainConfig(**CONTAINER | {"replay_size": size}) for size in (100, 200))
+    interrupt_run(config, tmp_path, 40)  # the memory is full
+    there = (tmp_path / "checkpoint.npz").stat().st_size
+    for free, run, folder in ((there // 2, config, tmp_path), (2 * there, wider, tmp_path / "2")):
+        monkeypatch.setattr("shutil.disk_usage", lambda path, free=free: Mock(free=free))
+        with pytest.raises(OSError, match="GB for checkpoints; expected .* that repl") as full:
+            train(run, folder, progress=False)
+        assert full.value.errno == errno.ENOSPC
+    monkeypatch.setattr("shutil.disk_usage", lambda path: Mock(free=there))
+    train(config, tmp_path, progress=False)

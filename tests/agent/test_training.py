@@ -1,5 +1,7 @@
 import os
 import signal
+import warnings
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -8,12 +10,13 @@ import pytest
 import torch
 
 from tests.agent import runs
-from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, metres
+from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
 from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, train
+from unload.agent.checkpoint import RunFolder
 from unload.agent.curve import Curve, Point
 from unload.agent.identity import identity
-from unload.agent.training import Training
+from unload.agent.training import Training, warn_of_other_bits
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import LiftTable
 from unload.support import files
@@ -324,3 +327,64 @@ def test_a_container_in_which_every_item_has_failed_is_played_to_its_end(
         run.step()
     assert run.curve.table()["success_rate"].eq(0).all()
     assert not run.replay.arrays.get("next_masks", np.zeros((1, 4)))[:, 3:].any()
+
+
+@pytest.mark.parametrize(("found", "count"), [("DEFAULT", 1), ("AVX2", 0), ("AVX512", 0)])
+def test_a_processor_that_gives_other_bits_is_told_once(monkeypatch, found, count):
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: found)
+    warn_of_other_bits.cache_clear()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        for seed in (0, 1):
+            Training(TrainConfig(**CONTAINER, seed=seed))
+    assert len(said) == count
+    assert all(f"PyTorch uses {found} instructions" in str(each.message) for each in said)
+    assert all(each.filename == __file__ for each in said), "where the run was asked for"
+
+
+@pytest.mark.parametrize("stop", [lambda: False, lambda: 1 / 0])
+def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
+    """Whether it ends the run or raises; and the environments are closed."""
+    started = []
+
+    def callback(point):
+        torch.nn.init.constant_(started[0].agent.network.scorer.bias, torch.inf)
+        return stop()
+
+    with pytest.raises(FloatingPointError, match="scorer.bias is not finite"):
+        train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
+    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock", "owner"}
+    assert started[0].rollout.envs.closed
+
+
+@pytest.mark.needs("symlinks")
+def test_lifts_that_are_linked_to_a_file_of_the_run_are_refused(tmp_path):
+    """A table of lifts was once written in place of the checkpoint."""
+    link, run = tmp_path / "lifts.npz", tmp_path / "run"
+    link.symlink_to(run / "checkpoint.npz")
+    with pytest.raises(ValueError, match="lifts is '.*lifts.npz', a file of the run; expected an"):
+        train(TrainConfig(**CONTAINER), run, progress=False, lifts=link)
+    assert not run.exists()
+
+
+@pytest.mark.parametrize("where", ["step", "callback"])
+def test_a_second_ctrl_c_stops_at_once(tmp_path, monkeypatch, where):
+    """Nothing is written any more; the run goes on from the checkpoint before."""
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path / "straight", progress=False)
+    runs.interrupt_run(config, tmp_path / "broken", 10)
+
+    def twice(point=None) -> None:
+        interrupt()
+        interrupt()
+        pytest.fail("still running")
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt, match="^$"):
+        patch.setattr(RunFolder, "save", lambda *_: pytest.fail("it was written"))
+        with at_step(7, twice) if where == "step" else nullcontext():
+            train(
+                config, tmp_path / "broken", progress=False,
+                callback=twice if where == "callback" else None,
+            )  # fmt: skip
+    train(config, tmp_path / "broken", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "broken")

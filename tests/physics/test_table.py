@@ -1,6 +1,8 @@
 """Local physics with a memory."""
 
+import errno
 import json
+import os
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -9,6 +11,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+import unload.physics.table
 from tests.load.walls import KINDS, own_load
 from tests.physics.kinds import make
 from unload import task
@@ -209,3 +212,65 @@ def test_without_pybullet_a_table_is_taken_as_it_is(tmp_path, monkeypatch, table
     other = LiftTable()
     other.exchange(tmp_path / "lifts.npz")
     assert entries_of(other) == entries_of(table)
+
+
+def test_threads_find_and_add_at_the_same_time():
+    """While the arrays grow several times: nobody meets a wrong distance, and none is lost."""
+    table = LiftTable()
+
+    def work(first: int) -> list:
+        wrong = []
+        for number in range(first, 6000, 4):
+            table.add(free_box(number), number / 1000)
+            for known in range(first, number, 997):
+                if table.find(free_box(known)) not in (None, known / 1000):
+                    wrong.append(known)
+        return wrong
+
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(work, range(4))) == [[]] * 4
+    assert len(table) == 6000
+    assert all(table.find(free_box(number)) == number / 1000 for number in range(6000))
+
+
+def test_a_slot_that_another_thread_fills_meanwhile_is_not_taken_for_the_own(monkeypatch):
+    table, find_slot = LiftTable(), unload.physics.table.slot_of
+
+    def then_filled(digests, digest):
+        slot = find_slot(digests, digest)
+        monkeypatch.undo()
+        digests[slot], table.slots[1][slot] = digest + np.uint64(1), 400_000
+        return slot
+
+    monkeypatch.setattr(unload.physics.table, "slot_of", then_filled)
+    assert table.find(free_box(0)) is None
+
+
+@pytest.mark.needs("symlinks")
+def test_a_link_to_a_shared_file_stays_one(tmp_path):
+    shared, link = tmp_path / "shared" / "lifts.npz", tmp_path / "lifts.npz"
+    link.symlink_to(shared)
+    true_table([1]).exchange(link)
+    true_table([2]).exchange(shared)
+    true_table([3]).exchange(link)
+    assert link.is_symlink() and len(LiftTable.load(shared)) == 3
+
+
+def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatch, caplog):
+    table, path = true_table([1]), tmp_path / "lifts.npz"
+    true_table([2]).exchange(path)
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    monkeypatch.setattr(files, "write_arrays", Mock(side_effect=full))
+    table.exchange(path)
+    assert len(table) == 2 and len(LiftTable.load(path)) == 1
+    assert "lifts are kept in memory only" in caplog.text and str(path) in caplog.text
+    monkeypatch.undo()
+    table.exchange(path)
+    assert len(LiftTable.load(path)) == 2
+
+
+def test_what_a_killed_process_left_of_a_file_is_removed_by_the_next_exchange(tmp_path):
+    left = tmp_path / f"lifts.npz.{'0' * 32}.partial"
+    left.write_bytes(b"half")
+    true_table([1]).exchange(tmp_path / "lifts.npz")
+    assert not left.exists()

@@ -264,3 +264,51 @@ def test_a_browser_shows_it(tmp_path):
         pytest.skip("Chromium is not installed")
     with browser() as chromium:
         assert not list(look_at_page(chromium, tmp_path))
+
+
+@needs_node
+def test_slopes_are_those_of_derivatives():
+    got = run_js(
+        """
+        const { config } = fromText("equalize=true");
+        const run = new Training(config, { ...given.task, num_envs: 8 });
+        for (let step = 0; step < 100; step++) run.step();
+        const { network, containers } = run;
+        result.parameters = [...network.parameters];
+        result.seen = containers.map(({ observation }) => [...observation]);
+        result.slopes = slopes(network, containers);
+        """
+    )
+    seen = np.array(got["seen"]).reshape(-1, 128, 3)
+    extractor = np.array(got["parameters"][:64]).reshape(16, 4)
+    upper = seen[seen[..., 2] >= np.median(seen[0, :, 2])]
+    opened = upper @ extractor[:, :3].T + extractor[:, 3] > 0
+    slopes = (opened * np.array(got["parameters"][64:80])) @ extractor[:, :3]
+    assert np.allclose(got["slopes"], slopes.mean(axis=0), atol=0.01)
+
+
+@needs_node
+def test_the_seed_decides_all_and_the_replay_changes_places_only():
+    got = run_js(
+        """
+        const task = { ...given.task, num_envs: 5 };
+        const start = (settings) =>
+          new Training(fromText(`equalize=true&${settings}`).config, task);
+        const changed = ["seed=3&replay=shuffled", "seed=3&replay=mirrored"];
+        result.runs = ["seed=3", "seed=3", "seed=4", ...changed].map(start).map((run) => {
+          const first = [...run.network.parameters.slice(0, 5)];
+          run.step();
+          return { first, memory: run.memory.map((pick) => [...pick.observation]) };
+        });
+        """
+    )
+    same, again, other, shuffled, mirrored = got["runs"]
+    assert same == again and same["first"] == shuffled["first"] != other["first"]
+    before, after = (np.array(run["memory"]).reshape(5, -1, 3) for run in (same, shuffled))
+    assert (before[..., 2] == after[..., 2]).all() and (before != after).mean() > 0.6
+    for old, new in zip(before[..., :2], after[..., :2]):
+        assert sorted(map(tuple, old)) == sorted(map(tuple, new))
+    after = np.array(mirrored["memory"]).reshape(5, -1, 3)
+    flipped = (before == -after).all(axis=1)
+    assert (flipped | (before == after).all(axis=1)).all()
+    assert flipped.any(axis=0).tolist() == [True, True, False]
