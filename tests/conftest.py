@@ -30,7 +30,6 @@ AVAILABLE = {
     "/proc": os.path.exists("/proc/self/statm"),
     "SIGKILL": hasattr(signal, "SIGKILL"),
     "SIGPIPE": hasattr(signal, "SIGPIPE"),
-    "fcntl": find_spec("fcntl") is not None,
     "fork": hasattr(os, "fork"),
     "mkfifo": hasattr(os, "mkfifo"),
     "make": shutil.which("make") is not None,

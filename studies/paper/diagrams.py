@@ -12,13 +12,13 @@ from unload import task
 from unload.load.picture import package_colour
 from unload.load.substacks import (
     CELL,
+    CELLS_HIGH,
     CELLS_WIDE,
     COLUMNS,
     LEFT,
     MID,
     PACKAGES,
     RIGHT,
-    ROWS_HIGH,
 )
 
 INK = "#333333"
@@ -99,7 +99,7 @@ def fig03_substacks() -> Figure:
         axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
         across += width + gap
     for variant in range(3):
-        middle = (3 - variant) * down + ROWS_HIGH * CELL / 2
+        middle = (3 - variant) * down + CELLS_HIGH * CELL / 2
         axes.text(-0.08, middle, f"variant {variant}", ha="right", va="center")
     bar = across - gap + 0.14
     axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
@@ -109,7 +109,7 @@ def fig03_substacks() -> Figure:
     for (left, variants), number in zip(COLUMNS, (0, 1, 2, 0)):
         _draw_substack(axes, variants[number], left * CELL, low)
     label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
-    axes.text(CELLS_WIDE * CELL + 0.08, low + ROWS_HIGH * CELL / 2, label, va="center")
+    axes.text(CELLS_WIDE * CELL + 0.08, low + CELLS_HIGH * CELL / 2, label, va="center")
     axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(low - 0.02, 4 * down + 0.02))
     axes.set_aspect("equal")
     axes.axis("off")
@@ -238,7 +238,7 @@ def _draw_substack(axes: Axes, boxes, x: float, z: float) -> None:
 
 def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
     """Lines between cells of which one belongs to the substack and the other does not."""
-    inside = np.zeros((CELLS_WIDE + 2, ROWS_HIGH + 2), dtype=bool)
+    inside = np.zeros((CELLS_WIDE + 2, CELLS_HIGH + 2), dtype=bool)
     for package, left, lower in boxes:
         width, height = PACKAGES[package]
         inside[left + 1 : left + width + 1, lower + 1 : lower + height + 1] = True

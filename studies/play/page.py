@@ -43,7 +43,7 @@ def task_numbers() -> dict:
         "tie_tolerance": TIE_TOLERANCE,
         "cell": substacks.CELL,
         "cells_wide": substacks.CELLS_WIDE,
-        "rows_high": substacks.ROWS_HIGH,
+        "rows_high": substacks.CELLS_HIGH,
         "rows": substacks.ROWS,
         "walls": substacks.WALLS,
         "packages": substacks.PACKAGES.tolist(),

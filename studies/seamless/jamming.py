@@ -43,12 +43,12 @@ def jam(run: Training, share: float, lasts: int = 0) -> None:
             drawn anew at each attempt.
     """
     envs, seed = run.rollout.envs.unwrapped, run.config.seed
-    look_up, rows = envs._look_up, np.arange(run.config.num_envs)
+    lift, rows = envs._lift, np.arange(run.config.num_envs)
 
-    def look_up_jammed(actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def lift_jammed(actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         state, masks = envs._containers, envs._containers.masks.copy()
         state.masks[:] = 1  # a masked row would give the distance of its last attempt
-        items, distances = look_up(actions)
+        items, distances = lift(actions)
         state.masks[:] = masks
         if lasts:
             episode = run.rollout.steps // run.config.max_picks
@@ -60,7 +60,7 @@ def jam(run: Training, share: float, lasts: int = 0) -> None:
         distances[(distances >= task.LIFT_THRESHOLD) & (drawn < share)] = 0.0
         return items, distances
 
-    envs._look_up = look_up_jammed
+    envs._lift = lift_jammed
 
 
 def jam_by_place(run: Training, shares: np.ndarray, lasts: int) -> None:
@@ -75,15 +75,15 @@ def jam_by_place(run: Training, shares: np.ndarray, lasts: int) -> None:
     envs = run.rollout.envs.unwrapped
     share = np.zeros(run.config.num_envs)
     jam(run, share, lasts)
-    look_up, rows = envs._look_up, np.arange(len(share))
+    lift, rows = envs._lift, np.arange(len(share))
 
-    def look_up_in_place(actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def lift_in_place(actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         items = np.maximum(envs._containers.visible[rows, actions], 0)  # -1 is nobody
         covered, beside = neighbours(envs._containers, items)
         share[:] = np.asarray(shares)[covered, np.minimum(beside, 3)]
-        return look_up(actions)
+        return lift(actions)
 
-    envs._look_up = look_up_in_place
+    envs._lift = lift_in_place
 
 
 def neighbours(state: containers.Containers, items: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

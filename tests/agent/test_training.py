@@ -312,10 +312,8 @@ def test_a_container_in_which_every_item_has_failed_is_played_to_its_end(
     gamma, mask, boxes, monkeypatch
 ):
     """With the mask, too: its items may then be picked again. Rows without one never are."""
-    look_up = ContainerVectorEnv._look_up
-    monkeypatch.setattr(
-        ContainerVectorEnv, "_look_up", lambda *each: (look_up(*each)[0], np.zeros(4))
-    )
+    look_up = ContainerVectorEnv._lift
+    monkeypatch.setattr(ContainerVectorEnv, "_lift", lambda *each: (look_up(*each)[0], np.zeros(4)))
     three = boxes((0.4, 0.2), (1.2, 0.2), (2.0, 0.2))
     config = TrainConfig(**CONTAINER | {"mask": mask, "gamma": gamma, "epsilon_init": 0.4})
     run = Training(config, stack=lambda rng: three)

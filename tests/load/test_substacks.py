@@ -7,10 +7,10 @@ from unload import task
 from unload.load.boxes import Load
 from unload.load.substacks import (
     CELL,
+    CELLS_HIGH,
     CELLS_WIDE,
     DEPTH,
     PACKAGES,
-    ROWS_HIGH,
     _substacks_that_fit,
     build_load,
     stack_load,
@@ -25,16 +25,16 @@ def wall_cells(load: Load) -> list[tuple[int, int, int]]:
 
 @pytest.mark.parametrize("variants", list(itertools.product(range(3), repeat=4)))
 def test_every_combination_tiles_a_row(variants):
-    covered = np.zeros((ROWS_HIGH, CELLS_WIDE), dtype=int)
+    covered = np.zeros((CELLS_HIGH, CELLS_WIDE), dtype=int)
     for package, left, lower in wall_cells(build_load([[variants]])):
         width, height = PACKAGES[package]
-        assert left + width <= CELLS_WIDE and lower + height <= ROWS_HIGH
+        assert left + width <= CELLS_WIDE and lower + height <= CELLS_HIGH
         covered[lower : lower + height, left : left + width] += 1
     assert (covered == 1).all()
 
 
 def test_all_variants_of_all_substacks_occur(full_load):
-    items = {(package, left, low % ROWS_HIGH) for package, left, low in wall_cells(full_load)}
+    items = {(package, left, low % CELLS_HIGH) for package, left, low in wall_cells(full_load)}
     same_everywhere = (wall_cells(build_load([[[variant] * 4]])) for variant in range(3))
     assert items == {item for items in same_everywhere for item in items}
 
@@ -64,13 +64,13 @@ def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
     load = stack_load(rng, scale=scale)
     reach = (load.positions + load.sizes / 2).max(axis=0)
     width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale
-    height = rows * ROWS_HIGH * CELL * scale
+    height = rows * CELLS_HIGH * CELL * scale
     assert reach == pytest.approx([7.0, width, height])
     # Boxes do not overlap, or there were no load: so they leave no hole.
     assert load.sizes.prod(axis=1).sum() == pytest.approx(7.0 * width * height)
     assert len(np.unique(load.walls)) == walls
     # No further substack would fit.
-    assert width + 10 * CELL * scale > 2.5 and height + ROWS_HIGH * CELL * scale > 2.5
+    assert width + 10 * CELL * scale > 2.5 and height + CELLS_HIGH * CELL * scale > 2.5
     expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
     assert load.sizes == pytest.approx(scale * expected)
 

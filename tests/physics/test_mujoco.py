@@ -53,11 +53,11 @@ def test_it_pulls_other_masses_with_other_forces(boxes):
 def test_floor_and_side_walls_hold_what_they_touch():
     """A box inside the floor or a side wall is pushed out; one beside them is only lifted."""
     box = np.array([[0, 0, 0, 400_000, 400_000, 400_000]], np.int32)
-    free = mujoco.lift(Situation(box, 1, None, ()))
-    beside = mujoco.lift(Situation(box, 1, -200_000, (-200_000, 200_000)))
+    free = mujoco.simulate(Situation(box, 1, None, ()))
+    beside = mujoco.simulate(Situation(box, 1, -200_000, (-200_000, 200_000)))
     assert beside == pytest.approx(free, abs=1e-3)
     for floor, sides in ((-190_000, ()), (None, (-190_000,)), (None, (190_000,))):
-        assert abs(mujoco.lift(Situation(box, 1, floor, sides)) - free) > 0.002
+        assert abs(mujoco.simulate(Situation(box, 1, floor, sides)) - free) > 0.002
 
 
 @pytest.mark.pybullet
@@ -79,7 +79,7 @@ def test_what_it_lifted_before_makes_no_difference(hard):
 
 def test_without_pybullet_it_answers_what_no_table_knows(no_pybullet, hard, monkeypatch):
     assert LocalPhysics().engine == TablePhysics(shared_table()).engine == "mujoco"
-    monkeypatch.setattr(mujoco, "lift", Mock(return_value=0.123))
+    monkeypatch.setattr(mujoco, "simulate", Mock(return_value=0.123))
     assert LocalPhysics().simulate(hard[0]) == 0.123
     table = shared_table()
     known = [each for each in hard if table.find(each) is not None]

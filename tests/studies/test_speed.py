@@ -95,6 +95,22 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
         "fused": ("FusedLearner", 1, 64, 2048),
         "fused, 2 threads": ("FusedLearner", 2, 64, 2048),
     }
+    assert torch.get_num_threads() == 1
+
+
+def test_the_first_steps_of_stable_baselines_do_not_count(monkeypatch):
+    """They fill its memory: a second each here, and 0.64 s each of the ten that follow."""
+    config = unload.TrainConfig()
+    before = config.batch_size // config.num_envs + 2
+    clock = iter(np.cumsum([1.0] * before + [0.64] * 20))
+
+    def learn(picks, callback):
+        assert all(callback() for _ in range(picks // config.num_envs))
+
+    monkeypatch.setattr(run, "containers", lambda config: None)
+    monkeypatch.setattr(run, "dqn", lambda config, envs: SimpleNamespace(learn=learn))
+    monkeypatch.setattr(run, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    assert run._their_rate(10 * config.num_envs, 1) == pytest.approx(100)
 
 
 CODE = """

@@ -201,7 +201,7 @@ class _OneContainer(ContainerVectorEnv):
             self._containers.masks[0] &= ~self._failed[visible]
         return rewards, picked
 
-    def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         item = int(self._containers.visible[0, actions[0]])
         # A row without a box is a failed pick that asks no physics.
         distance = self.physics.lift(item) if item >= 0 else 0.0

@@ -78,7 +78,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         """(num_envs, 128) bool, which rows of the observations can be unloaded now."""
         self._check_started()
         rows = (np.full(self.num_envs, row) for row in range(task.N_VISIBLE))
-        distances = np.stack([self._look_up(actions)[1] for actions in rows], axis=1)
+        distances = np.stack([self._lift(actions)[1] for actions in rows], axis=1)
         return distances >= task.LIFT_THRESHOLD
 
     def _fill(
@@ -135,11 +135,11 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        items, distances = self._look_up(actions)
+        items, distances = self._lift(actions)
         rewards = containers.pick(self._containers, actions, distances, *self._features)
         return rewards, {"item": items, "distance": distances}
 
-    def _look_up(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
         state = self._containers
         items, distances = containers.look_up(state, actions, self._asks, *self.table.slots)

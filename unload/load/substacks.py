@@ -17,7 +17,7 @@ from unload.load.boxes import Load
 from unload.support import checks
 
 CELLS_WIDE = 36
-ROWS_HIGH = 10  # cells of height per row of substacks
+CELLS_HIGH = 10  # of a row of substacks
 CELL = task.CONTAINER[1] / CELLS_WIDE  # m
 ROWS = 3  # bottom, mid, top
 WALLS = 12  # not in the paper: gives 938 ± 40 items, in its range of 800–1000
@@ -82,7 +82,7 @@ def _substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
     """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
     cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # the width; the height
     columns = 1 + int((cells - _LEFT_CELLS) / _OTHER_CELLS)
-    return round(WALLS / scale), int(cells / ROWS_HIGH), columns
+    return round(WALLS / scale), int(cells / CELLS_HIGH), columns
 
 
 def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
@@ -112,7 +112,7 @@ def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
     # In walls and cells, and in m: a wall is as deep as each of its boxes.
     edges = np.insert(PACKAGES, 0, 1, axis=1)[packages]
     units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL * scale, CELL * scale])
-    positions = (np.column_stack([walls, left, low + rows * ROWS_HIGH]) + edges / 2) * units
+    positions = (np.column_stack([walls, left, low + rows * CELLS_HIGH]) + edges / 2) * units
     return Load(positions, edges * units, packages, walls)
 
 

@@ -41,7 +41,7 @@ class LocalPhysics(Physics):
         """
         self._check_open()
         if self.engine == "mujoco":
-            return round(mujoco.lift(situation), 6)
+            return round(mujoco.simulate(situation), 6)
         if self._world is None:
             self._world = World()
         elif self._world.bodies > _MOST_BODIES:

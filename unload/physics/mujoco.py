@@ -23,7 +23,7 @@ def settings() -> dict:
     return {name: value for name, value in own.items() if name != "pybullet"}
 
 
-def lift(situation: Situation) -> float:
+def simulate(situation: Situation) -> float:
     """Pull the chosen box of a situation; return how far it moved, in m (Sec. III-C).
 
     Raises:

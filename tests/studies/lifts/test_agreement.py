@@ -152,6 +152,7 @@ def test_committed_lifts_of_the_second_engine_can_be_computed_again(monkeypatch)
 def test_committed_rates_are_those_of_the_published_policies():
     table, names = read_table(engines.MSR_NAME), ["policy", "mask", "condition"]
     assert table[names].to_dict("records") == [case for case, _ in engines.played()]
+    assert read_provenance(engines.MSR_NAME)["settings"]["notebook 12"] == engines.APPLIED
     # Whole containers are left out, see ``played``.
     played = read_table("policies/comparison").query("condition != 'complete'")
     published = played.groupby(names)["success_rate"].mean()

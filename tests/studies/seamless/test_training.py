@@ -32,7 +32,7 @@ def test_the_jams_of_the_next_episode_are_others():
     run, found = Training(replace(CONFIG, seed=3, mask=False), change=change), []
     for _ in range(2):
         rows = (np.full(run.config.num_envs, row) for row in range(task.N_VISIBLE))
-        found.append(np.stack([run.rollout.envs.unwrapped._look_up(row)[1] for row in rows]))
+        found.append(np.stack([run.rollout.envs.unwrapped._lift(row)[1] for row in rows]))
         run.rollout.steps += run.config.max_picks
     run.rollout.close()
     free = np.maximum(*found) >= task.LIFT_THRESHOLD
