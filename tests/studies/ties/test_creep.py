@@ -25,6 +25,11 @@ def test_a_world_settles_and_goes_on(monkeypatch):
     assert (offsets[1:, still] != offsets[0, still]).any(), "nobody touches them, and they creep"
 
 
+def test_five_loads_are_played_by_both():
+    played = {(world.load, world.policy) for world in creep.worlds() if world.walls == 3}
+    assert played == {(load, policy) for load in range(5) for policy in ("highest", "random")}
+
+
 def test_a_stack_is_a_box_and_all_that_rests_on_it():
     load = load_of(Case(0, 1))
     low = int(load.positions[:, 2].argmin())
