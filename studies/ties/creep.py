@@ -6,22 +6,26 @@ Every box is simulated by PyBullet, and nothing is put back: what a pick moves s
 while a box is pulled the others go on to creep. Observed are boxes that nobody touches.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import ScalarFormatter
 from scipy.stats import spearmanr
 
 from studies.results import COMMAND, JOBS, keep_all, publish
 from studies.seamless.jams import Case, SeamlessPhysics, load_of
+from studies.style import COLOURS, styled
 from unload import task
 from unload.env.observation import nearest
 from unload.load.boxes import ABOVE
 from unload.physics.bullet import GAP
 
 PICKS = 120
-CONTAINER_PICKS = 60  # of a whole container, which takes four times as long as three walls
+CONTAINER_PICKS = 60  # of a whole container, which takes an hour
 LAGS = (1, 2, 5, 10, 20, 40, 60, 120)  # picks
 EVERY = 20  # picks between two moments from which on boxes are followed
 FEWEST = 4  # boxes at the same place along an axis, of which an order is compared
@@ -55,9 +59,7 @@ def worlds() -> Iterator[World]:
     for load in range(2):
         for gap in (0.0005, 0.002):
             yield World(load, gap=gap)
-    for load in range(5):
-        for policy in ("highest", "random"):
-            yield World(load, walls=12, policy=policy)
+    yield World(0, walls=12)
 
 
 def play(world: World) -> dict[str, list]:
@@ -144,6 +146,39 @@ def equals(load, axis: int, left: np.ndarray) -> Iterator[np.ndarray]:
             group = np.flatnonzero(inside & (places == place))
             if len(group) >= FEWEST:
                 yield group
+
+
+def durations(table: pd.DataFrame) -> pd.DataFrame:
+    """Means of what ``rows`` say of the package's gap, by ``walls``, ``axis`` and ``lag``."""
+    usual = table[table["gap"] == GAP]
+    return usual.groupby(["walls", "axis", "lag"])[["boxes", "rms", "spearman"]].mean()
+
+
+@styled
+def draw_durations(table: pd.DataFrame, drift: Sequence[float]) -> Figure:
+    """How long the order among equals lasts, by axis, beside noise that drifts.
+
+    Args:
+        table: as ``creep_data`` writes it.
+        drift: of this noise, the correlation from one pick to the next along x, y and z.
+    """
+    figure, panels = plt.subplots(1, 3, figsize=(8.4, 2.7), sharey=True)
+    found, lags = durations(table)["spearman"], np.arange(1, LAGS[-1] + 1)
+    for axes, axis, correlation in zip(panels, "xyz", drift):
+        for walls, marker, label in ((3, "o-", "three walls"), (12, "s-", "a whole container")):
+            measured = found[walls, axis]
+            hollow = None if walls == 3 else "none"
+            axes.plot(measured.index, measured, marker, color="0.25", mfc=hollow, ms=4, label=label)
+        label = f"drift, ρ = {correlation:g}"
+        axes.plot(lags, correlation**lags, "--", color=COLOURS["ranks"], label=label)
+        axes.axhline(0, color="0.6", linewidth=0.8)
+        axes.set(title=f"along {axis}", xscale="log", xticks=LAGS[::2], ylim=(-0.2, 1.05))
+        axes.xaxis.set_major_formatter(ScalarFormatter())
+        axes.minorticks_off()
+        axes.legend(fontsize=7, loc="lower left")
+    panels[0].set_ylabel("rank correlation")
+    panels[1].set_xlabel("picks in between")
+    return figure
 
 
 def creep_data(n_jobs: int = -1) -> None:

@@ -30,7 +30,7 @@ SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
 PUBLISHED = {
     "00_playground": "cell-04 cell-07 cell-09",
     "01_task": "code-08 code-04 code-18",
-    "02_equalization": "code-16 code-18",
+    "02_equalization": "code-16 code-18 creep",
     "03_network": "code-04",
     "06_why_runs_fall": "why-runs-fall-4 06-why-runs-fal-c8 why-runs-fall-10 why-runs-fall-14",
     "10_lifting": "code-31 second-engine engines-figure engines-msr lifting-jams",
