@@ -1,8 +1,12 @@
+from itertools import combinations
+
 import numpy as np
 import pytest
 
-from unload import task
+from unload import Load, task
+from unload.load import picture
 from unload.load.picture import (
+    COLOURS,
     CORNERS,
     EYE,
     TARGET,
@@ -50,3 +54,42 @@ def test_a_snapshot_shows_the_present_boxes_where_they_are(boxes):
 def test_what_stands_upright_is_drawn_upright():
     seen = project(TARGET + np.outer([-1, 0, 1], [0, 0, 1]))
     assert seen[:, 0] == pytest.approx(0) and (np.diff(seen[:, 1]) > 0).all()
+
+
+# Machado et al. (2009): linear RGB as seen without the long, the middle, the short cones.
+BLINDNESS = {
+    "protanopia": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopia": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopia": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+
+
+@pytest.mark.parametrize("kind", BLINDNESS)
+def test_the_colour_blind_tell_all_meanings_apart(kind):
+    linear = np.array(list(COLOURS.values())) ** 2.2
+    assert linear.max() <= 1
+    seen = (linear @ np.transpose(BLINDNESS[kind])).clip(0, 1) ** (1 / 2.2)
+    for (one, a), (other, b) in combinations(zip(COLOURS, seen), 2):
+        assert np.linalg.norm(a - b) > 0.1, (one, other)
+
+
+def test_numbers_stand_on_the_first_picks_that_are_seen(boxes, monkeypatch):
+    """On a face that is not covered; a box that is hidden has none."""
+    written = {}
+
+    def write(axes, x, y, text, **style):
+        written[text] = x, y
+
+    monkeypatch.setattr("matplotlib.axes.Axes.text", write)
+    load = boxes((0.3, 0.2), (0.3, 0.6), (1.0, 0.2), (1.6, 0.2))
+    monkeypatch.setattr(picture, "_NUMBERED", 3)
+    assert picture.numbered(load, np.array([1, 0, 2, 3])).startswith(b"\x89PNG")
+    low, high = picture.corners(load, np.arange(4))
+    faces = picture._faces(low, high, load.container).mean(axis=2)
+    assert [*written] == ["1", "2", "3"]
+    for text, item in (("1", 1), ("2", 0), ("3", 2)):
+        assert any(np.allclose(written[text], face) for face in faces[item])
+    written.clear()
+    wall = Load.from_corners([[0, 1, 0], [3, 0, 0]], [[1, 0.3, 0.3], [1, 2.4, 2.4]])
+    picture.numbered(wall, np.array([0, 1]))
+    assert [*written] == ["2"]

@@ -11,6 +11,7 @@ import torch
 
 import unload
 from studies.policies.sb3 import containers, dqn
+from studies.results import read_provenance, read_table
 from studies.speed import mutants, parts, run
 from studies.speed.parts import lift_rates, pick_rates, update_times
 from unload.agent import learner
@@ -172,3 +173,18 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     endless = CODE.encode() + b"while True:\n    pass\n"
     assert mutants.killed_by(trees, room, path, endless, limit=2) == "time limit"
     assert path.read_text(encoding="utf-8") == CODE and trees.get() == tmp_path
+
+
+def test_speeds_are_printed_and_published_with_ratios(own_data, monkeypatch, capsys):
+    for name, rates in {
+        "lift_rates": {"full": 2.0, "table": 12345.0},
+        "pick_rates": {"one": 4.0},
+        "update_times": {"PyTorch": 8.0, "fused": 2.0},
+        "training_rates": {"theirs": 5.0, "here": 4.0},
+    }.items():
+        monkeypatch.setattr(run, name, lambda *load, rates=rates: rates)
+    run.main()
+    assert read_table("benchmarks/speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
+    said = capsys.readouterr()
+    assert "12,300 lifts/s 6,170 ×" in said.out and "measuring: training" in said.err
+    assert read_provenance("benchmarks/benchmarks")["runs"] == 1

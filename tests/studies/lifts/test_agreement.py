@@ -13,6 +13,7 @@ from studies.lifts import lift_table as lifts
 from studies.policies.robustness import front_walls
 from studies.results import read_provenance, read_table
 from unload import policies, task
+from unload.agent.evaluation import evaluate
 from unload.env.vector import ContainerVectorEnv
 from unload.load.substacks import stack_load
 from unload.physics.bullet import ENGINES
@@ -161,3 +162,23 @@ def test_committed_rates_are_those_of_the_published_policies():
     assert np.allclose(both["pybullet"], both["success_rate"], atol=1e-5)
     equal = table["pybullet"] == table["mujoco"]
     assert (equal | (table["differ"] > 0)).all() and (table["differ"] <= table["containers"]).all()
+
+
+def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):
+    """PyBullet's answers, which ship, are never taken; MuJoCo's are kept for the next process."""
+    monkeypatch.setattr(engines, "LIFTS", own_data / "mujoco.npz")
+    monkeypatch.setattr(LiftTable, "check", lambda *_: None)
+    asked = []
+
+    def simulate(physics: LocalPhysics, situation) -> float:
+        asked.append(physics.engine)
+        return task.LIFT_THRESHOLD
+
+    monkeypatch.setattr(LocalPhysics, "simulate", simulate)
+    arguments = {"episodes": 2, "seed": 0, "mask": False, "max_picks": 60}
+    row = engines.both_rates(policies.random, arguments)
+    kept, count = LiftTable.load(own_data / "mujoco.npz", "mujoco"), len(asked)
+    assert {*asked} == {"mujoco"} and 0 < len(kept) <= count
+    assert engines.both_rates(policies.random, arguments) == row and len(asked) == count
+    assert row["pybullet"] == evaluate(policies.random, **arguments)["success_rate"].mean()
+    assert row["containers"] == row["differ"] == 2 and row["mujoco"] > row["pybullet"]
