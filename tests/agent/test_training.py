@@ -283,7 +283,6 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
     usual = {"progress": False, "lifts": "lifts.npz", "callback": callback}
     with pytest.raises(OSError, match="no more"):
         train(config, "run", **usual)
-    assert (tmp_path / "lifts.npz").exists()
     monkeypatch.chdir(tmp_path)
     train(config, "run", **usual)
     assert steps == list(range(20, 201, 20))
