@@ -195,7 +195,9 @@ def test_what_is_published_are_the_planned_cases():
 
 
 def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too(own_data, monkeypatch):
-    pytest.importorskip("mujoco")
+    mujoco, steps = pytest.importorskip("mujoco"), []
+    step = mujoco.mj_step
+    monkeypatch.setattr(mujoco, "mj_step", lambda *given: steps.append(step(*given)))
     case = Case(0, walls=1, friction=0.25, gap=0.001, settle=0.1)
     monkeypatch.setattr(mujoco_jams, "cases", lambda: [case])
     mujoco_jams.mujoco_data(1)
@@ -203,3 +205,5 @@ def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too(own_data, mon
     load = jams.load_of(case)
     assert row.free == len(jams.visible_free(load, np.ones(len(load), bool)))
     assert (row.settle, row.jammed) == (0.1, 0) and row.median == pytest.approx(0.46, abs=0.02)
+    times = [case.settle, *[task.LIFT_TIME] * row.free]
+    assert len(steps) == sum(round(time / case.time_step) for time in times)
