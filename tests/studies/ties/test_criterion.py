@@ -12,8 +12,9 @@ from studies.results import read_provenance, read_table
 from studies.ties import earlier, leak, training
 from studies.ties.criterion import FIG11, FIG12, likeness
 from studies.ties.figures import draw_ends, read_by_ties
-from studies.ties.laboratory import CELLS
+from studies.ties.laboratory import CELLS, mirrored_load
 from tests.studies.curves import course
+from unload import stack_load, task
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
 # noisier after the loss's peak.
@@ -86,6 +87,13 @@ def test_order_tells_which_box_is_the_upper_one(ties):
         assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
     else:
         assert told["upper"] == pytest.approx(told["pairs"] / 2, rel=0.3)
+
+
+def test_a_mirrored_load_exchanges_left_and_right():
+    load, mirrored = (make(np.random.default_rng(1)) for make in (stack_load, mirrored_load))
+    assert np.allclose(load.positions[:, 1] + mirrored.positions[:, 1], task.CONTAINER[1])
+    assert np.allclose(load.positions[:, ::2], mirrored.positions[:, ::2])
+    assert (load.sizes == mirrored.sizes).all()
 
 
 def test_what_is_published_was_asked_as_it_is_asked_today():
