@@ -13,7 +13,6 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 from tqdm import tqdm
 
@@ -21,8 +20,9 @@ from studies import paths
 from studies.results import COMMAND, kept, publish
 from unload import task
 from unload.agent import policies
+from unload.env.vector import ContainerVectorEnv
 from unload.physics.bullet import ENGINES, SETTINGS
-from unload.physics.table import LIFTS_FILE, LiftTable
+from unload.physics.table import LIFTS_FILE, LiftTable, TablePhysics
 
 EPISODES, SEED = 12, 0  # of 64 containers, for each policy
 RANDOM_SHARE = 40  # times as many episodes of random picks
@@ -48,15 +48,15 @@ def lift_data() -> None:
 def _fill(path: Path) -> None:
     """Fill an empty table by playing, and save it."""
     rng = np.random.default_rng(SEED)
-    envs = gymnasium.make_vec("unload/Container-v0", task.NUM_ENVS).unwrapped
-    envs.table = LiftTable(ENGINES[0])  # the reference, wherever this runs
+    table = LiftTable(ENGINES[0])  # the reference, wherever this runs
+    envs = ContainerVectorEnv(task.NUM_ENVS, TablePhysics(table))
     jobs = list(product(range(EPISODES), _filling_policies(rng)))
     for _, policy in tqdm(jobs, unit="episode", ncols=100, file=sys.stdout):
         observations, infos = envs.reset(seed=int(rng.integers(2**31)))
         for _ in range(task.MAX_PICKS):
             actions = policy(observations, infos["action_mask"], rng)
             observations, _, _, _, infos = envs.step(actions)
-    envs.table.save(path)
+    table.save(path)
 
 
 def _filling_policies(rng: np.random.Generator) -> list[Callable]:

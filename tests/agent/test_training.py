@@ -149,7 +149,7 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
         )  # fmt: skip
         assert kept[-1] > 0, "by the checkpoints, before the end"
         assert len(LiftTable.load(lifts)) == len(table) > 0
-        monkeypatch.setattr("unload.physics.table.TablePhysics.simulate_all", None)
+        monkeypatch.setattr("unload.physics.table.LocalPhysics.simulate", None)
     assert_same(tmp_path / "first", tmp_path / "second")
 
 

@@ -13,7 +13,6 @@ from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Surroundings
 from unload.physics.table import FREE_LIFT, LiftTable, TablePhysics, free_lift
-from unload.support import files
 
 
 @pytest.mark.parametrize("kind", EACH)
@@ -168,17 +167,6 @@ def test_arrays_know_ceilings_and_refuse_masses(boxes):
         single = ContainerEnv(LocalPhysics(force=force))
         single.reset(seed=0, options={"load": low})
         assert table.liftable()[1].tolist() == single.liftable().tolist()
-
-
-def test_a_file_says_nothing_of_the_pull_of_the_task(boxes, tmp_path):
-    """So that it has the bytes that it had before there were others."""
-    load, table, path = boxes((0.3, 0.2), (0.3, 0.6)), LiftTable(), tmp_path / "lifts.npz"
-    for masses, written in (((), False), ((1, 2), True)):
-        table.add(Surroundings(weighed(load, *masses), np.ones(2, bool)).situation(0), 0.1)
-        table.save(path)
-        assert ("pull" in str(files.read_arrays(path)["samples"])) == written
-    pulls = [tuple(each.pull) for each in LiftTable.load(path).samples.values()]
-    assert {*pulls} == {(), (20_000, 1000, 2000)}
 
 
 def test_a_physics_of_ones_own_stays_open(boxes):

@@ -10,7 +10,6 @@ from tests.physics.kinds import ONE_BOX, TWO_BOXES, lifts, make
 from unload import Load, task
 from unload.physics import bullet, mujoco
 from unload.physics.local import LocalPhysics
-from unload.physics.pool import Pool
 from unload.physics.situation import Situation
 from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, free_lift, shared_table
 
@@ -74,7 +73,6 @@ def test_what_it_lifted_before_makes_no_difference(hard):
     physics = LocalPhysics("mujoco")
     alone = [physics.simulate(each) for each in hard]
     assert [physics.simulate(each) for each in hard[::-1]] == alone[::-1]
-    assert Pool("mujoco").simulate(hard, physics.simulate) == alone
 
 
 def test_without_pybullet_it_answers_what_no_table_knows(no_pybullet, hard, monkeypatch):

@@ -21,7 +21,7 @@ from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 9  # of the checkpoints
+FORMAT = 10  # of the checkpoints
 OTHER = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 
@@ -128,8 +128,7 @@ class RunFolder:
             raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
             raise ValueError(f"{self._checkpoint} is not of format {FORMAT}; {OTHER}")
-        # The first ones of this format do not tell it.
-        if (version := str(stored.pop("version", task.VERSION))) != task.VERSION:
+        if (version := str(stored.pop("version", None))) != task.VERSION:
             raise ValueError(f"{self._checkpoint} is of unload {version}; {OTHER}")
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)

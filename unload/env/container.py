@@ -167,12 +167,7 @@ class _OneContainer(ContainerVectorEnv):
     def __init__(self, physics: Name | Physics, after_pick: str, settings: dict[str, Any]) -> None:
         super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)
         self.physics = make_physics(physics, after_pick)
-        self._lent = self.physics is physics  # and whoever lent it closes it
-
-    def close_extras(self, **kwargs) -> None:
-        if not self._lent:
-            self.physics.close()
-        super().close_extras(**kwargs)
+        self._lent = self.physics is physics
 
     def observed_positions(self) -> np.ndarray:
         return self.physics.positions() + self._blur

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -16,7 +15,7 @@ from unload.fast import containers
 from unload.load.boxes import Load, check_stack
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
-from unload.physics.situation import Situation, situation_in
+from unload.physics.situation import situation_in
 from unload.physics.table import LiftTable, TablePhysics, shared_table
 from unload.support import checks
 
@@ -32,7 +31,8 @@ class ContainerVectorEnv(PickingVectorEnv):
             ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
 
     Attributes:
-        table: the lifts that this process knows, filled by unknown ones; it may be replaced.
+        physics: what lifts.
+        table: the lifts that this process or ``physics`` knows, filled by unknown ones.
         visible: (num_envs, 128) int32, the item in each row of the observations, -1 in rows
             without.
     """
@@ -49,25 +49,21 @@ class ContainerVectorEnv(PickingVectorEnv):
         super().__init__(num_envs, **settings)
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
-        self.stack, self._own = stack, not isinstance(physics, LocalPhysics)
-        if isinstance(physics, TablePhysics):
-            self.table = physics.table
-        elif self._own:
+        self.stack, self._lent = stack, isinstance(physics, LocalPhysics)
+        if not isinstance(physics, LocalPhysics):
             checks.one_of("physics", physics, ("table", "a LocalPhysics"))
-            physics = TablePhysics()
-        self._physics: Any = physics
+            physics = TablePhysics(shared_table())
+        self.physics: Any = physics
+        # The lifts that are known; none where another class is asked about each pick.
+        self.table = physics.table if isinstance(physics, TablePhysics) else LiftTable()
         # No table, and no compiled loop, knows what another class or a weaker pull does.
         self._asks = type(physics) is not TablePhysics or physics.force < task.PICK_FORCE
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
-        if self._own:
-            self._physics.close()
+        if not self._lent:  # whoever lent it closes it
+            self.physics.close()
         super().close_extras(**kwargs)
-
-    @cached_property
-    def table(self) -> LiftTable:
-        return shared_table()
 
     @property
     def visible(self) -> np.ndarray:
@@ -147,21 +143,11 @@ class ContainerVectorEnv(PickingVectorEnv):
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
             situations = [situation_in(*(array[env] for array in arrays)) for env in unknown]
-            distances[unknown] = (self._ask if self._asks else self._simulate)(situations)
+            if self.physics.force < task.PICK_FORCE:
+                pull, mass = (round(1000 * each) for each in (self.physics.force, task.MASS))
+                situations = [replace(s, pull=(pull, *[mass] * s.dynamic)) for s in situations]
+            distances[unknown] = [self.physics.simulate(each) for each in situations]
         return items, distances
-
-    def _ask(self, situations: list[Situation]) -> list[float]:
-        if self._physics.force < task.PICK_FORCE:
-            pull, mass = (round(1000 * each) for each in (self._physics.force, task.MASS))
-            situations = [replace(s, pull=(pull, *[mass] * s.dynamic)) for s in situations]
-        return [self._physics.simulate(each) for each in situations]
-
-    def _simulate(self, situations: list[Situation]) -> list[float]:
-        if self._physics.table is not self.table:  # at first the process's, later perhaps another
-            if self._own:
-                self._physics.close()
-            self._physics, self._own = TablePhysics(self.table), True
-        return self._physics.simulate_all(situations)
 
     def _emptied(self) -> np.ndarray:
         return self._containers.left == 0

@@ -9,8 +9,6 @@ others on top is held down.
 import errno
 import json
 import logging
-from contextlib import closing, suppress
-from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -22,7 +20,6 @@ from unload.load.boxes import Load
 from unload.physics.base import Force
 from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.pool import Pool
 from unload.physics.situation import PULL, Situation
 from unload.support import files
 from unload.support.compiled import compiled
@@ -32,12 +29,8 @@ HELD_DOWN = 3  # boxes on top that no lift moves
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
 _FEWEST_SLOTS = 1024
-_ARRAYS = {"digests", "micrometres", "settings", "samples"}  # of a file
-_SAMPLES = 4  # situations that a table keeps whole, so that their lifts can be simulated again
-_CLOSE = 1e-5  # m, other processors may round otherwise
+_ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 _FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
-_FEWEST_SHARED = 4  # lifts at a time that are worth asking other processes
-_PATIENCE = 500  # such lifts, a second's, before these are started, which takes as long
 
 
 def free_lift(force: float = task.PICK_FORCE, mass: float = task.MASS) -> float:
@@ -82,7 +75,6 @@ class LiftTable:
     Attributes:
         slots: digests, (n,) uint64, 0 in free slots, and their distances in micrometres,
             (n,) int32. n is a power of two, and at least half of the slots are free.
-        samples: of the situations that were added, those of the lowest digests, by digest.
         foreign: digests of another engine's lifts, which are answers here and never written.
     """
 
@@ -90,7 +82,6 @@ class LiftTable:
         self.engine = engine_of(engine)
         self._adding = Lock()
         self.foreign = np.zeros(0, np.uint64)
-        self.samples: dict[int, Situation] = {}
         self._start_slots(np.zeros(0, np.uint64), np.zeros(0, np.int32))
 
     def __len__(self) -> int:
@@ -114,7 +105,6 @@ class LiftTable:
                 return
             micrometres[slot] = round(distance * 1e6)
             digests[slot] = digest
-            self._take_samples({int(digest): situation})
             self._count += 1
             if 2 * self._count > len(digests):
                 self._start_slots(*self.entries())
@@ -145,22 +135,13 @@ class LiftTable:
         digests, first = np.unique(digests, return_index=True)
         self._start_slots(digests, micrometres[first])
 
-    def _take_samples(self, samples: dict[int, Situation]) -> None:
-        """Keep the lowest ones, which do not depend on the order in which they came."""
-        self.samples = dict(sorted((self.samples | samples).items())[:_SAMPLES])
-
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.own()
-        samples = [asdict(situation) for situation in self.samples.values()]
-        for sample in samples:
-            if not sample["pull"]:  # of the task, whose files hold none
-                del sample["pull"]
         arrays = {
             "digests": digests,
             "micrometres": micrometres,
             "settings": np.array(json.dumps(settings_of_lifts(self.engine))),
-            "samples": np.array(json.dumps(samples, default=np.ndarray.tolist)),
         }
         # A link to a file that several runs share stays one.
         files.write_arrays(Path(path).resolve(), arrays)
@@ -171,7 +152,7 @@ class LiftTable:
         # Of a damaged file nothing is taken, nor of one that holds another physics' answers.
         table = cls(engine)
         arrays = files.read_arrays(path, checked=True)
-        if set(arrays) != _ARRAYS:
+        if not _ARRAYS <= set(arrays):
             raise ValueError(f"{path} holds {sorted(arrays)}; expected a lift table")
         settings, wanted = str(arrays["settings"]), json.dumps(settings_of_lifts(table.engine))
         if settings != wanted:
@@ -181,21 +162,7 @@ class LiftTable:
             )
 
         table._start_slots(arrays["digests"], arrays["micrometres"])
-        for fields in json.loads(str(arrays["samples"])):
-            situation = Situation(**fields | {"boxes": np.array(fields["boxes"], np.int32)})
-            table._take_samples({int(_digest(situation)): situation})
         return table
-
-    def check(self, path: str | Path) -> None:
-        """Simulate the samples of ``path`` again, where one can; ValueError if they differ."""
-        with closing(LocalPhysics(self.engine)) as local, suppress(ModuleNotFoundError):
-            for situation in self.samples.values():
-                known, distance = self.find(situation), local.simulate(situation)
-                if known is None or abs(known - distance) > _CLOSE:
-                    raise ValueError(
-                        f"{path} says that a box moves by {known} m; simulated by "
-                        f"{self.engine} it moves by {distance} m. Remove it to fill a new one"
-                    )
 
     def exchange(self, path: str | Path) -> None:
         """Take in the lifts of a file, and write those that it lacks; it may be missing.
@@ -205,8 +172,7 @@ class LiftTable:
         simulated again.
 
         Raises:
-            ValueError: ``path`` does not end in ``.npz``; as ``load`` and ``check``. Nothing is
-                changed then.
+            ValueError: ``path`` does not end in ``.npz``; as ``load``. Nothing is changed then.
             OSError: the file cannot be written.
         """
         path = Path(path).resolve()
@@ -218,13 +184,10 @@ class LiftTable:
                 stored = LiftTable(self.engine)
                 if path.exists():
                     stored = LiftTable.load(path, self.engine)
-                stored.check(path)
                 count = len(stored)
                 with self._adding:
                     stored._take_in(self.own())
-                    stored._take_samples(self.samples)
                     self._take_in(stored.entries())
-                    self._take_samples(stored.samples)
                 if len(stored) > count:
                     stored.save(path)
         except OSError as error:
@@ -249,7 +212,6 @@ class TablePhysics(LocalPhysics):
     def __init__(self, table: LiftTable | None = None, force: Force = task.PICK_FORCE) -> None:
         self.table = LiftTable() if table is None else table
         super().__init__(self.table.engine, force)
-        self._pool, self._waited = Pool(self.engine), 0  # and the lifts that might have been shared
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
@@ -265,30 +227,13 @@ class TablePhysics(LocalPhysics):
             self.table.add(situation, distance)
         return distance
 
-    def simulate_all(self, situations: list[Situation]) -> list[float]:
-        """``simulate`` each of several situations that the table does not know, in m.
-
-        Where such lists keep coming, other processes share the lifts.
-        """
-        if len(situations) >= _FEWEST_SHARED:
-            self._waited += len(situations)
-            if self._waited > _PATIENCE:
-                shared = self._pool.simulate(situations, super().simulate)
-                for situation, distance in zip(situations, shared):
-                    self.table.add(situation, distance)
-        return [self.simulate(situation) for situation in situations]
-
-    def _stop(self) -> None:
-        self._pool.close()
-        super()._stop()
-
 
 @cache
 def shared_table() -> LiftTable:
     """The lifts known to this process: PyBullet's in ``LIFTS_FILE``, and all made since."""
     table = LiftTable.load(LIFTS_FILE, ENGINES[0])
     if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
-        table.engine, table.foreign, table.samples = engine_of(), table.entries()[0], {}
+        table.engine, table.foreign = engine_of(), table.entries()[0]
     return table
 
 

@@ -79,11 +79,6 @@ def _numba() -> Any:  # type checkers do not see the names of its settings
     return numba
 
 
-def threads() -> int:
-    """How many threads numba takes, which the environment's ``NUMBA_NUM_THREADS`` sets."""
-    return _numba().config.NUMBA_NUM_THREADS
-
-
 @cache
 def _folder() -> Path | None:
     """Where compiled code is kept: the first of three places that can be written, None if none can.
