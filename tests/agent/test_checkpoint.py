@@ -24,7 +24,6 @@ from tests.agent.runs import (
 )
 from unload import TrainConfig, stack_load, train
 from unload.agent.checkpoint import RunFolder, settings_of_run
-from unload.agent.training import Training
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -138,12 +137,6 @@ def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
     np.savez(checkpoint, **arrays)  # as another program writes it, without a digest
     with pytest.raises(ValueError, match="checkpoint.npz was changed or damaged"):
         train(config, checkpoint.parent, progress=False)
-
-
-def test_a_change_may_not_replace_a_part_of_a_run():
-    """It could not be put back."""
-    with pytest.raises(ValueError, match=r"change has replaced replay.\S+.*; expected m"):
-        Training(TrainConfig(**CONTAINER), change=lambda run: setattr(run, "replay", None))
 
 
 @pytest.mark.parametrize(

@@ -31,10 +31,7 @@ class TrainResult(NamedTuple):
 
     Attributes:
         policy: the trained network, as a greedy policy.
-        curve: one row per ``log_interval`` steps, means over it: ``picks`` so far,
-            ``mean_reward``, ``success_rate`` (MSR of the exploring agent), ``deadlocked``
-            (share of picks whose item had already failed since the last success), ``loss``
-            (NaN before the first update), ``epsilon``, and ``wall_time`` in s since the epoch.
+        curve: one row per ``unload.agent.curve.Point``, whose attributes are the columns.
     """
 
     policy: Greedy

@@ -11,7 +11,17 @@ SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 
 
 class Point(NamedTuple):
-    """A point of the learning curve, see ``TrainResult``."""
+    """A point of the learning curve: means over the ``log_interval`` steps before it.
+
+    Attributes:
+        picks: so far.
+        mean_reward: of the environment.
+        success_rate: MSR of the exploring agent.
+        deadlocked: share of picks whose item had already failed since the last success.
+        loss: NaN before the first update.
+        epsilon: exploration rate.
+        wall_time: in s since the epoch.
+    """
 
     picks: int
     mean_reward: float

@@ -39,12 +39,9 @@ class Place(NamedTuple):
     value: Any
 
 
-def places(owner: Any) -> list[Place]:
+def _walk(owner: Any, prefix: str = "", seen: set[int] | None = None) -> Iterator[Place]:
     """What an object and its parts hold of the state."""
-    return [*_walk(owner, "", set())]
-
-
-def _walk(owner: Any, prefix: str, seen: set[int]) -> Iterator[Place]:
+    seen = set() if seen is None else seen
     seen.add(id(owner))  # parts share others, such as the network
     for key, value in _entries(owner):
         name = f"{prefix}{key}"
@@ -78,7 +75,7 @@ def gather(run: Any) -> dict[str, np.ndarray]:
     """
     arrays: dict[str, np.ndarray] = {}
     numbers: dict[str, Any] = {}
-    for name, _, _, value in run.places():
+    for name, _, _, value in _walk(run):
         if isinstance(value, Containers):
             arrays |= {f"{name}.{field}": array for field, array in value._asdict().items()}
         elif isinstance(value, np.ndarray):
@@ -101,7 +98,7 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
     """
     stored: dict[str, Any] = dict(arrays)
     stored |= json.loads(str(stored.pop("numbers")))
-    for name, owner, key, value in run.places():
+    for name, owner, key, value in [*_walk(run)]:
         if isinstance(value, Containers):
             new: Any = Containers(*(stored.pop(f"{name}.{field}") for field in value._fields))
         else:

@@ -24,7 +24,6 @@ from unload.agent.greedy import Greedy
 from unload.agent.identity import unchanged
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
-from unload.agent.state import Place, places
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
 from unload.physics.table import shared_table
@@ -82,10 +81,7 @@ class Training:
         self.curve = Curve()
         self.rollout = Rollout(config, stack)
         self.kept: dict[str, np.ndarray] = {}
-        self._own = {place.name for place in places(self)}
         change(self)
-        self._own |= {f"kept.{name}" for name in self.kept}
-        self.places()
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before."""
@@ -142,20 +138,6 @@ class Training:
             "msr": {"at the end of its training": self.curve.points[-1].success_rate},
         }
         return Greedy(deepcopy(self.agent.network), config.equalize, config.ties, card)
-
-    def places(self) -> list[Place]:
-        """Where its state stands; what its change has added is not part of it.
-
-        Raises:
-            ValueError: the change has replaced a part.
-        """
-        found = {place.name: place for place in places(self)}
-        if missing := self._own - found.keys():
-            raise ValueError(
-                f"change has replaced {', '.join(sorted(missing))}; expected methods, which it "
-                "replaces again in a run that goes on"
-            )
-        return [place for name, place in found.items() if name in self._own]
 
 
 def train(
