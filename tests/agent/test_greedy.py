@@ -5,7 +5,7 @@ import torch
 from tests.agent.runs import HeightNetwork, Subclass, peq, weights
 from unload import Greedy, equalize, load_policy, save_policy
 from unload.agent.greedy import greedy_actions, settings_of
-from unload.agent.learner import highest_values
+from unload.agent.learner import best_actions
 from unload.network.weights import write_weights
 from unload.task import VERSION
 
@@ -32,7 +32,7 @@ def test_a_weight_that_is_not_finite_chooses_nothing(observations, layer, value)
     allowed, network = np.ones(observations.shape[:2], bool), peq(4)
     with torch.no_grad():
         getattr(network, layer).weight[0, 0] = value
-    for choose in (greedy_actions, highest_values):
+    for choose in (greedy_actions, best_actions):
         with pytest.raises(FloatingPointError, match="has no allowed action of a finite"):
             choose(network, observations, allowed)
 

@@ -17,7 +17,7 @@ from tests.network.test_peq import (  # noqa: F401
     test_what_absent_rows_hold_has_no_influence,
 )
 from unload import Greedy, TrainConfig, load_policy, train
-from unload.agent.learner import highest_values
+from unload.agent.learner import best_actions
 from unload.task import PADDING
 
 
@@ -49,7 +49,7 @@ def test_rows_without_an_item_have_no_part_in_the_choice(kind, rng):
     few = network(torch.from_numpy(observations[:, :4])).argmax(dim=1).numpy()
     observations[:, 4:], masks[:, 4:] = PADDING, 0
     assert (Greedy(network, equalize=False)(observations, masks, rng) == few).all()
-    with_padding = highest_values(network, observations, masks.astype(bool))
+    with_padding = best_actions(network, observations, masks.astype(bool))
     assert (with_padding != few).any() and (full != few).any()
 
 

@@ -1,7 +1,7 @@
 """The masked DQN agent and its training (Sec. II-B, III-G and IV-B).
 
-Read ``policies``, ``replay``, ``learner`` (the update in plain PyTorch), ``dqn`` and ``greedy``;
-then ``config``, ``rollout``, ``curve`` and ``training``; what keeps a run: ``state``,
+Read ``policies``, ``learner`` (the update in plain PyTorch), ``dqn`` and ``greedy``; then
+``config``, ``replay``, ``rollout``, ``curve`` and ``training``; what keeps a run: ``state``,
 ``checkpoint`` (its folder) and ``identity``; then ``evaluation`` and ``order``. ``unload.fast``
 holds the compiled twin of the learner.
 

@@ -86,7 +86,7 @@ class RunFolder:
 
     @property
     def finished(self) -> bool:
-        """Whether the run has made all its picks."""
+        """Whether the run has ended, and its policy is whole."""
         return self._config.exists()
 
     def check_room(self, run) -> None:

@@ -58,8 +58,8 @@ class TrainConfig:
         mask: * whether failed items are masked in training's choices, too.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
-        log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
-            of the run, at most 500. That is set once: ``replace`` with other picks keeps it.
+        log_interval: * steps of all environments per point of the curve; 0 is replaced by a
+            hundredth of the run, at most 500, which ``replace`` with other picks keeps.
 
     Raises:
         TypeError, ValueError: a field is not as described, or the picks are too few to learn from.

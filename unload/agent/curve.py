@@ -11,16 +11,16 @@ SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
 
 
 class Point(NamedTuple):
-    """A point of the learning curve: means over the ``log_interval`` steps before it.
+    """A point of the learning curve: means over the steps since the one before.
 
     Attributes:
-        picks: so far.
+        picks: so far in all.
         mean_reward: of the environment.
         success_rate: MSR of the exploring agent.
         deadlocked: share of picks whose item had already failed since the last success.
         loss: NaN before the first update.
-        epsilon: exploration rate.
-        wall_time: in s since the epoch.
+        epsilon: exploration rate at the last of them.
+        wall_time: then, in s since the epoch.
     """
 
     picks: int

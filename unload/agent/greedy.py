@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from unload import task
-from unload.agent.learner import highest_values
+from unload.agent.learner import best_actions
 from unload.agent.policies import check_batch
 from unload.env.equalization import TIES, equalize
 from unload.env.observation import holds_item
@@ -27,12 +27,12 @@ def greedy_actions(
     masks: np.ndarray,
     present: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Do as ``highest_values`` the fastest way; masks may hold 0 and 1, observations any float."""
+    """Do as ``best_actions`` the fastest way; masks may hold 0 and 1, observations any float."""
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
     if fused.applies(network):  # an item's own features decide: padded rows do not matter
         return fused.best_actions(fused.weights_of(network), observations, allowed)
-    return highest_values(network, observations, allowed, present)
+    return best_actions(network, observations, allowed, present)
 
 
 class Greedy:

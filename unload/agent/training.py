@@ -266,7 +266,7 @@ def _points(
                 keep_lifts()
                 saved = time.monotonic()
 
-            if not run.curve.sums["picks"]:  # a point has just ended
+            if not run.curve.sums["picks"]:  # end_point has just emptied them
                 point = run.curve.points[-1]
                 shares = {"MSR": f"{point.success_rate:.1%}", "loss": f"{point.loss:.3f}"}
                 bar.set_postfix(shares, refresh=False)

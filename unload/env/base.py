@@ -248,7 +248,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """Carry out checked actions where an environment is ``playing``, (num_envs,) bool.
 
-        The others are filled next.
+        What is done in the others does not count, because they are filled next.
 
         Returns:
             The rewards, (num_envs,) float64, and the infos of ``step`` only.

@@ -91,7 +91,7 @@ class HighestItemEnv(PickingEnv):
     ## Information
     ``action_mask`` and ``item_mask``: (128,) int8, all 1, since no row fails twice or is empty.
 
-    Arguments and errors are as for ``ContainerEnv``, but there is nothing to draw.
+    Arguments and errors are as for ``ContainerEnv``, but there is nothing to lift or to draw.
     """
 
     def __init__(self, *, render_mode: str | None = None, **settings) -> None:

@@ -1,4 +1,4 @@
-"""Many containers at once, in arrays (Sec. III-A, Fig. 2)."""
+"""Many containers in arrays (Sec. III-A, Fig. 2): what ``PickingVectorEnv.step`` asks of them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,7 +27,8 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     Args:
         physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Unless it is a
-            plain ``TablePhysics``, its ``simulate`` is asked about each pick. With
+            plain ``TablePhysics`` of full force, its ``simulate`` is asked about each pick whose
+            outcome neither an earlier failure nor the ceiling says. With
             ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
 
     Attributes:
@@ -50,13 +51,14 @@ class ContainerVectorEnv(PickingVectorEnv):
         check_stack(stack)
         self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self.stack, self._lent = stack, isinstance(physics, LocalPhysics)
-        if not isinstance(physics, LocalPhysics):
-            checks.one_of("physics", physics, ("table", "a LocalPhysics"))
+        if isinstance(physics, str):
+            checks.one_of("physics", physics, ("table",))
             physics = TablePhysics(shared_table())
-        self.physics: Any = physics
+        wanted = "'table' or a LocalPhysics"
+        self.physics: Any = checks.instance("physics", physics, LocalPhysics, wanted)
         # The lifts that are known; none where another class is asked about each pick.
         self.table = physics.table if isinstance(physics, TablePhysics) else LiftTable()
-        # No table, and no compiled loop, knows what another class or a weaker pull does.
+        # No compiled loop knows what another class or a weaker pull does.
         self._asks = type(physics) is not TablePhysics or physics.force < task.PICK_FORCE
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
@@ -132,11 +134,14 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, actions: np.ndarray, playing: np.ndarray
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         items, distances = self._lift(actions)
-        rewards = containers.pick(self._containers, actions, distances, *self._features)
+        rewards = containers.unload_lifted(self._containers, actions, distances, *self._features)
         return rewards, {"item": items, "distance": distances}
 
     def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64."""
+        """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64.
+
+        What the table does not know, ``physics`` simulates and adds to it.
+        """
         state = self._containers
         items, distances = containers.look_up(state, actions, self._asks, *self.table.slots)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)

@@ -12,8 +12,8 @@ import numpy as np
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
 from unload.load.boxes import OVERLAP
-from unload.physics.situation import find_movers, key_length, write_key
-from unload.physics.table import FREE_LIFT, HELD_DOWN, digest_of, slot_of
+from unload.physics.situation import digest_of, find_movers, key_length, write_key
+from unload.physics.table import FREE_LIFT, HELD_DOWN, slot_of
 from unload.support.compiled import compiled
 
 _N_VISIBLE = task.N_VISIBLE
@@ -156,7 +156,7 @@ def look_up(containers, actions, asks, digests, micrometres):
 
 
 @compiled
-def pick(containers, actions, distances, equalize, average, tolerance):
+def unload_lifted(containers, actions, distances, equalize, average, tolerance):
     """Unload the items that moved far enough; the rewards, (E,) float64."""
     rewards = np.empty(len(actions))
     for env in range(len(actions)):

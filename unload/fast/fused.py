@@ -78,7 +78,7 @@ def start_gradients(
         observations: (batch, items, 3) float32.
         actions: (batch,) int64, in 0 … items-1.
         targets: (batch,) float32.
-        beta: of the smooth-L1 loss, > 0.
+        beta: of the smooth-L1 loss, >= 0.
         rows: int64, which rows of these arrays are the batch, so that they need not be copied
             out of a large memory; None for all.
 

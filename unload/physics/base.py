@@ -29,7 +29,7 @@ class Physics(ABC):
     Attributes:
         force: N, the strongest pull; a box is pulled with 20 N per kg of its mass up to that,
             which is the paper's task for boxes of 1 kg.
-        exact: True where unlifted boxes stay exactly where the load put them.
+        exact: True where a lift leaves all other boxes exactly where they were.
         load: the load, None before the first ``reset``.
         present: (n,) bool, False for items that have been removed.
 

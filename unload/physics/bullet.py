@@ -1,4 +1,4 @@
-"""PyBullet, and the only file that imports it, with the first ``World``: it is optional.
+"""PyBullet, which only this file imports: when the first ``World`` is made, as it is optional.
 
 A ``World`` is one PyBullet client with boxes in it. It knows nothing of loads,
 observations or rewards, and checks nothing: that is done where loads, forces and times enter.
@@ -75,7 +75,7 @@ DAMPING = 0.04
 # Boxes are made this much narrower (x and y), so that neighbours do not rub: side by
 # side without a gap, free boxes rise less, and at a higher friction many jam.
 GAP = 0.001  # m
-# All that a lift's outcome depends on besides the boxes.
+# What a lift's outcome depends on besides the boxes; the solver is left as PyBullet has it.
 SETTINGS = {
     "pybullet": _version(),
     "time_step": TIME_STEP,

@@ -1,6 +1,6 @@
 """Lifts in a simulation of every box of the container; and a physics by its name."""
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def make_physics(
         force: of those that have a name, see ``Physics``.
     """
     if not isinstance(physics, Physics):
-        checks.one_of("physics", physics, ("local", "full", "table", "a Physics"))
+        checks.one_of("physics", physics, get_args(Name))
         if physics == "full":
             return FullPhysics(after_pick, force)
     elif force != task.PICK_FORCE:

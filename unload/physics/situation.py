@@ -21,14 +21,14 @@ RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are 
 
 @dataclass(frozen=True, eq=False)  # equal situations have equal keys
 class Situation:
-    """The surroundings of one box, relative to it, in whole micrometres.
+    """One box and what decides its lift, relative to it, in whole micrometres.
 
     Attributes:
         boxes: (m, 6) int32, centre relative to the chosen box and edge lengths, both
             along x, y, z. Row 0 is the chosen box, the next are those on top of it.
         dynamic: how many of the rows can move: the chosen box and all on top of it.
         floor: z of the floor if the chosen box stands on it, else None.
-        sides: y of the container's side walls that a box of the situation touches.
+        sides: y of the container's side walls that a box which can move touches.
         pull: what else decides: the force in mN, and the masses of the dynamic boxes in g; empty
             for those of the task, 20 N and 1 kg each.
     """
@@ -93,32 +93,6 @@ class Surroundings:
         pull = (int(self._pulls[item]), *self._grams[moving].tolist())
         usual = (round(_USUAL * PULL), *[_USUAL] * len(moving))
         return situation if pull == usual else replace(situation, pull=pull)
-
-
-def situation_in(
-    starts: np.ndarray,
-    links: np.ndarray,
-    present: np.ndarray,
-    geometry: np.ndarray,
-    right: float,
-    item: int,
-) -> Situation:
-    """The situation of ``item`` in a container given by arrays, see ``write_key``."""
-    members = np.empty(len(present), np.int32)
-    key = np.empty(key_length(len(present)), np.int32)
-    dynamic = find_movers(starts, links, present, item, members, len(members))
-    words = write_key(starts, links, present, geometry, right, members, dynamic, key)
-    key = key[:words].copy()
-
-    # What stands between its head and the boxes, six words each, are the floor and the sides.
-    first = 2 + key[1]
-    sides = (len(key) - first) % 6
-    return Situation(
-        boxes=key[first + sides :].reshape(-1, 6),
-        dynamic=int(key[0]),
-        floor=int(key[2]) if key[1] else None,
-        sides=tuple(key[first : first + sides].tolist()),
-    )
 
 
 @compiled(plain=True)
@@ -203,6 +177,32 @@ def write_key(starts, links, present, geometry, right, members, dynamic, key):
     return words
 
 
+def situation_in(
+    starts: np.ndarray,
+    links: np.ndarray,
+    present: np.ndarray,
+    geometry: np.ndarray,
+    right: float,
+    item: int,
+) -> Situation:
+    """The situation of ``item`` in a container given by arrays, see ``write_key``."""
+    members = np.empty(len(present), np.int32)
+    key = np.empty(key_length(len(present)), np.int32)
+    dynamic = find_movers(starts, links, present, item, members, len(members))
+    words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+    key = key[:words].copy()
+
+    # What stands between its head and the boxes, six words each, are the floor and the sides.
+    first = 2 + key[1]
+    sides = (len(key) - first) % 6
+    return Situation(
+        boxes=key[first + sides :].reshape(-1, 6),
+        dynamic=int(key[0]),
+        floor=int(key[2]) if key[1] else None,
+        sides=tuple(key[first : first + sides].tolist()),
+    )
+
+
 @compiled(plain=True)
 def _micrometres(length):
     return np.int32(np.rint(length / RESOLUTION))
@@ -225,3 +225,19 @@ def _insert(members, first, end, box):
         place -= 1
     members[place] = box
     return end + 1
+
+
+@compiled(plain=True)
+def _absorb(digest, word):
+    """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
+    digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
+    return digest ^ (digest >> np.uint64(29))
+
+
+@compiled(plain=True)
+def digest_of(words):
+    """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
+    digest = np.uint64(len(words))
+    for word in words:
+        digest = _absorb(digest, word)
+    return max(digest, np.uint64(1))

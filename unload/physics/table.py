@@ -20,7 +20,7 @@ from unload.load.boxes import Load
 from unload.physics.base import Force
 from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import PULL, Situation
+from unload.physics.situation import PULL, Situation, digest_of
 from unload.support import files
 from unload.support.compiled import compiled
 
@@ -200,7 +200,7 @@ class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
     A box with nothing on top moves by ``free_lift``, as PyBullet says. One with three or more
-    others on it, all of 1 kg, is held down, without a simulation: such situations hardly ever
+    others on it, in the task, is held down, without a simulation: such situations hardly ever
     repeat, and of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
 
     Args:
@@ -239,22 +239,6 @@ def shared_table() -> LiftTable:
 
 def _digest(situation: Situation) -> np.uint64:
     return np.uint64(digest_of(np.frombuffer(situation.key, np.int32)))
-
-
-@compiled(plain=True)
-def _absorb(digest, word):
-    """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
-    digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
-    return digest ^ (digest >> np.uint64(29))
-
-
-@compiled(plain=True)
-def digest_of(words):
-    """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
-    digest = np.uint64(len(words))
-    for word in words:
-        digest = _absorb(digest, word)
-    return max(digest, np.uint64(1))
 
 
 @compiled(plain=True)
