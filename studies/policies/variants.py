@@ -7,7 +7,6 @@ makes them affordable: fewer picks and a smaller batch. Networks without a fused
 too, and so is the paper's beside them.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -21,7 +20,7 @@ from studies.changes import height_reward
 from studies.falls import measures
 from studies.grid import Cell, Grid, train_grid
 from studies.networks import NETWORKS as KINDS
-from studies.results import COMMAND, JOBS, read_table
+from studies.results import COMMAND, read_table
 from studies.statistics import t_interval
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload.agent.config import TrainConfig
@@ -77,19 +76,17 @@ GRIDS = {
     # The paper's configuration but for one thing, and shorter: positions, not ranks.
     "recommended": _grid("variants/recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
 }
-OPTIONS = {"--grids": {"nargs": "+", "choices": GRIDS, "default": tuple(GRIDS)}, **JOBS}
 
 
-def variants_data(grids: Sequence[str] = tuple(GRIDS), n_jobs: int = -1) -> None:
-    """Train some grids, see ``train_grid``.
+def variants_data(n_jobs: int = -1) -> None:
+    """Train both grids, see ``train_grid``.
 
     The recommended agent's first run is also the policy that comes with the package.
     """
-    for name in grids:
-        kept = train_grid(GRIDS[name], n_jobs=n_jobs)
-        if name == "recommended":
-            best = load_policy(kept / "positions/seed_0/policy.safetensors")
-            save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
+    train_grid(GRIDS["variants"], n_jobs=n_jobs)
+    kept = train_grid(GRIDS["recommended"], n_jobs=n_jobs)
+    best = load_policy(kept / "positions/seed_0/policy.safetensors")
+    save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
 
 
 def read_variants(part: str) -> pd.DataFrame:

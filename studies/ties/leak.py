@@ -11,7 +11,7 @@ from scipy.stats import spearmanr
 
 from studies import paths
 from studies.grid import cell_of, read_policies
-from studies.results import COMMAND, JOBS, keep_all, measured, publish
+from studies.results import COMMAND, keep_all, measured, publish
 from studies.seamless.training import SEAMLESS
 from unload.agent.evaluation import evaluate
 from unload.env.equalization import equalize
@@ -23,7 +23,6 @@ NOISE = {"order": 0.0, "noise": POSITION_NOISE}  # m, by how ties are broken
 LOADS = range(700, 720)
 CELLS = [name for name in SEAMLESS.cells if name.endswith("_order") and "b2048" in name]
 JUDGED = {"episodes": 64, "seed": 7000}  # fresh containers, 500 picks each
-OPTIONS = JOBS
 
 
 def told_by_rank(load_seed: int, ties: str) -> dict:

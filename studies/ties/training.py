@@ -12,7 +12,7 @@ from functools import partial
 from studies import changes
 from studies.grid import Cell, Grid, train_grid
 from studies.paper.training import B2048
-from studies.results import COMMAND, JOBS
+from studies.results import COMMAND
 from studies.seamless.jamming import jam
 from studies.ties.noise import drifting
 from unload.agent.config import TrainConfig
@@ -69,7 +69,6 @@ CELLS = {
     **{f"{ties}_jams_0.4_mask": _cell(ties, share=0.4, mask=True) for ties in CORRELATIONS},
 }
 TIES = Grid("ties/runs", f"{COMMAND} ties", CELLS)
-OPTIONS = {"--cells": {"nargs": "+", "choices": CELLS}, **JOBS}
 
 
 def ties_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:

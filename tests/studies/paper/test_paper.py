@@ -31,9 +31,8 @@ def test_what_differs_does_not_agree(monkeypatch):
 def test_policies_play_elsewhere_once_their_cell_is_trained(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "train_grid", lambda *given: None)
     monkeypatch.setattr(files, "SHIPPED", tmp_path)
-    for cells, picks in ((["paper_mask"], None), (None, 64_000)):
-        training.training_data(cells, picks)
-        assert not list(tmp_path.iterdir())
+    training.training_data(["paper_mask"])
+    assert not list(tmp_path.iterdir())
     training.training_data()
     policies = read_policies(paths.DATA / "falls/paper.safetensors")
     assert [*policies] == [*PAPER.configs()]
