@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,6 @@ from studies import changes, paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
 from studies.grid import read_policies
-from studies.networks import NETWORKS
 from studies.paper.training import PAPER
 from studies.results import read_provenance, read_table
 from unload import evaluate
@@ -190,21 +188,8 @@ def observations():
     return np.random.default_rng(0).uniform(-1, 1, (40, 128, 3)).astype(np.float32)
 
 
-@pytest.mark.parametrize("name", ["two_layer", "stack", "attention"])
-def test_slopes_of_other_networks_are_those_of_their_values(name, observations):
-    """Their first weights are no slopes, and not all of them have an extractor."""
-    seen, step = observations[:2, :7].astype(float), 1e-5
-    network = NETWORKS[name](8, torch.Generator().manual_seed(0)).double()
-    upper = np.argwhere(seen[..., 2] > np.median(seen[..., 2]))
-    expected = np.zeros(3)
-    for (row, item), axis, sign in product(upper, range(3), (1, -1)):
-        moved = seen.copy()
-        moved[row, item, axis] += sign * step
-        with torch.no_grad():
-            value = network(torch.from_numpy(moved))[row, item].item()
-        expected[axis] += sign * value / (2 * step) / len(upper)
-    assert measures.slopes(network, seen) == pytest.approx(expected, abs=1e-7)
-    assert np.abs(expected).max() > 1e-3
+def test_slopes_are_those_of_the_score(network, observations):
+    assert measures.slopes(network, observations) == pytest.approx([0, 0.5, 1])
 
 
 def test_tilt_is_the_effect_of_place_at_equal_height(observations):
