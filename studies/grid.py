@@ -154,10 +154,9 @@ def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
         if grid.policies:
             write_policies(paths.DATA / f"{grid.name}.safetensors", policies)
     else:
-        names = [name.rpartition("/seed_") for name in done]
         rows = [
-            {"cell": cell, "seed": int(seed), **grid.measure(policies[name], config)}
-            for (cell, _, seed), (name, config) in zip(names, done.items())
+            {"cell": cell_of(name), "seed": config.seed, **grid.measure(policies[name], config)}
+            for name, config in done.items()
         ]
         write_table(grid.name, pd.DataFrame(rows))
 

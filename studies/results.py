@@ -90,7 +90,7 @@ def packed(arrays: Mapping[str, np.ndarray]) -> str:
 
 def unpacked(text: str) -> dict[str, np.ndarray]:
     """The arrays of ``packed``."""
-    with np.load(BytesIO(b64decode(text)), allow_pickle=False) as stored:
+    with np.load(BytesIO(b64decode(text))) as stored:
         return dict(stored)
 
 

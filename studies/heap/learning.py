@@ -169,7 +169,6 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
 
 def network_of(weights: dict[str, torch.Tensor], n_features: int = FEATURES) -> FateNetwork:
     """The network with these weights; RuntimeError if they are not those of so many features."""
-    with torch.device("meta"):  # where nothing is made: a forged file may tell of millions
-        network = FateNetwork(n_features)
-    network.load_state_dict(weights, assign=True)
+    network = FateNetwork(n_features)
+    network.load_state_dict(weights)
     return network.eval()

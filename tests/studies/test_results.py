@@ -168,10 +168,3 @@ def test_all_planned_runs_are_published_in_full_length(name):
     if grid.measure is None:
         last = rows.groupby(["cell", "seed"])["picks"].max()
         assert {config.picks for config in planned.values()} == {*last}
-
-
-def test_a_kept_answer_runs_no_code():
-    """What is read back is numbers; objects would be made by their pickles."""
-    text = packed({"harmless": np.array([Mock], dtype=object)})
-    with pytest.raises(ValueError, match="allow_pickle=False"):
-        unpacked(text)
