@@ -42,10 +42,8 @@ def policies(n_jobs: int) -> None:
 
 def sb3(n_jobs: int) -> None:
     """Train agents of Stable-Baselines3."""
-    try:
-        from studies.policies.sb3 import sb3_data  # here, because no other part needs the library
-    except ModuleNotFoundError as error:
-        raise SystemExit(f'{error}; expected it: pip install ".[studies]"') from error
+    from studies.policies.sb3 import sb3_data  # here, because no other part needs the library
+
     sb3_data(n_jobs)
 
 

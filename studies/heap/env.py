@@ -71,13 +71,11 @@ class HeapEnv(EpisodeEnv):
       since the last pick that unloaded something (if that is all of them, they are allowed
       again);
     - ``item_mask``: (96,) int8, 0 for rows without a box;
-    - ``left``: int, boxes in the heap;
 
     and ``step`` also
 
     - ``unloaded`` and ``falls``: int, the two parts of the reward;
     - ``box``: int, the dragged box's number in the heap before the pick, -1 if there was none;
-    - ``moved``: float, m, how far it came, and ``came``: bool;
     - ``fates``: (96,) int8, what happened to the box in each row of the observation before the
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
@@ -152,8 +150,6 @@ class HeapEnv(EpisodeEnv):
             "unloaded": outcome.unloaded.sum(),
             "falls": outcome.fallen.sum(),
             "box": np.int64(box),
-            "moved": np.float64(outcome.moved),
-            "came": np.bool_(outcome.came),
             "fates": fates,
         }
         reward = float(pick["unloaded"] - pick["falls"])
@@ -185,5 +181,4 @@ class HeapEnv(EpisodeEnv):
         return {
             "action_mask": (untried if untried.any() else boxes).astype(np.int8),
             "item_mask": boxes.astype(np.int8),
-            "left": np.int64(len(self.heap)),
         }

@@ -25,7 +25,7 @@ from studies.statistics import t_interval
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
-from unload.support import checks, files
+from unload.support import files
 
 CONFIG = TrainConfig(picks=1_000_000, batch_size=256, log_interval=500)
 SEEDS = range(3)
@@ -91,7 +91,6 @@ def variants_data(n_jobs: int = -1) -> None:
 
 def read_variants(part: str) -> pd.DataFrame:
     """What ``judged`` says of the policies of one of ``PARTS``, a row per ``cell`` and ``seed``."""
-    checks.one_of("part", part, PARTS)
     rows = read_table(GRIDS["variants"].name)
     return rows[rows["cell"].isin(PARTS[part])]
 
