@@ -2,8 +2,10 @@
 
 import argparse
 from collections.abc import Callable, Iterable
+from functools import partial
 
 from studies.falls import laboratory, long
+from studies.grid import train_grid
 from studies.heap import table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
@@ -68,7 +70,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "ties_laboratory": (
         "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS
     ),
-    "ties": ("how equal coordinates are ranked", ties.ties_data, some(ties.CELLS)),
+    "ties": ("how equal coordinates are ranked", partial(train_grid, ties.TIES), some(ties.CELLS)),
     "falls": ("why runs fall: the long runs", long.falls_data, some(long.LONG.cells)),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
 }  # fmt: skip
