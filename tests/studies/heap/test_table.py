@@ -13,9 +13,16 @@ from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.rake import Outcome
 from studies.heap.recording import HEAPS, make_networks
-from studies.heap.table import family
+from studies.heap.table import best_rule, family
 from studies.results import read_provenance, read_table
 from unload.load.picture import COLOURS
+
+
+def test_the_best_rule_depends_on_the_weight_of_falls():
+    columns = ["rule", "heaps", "boxes", "falls"]
+    rows = [("bold", 20, 2.0, 1.0), ("lucky", 4, 5.0, 0.0), ("shy", 20, 1.2, 0.0)]
+    rules = pd.DataFrame(rows, columns=columns)
+    assert [best_rule(rules, weight) for weight in (0.0, 1.0)] == ["bold", "shy"]
 
 
 @pytest.mark.pybullet

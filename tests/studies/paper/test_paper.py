@@ -14,7 +14,7 @@ from studies.paper import numbers, training, tuning
 from studies.paper.training import PAPER
 from studies.paper.tuning import tuning_grid
 from studies.results import read_table
-from unload import TrainConfig, load_policy
+from unload import TrainConfig, load_policy, task
 from unload.support import files
 
 
@@ -89,3 +89,10 @@ def test_committed_files_of_the_papers_plots_are_those_of_the_tables(own_data):
     assert len(written) == 8
     for path in written:
         assert (own_data / path).read_bytes() == (committed / path).read_bytes()
+
+
+def test_chance_counts_all_others(monkeypatch):
+    """Of three items of two heights: one below is among the highest if both others are below."""
+    monkeypatch.setattr(tuning, "GRID", np.array([[0, 0, 0.1], [0, 0, 0.2]]))
+    monkeypatch.setattr(task, "N_VISIBLE", 3)
+    assert tuning.chance() == pytest.approx(0.5 + 0.5 * 0.25)

@@ -77,3 +77,11 @@ def test_a_run_is_the_same_however_it_is_played(full_load):
     in_parts.back_to(10)
     in_parts.play_to(30)
     assert in_parts.picks == at_once.picks
+
+
+def test_a_random_player_draws_another_row_at_each_pick(full_load):
+    run, rows = Run("random", full_load, seed=2, mask=False), []
+    for count in range(1, 31):
+        rows.append(run.visible.tolist().index(run.choose()))
+        run.play_to(count)
+    assert len(set(rows)) > 20

@@ -178,6 +178,15 @@ def test_agents_of_another_library_are_trained_and_measured(own_data, monkeypatc
     assert rows.query("agent == 'unload' and mask")["msr"].iloc[0] == pytest.approx(again["msr"])
 
 
+def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
+    monkeypatch.setattr(variants, "LOADS", {"episodes": 3, "seed": 1000})
+    policy = load_policy("paper_seed_2")
+    expected = [
+        evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
+    ]
+    assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
+
+
 def test_the_recommended_policy_is_judged_as_the_data_say():
     policy = load_policy("recommended")
     first = read_table("variants/recommended").iloc[0]
