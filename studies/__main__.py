@@ -1,22 +1,32 @@
-"""The command line: each experiment is a part, with the options that its module declares."""
+"""The command line: each experiment is a part."""
 
 import argparse
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterable
+from functools import partial
 
 from studies.falls import laboratory, long
+from studies.grid import train_grid
 from studies.heap import table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, robustness, variants
-from studies.results import COMMAND, JOBS
+from studies.results import COMMAND
 from studies.seamless import jam_tables
 from studies.seamless import training as seamless
 from studies.ties import creep, leak
 from studies.ties import laboratory as ties_laboratory
 from studies.ties import training as ties
-from unload.agent.config import TrainConfig
-from unload.support import checks
+
+JOBS = {
+    "--jobs": {
+        "dest": "n_jobs", "type": int, "default": -1, "help": "processes; one per core if -1"
+    }
+}  # fmt: skip
+
+
+def some(cells: Iterable[str]) -> dict:
+    """The options of a part of which some cells can be trained alone."""
+    return {"--cells": {"nargs": "+", "choices": cells}, **JOBS}
 
 
 def lifts(n_jobs: int) -> None:
@@ -34,10 +44,8 @@ def policies(n_jobs: int) -> None:
 
 def sb3(n_jobs: int) -> None:
     """Train agents of Stable-Baselines3."""
-    try:
-        from studies.policies.sb3 import sb3_data  # here, because no other part needs the library
-    except ModuleNotFoundError as error:
-        raise SystemExit(f'{error}; expected it: pip install ".[studies]"') from error
+    from studies.policies.sb3 import sb3_data  # here, because no other part needs the library
+
     sb3_data(n_jobs)
 
 
@@ -47,24 +55,23 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "engines": ("lifts and MSRs by a second engine", engines.engines_data, JOBS),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
-    "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
-    "variants": ("other networks, rewards and settings", variants.variants_data, variants.OPTIONS),
+    "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),
+    "variants": ("other networks, rewards and settings", variants.variants_data, JOBS),
     "policies": ("policies compared", policies, JOBS),
     "sb3": ("agents of Stable-Baselines3, trained for minutes", sb3, JOBS),
-    "laboratory": (
-        "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
-    ),
+    "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
-    "seamless": ("seamless walls, in which boxes jam", seamless.seamless_data, seamless.OPTIONS),
+    "seamless": (
+        "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.CELLS)
+    ),
     "creep": ("how long the order of equals lasts in PyBullet", creep.creep_data, JOBS),
     "leak": ("what ties by the items' order tell a network", leak.leak_data, JOBS),
     "ties_laboratory": (
-        "how long an order of equals lasts: the laboratory",
-        ties_laboratory.laboratory_data, ties_laboratory.OPTIONS,
+        "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS
     ),
-    "ties": ("how equal coordinates are ranked", ties.ties_data, ties.OPTIONS),
-    "falls": ("why runs fall: the long runs", long.falls_data, long.OPTIONS),
+    "ties": ("how equal coordinates are ranked", partial(train_grid, ties.TIES), some(ties.CELLS)),
+    "falls": ("why runs fall: the long runs", long.falls_data, some(long.LONG.cells)),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
 }  # fmt: skip
 
@@ -95,21 +102,9 @@ def main() -> None:
             part.add_argument(option, **details)
     chosen = vars(parser.parse_args())
     del chosen["part"]
-    try:
-        check(chosen)
-    except ValueError as error:
-        parser.error(str(error))
-    chosen.pop("make")(**chosen)
-
-
-def check(chosen: dict) -> None:
-    """Raise a ValueError for a number that no part can run with, before anything starts."""
     if chosen.get("n_jobs") == 0:
-        raise ValueError("--jobs is 0; expected a number of processes, or -1 for one per core")
-    if chosen.get("seeds") is not None:
-        checks.integer("--seeds", chosen["seeds"], 1)
-    if chosen.get("picks") is not None:
-        replace(TrainConfig(), picks=chosen["picks"])
+        parser.error("--jobs is 0; expected a number of processes, or -1 for one per core")
+    chosen.pop("make")(**chosen)
 
 
 if __name__ == "__main__":

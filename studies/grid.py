@@ -72,28 +72,21 @@ class Grid(NamedTuple):
     measure: Callable[[Greedy, TrainConfig], dict[str, float]] | None = None
     policies: bool = True
 
-    def configs(self, picks: int | None = None) -> dict[str, TrainConfig]:
+    def configs(self) -> dict[str, TrainConfig]:
         """The configuration of each planned run by its name, ``<cell>/seed_<seed>``."""
-        length = {} if picks is None else {"picks": picks}
         return {
-            f"{name}/seed_{seed}": replace(cell.config, seed=seed, **length)
+            f"{name}/seed_{seed}": replace(cell.config, seed=seed)
             for name, cell in self.cells.items()
             for seed in cell.seeds
         }
 
 
-def train_grid(
-    grid: Grid,
-    cells: Sequence[str] | None = None,
-    picks: int | None = None,
-    n_jobs: int = -1,
-) -> Path:
+def train_grid(grid: Grid, cells: Sequence[str] | None = None, n_jobs: int = -1) -> Path:
     """Train the runs of a grid that are not finished, and publish all that are.
 
     Args:
         grid: of the runs.
         cells: to train, all if None.
-        picks: of each run, those of the plan if None; a grid with others goes to ``reduced``.
 
     Returns:
         The folder that holds the folders of the runs, by their names.
@@ -102,19 +95,16 @@ def train_grid(
         RuntimeError: runs failed; the message says which and why. The others are published.
         ValueError: fewer runs would be finished than are published; nothing is trained.
     """
-    for cell in cells or ():
-        checks.one_of("cells", cell, grid.cells)
-    configs = grid.configs(picks)
+    configs = grid.configs()
     wanted = {
         name: config for name, config in configs.items() if not cells or cell_of(name) in cells
     }
     fingerprint = training_fingerprint({cell.config.network for cell in grid.cells.values()})
-    kept = paths.RUNS / grid.name / fingerprint / ("full" if picks is None else f"{picks}")
+    kept = paths.RUNS / grid.name / fingerprint / "full"
     changes = {name: grid.cells[cell_of(name)].change for name in wanted}
-    place = Path("" if picks is None else "reduced", grid.name)
-    _check_count(place, kept, len(_records(kept, configs).keys() | wanted.keys()))
+    _check_count(grid.name, kept, len(_records(kept, configs).keys() | wanted.keys()))
     report = run_sweep(wanted, kept, n_jobs, changes=changes)
-    _publish(grid, configs, kept, place, picks is not None, fingerprint)
+    _publish(grid, configs, kept, fingerprint)
     failed = report[report["error"] != ""]
     if len(failed):
         raise RuntimeError("runs failed:\n" + failed["error"].to_string(header=False))
@@ -127,20 +117,20 @@ def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
     return {name: path for name, path in records.items() if path.exists()}
 
 
-def _check_count(place: Path, kept: Path, runs: int) -> None:
+def _check_count(name: str, kept: Path, runs: int) -> None:
     """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
-    there = read_provenance(place)["runs"] if provenance_file(place).exists() else 0
+    there = read_provenance(name)["runs"] if provenance_file(name).exists() else 0
     if runs < there:
         raise ValueError(
             f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "
-            f"of {place}"
+            f"of {name}"
         )
 
 
-def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint: str) -> None:
+def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
     """Publish the finished runs in ``kept``, no fewer than there are, and their provenance."""
     records = _records(kept, configs)
-    _check_count(place, kept, len(records))
+    _check_count(grid.name, kept, len(records))
     if not records:
         return
     done = {name: configs[name] for name in records}
@@ -155,19 +145,18 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
         for column, digits in COLUMNS.items():
             tables: dict[Path, dict[str, pd.Series]] = {}
             for name, curve in curves.items():
-                table = _table_name(place, cell_of(name), column)
+                table = _table_name(grid, cell_of(name), column)
                 tables.setdefault(table, {"picks": picks})[name] = curve[column]
             for table, content in tables.items():
                 write_table(table, pd.DataFrame(content), digits)
         if grid.policies:
-            write_policies(paths.DATA / f"{place}.safetensors", policies)
+            write_policies(paths.DATA / f"{grid.name}.safetensors", policies)
     else:
-        names = [name.rpartition("/seed_") for name in done]
         rows = [
-            {"cell": cell, "seed": int(seed), **grid.measure(policies[name], config)}
-            for (cell, _, seed), (name, config) in zip(names, done.items())
+            {"cell": cell_of(name), "seed": config.seed, **grid.measure(policies[name], config)}
+            for name, config in done.items()
         ]
-        write_table(place, pd.DataFrame(rows))
+        write_table(grid.name, pd.DataFrame(rows))
 
     # The first seed stands for the others of its cell: it rebuilds their configurations, too.
     first = {
@@ -175,7 +164,7 @@ def _publish(grid, configs, kept: Path, place: Path, reduced: bool, fingerprint:
     }
     record = joined(map(files.read_json, records.values()))
     record |= {"fingerprint": fingerprint, "planned": len(configs)}
-    write_provenance(place, grid.command, first, reduced, record)
+    write_provenance(grid.name, grid.command, first, record)
 
 
 def cell_of(run: str) -> str:
@@ -183,8 +172,9 @@ def cell_of(run: str) -> str:
     return run.rpartition("/seed_")[0]
 
 
-def _table_name(place: Path, cell: str, column: str) -> Path:
+def _table_name(grid: Grid, cell: str, column: str) -> Path:
     """Of the table of a column of a cell's curves: a row per point, a column per run."""
+    place = Path(grid.name)
     return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}")
 
 
@@ -202,10 +192,10 @@ def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
-    place, columns = Path(grid.name), []
+    columns = []
     for column in COLUMNS:
         parts = []
-        for name in dict.fromkeys(_table_name(place, cell, column) for cell in wanted):
+        for name in dict.fromkeys(_table_name(grid, cell, column) for cell in wanted):
             table = read_table(name)
             table = table[[name for name in table if name == "picks" or cell_of(name) in wanted]]
             parts.append(table.melt("picks", var_name="run", value_name=column))

@@ -33,12 +33,6 @@ from unload.support import checks, files
 
 PACKAGES = ("gymnasium", "joblib", "mujoco-core", "numba", "numpy", "pandas", "pybullet", "torch")
 COMMAND = "python -m studies"
-# The command-line option of every experiment that uses several processes.
-JOBS = {
-    "--jobs": {
-        "dest": "n_jobs", "type": int, "default": -1, "help": "processes; one per core if -1"
-    }
-}  # fmt: skip
 
 
 class Result(NamedTuple):
@@ -96,7 +90,7 @@ def packed(arrays: Mapping[str, np.ndarray]) -> str:
 
 def unpacked(text: str) -> dict[str, np.ndarray]:
     """The arrays of ``packed``."""
-    with np.load(BytesIO(b64decode(text)), allow_pickle=False) as stored:
+    with np.load(BytesIO(b64decode(text))) as stored:
         return dict(stored)
 
 
@@ -128,7 +122,6 @@ def publish(
     results: Iterable[Result],
     fingerprint: str | None = None,
     float_format: str = "%.6g",
-    reduced: bool = False,
 ) -> None:
     """Write tables of results and, last, their provenance.
 
@@ -141,16 +134,13 @@ def publish(
         fingerprint: of the training that the results rest on, see ``training_fingerprint``;
             None if they rest on none, or on one that is not known.
         float_format: of the tables.
-        reduced: whether the run is smaller than the one that ``data/`` holds; what it gives goes
-            to ``data/reduced``.
     """
-    place = Path("reduced" if reduced else "", name)
     for table_name, table in tables.items():
-        write_table(place.with_name(table_name), table, float_format)
+        write_table(Path(name).with_name(table_name), table, float_format)
     record = joined(result.record for result in results)
     if fingerprint is not None:
         record["fingerprint"] = fingerprint
-    write_provenance(place, command, settings, reduced, record)
+    write_provenance(name, command, settings, record)
 
 
 def write_table(name: str | Path, table: pd.DataFrame, float_format: str = "%.6g") -> None:
@@ -170,12 +160,9 @@ def read_table(name: str | Path) -> pd.DataFrame:
     return pd.read_csv(path)
 
 
-def write_provenance(
-    name: str | Path, command: str, settings: dict, reduced: bool, record: dict
-) -> None:
+def write_provenance(name: str | Path, command: str, settings: dict, record: dict) -> None:
     """Write the provenance of data, see ``publish``; the record is ``joined``."""
-    content = {"command": command, "reduced": reduced, "settings": settings, **record}
-    files.write_json(provenance_file(name), content)
+    files.write_json(provenance_file(name), {"command": command, "settings": settings, **record})
 
 
 def read_provenance(name: str | Path) -> dict:

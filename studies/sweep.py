@@ -5,7 +5,6 @@ import os
 import sys
 import time
 import traceback
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -13,19 +12,15 @@ from pathlib import Path
 
 import pandas as pd
 import torch
-from joblib import Parallel, delayed, effective_n_jobs
-from joblib.parallel import get_active_backend
+from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies.results import run_record
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.identity import unchanged
-from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training, train
-from unload.support import checks, files
-
-BASE = 500 * 2**20  # bytes of a run besides its replay memory
+from unload.support import files
 
 
 def run_sweep(
@@ -65,15 +60,8 @@ def run_sweep(
             ``wait_for_workers_timeout``.
         BrokenProcessPool: a process has died, for want of memory, say; call it again to go on.
     """
-    checks.entries("configs", configs, ())
-    for name in changes or {}:
-        checks.one_of("changes", name, configs)
     # Absolute, because a cluster's processes may stand elsewhere.
-    folder = checks.path("folder", folder).absolute()
-    at_once = effective_n_jobs(n_jobs)
-    if not hasattr(get_active_backend()[0], "client"):  # Dask's runs are on other machines
-        _warn_of_memory(configs, at_once)
-
+    folder = Path(folder).absolute()
     runs = Parallel(n_jobs, return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
     changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
     jobs = ((name, configs[name], folder / name, changes[name]) for name in configs)
@@ -88,20 +76,6 @@ def run_sweep(
         for name, config in configs.items()
     ]
     return pd.DataFrame(rows, index=pd.Index(configs, name="run"))
-
-
-def _warn_of_memory(configs: Mapping[str, TrainConfig], at_once: int) -> None:
-    """Warn where the largest runs that may be at work at once do not fit this machine."""
-    memories = (ReplayBuffer.of(config).arrays.values() for config in configs.values())
-    sizes = sorted(BASE + sum(array.nbytes for array in arrays) for arrays in memories)
-    needed = sum(sizes[-at_once:])
-    there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    if needed > there:
-        warnings.warn(
-            f"{min(at_once, len(sizes))} runs at once need {needed / 1e9:.1f} GB of memory, and "
-            f"this machine has {there / 1e9:.1f} GB; take a smaller n_jobs",
-            stacklevel=3,
-        )
 
 
 def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):

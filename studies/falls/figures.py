@@ -179,13 +179,11 @@ def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
     preferences = rows[["slope_x", "slope_y"]].abs().div(rows["slope_z"].abs(), axis=0)
     preferences = preferences.clip(upper=0.98 * MOST_PREFERENCE)
     errs = rows["judged_as_is"] < ERRS
-    for name, chosen, colour, marker in (
-        ("errs", errs, "C1", "o"), ("does not", ~errs, "C0", "o"),
-    ):  # fmt: skip
+    for name, chosen, colour in (("errs", errs, "C1"), ("does not", ~errs, "C0")):
         places = preferences[chosen]
         axes.plot(
-            places["slope_x"], places["slope_y"], marker, color=colour, markersize=4, alpha=0.7,
+            places["slope_x"], places["slope_y"], "o", color=colour, markersize=4, alpha=0.7,
             markeredgewidth=0, label=f"{name}: {len(places)}",
         )  # fmt: skip
-    axes.set(xlabel="|preference| along x (depth)", xlim=(0, MOST_PREFERENCE))
-    axes.set(ylim=(0, MOST_PREFERENCE))
+    limits = 0, MOST_PREFERENCE
+    axes.set(xlabel="|preference| along x (depth)", xlim=limits, ylim=limits)

@@ -6,7 +6,7 @@
 How its cells are trained and measured, and when a preference becomes a mistake.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from studies.falls import measures
 from studies.falls.cells import CELLS, CONFIG, FRESH, SEEN, Change
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, Result, keep_all, publish
+from studies.results import COMMAND, Result, keep_all, publish
 from studies.statistics import end_msr
 from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
@@ -34,11 +34,6 @@ COLUMNS = ["cell", "seed", "mean", "end", *JUDGED, *SLOPES, *TILTS]
 FRESH_COLUMNS = ["cell", "seed", "end", *JUDGED, "judged_averaged_x", *SLOPES]
 THRESHOLDS = 0.22, 0.42  # preferences along x and y above which a network errs
 ERRS = 0.95  # MSR in fresh containers below which a network errs
-OPTIONS = {
-    "--cells": {"nargs": "+", "metavar": "CELL", "choices": CELLS, "default": tuple(CELLS)},
-    "--seeds": {"type": int, "help": "of each cell at most; those of the plan if not given"},
-    **JOBS,
-}
 
 
 def train_in_laboratory(
@@ -117,9 +112,7 @@ def keep_cells(
     return keep_all(place, run, asked, n_jobs)
 
 
-def laboratory_data(
-    cells: Sequence[str] = tuple(CELLS), seeds: int | None = None, n_jobs: int = -1
-) -> None:
+def laboratory_data(n_jobs: int = -1) -> None:
     """Train the laboratory's cells; write ``falls/laboratory.csv`` and ``falls/trace.csv``.
 
     The first has a row per run: ``cell``, ``seed``; ``mean`` and ``end``, the MSR while training
@@ -128,19 +121,11 @@ def laboratory_data(
     both set to 0; its slopes at the end, and the mean ``tilt_x`` and ``tilt_y`` of the containers
     over the training (see ``measures``). The second has the points of the runs in ``TRACED``, see
     ``point``.
-
-    A part of the ``cells``, or fewer ``seeds`` of each, goes to the folder ``reduced``.
     """
-    chosen = {cell: CELLS[cell]._replace(seeds=CELLS[cell].seeds[:seeds]) for cell in cells}
-    results = keep_cells("laboratory", chosen, n_jobs)
-    rows = [result.value["row"] for result in results]
-    tables = {"laboratory": pd.DataFrame(rows)[COLUMNS]}
-    if trace := [point for result in results for point in result.value["trace"]]:
-        tables["trace"] = pd.DataFrame(trace)[["cell", "seed", *POINT]].astype({"picks": int})
-    reduced = seeds is not None or set(cells) < set(CELLS)
-    name, command = "falls/laboratory", f"{COMMAND} laboratory"
-    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(rows)}, training_fingerprint()
-    publish(name, tables, command, settings, results, fingerprint, "%.4g", reduced)
+    results = keep_cells("laboratory", CELLS, n_jobs)
+    trace = pd.DataFrame([point for result in results for point in result.value["trace"]])
+    trace = trace[["cell", "seed", *POINT]].astype({"picks": int})
+    _publish("laboratory", COLUMNS, results, {"trace": trace})
 
 
 def fresh_data(n_jobs: int = -1) -> None:
@@ -149,11 +134,15 @@ def fresh_data(n_jobs: int = -1) -> None:
     Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
     containers if equal x share one rank when the trained network chooses.
     """
-    results = keep_cells("fresh", FRESH, n_jobs)
-    table = pd.DataFrame([result.value["row"] for result in results])[FRESH_COLUMNS]
+    _publish("fresh", FRESH_COLUMNS, keep_cells("fresh", FRESH, n_jobs), {})
+
+
+def _publish(name: str, columns: list[str], results: list[Result], more: dict) -> None:
+    """Write a table with the rows of ``run_cell``, and perhaps more tables."""
+    table = pd.DataFrame([result.value["row"] for result in results])[columns]
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
-    name, command = "falls/fresh", f"{COMMAND} fresh"
-    publish(name, {"fresh": table}, command, settings, results, fingerprint, "%.4g")
+    place, command = f"falls/{name}", f"{COMMAND} {name}"
+    publish(place, {name: table} | more, command, settings, results, fingerprint, "%.4g")
 
 
 def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:

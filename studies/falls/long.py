@@ -19,7 +19,7 @@ from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
-from studies.results import COMMAND, JOBS, digest, keep_all, packed, publish
+from studies.results import COMMAND, digest, keep_all, packed, publish
 from unload.agent.config import TrainConfig
 from unload.network.peq import PEQNetwork
 
@@ -47,7 +47,6 @@ LONG = Grid(
 LOADS = {"episodes": 100, "seed": 1000}  # that policies are judged in, 500 picks each
 UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
 COLUMNS = ["cell", "seed", *JUDGED]
-OPTIONS = {"--cells": {"nargs": "+", "choices": LONG.cells}, **JOBS}
 
 
 def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:

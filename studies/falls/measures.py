@@ -21,34 +21,23 @@ BLANKED = {"as_is": (), "x": (0,), "y": (1,), "place": (0, 1)}  # coordinates se
 LOADS = {"episodes": 16, "seed": 1000}  # of fresh containers, 500 picks each
 
 
-def slopes(network: nn.Module, observations: np.ndarray) -> np.ndarray:
+def slopes(network: PEQNetwork, observations: np.ndarray) -> np.ndarray:
     """Mean slope of the score along x, y and z over the upper half of the items, (3,).
 
-    Of the paper's network the score is what decides among the items of an observation: tanh's
-    argument without the pooled part, which moves all of them alike. In any other network the two
-    need not be apart. There it is the value of an item, and the slope is that by its own
-    coordinates while the other items stay.
+    The score is what decides among the items of an observation: tanh's argument without the pooled
+    part, which moves all of them alike.
 
     Args:
-        network: (k, items, 3) float32 → (k, items), see ``unload.network``.
+        network: the paper's.
         observations: (k, items, 3) of the dtype of its weights, ranks or positions.
     """
     heights = observations[..., 2]
     upper = heights > np.median(heights)
-    if isinstance(network, PEQNetwork):
-        items = torch.from_numpy(observations[upper]).requires_grad_()
-        own = torch.relu(network.extractor(items))
-        scores = own @ network.scorer.weight[0, : network.n_features]
-        (gradient,) = torch.autograd.grad(scores.sum(), items)
-        return gradient.numpy().mean(axis=0)
-    seen = torch.from_numpy(observations).requires_grad_()
-    values = network(seen)
-    # Item by item, because a value depends on the other items, too.
-    gradients = [
-        torch.autograd.grad(values[:, item].sum(), seen, retain_graph=True)[0][:, item]
-        for item in range(values.shape[1])
-    ]
-    return torch.stack(gradients, dim=1).numpy()[upper].mean(axis=0)
+    items = torch.from_numpy(observations[upper]).requires_grad_()
+    own = torch.relu(network.extractor(items))
+    scores = own @ network.scorer.weight[0, : network.n_features]
+    (gradient,) = torch.autograd.grad(scores.sum(), items)
+    return gradient.numpy().mean(axis=0)
 
 
 def tilt(observations: np.ndarray, liftable: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ import gymnasium
 import numpy as np
 
 from studies.heap.boxes import Heap
-from studies.heap.generate import SPLITS, stored_heaps
+from studies.heap.generate import stored_heaps
 from studies.heap.observation import COLUMNS, FELL, ROWS, UNLOADED, Camera, features, visible_boxes
 from studies.heap.rake import Outcome, Rake
 from unload.env.base import EpisodeEnv
@@ -71,13 +71,11 @@ class HeapEnv(EpisodeEnv):
       since the last pick that unloaded something (if that is all of them, they are allowed
       again);
     - ``item_mask``: (96,) int8, 0 for rows without a box;
-    - ``left``: int, boxes in the heap;
 
     and ``step`` also
 
     - ``unloaded`` and ``falls``: int, the two parts of the reward;
     - ``box``: int, the dragged box's number in the heap before the pick, -1 if there was none;
-    - ``moved``: float, m, how far it came, and ``came``: bool;
     - ``fates``: (96,) int8, what happened to the box in each row of the observation before the
       pick: 1 if it was unloaded, 2 if it fell, 3 if both, 0 if neither.
 
@@ -89,7 +87,6 @@ class HeapEnv(EpisodeEnv):
         split: ``"train"`` or ``"test"``, which of the stored heaps are played.
         physics: ``"whole"`` or ``"coarse"``, see ``Rake``.
         max_picks: greatest length of an episode.
-        render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
         heap: the ``Heap`` as it is.
@@ -100,24 +97,14 @@ class HeapEnv(EpisodeEnv):
     Raises:
         TypeError, ValueError: an argument or an action is not as described.
         FileNotFoundError: the stored heaps are missing.
-        gymnasium.error.ResetNeeded: ``step`` or ``render`` before ``reset``, or ``step`` after an
-            episode's end.
+        gymnasium.error.ResetNeeded: ``step`` before ``reset``, or after an episode's end.
         gymnasium.error.ClosedEnvironmentError: use after ``close``.
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 2}
-
     def __init__(
-        self,
-        split: str = "train",
-        physics: str = "whole",
-        max_picks: int = MAX_PICKS,
-        render_mode: str | None = None,
+        self, split: str = "train", physics: str = "whole", max_picks: int = MAX_PICKS
     ) -> None:
-        checks.one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
-        self.render_mode = render_mode
         self.max_picks = checks.integer("max_picks", max_picks, 1)
-        checks.one_of("split", split, SPLITS)
         self.heaps = stored_heaps(split)
         self.observation_space = gymnasium.spaces.Box(
             -LARGEST, LARGEST, (ROWS, len(COLUMNS)), np.float32
@@ -163,8 +150,6 @@ class HeapEnv(EpisodeEnv):
             "unloaded": outcome.unloaded.sum(),
             "falls": outcome.fallen.sum(),
             "box": np.int64(box),
-            "moved": np.float64(outcome.moved),
-            "came": np.bool_(outcome.came),
             "fates": fates,
         }
         reward = float(pick["unloaded"] - pick["falls"])
@@ -172,15 +157,6 @@ class HeapEnv(EpisodeEnv):
         if terminated or truncated:
             self._state = "finished"
         return self._observation.copy(), reward, terminated, truncated, self._info() | pick
-
-    def render(self) -> np.ndarray | None:
-        """(480, 640, 3) uint8 for ``render_mode="rgb_array"``, else None."""
-        self._check_started()
-        if self.render_mode is None:
-            return None
-        from studies.heap.picture import picture  # here, because few look and Matplotlib is slow
-
-        return picture(self.heap)
 
     def close(self) -> None:
         """Let go of both clients, which disconnects them; may be called again."""
@@ -205,5 +181,4 @@ class HeapEnv(EpisodeEnv):
         return {
             "action_mask": (untried if untried.any() else boxes).astype(np.int8),
             "item_mask": boxes.astype(np.int8),
-            "left": np.int64(len(self.heap)),
         }

@@ -12,7 +12,6 @@ from studies.heap.network import FATES, FEATURES, FateNetwork
 from studies.heap.observation import COLUMN, FELL, UNLOADED
 from studies.heap.policies import Picks
 from unload.network.weights import read_weights, write_weights
-from unload.support import checks
 
 BATCH = 128
 LEARNING_RATE = 5e-3  # with 0.001, STEPS are far too few; with 0.01 it learns less again
@@ -49,12 +48,8 @@ def fit(picks: Picks, seed: int, steps: int = STEPS) -> FateNetwork:
         seed: of weights and batches.
         steps: of the optimizer, a batch each.
     """
-    checks.integer("steps", steps, 1)
-    if not len(picks):
-        raise ValueError("picks is empty; expected at least one")
-
     # One generator draws weights, batches and mirrors, so that the seed decides all of them.
-    generator = torch.Generator().manual_seed(checks.integer("seed", seed, 0))
+    generator = torch.Generator().manual_seed(seed)
     network = FateNetwork(generator=generator)
     data = {name: torch.from_numpy(array) for name, array in vars(picks).items()}
     adam = torch.optim.AdamW(network.parameters(), LEARNING_RATE, weight_decay=WEIGHT_DECAY)
@@ -117,10 +112,7 @@ class Learned:
     """
 
     def __init__(self, networks: Sequence[FateNetwork], falls_weight: float = 1.0) -> None:
-        if not networks:
-            raise ValueError("networks is empty; expected at least one FateNetwork")
-        self.networks = list(networks)
-        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+        self.networks, self.falls_weight = networks, falls_weight
 
     def __call__(
         self, observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator
@@ -177,7 +169,6 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
 
 def network_of(weights: dict[str, torch.Tensor], n_features: int = FEATURES) -> FateNetwork:
     """The network with these weights; RuntimeError if they are not those of so many features."""
-    with torch.device("meta"):  # where nothing is made: a forged file may tell of millions
-        network = FateNetwork(n_features)
-    network.load_state_dict(weights, assign=True)
+    network = FateNetwork(n_features)
+    network.load_state_dict(weights)
     return network.eval()

@@ -10,7 +10,6 @@ import torch
 from torch import nn
 
 from studies.heap.observation import COLUMN, COLUMNS
-from unload.support import checks
 
 FEATURES = 64
 PAIR_COLUMNS = 6  # see ``pair_columns``
@@ -58,7 +57,7 @@ class FateNetwork(nn.Module):
         self, n_features: int = FEATURES, generator: torch.Generator | None = None
     ) -> None:
         super().__init__()
-        self.n_features = n = checks.integer("n_features", n_features, 1)
+        self.n_features = n = n_features
         self.own = nn.Linear(len(COLUMNS), n)
         self.chosen = nn.Linear(len(COLUMNS), n)
         self.other = nn.Linear(len(COLUMNS), n, bias=False)

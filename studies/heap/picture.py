@@ -1,4 +1,4 @@
-"""Pictures of a heap, as its environment renders it and the figures show it."""
+"""Pictures of a heap."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,7 +9,7 @@ from matplotlib.path import Path
 
 from studies.heap.boxes import FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.rake import Outcome
-from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, pixels, project
+from unload.load.picture import COLOURS, CORNERS, EYE, SEAM, project
 
 # What happens to a box in a pick, and its colour. The later ones win.
 MEANINGS = {
@@ -85,13 +85,6 @@ def outcome_colours(outcome: Outcome, box: int) -> np.ndarray:
 def add_legend(figure: Figure) -> None:
     handles = [Patch(facecolor=c, edgecolor="0.5", label=name) for name, c in MEANINGS.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(MEANINGS), frameon=False)
-
-
-def picture(heap: Heap) -> np.ndarray:
-    """(480, 640, 3) uint8, a heap as ``draw_heap`` draws it."""
-    figure = Figure((6.4, 4.8), dpi=100, facecolor="white", layout="none")
-    draw_heap(figure.add_axes((0, 0, 1, 1)), heap)
-    return pixels(figure)
 
 
 def _faces(heap: Heap) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

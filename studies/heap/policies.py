@@ -75,8 +75,7 @@ class Oracle:
     """
 
     def __init__(self, env: HeapEnv, falls_weight: float, physics: str = "whole") -> None:
-        self.env = env
-        self.falls_weight = checks.real("falls_weight", falls_weight, 0)
+        self.env, self.falls_weight = env, falls_weight
         self._rakes = [Rake("coarse"), Rake(physics)]
 
     def __call__(self, observations, masks, rng: np.random.Generator) -> np.ndarray:
@@ -132,7 +131,7 @@ _TOLD = "unloaded", "falls", "fates", "box"  # by the environment, as in ``Episo
 
 def play(env: HeapEnv, policy: Callable, heap: Heap, seed: int) -> Episode:
     """Let a policy play a heap until the episode ends; the seed is of its random numbers."""
-    rng = np.random.default_rng(checks.integer("seed", seed, 0))
+    rng = np.random.default_rng(seed)
     observation, info = env.reset(options={"heap": heap})
     picks, heaps, outcomes, ended = [], [env.heap], [], False
     while not ended:

@@ -80,11 +80,10 @@ def candidates() -> dict[str, Callable]:
     return named | {name: best(linear(weights)) for name, weights in family().items()}
 
 
-def choose_rules(n_jobs: int = 1) -> pd.DataFrame:
+def choose_rules(n_jobs: int = 1) -> None:
     """Let the rules play training heaps, and the best of them more; write ``heap/rules.csv``.
 
-    Returns:
-        One row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and ``falls`` a pick.
+    It has a row per rule: ``rule``, ``heaps`` that it has played, ``boxes`` and ``falls`` a pick.
     """
     first = {name: ({"rule": name}, FIRST_HEAPS) for name in candidates()}
     answers = _played(first, "train", RULE_PHYSICS, n_jobs)
@@ -99,7 +98,6 @@ def choose_rules(n_jobs: int = 1) -> pd.DataFrame:
     }  # fmt: skip
     results = [answer for of in answers.values() for answer in of]
     publish(f"{NAME}/rules", {"rules": rules}, f"{COMMAND} {NAME}", settings, results)
-    return rules
 
 
 def _played(
@@ -179,12 +177,8 @@ def plan(rules: pd.DataFrame, networks: str | Path) -> dict[tuple[float, str], d
     return players | {(SHOWN_WEIGHT, ORACLE): {"oracle": SHOWN_WEIGHT}}
 
 
-def compare(n_jobs: int = 1) -> pd.DataFrame:
-    """Let all policies play the unseen heaps; write ``heap/{episodes,table}.csv``.
-
-    Returns:
-        ``table.csv``, see ``compared``.
-    """
+def compare(n_jobs: int = 1) -> None:
+    """Let all policies play the unseen heaps; write ``heap/{episodes,table}.csv``."""
     rules = read_table(f"{NAME}/rules")
     planned = plan(rules, paths.DATA / NAME / "networks.safetensors")
     players = {cell: (player, TEST_HEAPS) for cell, player in planned.items()}
@@ -197,15 +191,13 @@ def compare(n_jobs: int = 1) -> pd.DataFrame:
         for number, answer in enumerate(of)
     )
     episodes["net"] = episodes["boxes"] - episodes["falls_weight"] * episodes["falls"]
-    table = compared(episodes)
     settings = {
         "heaps": TEST_HEAPS, "physics": PHYSICS, "picks": MAX_PICKS,
         "best rules": {str(weight): best_rule(rules, weight) for weight in WEIGHTS},
     }  # fmt: skip
     results = [answer for of in played.values() for answer in of]
-    tables = {"episodes": episodes, "table": table}
+    tables = {"episodes": episodes, "table": compared(episodes)}
     publish(f"{NAME}/table", tables, f"{COMMAND} {NAME}", settings, results)
-    return table
 
 
 def compared(episodes: pd.DataFrame) -> pd.DataFrame:

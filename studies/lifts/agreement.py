@@ -20,10 +20,10 @@ import numpy as np
 import pandas as pd
 
 from studies.lifts.lift_table import mixed
+from studies.policies.comparison import SIMPLE
 from studies.results import COMMAND, keep_all, measured, publish
 from studies.statistics import share_interval
 from unload import task
-from unload.agent import policies
 from unload.env.container import ContainerEnv
 from unload.load.boxes import Load
 from unload.load.substacks import WALLS
@@ -48,12 +48,7 @@ COLUMNS = [
     "policy", "seed", "picks", "item", "on_top", "situation",
     "asked_full", "walls", "table", "local", "full",
 ]  # fmt: skip
-UNLOADED_BY = {
-    "random": policies.random,
-    "nearest": policies.nearest,
-    "highest": policies.highest,
-    "mixed": mixed(policies.highest, 0.3),
-}
+UNLOADED_BY = SIMPLE | {"mixed": mixed(SIMPLE["highest"], 0.3)}
 
 
 def agreement_data(n_jobs: int = 1) -> None:

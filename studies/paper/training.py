@@ -17,7 +17,7 @@ from matplotlib.ticker import EngFormatter
 
 from studies import paths
 from studies.grid import Cell, Grid, read_policies, train_grid
-from studies.results import COMMAND, JOBS
+from studies.results import COMMAND
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload import task
 from unload.agent.config import TrainConfig
@@ -56,22 +56,15 @@ DEFAULT_SEEDS = range(4)  # of its runs that the figures show; the first is the 
 PLAYERS = {0: "paper", 2: "paper_seed_2", 3: "paper_seed_3"}  # policies that play elsewhere
 MASK_LINES = {"with the mask": "-", "without the mask": "--"}  # as everywhere: dashed is without
 SMOOTH = 16  # episodes of all containers, about half a million picks
-OPTIONS = {
-    "--cells": {"nargs": "+", "choices": PAPER.cells},
-    "--picks": {"type": int, "help": "of a run, if not the paper's; the data go to data/reduced"},
-    **JOBS,
-}
 
 
-def training_data(
-    cells: Sequence[str] | None = None, picks: int | None = None, n_jobs: int = -1
-) -> None:
+def training_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
     """Train the paper's configuration, see ``train_grid``.
 
     The policies that play elsewhere are those that come with the package, too.
     """
-    train_grid(PAPER, cells, picks, n_jobs)
-    if picks is None and (cells is None or DEFAULTS in cells):
+    train_grid(PAPER, cells, n_jobs)
+    if cells is None or DEFAULTS in cells:
         for seed, name in PLAYERS.items():
             policy = default_policies()[seed]
             save_policy(policy, files.SHIPPED / "policies" / f"{name}.safetensors")

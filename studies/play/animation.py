@@ -13,7 +13,6 @@ from studies.play.episode import Run
 from studies.style import styled
 from unload import task
 from unload.agent.evaluation import Policy
-from unload.load.boxes import Load
 from unload.load.picture import COLOURS, back_to_front, corners, draw, pixels
 from unload.support import files
 
@@ -27,16 +26,16 @@ PALETTE = 127  # colours of all frames, besides white
 LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
 
 
-def record_episode(policy: Policy, seed: int, load: Load | None = None, mask: bool = False) -> Run:
+def record_episode(policy: Policy, seed: int, mask: bool = False) -> Run:
     """Let an agent unload a container.
 
     The episode ends when the container is empty, or after 128 failed picks in a row.
 
     Args:
         policy: see ``unload.policies``.
-        seed, load, mask: see ``Run``.
+        seed, mask: see ``Run``.
     """
-    run = Run(policy, load, seed, mask)
+    run = Run(policy, None, seed, mask)
     while run.allowed(mask).any() and (
         len(run.picks) < STUCK or any(pick.success for pick in run.picks[-STUCK:])
     ):

@@ -85,7 +85,7 @@ class Episode:
     def __init__(self, load: Load | None, seed: int) -> None:
         self._env = ContainerEnv("table", max_picks=sys.maxsize)
         self._options = {} if load is None else {"load": load}
-        self._seed = checks.integer("seed", seed, 0)
+        self._seed = seed
         self._begin()
         self.load = self._env.physics.load
 
@@ -121,30 +121,25 @@ class Episode:
 
     def pick(self, item: int) -> Pick:
         """Lift a visible item."""
-        item = checks.integer("item", item, 0)
-        rows = np.flatnonzero(self._env.visible == item)
-        if not rows.size:
-            raise ValueError(f"item is {item}; expected one of the visible items")
-        surroundings = Surroundings(self.load, self._env.physics.present)
-        on_top = tuple(surroundings.on_top(item))
-        deadlocked = self.allowed()[rows[0]] == 0
-        observation, reward, _, _, info = self._env.step(int(rows[0]))
+        row = self._env.visible.tolist().index(item)
+        on_top = tuple(Surroundings(self.load, self._env.physics.present).on_top(item))
+        deadlocked = bool(self.allowed()[row] == 0)
+        observation, reward, _, _, info = self._env.step(row)
         self._now = observation, info
-        self.picks.append(Pick(item, info["distance"], reward > 0, on_top, bool(deadlocked)))
+        self.picks.append(Pick(item, info["distance"], reward > 0, on_top, deadlocked))
         self._remember(self.picks[-1])
         return self.picks[-1]
 
     def back_to(self, count: int) -> None:
         """Take back all picks but the first ``count``, which are made again."""
-        made = self.picks[: checks.integer("count", count, 0, len(self.picks))]
+        made = self.picks[:count]
         self._begin()
         for pick in made:
             self.pick(pick.item)
 
     def moment(self, count: int | None = None) -> Moment:
         """The container after the first ``count`` picks; after all of them if None."""
-        count = len(self.picks) if count is None else count
-        return self._moments[checks.integer("count", count, 0, len(self.picks))]
+        return self._moments[-1 if count is None else count]
 
     def liftable(self, count: int | None = None) -> np.ndarray:
         """(k,) int64, the visible items that could be unloaded after the first ``count`` picks."""

@@ -13,9 +13,7 @@ from unload.network.peq import PEQNetwork
 
 def steps_of(load: Load) -> np.ndarray:
     """Steps from a box to one that lies on it: to the side (y) and up (z), (pairs, 2) in m."""
-    starts, boxes = load.contacts.starts[ABOVE], load.contacts.boxes
-    below = np.repeat(np.arange(len(load)), np.diff(starts))
-    above = boxes[starts[0] : starts[-1]]
+    below, above = load.covers
     return (load.positions[above] - load.positions[below])[:, 1:]
 
 

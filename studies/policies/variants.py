@@ -7,7 +7,6 @@ makes them affordable: fewer picks and a smaller batch. Networks without a fused
 too, and so is the paper's beside them.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -21,12 +20,12 @@ from studies.changes import height_reward
 from studies.falls import measures
 from studies.grid import Cell, Grid, train_grid
 from studies.networks import NETWORKS as KINDS
-from studies.results import COMMAND, JOBS, read_table
+from studies.results import COMMAND, read_table
 from studies.statistics import t_interval
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
-from unload.support import checks, files
+from unload.support import files
 
 CONFIG = TrainConfig(picks=1_000_000, batch_size=256, log_interval=500)
 SEEDS = range(3)
@@ -77,24 +76,21 @@ GRIDS = {
     # The paper's configuration but for one thing, and shorter: positions, not ranks.
     "recommended": _grid("variants/recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
 }
-OPTIONS = {"--grids": {"nargs": "+", "choices": GRIDS, "default": tuple(GRIDS)}, **JOBS}
 
 
-def variants_data(grids: Sequence[str] = tuple(GRIDS), n_jobs: int = -1) -> None:
-    """Train some grids, see ``train_grid``.
+def variants_data(n_jobs: int = -1) -> None:
+    """Train both grids, see ``train_grid``.
 
     The recommended agent's first run is also the policy that comes with the package.
     """
-    for name in grids:
-        kept = train_grid(GRIDS[name], n_jobs=n_jobs)
-        if name == "recommended":
-            best = load_policy(kept / "positions/seed_0/policy.safetensors")
-            save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
+    train_grid(GRIDS["variants"], n_jobs=n_jobs)
+    kept = train_grid(GRIDS["recommended"], n_jobs=n_jobs)
+    best = load_policy(kept / "positions/seed_0/policy.safetensors")
+    save_policy(best, files.SHIPPED / "policies/recommended.safetensors")
 
 
 def read_variants(part: str) -> pd.DataFrame:
     """What ``judged`` says of the policies of one of ``PARTS``, a row per ``cell`` and ``seed``."""
-    checks.one_of("part", part, PARTS)
     rows = read_table(GRIDS["variants"].name)
     return rows[rows["cell"].isin(PARTS[part])]
 

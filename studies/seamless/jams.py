@@ -13,7 +13,7 @@ import numpy as np
 
 from unload import task
 from unload.env.observation import nearest
-from unload.load.boxes import ABOVE, CONTACT_TOLERANCE, Load
+from unload.load.boxes import BESIDE, CONTACT_TOLERANCE, Load
 from unload.load.substacks import stack_load
 from unload.physics.bullet import ITERATIONS, TIME_STEP, World
 from unload.physics.full import FullPhysics
@@ -91,8 +91,7 @@ def visible_free(load: Load, present: np.ndarray) -> np.ndarray:
     """The boxes of a load that are observed and have nothing on top, ascending."""
     there = np.flatnonzero(present)
     seen = there[nearest(load.positions[there])]
-    free = [box for box in seen if not present[load.contacts.of(ABOVE, box)].any()]
-    return np.sort(np.array(free, dtype=np.int64))
+    return np.sort(seen[~load.covered(present)[seen]])
 
 
 def prepared(case: Case, rng: np.random.Generator) -> SeamlessPhysics:
@@ -140,17 +139,12 @@ def place(load: Load, present: np.ndarray, box: int) -> dict:
     over = (low[:, 1:] < high[box, 1:] - CONTACT_TOLERANCE).all(axis=1)
     over &= (high[:, 1:] > low[box, 1:] + CONTACT_TOLERANCE).all(axis=1)
     behind = over & present & (np.abs(low[:, 0] - high[box, 0]) <= CONTACT_TOLERANCE)
-    level = (low[:, 2] < high[box, 2] - CONTACT_TOLERANCE) & (
-        high[:, 2] > low[box, 2] + CONTACT_TOLERANCE
-    )
-    touching = np.minimum(np.abs(low[:, 1] - high[box, 1]), np.abs(high[:, 1] - low[box, 1]))
-    beside = level & present & (load.walls == load.walls[box]) & (touching <= CONTACT_TOLERANCE)
     return {
         "box": int(box),
         "wall": int(load.walls.max() - load.walls[box]),
         "edge": bool(edge),
         "covered": bool(behind.any()),
-        "beside": int(beside.sum()),
+        "beside": int(present[load.contacts.of(BESIDE, box)].sum()),
     }
 
 

@@ -14,7 +14,6 @@ import pandas as pd
 
 from studies import changes
 from studies.grid import Cell, Grid, read_grid, train_grid
-from studies.paper import training as paper
 from studies.results import COMMAND, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
@@ -83,16 +82,13 @@ CELLS: dict[str, Cell] = {
 }
 EXPORTED = "b2048_no_mask_order", 41  # chosen afterwards among those like the paper's figures
 SEAMLESS = Grid("seamless/runs", f"{COMMAND} seamless", CELLS)
-OPTIONS = paper.OPTIONS | {"--cells": {"nargs": "+", "choices": CELLS}}
 
 
-def seamless_data(
-    cells: Sequence[str] | None = None, picks: int | None = None, n_jobs: int = -1
-) -> None:
+def seamless_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
     """Train the cells, see ``train_grid``; export the run ``EXPORTED``."""
-    kept = train_grid(SEAMLESS, cells, picks, n_jobs)
+    kept = train_grid(SEAMLESS, cells, n_jobs)
     cell, seed = EXPORTED
-    if picks is None and (cells is None or cell in cells):
+    if cells is None or cell in cells:
         config, change = replace(CELLS[cell].config, seed=seed), CELLS[cell].change
         settings = settings_of_run(config, change=change)
         run = RunFolder(kept / f"{cell}/seed_{seed}").result(config, settings)

@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 from scipy.stats import spearmanr
 
-from studies.results import COMMAND, JOBS, keep_all, publish
+from studies.results import COMMAND, keep_all, publish
 from studies.seamless.jams import Case, SeamlessPhysics, load_of
 from studies.style import COLOURS, styled
 from unload import task
 from unload.env.observation import nearest
-from unload.load.boxes import ABOVE
 from unload.physics.bullet import GAP
+from unload.physics.situation import Surroundings
 
 PICKS = 120
 CONTAINER_PICKS = 60  # of a whole container, which takes an hour
@@ -31,7 +31,6 @@ EVERY = 20  # picks between two moments from which on boxes are followed
 FEWEST = 4  # boxes at the same place along an axis, of which an order is compared
 SETTLE = 0.5  # s
 FRICTION = 0.25  # of a contact, as everywhere in the package
-OPTIONS = JOBS
 
 
 @dataclass(frozen=True)
@@ -76,32 +75,20 @@ def play(world: World) -> dict[str, list]:
     load = load_of(case)
     physics.reset(load)
     physics.settle(SETTLE)
-    touched = np.full(len(load), -1)
+    touched, around = np.full(len(load), -1), Surroundings(load, np.ones(len(load), bool))
     offsets = [physics.positions() - load.positions]
     for pick in range(PICKS if world.walls == 3 else CONTAINER_PICKS):
         there = np.flatnonzero(physics.present)
         seen = there[nearest(physics.positions()[there])]
-        box = int(rng.choice(seen) if world.policy == "random" else highest(physics, seen))
-        pulled = stack_of(load, box)
+        highest = seen[physics.positions()[seen, 2].argmax()]
+        box = int(rng.choice(seen) if world.policy == "random" else highest)
+        pulled = [box, *around.on_top(box)]  # present or not
         touched[pulled] = np.where(touched[pulled] < 0, pick, touched[pulled])
         if physics.lift(box) >= task.LIFT_THRESHOLD:
             physics.remove(box)
         offsets.append(physics.positions() - load.positions)
     physics.close()
     return {"offsets": np.rint(np.stack(offsets) * 1e6).tolist(), "touched": touched.tolist()}
-
-
-def highest(physics: SeamlessPhysics, seen: np.ndarray) -> int:
-    """The highest of some boxes."""
-    return seen[physics.positions()[seen, 2].argmax()]
-
-
-def stack_of(load, box: int) -> list[int]:
-    """A box and all that rests on it, directly or not, present or not."""
-    members = [box]
-    for member in members:
-        members += [other for other in load.contacts.of(ABOVE, member) if other not in members]
-    return members
 
 
 def rows(world: World, played: dict[str, list]) -> list[dict]:

@@ -14,17 +14,25 @@ from io import StringIO
 import pandas as pd
 
 from studies import paths
-from studies.results import joined, read_table, write_provenance, write_table
+from studies.grid import COLUMNS, Cell, Grid
+from studies.paper.training import PAPER
+from studies.results import joined, write_provenance, write_table
 from studies.statistics import end_msr, fell
 from studies.ties.criterion import likeness
 
 REVISION = "c062fca"
 FOLDER = "data/answer"
-TIES = tuple(
-    f"ties_by_{ties}_{mask}" for ties in ("order", "drift") for mask in ("mask", "no_mask")
-)
-COLUMNS = {"success_rate": "%.6g", "loss": "%.5g"}
 NAME, COMMAND = "ties/earlier", "python -m studies.ties.earlier"
+# Whose curves are published; how their ties are broken no configuration says any more.
+EARLIER = Grid(
+    NAME,
+    COMMAND,
+    {
+        f"ties_by_{ties}_{mask}": Cell(PAPER.cells[f"paper_{mask}"].config, range(5))
+        for ties in ("order", "drift")
+        for mask in ("mask", "no_mask")
+    },
+)
 
 
 def git(*arguments: str) -> str:
@@ -53,7 +61,7 @@ def earlier_data() -> None:
         rows.append({"cell": cell, "seed": int(seed), **measures})
         record = path.replace(".csv", ".provenance.json")
         records.append(json.loads(git("show", f"{REVISION}:{record}")))
-        if cell in TIES:
+        if cell in EARLIER.cells:
             runs[f"{cell}/seed_{seed}"] = curve
     write_table(NAME, pd.DataFrame(rows))
     for column, digits in COLUMNS.items():
@@ -62,21 +70,7 @@ def earlier_data() -> None:
         write_table(f"{NAME}_{column}", pd.DataFrame({"picks": picks} | curves), digits)
     settings = {"from": f"{REVISION}:{FOLDER}", "made by": records[0]["command"].split(" --")[0]}
     settings["fingerprints then"] = sorted({record["fingerprint"] for record in records})
-    write_provenance(NAME, COMMAND, settings, False, joined(records))
-
-
-def read_earlier() -> pd.DataFrame:
-    """The twenty curves, with the columns of ``studies.grid.read_grid``."""
-    tables = [read_table(f"{NAME}_{column}") for column in COLUMNS]
-    parts = [
-        table.melt("picks", var_name="run", value_name=column)
-        for table, column in zip(tables, COLUMNS)
-    ]
-    curves = parts[0].assign(loss=parts[1]["loss"])
-    names = curves.pop("run").str.rpartition("/seed_")
-    curves.insert(0, "cell", names[0])
-    curves.insert(1, "seed", names[2].astype(int))
-    return curves
+    write_provenance(NAME, COMMAND, settings, joined(records))
 
 
 if __name__ == "__main__":

@@ -15,19 +15,19 @@ from studies.paper.training import PAPER, SMOOTH
 from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.criterion import WORDS, likeness, open_course
-from studies.ties.earlier import read_earlier
+from studies.ties.earlier import EARLIER
 from studies.ties.laboratory import RHOS
 from studies.ties.training import TIES
 
 PICKS = 20_000_000  # of a run
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
 # the ending that says whether the mask is on in training.
-KINDS: dict[str, list[tuple[Grid | None, str]]] = {
-    "items' order": [(None, "ties_by_order")],
+KINDS: dict[str, list[tuple[Grid, str]]] = {
+    "items' order": [(EARLIER, "ties_by_order")],
     "averaged": [(PAPER, "averaged"), (TIES, "averaged")],
     "noise anew\nat each pick": [(TIES, "anew")],
     "noise that\ndrifts": [(TIES, "drifting")],
-    "settled walls,\nfrozen": [(None, "ties_by_drift")],
+    "settled walls,\nfrozen": [(EARLIER, "ties_by_drift")],
     "noise,\nfrozen": [(PAPER, "paper"), (LONG, "ranks"), (TIES, "frozen")],
 }
 
@@ -38,14 +38,14 @@ def read_by_ties() -> pd.DataFrame:
     Returns:
         A row per run: ``ties``, ``mask``, ``cell``, ``seed``, and what ``criterion.likeness`` says.
     """
-    curves = {grid.name: read_grid(grid) for grid in (PAPER, LONG, TIES)}
+    curves = {grid.name: read_grid(grid) for grid in (PAPER, LONG, TIES, EARLIER)}
     rows = []
     for ties, cells in KINDS.items():
         for mask in (True, False):
             for grid, name in cells:
                 # A cell of the long runs with the mask has no ending.
                 ending = ("" if grid is LONG else "_mask") if mask else "_no_mask"
-                table = read_earlier() if grid is None else curves[grid.name]
+                table = curves[grid.name]
                 found = table[table["cell"] == name + ending]
                 if len(found):
                     runs = by_run(found, likeness)
@@ -157,7 +157,7 @@ def draw_answer() -> Figure:
     Running means over half a million picks; a label counts the runs whose colour it has. Thick
     lines are means over runs.
     """
-    paper, ties, earlier = read_grid(PAPER), read_grid(TIES), read_earlier()
+    paper, ties, earlier = map(read_grid, (PAPER, TIES, EARLIER))
     figure, panels = plt.subplots(1, 3, figsize=(11.4, 3.7), sharex=True, sharey=True)
     left, middle, right = panels
     ranks, shared, positions = (COLOURS[name] for name in ("ranks", "averaged", "positions"))

@@ -5,19 +5,17 @@
 ``data/ties/PLAN.md`` says what was expected of its cells.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
-from studies.falls import measures
 from studies.falls.cells import CONFIG
-from studies.falls.laboratory import SLOPES, keep_cells, train_in_laboratory
+from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, JOBS, publish
+from studies.results import COMMAND, publish
 from studies.seamless.jamming import weigh
 from studies.statistics import end_msr
 from studies.ties.noise import drifting
@@ -59,28 +57,21 @@ CELLS = {
     "ranks_mirrored": Cell(CONFIG, SIGN_SEEDS, mirror_loads),
     "ranks_whole_walls": Cell(CONFIG, SIGN_SEEDS, partial(weigh, z=0.0)),
 }
-OPTIONS = {"--cells": {"nargs": "+", "choices": CELLS, "default": tuple(CELLS)}, **JOBS}
 
 
 def run_cell(name: str, cell: Cell, seed: int) -> dict:
     """Train a run: its MSR over the last tenth, slopes and tilt before its last pick."""
     last: dict[str, float] = {}
-
-    def watch(run: Training) -> None:
-        seen = run.rollout.observations
-        last.update(zip(SLOPES, map(float, measures.slopes(run.agent.network, seen))))
-        tilts = measures.tilt(seen, run.rollout.envs.liftable())
-        last.update(zip(("tilt_x", "tilt_y"), map(float, tilts)))
-
-    run = train_in_laboratory(replace(cell.config, seed=seed), cell.change, watch)
-    return {"cell": name, "seed": seed, "end": end_msr(run.curve.table()), **last}
+    config = replace(cell.config, seed=seed)
+    run = train_in_laboratory(config, cell.change, lambda run: last.update(point(run)))
+    row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
+    return row | {measure: last[measure] for measure in (*SLOPES, *TILTS)}
 
 
-def laboratory_data(cells: Sequence[str] = tuple(CELLS), n_jobs: int = -1) -> None:
-    """Train some cells; write ``ties/laboratory.csv``, a row per run of these, see ``run_cell``."""
-    results = keep_cells("ties/laboratory", {name: CELLS[name] for name in cells}, n_jobs, run_cell)
+def laboratory_data(n_jobs: int = -1) -> None:
+    """Train all cells; write ``ties/laboratory.csv``, a row per run, see ``run_cell``."""
+    results = keep_cells("ties/laboratory", CELLS, n_jobs, run_cell)
     table = pd.DataFrame([result.value for result in results])
-    settings = {"config": CONFIG.plain(), "runs": len(table)}
-    chosen = "" if len(cells) == len(CELLS) else f" --cells {' '.join(cells)}"
-    name, command = "ties/laboratory", f"{COMMAND} ties_laboratory{chosen}"
-    publish(name, {"laboratory": table}, command, settings, results, training_fingerprint(), "%.4g")
+    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
+    name, command = "ties/laboratory", f"{COMMAND} ties_laboratory"
+    publish(name, {"laboratory": table}, command, settings, results, fingerprint, "%.4g")

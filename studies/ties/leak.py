@@ -11,19 +11,17 @@ from scipy.stats import spearmanr
 
 from studies import paths
 from studies.grid import cell_of, read_policies
-from studies.results import COMMAND, JOBS, keep_all, measured, publish
+from studies.results import COMMAND, keep_all, measured, publish
 from studies.seamless.training import SEAMLESS
 from unload.agent.evaluation import evaluate
 from unload.env.equalization import equalize
 from unload.env.observation import POSITION_NOISE, drift, nearest, scale
-from unload.load.boxes import ABOVE
 from unload.load.substacks import stack_load
 
 NOISE = {"order": 0.0, "noise": POSITION_NOISE}  # m, by how ties are broken
 LOADS = range(700, 720)
 CELLS = [name for name in SEAMLESS.cells if name.endswith("_order") and "b2048" in name]
 JUDGED = {"episodes": 64, "seed": 7000}  # fresh containers, 500 picks each
-OPTIONS = JOBS
 
 
 def told_by_rank(load_seed: int, ties: str) -> dict:
@@ -45,12 +43,12 @@ def told_by_rank(load_seed: int, ties: str) -> dict:
         for wall in np.unique(walls)
         if (walls == wall).sum() > 3
     ]
-    row = {int(item): number for number, item in enumerate(seen)}
-    pairs = [(row[a], row[b]) for b in row for a in load.contacts.of(ABOVE, b) if a in row]
-    upper = sum(ranks[above, 0] < ranks[below, 0] for above, below in pairs)
+    along_x = np.full(len(load), np.nan)
+    along_x[seen] = ranks[:, 0]
+    below, above = (along_x[each] for each in load.covers)
     return {
         "load": load_seed, "ties": ties, "spearman": float(np.mean(found)),
-        "pairs": len(pairs), "upper": int(upper),
+        "pairs": int(np.isfinite(below + above).sum()), "upper": int((above < below).sum()),
     }  # fmt: skip
 
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 from functools import partial
 
 from studies import changes
-from studies.grid import Cell, Grid, train_grid
+from studies.grid import Cell, Grid
 from studies.paper.training import B2048
-from studies.results import COMMAND, JOBS
+from studies.results import COMMAND
 from studies.seamless.jamming import jam
 from studies.ties.noise import drifting
 from unload.agent.config import TrainConfig
@@ -69,9 +69,3 @@ CELLS = {
     **{f"{ties}_jams_0.4_mask": _cell(ties, share=0.4, mask=True) for ties in CORRELATIONS},
 }
 TIES = Grid("ties/runs", f"{COMMAND} ties", CELLS)
-OPTIONS = {"--cells": {"nargs": "+", "choices": CELLS}, **JOBS}
-
-
-def ties_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
-    """Train the cells, see ``train_grid``."""
-    train_grid(TIES, cells, n_jobs=n_jobs)

@@ -36,9 +36,9 @@ def test_a_part_runs_at_full_size_unless_options_say_otherwise(called):
     assert called("observation") == [("observation", {})]
     for name in ("lifts", "tuning", "policies"):
         assert called(name) == [(name, {"n_jobs": -1})]
-    assert called("training") == [("training", {"cells": None, "picks": None, "n_jobs": -1})]
-    given = called("training", "--picks", "64000", "--cells", "paper_mask", "--jobs", "2")
-    assert given == [("training", {"picks": 64000, "cells": ["paper_mask"], "n_jobs": 2})]
+    assert called("training") == [("training", {"cells": None, "n_jobs": -1})]
+    given = called("training", "--cells", "paper_mask", "--jobs", "2")
+    assert given == [("training", {"cells": ["paper_mask"], "n_jobs": 2})]
 
 
 def test_paper_makes_every_part(called):
@@ -52,9 +52,7 @@ def test_paper_makes_every_part(called):
     ("arguments", "message"),
     [
         (["training", "--cells", "none"], "argument --cells: invalid choice: 'none'"),
-        (["seamless", "--picks", "128"], "picks is 128; expected at least 2112"),
         (["paper", "--jobs", "0"], "--jobs is 0; expected a number of processes"),
-        (["laboratory", "--seeds", "0"], "--seeds is 0; expected an integer >= 1"),
     ],
 )
 def test_what_nothing_can_run_with_is_refused_in_one_line(called, arguments, message, capsys):

@@ -97,18 +97,14 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     table = pd.DataFrame({"seed": [0], "msr": [1 / 3]})
     results = [measured(int), measured(int)]
     command, settings = "make tea", {"seeds": [0]}
-    publish("t/tea", {"a": table, "b": table}, command, settings, results, reduced=True)
+    publish("t/tea", {"a": table, "b": table}, command, settings, results)
     publish("more", {"c": table}, command, settings, results[:1], "f00", "%.12g")
-    texts = [
-        (own_data / f"{name}.csv").read_text(encoding="utf-8")
-        for name in ("reduced/t/a", "reduced/t/b", "c")
-    ]
+    texts = [(own_data / f"{name}.csv").read_text(encoding="utf-8") for name in ("t/a", "t/b", "c")]
     assert texts == ["seed,msr\n0,0.333333\n"] * 2 + ["seed,msr\n0,0.333333333333\n"]
-    tea, more = map(read_provenance, ("reduced/t/tea", "more"))
-    assert (tea["command"], tea["settings"], tea["reduced"]) == (command, settings, True)
+    tea, more = map(read_provenance, ("t/tea", "more"))
+    assert (tea["command"], tea["settings"]) == (command, settings)
     assert (tea["runs"], more["runs"]) == (2, 1)
     assert "fingerprint" not in tea and more["fingerprint"] == "f00"
-    assert not more["reduced"]
 
 
 def test_records_are_joined(monkeypatch):
@@ -166,17 +162,9 @@ def test_all_planned_runs_are_published_in_full_length(name):
     grid, provenance = PUBLISHED[name], read_provenance(name)
     planned = grid.configs()
     assert provenance["runs"] == provenance["planned"] == len(planned)
-    assert not provenance["reduced"]
     rows = read_grid(grid) if grid.measure is None else read_table(name)
     runs = [f"{cell}/seed_{seed}" for cell, seed in zip(rows["cell"], rows["seed"])]
     assert [*dict.fromkeys(runs)] == list(planned)
     if grid.measure is None:
         last = rows.groupby(["cell", "seed"])["picks"].max()
         assert {config.picks for config in planned.values()} == {*last}
-
-
-def test_a_kept_answer_runs_no_code():
-    """What is read back is numbers; objects would be made by their pickles."""
-    text = packed({"harmless": np.array([Mock], dtype=object)})
-    with pytest.raises(ValueError, match="allow_pickle=False"):
-        unpacked(text)

@@ -54,19 +54,6 @@ def test_share_intervals_are_those_of_the_binomial_distribution():
     assert stats.binom.cdf(4, 50, high) == pytest.approx(0.025)
 
 
-@pytest.mark.parametrize(
-    ("function", "arguments", "message"),
-    [
-        (statistics.t_interval, ([np.inf, 1],), "values"),
-        (statistics.share_interval, (3, 2), "count is 3; expected an integer >= 0 and <= 2"),
-        (statistics.share_interval, (0, 0), "total is 0; expected an integer >= 1"),
-    ],
-)
-def test_bad_values_are_refused_by_name(function, arguments, message):
-    with pytest.raises(ValueError, match=message):
-        function(*arguments)
-
-
 def test_pairs_make_the_interval_of_a_ratio_narrow():
     reference = np.array([1.0, 5.0, 2.0, 8.0])
     ratio, low, high = statistics.ratio_interval(1.3 * reference, reference)

@@ -31,9 +31,8 @@ def test_what_differs_does_not_agree(monkeypatch):
 def test_policies_play_elsewhere_once_their_cell_is_trained(tmp_path, monkeypatch):
     monkeypatch.setattr(training, "train_grid", lambda *given: None)
     monkeypatch.setattr(files, "SHIPPED", tmp_path)
-    for cells, picks in ((["paper_mask"], None), (None, 64_000)):
-        training.training_data(cells, picks)
-        assert not list(tmp_path.iterdir())
+    training.training_data(["paper_mask"])
+    assert not list(tmp_path.iterdir())
     training.training_data()
     policies = read_policies(paths.DATA / "falls/paper.safetensors")
     assert [*policies] == [*PAPER.configs()]
@@ -90,11 +89,6 @@ def test_committed_files_of_the_papers_plots_are_those_of_the_tables(own_data):
     assert len(written) == 8
     for path in written:
         assert (own_data / path).read_bytes() == (committed / path).read_bytes()
-
-
-def test_the_search_has_240_runs_of_which_slow_ones_come_first():
-    sizes = [config.batch_size for config in tuning.TUNING.configs().values()]
-    assert len(sizes) == 240 and sizes == sorted(sizes, reverse=True)
 
 
 def test_chance_counts_all_others(monkeypatch):

@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 import unload
-from studies.play import animation
 from studies.play.episode import Episode, Run
-from tests.agent.runs import lowest
 from tests.env.comparing import make_env
-from unload import policies
 
 
 @pytest.fixture
@@ -88,19 +85,3 @@ def test_a_random_player_draws_another_row_at_each_pick(full_load):
         rows.append(run.visible.tolist().index(run.choose()))
         run.play_to(count)
     assert len(set(rows)) > 20
-
-
-def test_a_recorded_episode_ends_when_the_container_is_empty_or_the_agent_stuck(
-    boxes, tmp_path, monkeypatch
-):
-    """It is saved as the same bytes each time: no pick, one more in each frame, the end twice."""
-    monkeypatch.setattr(animation, "STUCK", 5)
-    tower, players = boxes((1.0, 0.2), (1.0, 0.6)), (lowest, policies.highest)
-    stuck, empty = (animation.record_episode(player, 3, tower) for player in players)
-    assert [pick.item for pick in empty.picks] == [1, 0] and empty.unloaded() == 2
-    assert [pick.item for pick in stuck.picks] == [0] * 5 and not stuck.unloaded()
-    first, second = tmp_path / "a.gif", tmp_path / "b.gif"
-    for path in (first, second):
-        frames = animation.save_unloading({"stuck": stuck, "empty": empty}, path)
-        assert len(frames) == 1 + 5 + 1
-    assert first.read_bytes() == second.read_bytes()

@@ -114,7 +114,6 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it():
 
 BAD_INPUT = {
     "load is 'load'; expected an unload.Load": lambda load: Episode("load", 0),
-    "item is 0; expected one of the visible": lambda load: Episode(load, 0).pick(0),
     "player is 'chess'; expected one of 'random'": lambda load: Run("chess", load, 0),
     "player is 'me'; expected one of 'you', 'random'": lambda load: Playground(player="me"),
 }

@@ -6,7 +6,6 @@ import pytest
 
 from studies.seamless.jams import Case, load_of
 from studies.ties import creep
-from unload.load.boxes import ABOVE
 
 
 @pytest.mark.pybullet
@@ -28,15 +27,6 @@ def test_a_world_settles_and_goes_on(monkeypatch):
 def test_five_loads_are_played_by_both():
     played = {(world.load, world.policy) for world in creep.worlds() if world.walls == 3}
     assert played == {(load, policy) for load in range(5) for policy in ("highest", "random")}
-
-
-def test_a_stack_is_a_box_and_all_that_rests_on_it():
-    load = load_of(Case(0, 1))
-    low = int(load.positions[:, 2].argmin())
-    stack = creep.stack_of(load, low)
-    assert stack[0] == low and len(stack) == len(set(stack)) > 3
-    above = {int(other) for member in stack for other in load.contacts.of(ABOVE, member)}
-    assert above == {*stack} - {low}
 
 
 def test_the_order_of_equals_is_followed_among_untouched_boxes():

@@ -65,9 +65,9 @@ def test_published_runs_are_whole_ones_of_the_grid():
 
 
 def test_the_runs_of_the_first_plan_are_all_there():
-    table, curves = read_table("ties/earlier"), earlier.read_earlier()
+    table, curves = read_table("ties/earlier"), read_grid(earlier.EARLIER)
     assert len(table) == 226 and table["cell"].nunique() == 38
-    twenty = table[table["cell"].isin(earlier.TIES)].set_index(["cell", "seed"])["end"]
+    twenty = table[table["cell"].isin(earlier.EARLIER.cells)].set_index(["cell", "seed"])["end"]
     late = curves[curves["picks"] > 18_000_000].groupby(["cell", "seed"])["success_rate"].mean()
     assert len(late) == 20 and np.allclose(late.sort_index(), twenty.sort_index(), atol=1e-4)
 
