@@ -56,7 +56,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),
-    "variants": ("other networks, rewards and settings", variants.variants_data, JOBS),
+    "variants": ("other networks and rewards", variants.variants_data, JOBS),
     "policies": ("policies compared", policies, JOBS),
     "sb3": ("agents of Stable-Baselines3, trained for minutes", sb3, JOBS),
     "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),

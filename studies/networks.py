@@ -11,8 +11,6 @@ from torch.nn.functional import linear
 
 from unload.network.peq import ScoringNetwork, pooled
 
-HEADS = 2  # of the attention; PyTorch is slow where one has fewer than 16 features
-
 
 class TwoLayerScorer(ScoringNetwork):
     """The paper's network with a hidden layer in its relation scorer.
@@ -58,39 +56,9 @@ class EquivariantStack(ScoringNetwork):
         return own
 
 
-class AttentionNetwork(ScoringNetwork):
-    """Each item attends to all: two transformer blocks with layer normalization first.
-
-    There is no positional encoding, because the order of the items means nothing, no dropout,
-    and 2 n hidden units per block. Two heads share the n features: an odd n is a ValueError.
-    """
-
-    def __init__(self, n_features: int = 64, generator: torch.Generator | None = None) -> None:
-        super().__init__(n_features)
-        if n_features % HEADS:
-            raise ValueError(f"n_features is {n_features}; expected a multiple of {HEADS}")
-        self.scorer, self.extractor = nn.Linear(n_features, 1), nn.Linear(3, n_features)
-        self.blocks = nn.ModuleList(
-            nn.TransformerEncoderLayer(
-                n_features, HEADS, 2 * n_features, dropout=0, batch_first=True, norm_first=True
-            )
-            for _ in range(2)
-        )
-        self.norm = nn.LayerNorm(n_features)
-        self.reset_parameters(generator)
-
-    def features(self, observations: torch.Tensor, present: torch.Tensor | None) -> torch.Tensor:
-        own = self.extractor(observations)
-        padding = None if present is None else ~present
-        for block in self.blocks:
-            own = block(own, src_key_padding_mask=padding)
-        return self.norm(own)
-
-
 NETWORKS = {  # by their names in published settings
     "two_layer": TwoLayerScorer,
     "stack": EquivariantStack,
-    "attention": AttentionNetwork,
 }
 
 

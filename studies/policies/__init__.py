@@ -2,5 +2,5 @@
 
 Read ``margin`` first (why many rules never fail in a neat load), then ``comparison`` (where the
 lift table reaches, what a policy's file says of it, and the figure), ``robustness`` (every box
-simulated), ``variants`` (other networks, rewards and settings) and ``sb3`` (other agents).
+simulated), ``variants`` (other networks and rewards) and ``sb3`` (other agents).
 """

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from studies.networks import NETWORKS, AttentionNetwork, EquivariantStack, TwoLayerScorer
+from studies.networks import NETWORKS, EquivariantStack, TwoLayerScorer
 from tests.agent.runs import CONTAINER, assert_same, interrupt_run
 from tests.network.test_peq import (  # noqa: F401
     make,
@@ -71,15 +71,3 @@ def test_the_stack_is_three_layers_on_own_features_and_maxima(items):
         own = torch.relu(layer(torch.cat([own, maxima], dim=2)))
     assert len(network.layers) == 3
     torch.testing.assert_close(values, torch.tanh(network.scorer(own)).squeeze(2))
-
-
-def test_the_attention_network_is_two_blocks_with_normalization_first(items):
-    network, batch = make(AttentionNetwork), items(3, 9)
-    own = network.extractor(batch)
-    for block in network.blocks:
-        normed = block.norm1(own)
-        own = own + block.self_attn(normed, normed, normed)[0]
-        own = own + block.linear2(torch.relu(block.linear1(block.norm2(own))))
-    values = torch.tanh(network.scorer(network.norm(own))).squeeze(2)
-    assert len(network.blocks) == 2
-    torch.testing.assert_close(network(batch), values)
