@@ -163,7 +163,7 @@ def test_a_second_process_is_told_whose_the_folder_is_or_waits(tmp_path, monkeyp
 
 
 @pytest.mark.needs("fork")
-def test_the_package_can_be_imported_where_windows_lacks_something():
+def test_the_package_can_be_imported_where_windows_lacks_something(run_python):
     script = """if True:
         import errno, importlib, json, os, pathlib, pkgutil, signal, sys
 
@@ -191,11 +191,8 @@ def test_the_package_can_be_imported_where_windows_lacks_something():
     """
     # Text that names no encoding is ASCII then.
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    environment = os.environ | locale | {"MPLBACKEND": "Agg"}
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT, env=environment
-    )
-    assert done.stdout.endswith("True\n"), done.stderr
+    printed, _ = run_python(script, ROOT, **locale, MPLBACKEND="Agg")
+    assert printed.endswith("True\n")
 
 
 @pytest.mark.parametrize(("system", "written"), [("win32", "new"), ("linux", "old")])
