@@ -1,4 +1,4 @@
-"""The three physics, with one engine and the other, the appendix's distances, and lifts one after the other."""
+"""The three physics, one also by MuJoCo, the appendix's distances, and lifts in a row."""
 
 from functools import partial
 
