@@ -54,11 +54,9 @@ SIZES = {
 FINGER = 44  # pixels, the height of what is touched
 PLOTLY = ".jp-RenderedPlotly"
 LAB = {
-    "@jupyterlab/apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
-    "@jupyterlab/docmanager-extension:plugin": {"autosave": False},
-    "@jupyterlab/notebook-extension:tracker": {
-        "windowingMode": "none"
-    },  # all cells are in the page
+    "apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
+    "docmanager-extension:plugin": {"autosave": False},
+    "notebook-extension:tracker": {"windowingMode": "none"},  # all cells are in the page
 }
 CELLS = "() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells"
 
@@ -241,7 +239,8 @@ def jupyterlab(notebooks: list[Path]) -> Iterator[str]:
         papermill.execute_notebook(path, copy, reduced, prepare_only=True)
     (BUILD / "config" / "labconfig").mkdir(parents=True)
     overrides = BUILD / "config" / "labconfig" / "default_setting_overrides.json"
-    overrides.write_text(json.dumps(LAB), encoding="utf-8")
+    settings = {f"@jupyterlab/{plugin}": values for plugin, values in LAB.items()}
+    overrides.write_text(json.dumps(settings), encoding="utf-8")
     runtime = BUILD / "runtime"
     env = {"JUPYTER_CONFIG_DIR": str(BUILD / "config"), "JUPYTER_RUNTIME_DIR": str(runtime)}
     env |= {"IPYTHONDIR": str(BUILD / "ipython")}

@@ -247,13 +247,6 @@ def test_json_holds_records_or_columns(tmp_path, written):
         read_load(path)
 
 
-def test_a_text_may_begin_as_an_excel_file_does(written):
-    """With PK."""
-    columns = f"PK,Kartonnummer,{CORNERS}"
-    load = read_load(written(*(f"{line[0]},{line}" for line in STACK), columns=columns))
-    assert load.ids.tolist() == [line[0] for line in STACK] == load.extras["PK"].tolist()
-
-
 def test_a_row_that_is_too_long_becomes_smaller(written, caplog):
     """Two rows, each 4 mm longer than the container is wide."""
     lines = [f"{n},{x},{0.5 * n},0,1,0.5008,1" for x in (0, 1) for n in range(5)]
