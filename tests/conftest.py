@@ -3,6 +3,8 @@
 import os
 import shutil
 import signal
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -56,6 +58,20 @@ def close_figures() -> Iterator[None]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(0)
+
+
+@pytest.fixture
+def run_python() -> Callable[..., tuple[str, str]]:
+    """``run_python(code, folder, *options, **environ)``: what a new process prints and says."""
+
+    def run(code: str, folder: Path, *options: str, **environ: str) -> tuple[str, str]:
+        command = [sys.executable, *options, "-c", code]
+        env = os.environ | environ
+        done = subprocess.run(command, cwd=folder, env=env, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout, done.stderr
+
+    return run
 
 
 @pytest.fixture

@@ -20,16 +20,6 @@ def test_views_are_preferred_to_pictures_and_animations_wait_for_their_button():
     assert 'id="view-1"' in first["text/html"] and 'id="view-2"' in second["text/html"]
 
 
-def test_docstrings_are_shown_as_they_are_meant():
-    lines = ["## Rewards", ":ivar seed: * of loads, and more.", ":param a, b: two, once"]
-    pages.as_restructured_text(None, "class", "X", None, {}, lines)
-    assert lines == [
-        "**Rewards**\n",
-        ":ivar seed: \\* of loads, and more.",
-        ":param a,b: two, once",
-    ]
-
-
 def test_links_that_lead_nowhere_are_found(tmp_path):
     (tmp_path / "b.html").write_text('<h1 id="top">b</h1>', encoding="utf-8")
     (tmp_path / "a.html").write_text(

@@ -1,26 +1,27 @@
 """The libraries: named in pyproject.toml, pinned in environment.txt, and imported somewhere."""
 
-import ast
 import json
-import platform
 import re
 import sys
 import tomllib
 from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import packages_distributions, version
-from pathlib import Path
+
+from pip._vendor.packaging.requirements import Requirement
+from pip._vendor.packaging.utils import canonicalize_name
 
 from tests import wheels
+from tests.test_package import imported
+from tests.wheels import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # What loads and orders need, and what the rest of the package does.
 OF_THE_PACKAGE = ("train", "view")
 EXTRAS = PROJECT["optional-dependencies"]
 NEEDED = [*PROJECT["dependencies"], *(name for extra in OF_THE_PACKAGE for name in EXTRAS[extra])]
-LOWEST = dict(library.split(">=") for library in NEEDED)  # versions by name
-PINNED = {name: version for name, (version, _) in wheels.lines().items()}
+LOWEST = {line.name: line.specifier for line in map(Requirement, NEEDED)}  # versions
+PINNED = {name: str(line.specifier)[2:] for name, line in wheels.lines().items()}
 DISTRIBUTIONS = packages_distributions()  # by the names that are imported
 OWN = {"make", "notebooks", "studies", "tests", "unload"}
 WITH_PYTHON = {"pip"}
@@ -40,22 +41,6 @@ RUN_ONLY = {
 }
 
 
-def normal(name: str) -> str:
-    """A distribution's name as indexes compare it."""
-    return re.sub(r"[-_.]+", "-", name).lower()
-
-
-def wanted_here() -> set[str]:
-    """The names whose markers hold on this system and Python."""
-    here = next(
-        name
-        for name, (system, machine, _) in wheels.SYSTEMS.items()
-        if (system, machine) == (sys.platform, platform.machine())
-    )
-    found = wheels.lines().items()
-    return {n for n, (_, marker) in found if wheels.is_wanted(marker, here, sys.version_info[1])}
-
-
 def sources(folder: str) -> Iterator[str]:
     """The Python code of a folder: its modules, and the code cells of its notebooks."""
     for path in (ROOT / folder).rglob("*.py"):
@@ -72,32 +57,26 @@ def distributions(folder: str) -> set[str]:
     """The distributions that a folder's code imports from."""
     names = set()
     for source in sources(folder):
-        for node in ast.walk(ast.parse(source)):
-            if isinstance(node, ast.Import):
-                names |= {alias.name.split(".")[0] for alias in node.names}
-            elif isinstance(node, ast.ImportFrom):
-                names.add(node.module.split(".")[0])
-            elif isinstance(node, ast.Call) and ast.unparse(node.func) == "pytest.importorskip":
-                names.add(node.args[0].value.split(".")[0])
+        skipped_without = re.findall(r'pytest\.importorskip\("(\w+)', source)
+        names |= {name.split(".")[0] for name in [*imported(source), *skipped_without]}
     beside = {path.stem for path in (ROOT / folder).rglob("*.py")}  # tests import their helpers
     names -= sys.stdlib_module_names | OWN | WITH_PYTHON | (beside - DISTRIBUTIONS.keys())
-    return {normal(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or not installed
+    return {canonicalize_name(DISTRIBUTIONS.get(name, [name])[0]) for name in names}  # or missing
 
 
 def test_each_library_is_named_once_and_pinned():
     extras = {name: EXTRAS[name] for name in EXTRAS.keys() - {*OF_THE_PACKAGE, *ASIDE}}
     for extra in ON_DEMAND:
         assert all("==" in library for library in extras.pop(extra)), f"{extra} is not pinned"
-    engines = [line.partition("; ") for line in extras.pop("physics")]
+    engines = [Requirement(line) for line in extras.pop("physics")]
     named = [*LOWEST, *(name for extra in extras.values() for name in extra)]
-    assert all(name == normal(name) for name in named), "extras are names only"
+    assert all(name == canonicalize_name(name) for name in named), "extras are names only"
     assert sorted(named) == sorted(PINNED)
     # The reference where environment.txt has it, the other one elsewhere.
-    assert [name for name, *_ in engines] == extras["mujoco"] + extras["pybullet"]
-    there = engines[1][2].replace("'", '"')
-    assert there == wheels.lines()["pybullet"][1]
-    opposite = there.replace("==", "!=").replace("<", ">=").replace(" and ", " or ")
-    assert engines[0][2].replace("'", '"') == opposite
+    assert [line.name for line in engines] == extras["mujoco"] + extras["pybullet"]
+    other, there = (str(line.marker) for line in engines)
+    assert there == str(wheels.lines()["pybullet"].marker)
+    assert other == there.replace("==", "!=").replace("<", ">=").replace(" and ", " or ")
 
 
 def test_each_line_has_a_wheel_for_each_system_and_python():
@@ -106,9 +85,8 @@ def test_each_line_has_a_wheel_for_each_system_and_python():
 
 def test_a_line_without_a_wheel_is_found(monkeypatch):
     """PyBullet has one for one system and Python only, and a version that is new has none yet."""
-    there = wheels.lines()
-    version, marker = there["pybullet"]
-    fuller = there | {"pybullet": (version, ""), "numpy": ("99.0", "")}
+    new = [f"pybullet=={PINNED['pybullet']}", "numpy==99.0"]
+    fuller = wheels.lines() | dict(zip(("pybullet", "numpy"), map(Requirement, new)))
     monkeypatch.setattr(wheels, "lines", lambda: fuller)
     found = [*wheels.holes()]
     assert len(found) == 2 * len(wheels.SYSTEMS) * len(wheels.PYTHONS) - 1
@@ -116,14 +94,13 @@ def test_a_line_without_a_wheel_is_found(monkeypatch):
 
 
 def test_what_is_pinned_is_not_below_the_lowest_version():
-    for name, lowest in LOWEST.items():
-        parts = [[int(part) for part in each.split(".")] for each in (lowest, PINNED[name])]
-        assert parts[0] <= parts[1], name
+    assert not [name for name in LOWEST if PINNED[name] not in LOWEST[name]]
 
 
 def test_what_is_installed_is_what_is_pinned():
     """PyTorch's version may have a suffix that names its build, such as +cpu."""
-    found = {name: version(name).split("+")[0] for name in wanted_here()}
+    here = [n for n, line in wheels.lines().items() if not line.marker or line.marker.evaluate()]
+    found = {name: version(name).split("+")[0] for name in here}
     assert found == {name: each for name, each in PINNED.items() if name in found}
 
 

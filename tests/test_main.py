@@ -3,7 +3,6 @@
 import inspect
 import os
 import re
-import subprocess
 import sys
 import tomllib
 from dataclasses import fields
@@ -59,7 +58,7 @@ def test_every_field_is_an_option_that_is_explained(monkeypatch, capsys, given):
 
 
 @pytest.mark.needs("SIGPIPE")
-def test_nothing_is_imported_before_it_is_needed(tmp_path):
+def test_nothing_is_imported_before_it_is_needed(tmp_path, run_python):
     """Not by help, nor by a list that is refused; an order takes pandas, but compiles nothing.
 
     A script entry point calls ``command``. A pipe that is closed, as by ``head``, ends the program
@@ -80,24 +79,22 @@ def test_nothing_is_imported_before_it_is_needed(tmp_path):
                 {name}()
             except SystemExit as end:
                 code = end.code
-            slow = {{"gymnasium", "numba", "torch", "pandas", "matplotlib"}} & {{*sys.modules}}
+            slow = {{"gymnasium", "numba", "torch", "pandas", "matplotlib", "plotly", "pybullet"}}
+            slow &= {{*sys.modules}}
             print(code, signal.getsignal(signal.SIGPIPE).name, *sorted(slow), file=sys.stderr)
     """
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        capture_output=True, text=True, cwd=tmp_path,
-        env={"PATH": "", "NUMBA_CACHE_DIR": str(tmp_path / "compiled"),
-             "PYTHONPATH": os.pathsep.join([str(paths.ROOT), os.environ.get("PYTHONPATH", "")])},
-    )  # fmt: skip
-    *before, refused, after, summary, ordered, trained = done.stderr.splitlines()
+    path = os.pathsep.join([str(paths.ROOT), os.environ.get("PYTHONPATH", "")])
+    compiled = str(tmp_path / "compiled")
+    printed, said = run_python(program, tmp_path, PYTHONPATH=path, NUMBA_CACHE_DIR=compiled)
+    *before, refused, after, summary, ordered, trained = said.splitlines()
     assert before == ["0 SIG_DFL", "0 SIG_DFL"] and after == "1 SIG_DFL"
     assert refused.startswith("bad.csv is not a readable list: ")
     assert summary == "136 picks, 0 failed, 44% behind other boxes"
     assert ordered == "None SIG_DFL pandas" and "torch" in trained
     assert not (tmp_path / "compiled").exists()
-    assert done.stdout.startswith(f"unload {VERSION}, lifts by {engine_of()}\n")
+    assert printed.startswith(f"unload {VERSION}, lifts by {engine_of()}\n")
     for text in ("x_min", "size_z", "weight", "in m", "--units", "rear wall", "entrance"):
-        assert text in done.stdout
+        assert text in printed
 
 
 def test_what_an_extra_brings_is_named_where_it_is_missing(monkeypatch, capsys):

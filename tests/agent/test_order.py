@@ -107,16 +107,12 @@ def test_a_box_that_failed_waits_until_another_one_is_unloaded(boxes):
         ({"physics": "none"}, ValueError, "physics is 'none'; expected one of 'local', 'full', "),
         ({"physics": LocalPhysics(), "force": 30}, ValueError, "force is 30; expected it to be"),
         ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
+        ({"load": Load([[3.5, 1, 0.9]], [[0.4, 0.4, 0.4]])}, ValueError, "floats in load"),
     ],
 )
 def test_what_is_no_policy_or_rule_is_refused(given, error, message):
     with pytest.raises(error, match=message):
-        picking_order(read_load(), **given)
-
-
-def test_what_floats_is_not_unloaded(boxes):
-    with pytest.raises(ValueError, match="floats"):
-        picking_order(boxes((0.3, 0.9)))
+        picking_order(**{"load": read_load()} | given)
 
 
 def test_the_command_line_prints_the_order_as_csv(capsys, tmp_path):
@@ -158,15 +154,7 @@ def test_the_command_line_reads_what_read_load_reads(tmp_path, capsys, monkeypat
     ]
 
 
-def test_the_command_line_says_what_is_wrong(tmp_path, capsys, monkeypatch):
-    (tmp_path / "boxes.csv").write_text(
-        "x_min,y_min,z_min,size_x,size_y,size_z\n0,0,1,1,1,1\n", encoding="utf-8"
-    )
-    with pytest.raises(SystemExit, match="1"):
-        command.main([str(tmp_path / "boxes.csv")])
-    printed, said = capsys.readouterr()
-    assert printed == "" and said.count("\n") == 1
-    assert said.startswith(f"{tmp_path}/boxes.csv: row 1 (id '1')")
+def test_the_command_line_says_how_many_boxes_are_left(capsys, monkeypatch):
     monkeypatch.setattr("unload.physics.table.TablePhysics.simulate", lambda *_: 0.1)
     with pytest.raises(SystemExit, match="1"):
         command.main(["--policy", "highest"])

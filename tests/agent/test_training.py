@@ -99,22 +99,18 @@ def test_every_run_is_gone_on_with(tmp_path, fields):
     assert_same(tmp_path / "straight", tmp_path / "broken")
 
 
-def test_a_network_and_a_change_of_ones_own_are_trained_with_and_known(tmp_path):
-    config = TrainConfig(**CONTAINER | {"network": own_network, "epsilon_init": 0.1})
-    result = train(config, tmp_path, progress=False, change=metres)
-    assert result.policy.network.weight.item() > 0.12  # it was 0.1: to pick high ones pays
-    assert result.policy.card["configuration"]["network"] == identity(own_network)
-    assert result.policy.card["change"] == identity(metres)
-
-
 def test_a_reward_of_ones_own_gets_the_distance():
     """In metres; what is learned from changes, and the curve does not.
 
     Also of an episode's last pick, whose infos stand apart; NaN in a task without lifts.
     """
-    run = Training(TrainConfig(**CONTAINER | {"max_picks": 3}), change=metres)
+    config = TrainConfig(**CONTAINER | {"max_picks": 3, "network": own_network})
+    run = Training(config, change=metres)
     for _ in range(20):
         run.step()
+    card = run.policy().card
+    assert card["configuration"]["network"] == identity(own_network)
+    assert card["change"] == identity(metres)
     learned = run.replay.arrays["rewards"][:80].reshape(4, 20)  # of the four points so far
     assert (learned >= 0).all() and len(np.unique(learned)) > 1
     successes = run.curve.table()["success_rate"].tolist()
@@ -134,33 +130,28 @@ def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
 
 
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
-    """The second run asks PyBullet nothing, and gives the same."""
-    config = TrainConfig(**CONTAINER | {"picks": 40})
-    monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)
+    """Also when one is stopped. The second run asks PyBullet nothing, and gives the same."""
     lifts, kept = tmp_path / "lifts.npz", []
+    given = {
+        "config": TrainConfig(**CONTAINER | {"picks": 40}), "progress": False, "lifts": lifts,
+        "stack": lambda rng: own_load(rng, "continuous sizes"),
+        "callback": lambda point: kept.append(len(LiftTable.load(lifts))),
+    }  # fmt: skip
     for name in ("first", "second"):
         table = LiftTable()
         for place in ("unload.agent.training", "unload.env.vector"):
             monkeypatch.setattr(f"{place}.shared_table", lambda table=table: table)
-        train(
-            config, tmp_path / name, progress=False, lifts=lifts,
-            stack=lambda rng: own_load(rng, "continuous sizes"),
-            callback=lambda point: kept.append(len(LiftTable.load(lifts))),
-        )  # fmt: skip
-        assert kept[-1] > 0, "by the checkpoints, before the end"
-        assert len(LiftTable.load(lifts)) == len(table) > 0
+        if name == "first":
+            with at_step(2, interrupt), pytest.raises(KeyboardInterrupt):
+                train(**given, run_dir=tmp_path / name)
+            stopped = len(LiftTable.load(lifts))
+            assert stopped == len(table) > 0
+            monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)
+        train(**given, run_dir=tmp_path / name)
+        assert kept[-1] > stopped, "by the checkpoints, before the end"
+        assert len(LiftTable.load(lifts)) == len(table)
         monkeypatch.setattr("unload.physics.table.LocalPhysics.simulate", None)
     assert_same(tmp_path / "first", tmp_path / "second")
-
-
-def test_lifts_are_kept_when_a_run_is_stopped(tmp_path, monkeypatch):
-    table, lifts = LiftTable(), tmp_path / "lifts.npz"
-    for place in ("unload.agent.training", "unload.env.vector"):
-        monkeypatch.setattr(f"{place}.shared_table", lambda: table)
-    with at_step(5, runs.interrupt), pytest.raises(KeyboardInterrupt):
-        config, stack = TrainConfig(**CONTAINER), lambda rng: own_load(rng, "continuous sizes")
-        train(config, tmp_path / "run", progress=False, lifts=lifts, stack=stack)
-    assert len(LiftTable.load(lifts)) == len(table) > 0
 
 
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
@@ -217,12 +208,15 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message)
 
 
 @pytest.mark.needs("mkfifo")
-def test_a_pipe_is_refused(tmp_path):
-    """It once hung, of lifts as in place of a file of the run."""
-    config, run = TrainConfig(**CONTAINER), tmp_path / "run"
+def test_a_pipe_or_a_link_to_a_file_of_the_run_is_refused(tmp_path):
+    """A pipe once hung; a table of lifts was once written in place of the checkpoint."""
+    config, run, lifts = TrainConfig(**CONTAINER), tmp_path / "run", tmp_path / "lifts.npz"
     os.mkfifo(tmp_path / "fifo")
-    with pytest.raises(ValueError, match="lifts is '.*fifo'.*; expected"):
-        train(config, run, progress=False, lifts=tmp_path / "fifo")
+    for target, refused in (("fifo", ".*"), ("run/checkpoint.npz", ", a file of the run")):
+        lifts.symlink_to(tmp_path / target)
+        with pytest.raises(ValueError, match=f"lifts is '.*lifts.npz'{refused}; expected"):
+            train(config, run, progress=False, lifts=lifts)
+        lifts.unlink()
     assert not run.exists()
     run.mkdir()
     os.mkfifo(run / "config.json")
@@ -352,16 +346,6 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
         train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
     assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock", "owner"}
     assert started[0].rollout.envs.closed
-
-
-@pytest.mark.needs("symlinks")
-def test_lifts_that_are_linked_to_a_file_of_the_run_are_refused(tmp_path):
-    """A table of lifts was once written in place of the checkpoint."""
-    link, run = tmp_path / "lifts.npz", tmp_path / "run"
-    link.symlink_to(run / "checkpoint.npz")
-    with pytest.raises(ValueError, match="lifts is '.*lifts.npz', a file of the run; expected an"):
-        train(TrainConfig(**CONTAINER), run, progress=False, lifts=link)
-    assert not run.exists()
 
 
 @pytest.mark.parametrize("where", ["step", "callback"])

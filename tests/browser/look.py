@@ -7,7 +7,8 @@
 Copies of the notebooks are run, at reduced counts except for 00. Checked are: no error and
 nothing on stderr; 3D views hold pixels, with a kernel and without; figures under sliders change
 when one is moved, and the score in 00 when a box is clicked. On the page a reader takes the five
-steps and changes settings. Pictures of all are kept in build/browser/.
+steps and changes settings. Each notebook and each size of the page ends at what is wrong with it.
+Pictures of all are kept in build/browser/.
 """
 
 import argparse
@@ -15,31 +16,26 @@ import io
 import json
 import os
 import re
-import secrets
 import shutil
-import socket
 import subprocess
 import sys
 import time
-import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
-import nbformat
 import numpy as np
-from papermill.iorw import load_notebook_node
-from papermill.parameterize import parameterize_notebook
+import papermill
 from PIL import Image
-from playwright.sync_api import Browser, Error, Locator, Page, sync_playwright
+from playwright.sync_api import Browser, Error, Locator, Page, expect, sync_playwright
 
 from notebooks import run
 from studies.paths import ROOT
 from studies.play.page import PAGE
 
 BUILD = ROOT / "build" / "browser"
-COPIES = BUILD / "notebooks"
 NOTEBOOKS = ("00", "01", "04", "06", "21")
 PLAYGROUND = "00_playground"
 RUN_LIMIT = 400  # s, for all cells of a notebook
@@ -58,9 +54,9 @@ SIZES = {
 FINGER = 44  # pixels, the height of what is touched
 PLOTLY = ".jp-RenderedPlotly"
 LAB = {
-    "apputils-extension/notification": {"fetchNews": "false", "checkForUpdates": False},
-    "docmanager-extension/plugin": {"autosave": False},
-    "notebook-extension/tracker": {"windowingMode": "none"},  # all cells are in the page
+    "apputils-extension:notification": {"fetchNews": "false", "checkForUpdates": False},
+    "docmanager-extension:plugin": {"autosave": False},
+    "notebook-extension:tracker": {"windowingMode": "none"},  # all cells are in the page
 }
 CELLS = "() => jupyterapp.shell.currentWidget.content.model.sharedModel.toJSON().cells"
 
@@ -73,15 +69,28 @@ def main() -> int:
     if not chosen and "page" not in names:
         parser.error(f"no notebook starts with {names}")
     shutil.rmtree(BUILD, ignore_errors=True)
+    BUILD.mkdir(parents=True)
     failed = 0
-    with browser() as chromium:
+    with browser() as chromium, jupyterlab(chosen) if chosen else nullcontext() as address:
         looks = [look_at_page(chromium, BUILD)] if "page" in names else []
-        looks += [look_at_notebooks(chromium, chosen)] if chosen else []
+        looks += [
+            problems({p.stem: partial(look_at_notebook, chromium, p.stem, address)}) for p in chosen
+        ]
         for problem in chain(*looks):
             print(f"  FAILED: {problem}", flush=True)
             failed += 1
     print(f"{failed} failed; pictures are in {BUILD.relative_to(ROOT)}")
     return 1 if failed else 0
+
+
+def problems(looks: dict[str, Callable[[], None]]) -> Iterator[str]:
+    """Yield what is wrong first in each look, with its name."""
+    for name, look in looks.items():
+        print(f"{name} …", flush=True)
+        try:
+            look()
+        except (AssertionError, Error) as problem:
+            yield f"{name}: {problem}"
 
 
 @contextmanager
@@ -94,6 +103,7 @@ def browser() -> Iterator[Browser]:
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     # A container's root may not use Chromium's sandbox.
     options = [*OPTIONS, *(["--no-sandbox"] if hasattr(os, "getuid") and not os.getuid() else [])]
+    expect.set_options(timeout=1000 * DRAW_LIMIT)
     with sync_playwright() as playwright:
         try:
             chromium = playwright.chromium.launch(executable_path=found, args=options)
@@ -107,29 +117,13 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-def look_at_notebooks(chromium: Browser, notebooks: list[Path]) -> Iterator[str]:
-    """Yield what is wrong with copies of notebooks, as they are stored and after a run."""
-    COPIES.mkdir(parents=True, exist_ok=True)
-    for path in notebooks:
-        content = load_notebook_node(str(path))
-        reduced = {} if path.stem == PLAYGROUND else run.reduced_parameters(path)
-        if reduced:
-            content = parameterize_notebook(content, reduced)
-        nbformat.write(content, COPIES / path.name)
-    with jupyterlab(COPIES, BUILD) as address:
-        for path in notebooks:
-            print(f"{path.stem} …", flush=True)
-            page = chromium.new_page(viewport={"width": 1500, "height": 1000})
-            page.goto(address.format(path.name))
-            yield from look_at(page, path.stem)
-            page.close()
-
-
-def look_at(page: Page, name: str) -> Iterator[str]:
-    """Yield what is wrong with a notebook, as it is stored and after a run."""
+def look_at_notebook(chromium: Browser, name: str, address: str) -> None:
+    """Look at a notebook as it is stored, run it, look again and use it."""
+    page = chromium.new_page(viewport={"width": 1500, "height": 1000})
+    page.goto(address.format(f"{name}.ipynb"))
     page.wait_for_selector(".jp-Notebook .jp-MarkdownOutput", timeout=60_000)
     page.wait_for_timeout(3000)
-    yield from drawn(page, f"{name}, as stored")
+    check_views(page, f"{name}-as-stored")
     page.evaluate("() => jupyterapp.serviceManager.ready")
     page.wait_for_function(
         "() => jupyterapp.shell.currentWidget.sessionContext.session?.kernel?.status === 'idle'",
@@ -141,35 +135,34 @@ def look_at(page: Page, name: str) -> Iterator[str]:
     page.set_default_timeout(30_000)
     page.wait_for_timeout(3000)
     for number, cell in enumerate(page.evaluate(CELLS)):
-        if cell["source"] and cell.get("execution_count", 0) is None:
-            yield f"{name}: cell {number} has not been run"
+        not_run = cell["source"] and cell.get("execution_count", 0) is None
+        assert not not_run, f"cell {number} has not been run"
         for output in cell.get("outputs", []):
             if output["output_type"] == "error" or output.get("name") == "stderr":
                 text = str(output.get("evalue") or output.get("text"))
-                if not text.startswith("compiling "):  # said once, after a fresh installation
-                    yield f"{name}: cell {number} says {text[:300]!r}"
-    yield from drawn(page, name)
-    yield from sliders_answer(page, name)
+                # Said once, after a fresh installation.
+                assert text.startswith("compiling "), f"cell {number} says {text[:300]!r}"
+    check_views(page, name)
+    check_sliders(page, name)
     if name == PLAYGROUND:
-        yield from clicks_count(page)
+        check_clicks(page)
+    page.close()
 
 
-def drawn(page: Page, name: str) -> Iterator[str]:
-    """Yield which 3D views are blank, and keep a picture of each and of the page's parts."""
-    stem = re.sub(r"\W+", "-", name)
+def check_views(page: Page, name: str) -> None:
+    """Check that 3D views are drawn; keep a picture of each and of the page's parts."""
     views = page.locator(f"{PLOTLY}, canvas.unload-canvas")
-    for number in range(views.count()):
-        view = views.nth(number)
+    for number, view in enumerate(views.all()):
         if view.evaluate("(view) => view.matches('.jp-RenderedPlotly')"):
             interact(view)
-        if not until(page, lambda view=view: is_drawn(shot(view))):
-            yield f"{name}: view {number} is blank"
-        shot(view, BUILD / f"{stem}-view-{number}.png")
-    cells = page.locator(".jp-Cell")
-    for number in range(0, cells.count(), 4):
-        cells.nth(number).scroll_into_view_if_needed()
-        page.wait_for_timeout(300)
-        page.screenshot(path=BUILD / f"{stem}-{number}.png")
+        drawn = until(page, lambda view=view: is_drawn(shot(view)))
+        shot(view, BUILD / f"{name}-view-{number}.png")
+        assert drawn, f"view {number} is blank"
+    for number, cell in enumerate(page.locator(".jp-Cell").all()):
+        if number % 4 == 0:
+            cell.scroll_into_view_if_needed()
+            page.wait_for_timeout(300)
+            page.screenshot(path=BUILD / f"{name}-{number}.png")
 
 
 def interact(view: Locator) -> None:
@@ -207,22 +200,21 @@ def until(page: Page, holds: Callable[[], object], limit: float = DRAW_LIMIT) ->
     return True
 
 
-def sliders_answer(page: Page, name: str) -> Iterator[str]:
-    """Yield which figures stay as they are when their first slider is moved by a key."""
-    figures = page.locator(".jp-OutputArea-output:has(img.widget-image)")
-    for number in range(figures.count()):
-        figure = figures.nth(number)
+def check_sliders(page: Page, name: str) -> None:
+    """Check that figures change when their first slider is moved by a key."""
+    for number, figure in enumerate(
+        page.locator(".jp-OutputArea-output:has(img.widget-image)").all()
+    ):
         figure.scroll_into_view_if_needed()
         image = figure.locator("img.widget-image")
         before = image.get_attribute("src")
         figure.locator(".noUi-handle").first.press("ArrowRight")
-        if not until(page, lambda image=image, old=before: image.get_attribute("src") != old):
-            yield f"{name}: a slider does not change figure {number}"
+        expect(image, f"figure {number}").not_to_have_attribute("src", before)
         shot(figure, BUILD / f"{name}-slider-{number}.png")
 
 
-def clicks_count(page: Page) -> Iterator[str]:
-    """Yield whether a click on a box does not change the score."""
+def check_clicks(page: Page) -> None:
+    """Check that a click on a box changes the score."""
     canvas, score = (page.locator(each).first for each in ("canvas.unload-canvas", "[data-picks]"))
     pixels = shot(canvas, BUILD / "you.png")
     # Boxes that may be picked are blue, and bluer than the text's antialiasing.
@@ -231,142 +223,117 @@ def clicks_count(page: Page) -> Iterator[str]:
     y, x = (int(value) for value in np.random.default_rng(0).permutation(np.argwhere(blue))[0])
     before = score.text_content()
     canvas.click(position={"x": x, "y": y})
-    if not until(page, lambda: score.text_content() != before, 10):
-        yield f"00: a click at {x}, {y} does not change the score {before!r}"
+    expect(score, f"after a click at {x}, {y}").not_to_have_text(before, timeout=10_000)
 
 
 @contextmanager
-def jupyterlab(notebooks: Path, home: Path) -> Iterator[str]:
-    """A running JupyterLab; its address, in which ``format`` puts a notebook's name.
+def jupyterlab(notebooks: list[Path]) -> Iterator[str]:
+    """A running JupyterLab with copies; its address, in which ``format`` puts a notebook's name.
 
     The address resets the workspace, which would open earlier notebooks again, too.
-
-    Args:
-        notebooks: folder that it shows.
-        home: folder for its settings and messages; made.
     """
-    for name, values in LAB.items():
-        file = home / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(values), encoding="utf-8")
-    folders = {
-        "JUPYTERLAB_SETTINGS_DIR": "settings", "JUPYTERLAB_WORKSPACES_DIR": "workspaces",
-        "JUPYTER_CONFIG_DIR": "config", "JUPYTER_RUNTIME_DIR": "runtime", "IPYTHONDIR": "ipython",
-    }  # fmt: skip
-    env = os.environ | {name: str(home / folder) for name, folder in folders.items()}
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    place, token = f"http://127.0.0.1:{port}", secrets.token_hex(16)
+    for path in notebooks:
+        (BUILD / "notebooks").mkdir(exist_ok=True)
+        reduced = {} if path.stem == PLAYGROUND else run.reduced_parameters(path)
+        copy = BUILD / "notebooks" / path.name
+        papermill.execute_notebook(path, copy, reduced, prepare_only=True)
+    (BUILD / "config" / "labconfig").mkdir(parents=True)
+    overrides = BUILD / "config" / "labconfig" / "default_setting_overrides.json"
+    settings = {f"@jupyterlab/{plugin}": values for plugin, values in LAB.items()}
+    overrides.write_text(json.dumps(settings), encoding="utf-8")
+    runtime = BUILD / "runtime"
+    env = {"JUPYTER_CONFIG_DIR": str(BUILD / "config"), "JUPYTER_RUNTIME_DIR": str(runtime)}
+    env |= {"IPYTHONDIR": str(BUILD / "ipython")}
     command = [
         *(sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root"),
-        *(f"--port={port}", "--ServerApp.port_retries=0", f"--IdentityProvider.token={token}"),
-        *(f"--ServerApp.root_dir={notebooks}", "--LabApp.expose_app_in_browser=True"),
+        *(f"--ServerApp.root_dir={BUILD / 'notebooks'}", "--LabApp.expose_app_in_browser=True"),
     ]
-    with open(home / "jupyterlab.log", "w", encoding="utf-8") as log:
-        server = subprocess.Popen(command, stdout=log, stderr=log, env=env)
+    with open(BUILD / "jupyterlab.log", "w", encoding="utf-8") as log:
+        server = subprocess.Popen(command, stdout=log, stderr=log, env=os.environ | env)
         try:
             end = time.monotonic() + START_LIMIT
-            while not answers(f"{place}/api/status?token={token}"):
+            while not [*runtime.glob("jpserver-*.html")]:  # written when the server is up
                 if time.monotonic() > end:
                     sys.exit(f"JupyterLab does not start; see {log.name}")
                 time.sleep(0.5)
-            yield f"{place}/lab/tree/{{}}?token={token}&reset"
+            (info,) = runtime.glob("jpserver-*.json")
+            info = json.loads(info.read_text(encoding="utf-8"))
+            yield f"{info['url']}lab/tree/{{}}?token={info['token']}&reset"
         finally:
             server.terminate()
             server.wait(30)
 
 
-def answers(address: str) -> bool:
-    """Whether a server is up."""
-    with suppress(OSError):
-        urllib.request.urlopen(address, timeout=5).close()
-        return True
-    return False
-
-
 def look_at_page(chromium: Browser, pictures: Path) -> Iterator[str]:
     """Yield what is wrong with the page; keep pictures of it before and after training."""
-    for seed, (size, (width, height, scheme)) in enumerate(SIZES.items()):
-        context = chromium.new_context(
-            viewport={"width": width, "height": height}, color_scheme=scheme
-        )
-        page, errors, requests = context.new_page(), [], []
-        page.on("pageerror", lambda error, to=errors: to.append(str(error)))
-        page.on("request", lambda request, to=requests: to.append(request.url))
-        start(page, f"seed={seed}")
-        for problems in (fits(page, size), five_steps(page, f"{pictures}/train-{size}")):
-            yield from (f"{size}: {each}" for each in problems)
-        yield from (f"{size}: {each}" for each in fits(page, size))
-        if size == "desktop":
-            start(page)
-            yield from settings(page)
-        yield from (f"the page says {error!r}" for error in errors)
-        known = (PAGE.as_uri(), "blob:", "about:")
-        others = [url for url in requests if not url.startswith(known)]
-        if others:
-            yield f"the page asks for {others}"
-        context.close()
+    return problems({size: partial(use_page, chromium, size, pictures) for size in SIZES})
 
 
-def five_steps(page: Page, stem: Path) -> Iterator[str]:
-    """Yield whether a step does not do what it says; keep a picture of each."""
+def use_page(chromium: Browser, size: str, pictures: Path) -> None:
+    width, height, scheme = SIZES[size]
+    viewport, errors, requests = {"width": width, "height": height}, [], []
+    context = chromium.new_context(viewport=viewport, color_scheme=scheme)
+    page = context.new_page()
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    start(page, f"seed={[*SIZES].index(size)}")
+    check_size(page, size)
+    take_five_steps(page, pictures / f"train-{size}")
+    check_size(page, size)
+    if size == "desktop":
+        check_settings(page)
+    assert not errors, f"the page says {errors}"
+    others = [url for url in requests if not url.startswith((PAGE.as_uri(), "blob:", "about:"))]
+    assert not others, f"the page asks for {others}"
+    context.close()
 
-    def ends(step: str, expected: str) -> Iterator[str]:
+
+def take_five_steps(page: Page, stem: Path) -> None:
+    """Take the page's steps, and check what it says of each; keep a picture of each."""
+
+    def ends(step: str, expected: str) -> None:
         judged = "!run.running && (!run.picks || config.blank in run.rates)"
-        done = page.locator(f"{button(step)}.done")
-        if not until(page, lambda: done.count(), TRAIN_LIMIT):
-            yield f"step {step} does not end"
+        expect(page.locator(f"{button(step)}.done")).to_be_attached(timeout=1000 * TRAIN_LIMIT)
         until(page, lambda: page.evaluate(judged), TRAIN_LIMIT)
         page.screenshot(path=f"{stem}-{step}.png", full_page=True)
-        said = page.text_content("#verdict")
-        if not re.match(expected, said):
-            yield f"the verdict of step {step} is {said!r}; expected {expected!r}"
+        expect(page.locator("#verdict"), step).to_have_text(re.compile(f"^{expected}"))
 
     page.screenshot(path=f"{stem}-start.png", full_page=True)
     box = page.locator("#canvas").bounding_box()
     page.click("#canvas", position={"x": box["width"] / 2, "y": box["height"] * 0.28})
-    yield from ends("unload", "Unloaded: .* 1 of your 1 picks")
-    page.click(button("positions"))
-    yield from ends(
-        "positions", r"It learned: 100 % of its picks in fresh containers succeed, after \d"
-    )
-    page.click(button("paper"))
-    yield from ends("paper", "It (fell: best after|did not|learned)")
-    page.click(button("blank"))
-    yield from ends("blank", r"With height alone .* in \d+ % .* with x and y in \d+ %: ")
-    page.click(button("shuffled"))
-    yield from ends("shuffled", "It (learned|did not fall): ")
+    ends("unload", "Unloaded: .* 1 of your 1 picks")
+    for step, expected in (
+        ("positions", r"It learned: 100 % of its picks in fresh containers succeed, after \d"),
+        ("paper", "It (fell: best after|did not|learned)"),
+        ("blank", r"With height alone .* in \d+ % .* with x and y in \d+ %: "),
+        ("shuffled", "It (learned|did not fall): "),
+    ):
+        page.click(button(step))
+        ends(step, expected)
 
 
-def fits(page: Page, size: str) -> Iterator[str]:
-    """Yield whether the page is too wide, or a finger finds too little to touch."""
+def check_size(page: Page, size: str) -> None:
+    """Check that the page is not too wide, and that a finger finds enough to touch."""
     wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
-    if wide > 0:
-        yield f"the page is {wide} pixels too wide"
-    if size == "desktop":
-        return
+    assert wide <= 0, f"the page is {wide} pixels too wide"
     for each in page.locator("button, select, .choice label, #settings input").all():
         box = each.bounding_box()
-        if box and box["height"] < FINGER:
-            yield f"{each.inner_text()!r} is {box['height']} pixels high"
+        enough = size == "desktop" or not box or box["height"] >= FINGER
+        assert enough, f"{each.inner_text()!r} is {box['height']} pixels high"
 
 
-def settings(page: Page) -> Iterator[str]:
-    """Yield whether the address does not hold the settings, or a bad one stays."""
+def check_settings(page: Page) -> None:
+    """Check that the address holds the settings, and that a bad one does not stay."""
+    start(page)
     page.select_option("select[name=replay]", "shuffled")
     page.fill("input[name=seed]", "5")
     page.keyboard.press("Enter")
-    address = page.evaluate("location.href")
-    start(page, address.partition("#")[2])
+    start(page, page.evaluate("location.href").partition("#")[2])
     for name, value in {"replay": "shuffled", "seed": "5"}.items():
-        there = page.input_value(f"[name={name}]")
-        if there != value:
-            yield f"{address} gives {name} as {there!r}; expected {value!r}"
+        expect(page.locator(f"[name={name}]")).to_have_value(value)
     start(page, "seed=1e21&replay=gone")
-    said = page.text_content("#problems")
-    if "1e21" not in said or "gone" not in said or "1e21" in page.evaluate("location.href"):
-        yield f"of a bad address the page says {said!r}"
+    expect(page.locator("#problems")).to_have_text(re.compile("1e21.*gone|gone.*1e21", re.DOTALL))
+    assert "1e21" not in page.evaluate("location.href")
 
 
 def start(page: Page, settings: str = "") -> None:

@@ -105,7 +105,3 @@ def corners(draw) -> tuple[np.ndarray, np.ndarray]:
         low.append((0.0, draw(st.integers(0, 100)) / 100, bridged))
         high.append((7.0, draw(st.integers(150, 250)) / 100, bridged + 0.1))
     return np.array(low), np.array(high)
-
-
-def loads() -> st.SearchStrategy[Load]:
-    return corners().map(lambda pair: Load.from_corners(pair[0], pair[1] - pair[0]))

@@ -1,4 +1,6 @@
-"""The three physics, the appendix's distances, and lifts one after the other."""
+"""The three physics, one also by MuJoCo, the appendix's distances, and lifts in a row."""
+
+from functools import partial
 
 import pytest
 
@@ -9,8 +11,9 @@ from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
 KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
+KINDS["mujoco"] = partial(LocalPhysics, "mujoco")
 # The same as parameters of tests.
-EACH = [pytest.param("full", marks=pytest.mark.pybullet), "local", "table"]
+EACH = [pytest.param("full", marks=pytest.mark.pybullet), "local", "table", "mujoco"]
 ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg
 
 

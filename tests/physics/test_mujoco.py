@@ -6,12 +6,11 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from tests.physics.kinds import ONE_BOX, TWO_BOXES, lifts, make
-from unload import Load, task
+from unload import task
 from unload.physics import bullet, mujoco
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation
-from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, free_lift, shared_table
+from unload.physics.table import HELD_DOWN, LiftTable, TablePhysics, shared_table
 
 
 @pytest.fixture
@@ -31,22 +30,6 @@ def hard(situations) -> list[Situation]:
     """Different situations that a table knows by no rule."""
     different = {each.key: each for each in situations if 0 < each.on_top < HELD_DOWN}
     return list(different.values())[:12]
-
-
-def test_it_moves_boxes_as_far_as_the_appendix_says(boxes):
-    physics = LocalPhysics("mujoco")
-    physics.reset(boxes((1.2, 0.2), (1.2, 0.6)))
-    assert physics.lift(0) == pytest.approx(TWO_BOXES, abs=0.004)
-    assert physics.lift(1) == pytest.approx(ONE_BOX, rel=0.01)
-    assert physics._world is None, "PyBullet is not asked"
-
-
-def test_it_pulls_other_masses_with_other_forces(boxes):
-    load = boxes((0.3, 0.2), (0.8, 0.2), (0.8, 0.6))
-    heavy = Load(load.positions, load.sizes, masses=[2, 0.5, 5])
-    lifted = lifts(make("local", heavy, engine="mujoco", force=30), range(3))
-    assert lifted[0] == pytest.approx(free_lift(30, 2), rel=0.01)
-    assert lifted[1:] == pytest.approx([0, 0], abs=0.001)
 
 
 def test_floor_and_side_walls_hold_what_they_touch():
@@ -73,6 +56,7 @@ def test_what_it_lifted_before_makes_no_difference(hard):
     physics = LocalPhysics("mujoco")
     alone = [physics.simulate(each) for each in hard]
     assert [physics.simulate(each) for each in hard[::-1]] == alone[::-1]
+    assert physics._world is None, "PyBullet is not asked"
 
 
 def test_without_pybullet_it_answers_what_no_table_knows(no_pybullet, hard, monkeypatch):

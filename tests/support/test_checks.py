@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from unload.support import checks
+from unload.support.checks import entries, finite_array, flag_array, integer_array, shaped
 
 
 @pytest.mark.parametrize(
@@ -53,57 +54,47 @@ def test_what_does_not_fit_is_refused_by_name_and_value(check, value, arguments,
     assert str(caught.value) == f"n is {value!r}; expected {wanted}"
 
 
-def test_entries_names_what_is_missing():
-    with pytest.raises(ValueError, match="state has no a, b; expected b, a"):
-        checks.entries("state", {"c": 3}, ("b", "a"))
-
-
-def test_finite_array_returns_a_float64_copy():
-    given = np.array([[1, 2, 3]])
-    array = checks.finite_array("a", given, (None, 3))
-    assert array.dtype == np.float64 and array.tolist() == [[1, 2, 3]]
-    same_dtype = np.zeros((1, 3))
-    checks.finite_array("a", same_dtype, (None, 3))[0] = 5
-    assert not same_dtype.any()
+def test_finite_array_returns_a_copy():
+    given = np.zeros((1, 3))
+    finite_array("a", given, (None, 3))[0] = 5
+    assert not given.any()
 
 
 @pytest.mark.parametrize(
-    ("value", "error", "message"),
+    ("check", "value", "arguments", "dtype"),
     [
-        ([[1.0, 2.0]], ValueError, r"a has shape \(1, 2\); expected \(any, 3\)"),
-        ([[1, -np.inf, np.nan]], ValueError, r"a holds -inf at index \(0, 1\)"),
-        ([[True, True, True]], TypeError, "a has dtype bool; expected real numbers"),
-        (torch.ones(1, 3, requires_grad=True), TypeError, "a cannot be read as an array"),
+        (finite_array, np.array([[0, 1]]), ((None, 2),), np.float64),
+        (integer_array, np.array([0, 1], np.int8), ((None,),), np.int64),
+        (integer_array, [0, 3], ((2,), 3), np.int64),
+        *(
+            (flag_array, value, ((2,),), bool)
+            for value in ([False, True], [0.0, 1.0], np.array([0, 1], np.int8))
+        ),
     ],
 )
-def test_finite_array_refuses(value, error, message):
+def test_arrays_are_returned_in_one_dtype(check, value, arguments, dtype):
+    array = check("a", value, *arguments)
+    assert array.dtype == dtype and array.tolist() == np.asarray(value).tolist()
+
+
+@pytest.mark.parametrize(
+    ("check", "value", "arguments", "error", "message"),
+    [
+        (entries, {"c": 3}, (("b", "a"),), ValueError, "a has no a, b; expected b, a"),
+        (finite_array, [[1.0, 2.0]], ((None, 3),), ValueError, r"expected \(any, 3\)"),
+        (finite_array, [[1, -np.inf]], (None,), ValueError, r"holds -inf at index \(0, 1\)"),
+        (finite_array, [True], (None,), TypeError, "has dtype bool; expected real numbers"),
+        (finite_array, torch.ones(3, requires_grad=True), (None,), TypeError, "be read as an"),
+        (integer_array, [1.0, 2.0], ((2,),), TypeError, "dtype float64; expected integers"),
+        (integer_array, [True, False], ((2,),), TypeError, "dtype bool; expected integers"),
+        (integer_array, [-1, 3], ((2,), 3), ValueError, "holds -1 to 3; expected 0 to 3"),
+        (integer_array, [0, 4], ((2,), 3), ValueError, "holds 0 to 4; expected 0 to 3"),
+        (shaped, np.zeros(2, np.float32), ((2,), float), TypeError, "ndarray of dtype float32;"),
+        (shaped, [0.0, 0.0], ((2,), float), TypeError, "a is a list of dtype None; expected"),
+        (flag_array, [2, 0], ((2,),), ValueError, "holds 2; expected bool, or 0 and 1"),
+        (flag_array, [np.nan, 0], ((2,),), ValueError, "a holds nan; expected bool, or"),
+    ],
+)
+def test_arrays_and_entries_that_do_not_fit_are_refused(check, value, arguments, error, message):
     with pytest.raises(error, match=message):
-        checks.finite_array("a", value, (None, 3))
-
-
-def test_integer_array():
-    array = checks.integer_array("a", np.array([1, 2], np.int8), (None,))
-    assert array.dtype == np.int64 and array.tolist() == [1, 2]
-    for value in ([1.0, 2.0], [True, False]):
-        with pytest.raises(TypeError, match="a has dtype .*; expected integers"):
-            checks.integer_array("a", value, (2,))
-    assert checks.integer_array("a", [0, 3], (2,), high=3).tolist() == [0, 3]
-    for value in ([-1, 3], [0, 4]):
-        with pytest.raises(ValueError, match=f"a holds {value[0]} to {value[1]}; expected 0 to 3"):
-            checks.integer_array("a", value, (2,), high=3)
-
-
-def test_shaped():
-    checks.shaped("a", np.zeros((2, 3)), (None, 3), np.float64)
-    for value in (np.zeros((2, 3), np.float32), [[0.0] * 3] * 2):
-        with pytest.raises(TypeError, match="a is a .* of dtype .*; expected <class"):
-            checks.shaped("a", value, (None, 3), np.float64)
-
-
-def test_flag_array():
-    for value in ([True, False], [1, 0], [1.0, 0.0], np.array([1, 0], np.int8)):
-        array = checks.flag_array("a", value, (2,))
-        assert array.dtype == bool and array.tolist() == [True, False]
-    for value in ([2, 0], [np.nan, 0]):
-        with pytest.raises(ValueError, match="a holds .*; expected bool, or 0 and 1"):
-            checks.flag_array("a", value, (2,))
+        check("a", value, *arguments)

@@ -1,10 +1,8 @@
 """Compiled code on disk: used again as long as nothing changes that it was built from."""
 
 import ast
-import os
 import shutil
-import subprocess
-import sys
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -35,31 +33,23 @@ def copy(tmp_path) -> Path:
     return tmp_path
 
 
-def run(copy: Path) -> tuple[str, str]:
-    """What a new process that imports the module prints, and what it says besides."""
-    outcome = subprocess.run(
-        [sys.executable, "-c", "import unload.load.made"], cwd=copy, text=True,
-        capture_output=True, check=True,
-        env=os.environ | {"PYTHONPATH": "", "NUMBA_CACHE_DIR": ""},
-    )  # fmt: skip
-    return outcome.stdout.strip(), outcome.stderr
-
-
 def edit(copy: Path, old: str, new: str) -> None:
     path = copy / "unload/task.py"
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
 
 
-def test_code_is_compiled_once_for_each_value_of_a_constant(copy):
-    printed, said = run(copy)
-    assert printed == "0.3 0"
+def test_code_is_compiled_once_for_each_value_of_a_constant(copy, run_python):
+    given = {"PYTHONPATH": "", "NUMBA_CACHE_DIR": ""}
+    run = partial(run_python, "import unload.load.made", copy, **given)
+    printed, said = run()
+    assert printed == "0.3 0\n"
     assert said.count("compiling for this processor") == said.count("\n") == 1
     assert str(copy / "unload/__pycache__/compiled-") in said
     edit(copy, "LIFT_THRESHOLD = 0.2", "LIFT_THRESHOLD = 0.5")
-    printed, said = run(copy)
-    assert printed == "0.6 0" and "compiling" in said
+    printed, said = run()
+    assert printed == "0.6 0\n" and "compiling" in said
     edit(copy, "LIFT_THRESHOLD = 0.5", "LIFT_THRESHOLD = 0.2")
-    assert run(copy) == ("0.3 1", "")
+    assert run() == ("0.3 1\n", "")
 
 
 def test_all_that_compiled_functions_read_is_among_the_sources():
