@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.metadata import packages_distributions, version
 
-from pip._vendor.packaging.requirements import Requirement
-from pip._vendor.packaging.utils import canonicalize_name
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from tests import wheels
 from tests.test_package import imported

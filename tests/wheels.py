@@ -12,9 +12,9 @@ from itertools import product
 from pathlib import Path
 from urllib.request import Request, urlopen
 
-from pip._vendor.packaging import tags
-from pip._vendor.packaging.requirements import Requirement
-from pip._vendor.packaging.utils import canonicalize_name, parse_wheel_filename
+from packaging import tags
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name, parse_wheel_filename
 
 ROOT = Path(__file__).resolve().parents[1]
 LIST = Path(__file__).with_name("wheels.txt")
