@@ -9,12 +9,14 @@ too, and so is the paper's beside them.
 
 from dataclasses import replace
 from functools import partial
+from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
+from scipy import stats
 
 from studies.changes import height_reward
 from studies.falls import measures
@@ -81,6 +83,22 @@ def read_variants(part: str) -> pd.DataFrame:
     """What ``judged`` says of the policies of one of ``PARTS``, a row per ``cell`` and ``seed``."""
     rows = read_table(GRIDS["variants"].name)
     return rows[rows["cell"].isin(PARTS[part])]
+
+
+def differences(part: str) -> pd.DataFrame:
+    """Differences of the cells' mean MSR from that of the first one, with their 95 % intervals.
+
+    Returns:
+        A row per cell and entry of ``APPLIED``: ``difference``, ``low`` and ``high`` by Welch's t,
+        in points.
+    """
+    cells = dict(list(read_variants(part).groupby("cell", sort=False)))
+    reference, rows = cells.pop(next(iter(cells))), {}
+    for (name, cell), column in product(cells.items(), APPLIED):
+        test = stats.ttest_ind(cell[column], reference[column], equal_var=False)
+        difference = cell[column].mean() - reference[column].mean()
+        rows[name, APPLIED[column][2]] = (difference, *test.confidence_interval())
+    return 100 * pd.DataFrame(rows, index=["difference", "low", "high"]).T
 
 
 @styled
