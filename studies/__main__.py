@@ -39,7 +39,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, training.OPTIONS),
-    "variants": ("other networks, rewards and settings", variants.variants_data, variants.OPTIONS),
+    "variants": ("other networks and rewards", variants.variants_data, variants.OPTIONS),
     "policies": ("policies compared", policies, JOBS),
     "laboratory": (
         "why runs fall: the laboratory", laboratory.laboratory_data, laboratory.OPTIONS
