@@ -34,13 +34,21 @@ class DriftingTies:
         offsets: (num_envs, ``MOST_ITEMS``, 3) float32, of each item in units of ``SPREAD``; a part
             of the run's state.
 
+    Raises:
+        ValueError: the run's own noise would be added.
     """
 
     def __init__(self, run: Training, correlation: Sequence[float]) -> None:
+        config = run.config
+        if config.position_noise or not config.equalize:
+            raise ValueError(
+                f"position_noise is {config.position_noise} and equalize {config.equalize}; "
+                "expected 0 and True, because the ties of equalized positions are broken here"
+            )
         self._run = run
         self._kept = np.asarray(correlation, np.float32)
         self._drawn = np.sqrt(1 - self._kept**2)
-        run.kept["ties"] = np.zeros((run.config.num_envs, MOST_ITEMS, 3), np.float32)
+        run.kept["ties"] = np.zeros((config.num_envs, MOST_ITEMS, 3), np.float32)
 
     @property
     def offsets(self) -> np.ndarray:

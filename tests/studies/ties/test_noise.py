@@ -72,3 +72,9 @@ def test_a_resumed_run_has_the_same_bits(tmp_path):
         train(SMALL, tmp_path / "parts", progress=False, change=change)
     train(SMALL, tmp_path / "parts", progress=False, change=change)
     assert_same(tmp_path / "whole", tmp_path / "parts")
+
+
+@pytest.mark.parametrize("fields", [{"position_noise": 0.0005}, {"equalize": False}])
+def test_a_run_with_noise_of_its_own_is_refused(fields):
+    with pytest.raises(ValueError, match="expected 0 and True"):
+        Training(replace(SMALL, **fields), change=partial(drifting, correlation=(0, 0, 0)))
