@@ -54,12 +54,11 @@ def print_order(arguments: list[str]) -> None:
     """Print the order of picks for a packing list."""
     # Little else, because help should take no time.
     from unload.physics.bullet import engine_of
-    from unload.support.files import SHIPPED
+    from unload.support.files import POLICIES
 
     parser = _parser("unload", DESCRIPTION)
-    shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("policies/*.safetensors")))
     known = "reachable (the default: nothing lies on the next box or stands in front of it), "
-    known += f"highest, nearest, random, {shipped}, or a file of weights"
+    known += f"highest, nearest, random, {', '.join(POLICIES)}, or a file of weights"
     text = "CSV, JSON or Excel file; an example if missing"
     parser.add_argument("list", nargs="?", help=text)
     parser.add_argument("--policy", default="reachable", help=known)

@@ -92,8 +92,8 @@ def fig03_substacks() -> Figure:
     figure, axes = plt.subplots(figsize=(8.2, 6.6))
     across, down, gap = 0.0, 0.88, 0.3  # m
     for name, variants in SUBSTACKS.items():
-        every = np.concatenate(variants)
-        width = (every[:, 1] + PACKAGES[every[:, 0], 0]).max() * CELL
+        package, left, _ = np.concatenate(variants).T
+        width = (left + PACKAGES[package, 0]).max() * CELL
         for variant, boxes in enumerate(variants):
             _draw_substack(axes, boxes, across, (3 - variant) * down)
         axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
@@ -238,6 +238,7 @@ def _draw_substack(axes: Axes, boxes, x: float, z: float) -> None:
 
 def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
     """Lines between cells of which one belongs to the substack and the other does not."""
+    # With an empty cell all around: number i here is cell i - 1.
     inside = np.zeros((CELLS_WIDE + 2, CELLS_HIGH + 2), dtype=bool)
     for package, left, lower in boxes:
         width, height = PACKAGES[package]

@@ -115,7 +115,7 @@ def test_each_flipped_bit_of_a_shape_is_refused_by_name(checkpoint):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"format": np.array(9)}, "is not of format 10; if another version of unload"),
+        ({"format": np.array(9)}, "is not of format 11; if another version of unload"),
         ({"version": np.array("0.1.0")}, "is of unload 0.1.0; if another version of unl"),
         ({"settings": np.array("{")}, "JSONDecodeError"),
     ],

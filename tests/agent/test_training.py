@@ -234,12 +234,12 @@ def test_a_point_holds_the_means_since_the_last_one():
     curve = Curve()
     curve.add(np.array([1.0, -1.0]), np.array([False, True]), [])
     curve.end_point(2, 1.0)
-    curve.add(np.array([1.0, 1.0]), np.array([False, False]), [0.5, 0.25])
+    curve.add(np.array([3.0, 1.0]), np.array([False, False]), [0.5, 0.25])  # of an own task
     curve.add(np.array([1.0, -1.0]), np.array([True, True]), [0.0])
     curve.end_point(6, 0.5)
     first, second = curve.points
     assert first[:4] == (2, 0, 0.5, 0.5) and np.isnan(first.loss) and first.epsilon == 1
-    assert second[:4] == (6, 0.5, 0.75, 0.5) and (second.loss, second.epsilon) == (0.25, 0.5)
+    assert second[:4] == (6, 1, 0.75, 0.5) and (second.loss, second.epsilon) == (0.25, 0.5)
     assert first.wall_time <= second.wall_time
 
 

@@ -68,7 +68,7 @@ def test_fewer_boxes_may_have_more_contacts():
     """60 boxes apart, and 40 bars, 20 of them across the others."""
     grid = np.stack(np.meshgrid(0.5 * np.arange(12) + 0.4, 0.5 * np.arange(5) + 0.25, 0.15), -1)
     apart, crossed = unload.Load(grid.reshape(60, 3), np.full((60, 3), 0.3)), crossed_bars(20)
-    assert len(crossed.contacts.boxes) > 800 and len(apart.contacts.boxes) == 0
+    assert len(crossed.contacts.links) > 800 and len(apart.contacts.links) == 0
     loads = apart, crossed
     play_both(CONTAINER, 2, 30, seed=1, max_picks=5, stack=lambda rng: loads[rng.integers(2)])
 

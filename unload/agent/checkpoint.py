@@ -21,7 +21,7 @@ from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 10  # of the checkpoints
+FORMAT = 11  # of the checkpoints
 OTHER = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-SUMS = ("picks", "rewards", "deadlocked", "updates", "losses")
+SUMS = ("picks", "rewards", "successes", "deadlocked", "updates", "losses")
 
 
 class Point(NamedTuple):
@@ -16,7 +16,7 @@ class Point(NamedTuple):
     Attributes:
         picks: so far in all.
         mean_reward: of the environment.
-        success_rate: MSR of the exploring agent.
+        success_rate: MSR of the exploring agent, the share of picks with a positive reward.
         deadlocked: share of picks whose item had already failed since the last success.
         loss: NaN before the first update.
         epsilon: exploration rate at the last of them.
@@ -49,6 +49,7 @@ class Curve:
         sums = self.sums
         sums["picks"] += len(rewards)
         sums["rewards"] += rewards.sum()
+        sums["successes"] += (rewards > 0).sum()
         sums["deadlocked"] += deadlocked.sum()
         for loss in losses:
             sums["losses"] += loss
@@ -58,9 +59,11 @@ class Curve:
         """Add the point of the steps since the last one, after ``picks`` picks in all."""
         sums = self.sums
         reward, deadlocked = sums["rewards"] / sums["picks"], sums["deadlocked"] / sums["picks"]
+        # Of rewards ±1 to the bit their ``success_rate``; a task of one's own may have others.
+        balance = (2 * sums["successes"] - sums["picks"]) / sums["picks"]
         loss = sums["losses"] / sums["updates"] if sums["updates"] else float("nan")
         self.points.append(
-            Point(picks, reward, (reward + 1) / 2, deadlocked, loss, epsilon, time.time())
+            Point(picks, reward, (balance + 1) / 2, deadlocked, loss, epsilon, time.time())
         )
         self.sums = dict.fromkeys(SUMS, 0.0)
 

@@ -15,10 +15,8 @@ from unload.env.observation import holds_item
 from unload.fast import fused
 from unload.network.factory import NETWORKS, make_network
 from unload.network.weights import read_weights, write_weights
-from unload.support import checks, files
-
-# The policies that come with the package, by name.
-SHIPPED = {file.stem: file for file in sorted(files.SHIPPED.glob("policies/*.safetensors"))}
+from unload.support import checks
+from unload.support.files import POLICIES
 
 
 def greedy_actions(
@@ -119,11 +117,11 @@ def load_policy(path: str | Path, network: torch.nn.Module | None = None) -> Gre
         ValueError: the file is not one of a policy, is damaged, or its tensors do not fit
             ``network``.
     """
-    file = SHIPPED.get(str(path), checks.path("path", path))
+    file = POLICIES.get(str(path), checks.path("path", path))
     if not file.is_file():
         raise FileNotFoundError(
             f"path is {str(path)!r}; expected a .safetensors file of a policy, or one of "
-            + ", ".join(map(repr, SHIPPED))
+            + ", ".join(map(repr, POLICIES))
         )
     return read_weights(file, "policy", partial(policy_of, network=network))
 

@@ -18,12 +18,12 @@ from unload.load.boxes import OVERLAP, Load, check_stacked
 from unload.physics.base import Force, Physics, low_ceiling
 from unload.physics.full import Name, make_physics
 from unload.physics.table import too_heavy
-from unload.support import checks, files
+from unload.support import checks
+from unload.support.files import POLICIES
 
 LOGGER = logging.getLogger(__name__)
 BY_NAME = {each.__name__: each for each in (policies.highest, policies.nearest, policies.random)}
-SHIPPED = sorted(file.stem for file in files.SHIPPED.glob("policies/*.safetensors"))
-NAMES = ("reachable", *BY_NAME, *SHIPPED)
+NAMES = ("reachable", *BY_NAME, *POLICIES)
 FEW = 5  # ids of boxes that are named
 Rule = Callable[[Load, np.ndarray], Sequence[np.ndarray]]
 # Of a load, of the boxes that are present, and of those that may be picked: one of the latter, or

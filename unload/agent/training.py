@@ -248,7 +248,7 @@ def _points(
     is no longer finite.
     """
     rollout, whole = run.rollout, True
-    saved, shown = time.monotonic(), 0.0
+    checkpoint_saved, curve_saved = time.monotonic(), 0.0
     bar = tqdm(
         total=run.config.picks, initial=rollout.picks, unit="pick", unit_scale=True,
         mininterval=1.0, disable=not progress, ncols=100,
@@ -260,19 +260,19 @@ def _points(
             run.step()
             whole = True
             bar.update(run.config.num_envs)
-            if time.monotonic() - saved > CHECKPOINT_INTERVAL and not rollout.finished:
+            if time.monotonic() - checkpoint_saved > CHECKPOINT_INTERVAL and not rollout.finished:
                 run.agent.check_finite()
                 folder.save(run)
                 keep_lifts()
-                saved = time.monotonic()
+                checkpoint_saved = time.monotonic()
 
             if not run.curve.sums["picks"]:  # end_point has just emptied them
                 point = run.curve.points[-1]
                 shares = {"MSR": f"{point.success_rate:.1%}", "loss": f"{point.loss:.3f}"}
                 bar.set_postfix(shares, refresh=False)
-                if time.monotonic() - shown > CURVE_INTERVAL:
+                if time.monotonic() - curve_saved > CURVE_INTERVAL:
                     folder.save_curve(run)
-                    shown = time.monotonic()
+                    curve_saved = time.monotonic()
                 yield point
             if signals:
                 raise KeyboardInterrupt(

@@ -49,17 +49,17 @@ class ContainerVectorEnv(PickingVectorEnv):
     ) -> None:
         super().__init__(num_envs, **settings)
         check_stack(stack)
-        self._features = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
+        self._how_observed = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
         self.stack, self._lent = stack, isinstance(physics, LocalPhysics)
         if isinstance(physics, str):
             checks.one_of("physics", physics, ("table",))
             physics = TablePhysics(shared_table())
         wanted = "'table' or a LocalPhysics"
         self.physics: Any = checks.instance("physics", physics, LocalPhysics, wanted)
-        # The lifts that are known; none where another class is asked about each pick.
+        # The lifts that are known; none of a physics without a table.
         self.table = physics.table if isinstance(physics, TablePhysics) else LiftTable()
         # No compiled loop knows what another class or a weaker pull does.
-        self._asks = type(physics) is not TablePhysics or physics.force < task.PICK_FORCE
+        self._always_simulate = type(physics) is not TablePhysics or physics.force < task.PICK_FORCE
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
@@ -116,7 +116,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         first = state.unloaded[env]
         state.by_distance[env, first : first + len(items)] = items[order]
         state.seen[env, : len(load)] = scale(positions, load.container)
-        containers.show_nearest(state, env, *self._features)
+        containers.show_nearest(state, env, *self._how_observed)
 
     def _make_room(self, items: int, links: int) -> None:
         """Let the arrays hold loads of so many items and contacts."""
@@ -133,17 +133,20 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        # Also where nothing is playing; what that does goes with the next ``_fill``.
         items, distances = self._lift(actions)
-        rewards = containers.unload_lifted(self._containers, actions, distances, *self._features)
+        lifted = self._containers, actions, distances
+        rewards = containers.unload_lifted(*lifted, *self._how_observed)
         return rewards, {"item": items, "distance": distances}
 
     def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each chosen item, (num_envs,) int64, and how far a lift moves it in m, float64.
 
-        What the table does not know, ``physics`` simulates and adds to it.
+        What is not known, ``physics`` simulates; a ``TablePhysics`` adds it to its table.
         """
         state = self._containers
-        items, distances = containers.look_up(state, actions, self._asks, *self.table.slots)
+        slots = self.table.slots
+        items, distances = containers.look_up(state, actions, self._always_simulate, *slots)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)

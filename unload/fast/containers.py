@@ -28,9 +28,10 @@ class Containers(NamedTuple):
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
-        left, unloaded: (E,) int64, how many items there are, and how many there were besides.
+        left, unloaded: (E,) int64, how many items are there, and how many have been taken out.
         seen: (E, capacity, 3) float32, the scaled positions as observed.
-        by_distance: (E, capacity) int32, the items, nearest first.
+        by_distance: (E, capacity) int32, the items, nearest first. Shown anew, those that are left
+            stand after as many entries as there are unloaded.
         visible: (E, 128) int32, the item in each row of the observation, -1 in padded rows.
         values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows
             that hold an item.
@@ -108,11 +109,11 @@ def _show(containers, env, rows, equalize, average, tolerance):
 
 
 @compiled
-def look_up(containers, actions, asks, digests, micrometres):
+def look_up(containers, actions, always_simulate, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
-    Where the row is padded, the item is -1 and moves by 0. With ``asks`` nothing else is known but
-    what has failed and what the ceiling holds.
+    Where the row is padded, the item is -1 and moves by 0. With ``always_simulate``, for a physics
+    that the table does not speak for, only what has failed and what the ceiling holds is known.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     capacity = containers.present.shape[1]
@@ -135,7 +136,7 @@ def look_up(containers, actions, asks, digests, micrometres):
         if containers.ceilings[env] - top < task.LIFT_THRESHOLD - OVERLAP:
             distances[env] = 0
             continue
-        if asks:
+        if always_simulate:
             distances[env] = UNKNOWN
             continue
 

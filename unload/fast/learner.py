@@ -25,7 +25,7 @@ class FusedLearner:
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
         self.weights, self.beta = fused.weights_of(network), beta
         self.learning_rate, self.steps = learning_rate, 0
-        self._rows = tuple(array.reshape(-1) for array in self.weights)  # the same memory
+        self._flat = tuple(array.reshape(-1) for array in self.weights)  # the same memory
         # Running means of the gradients and of their squares.
         self.moments = np.zeros((2, sum(array.size for array in self.weights)))
 
@@ -37,12 +37,13 @@ class FusedLearner:
     ) -> Callable[[], float]:
         """See ``PlainLearner``; weights and arrays must stay as they are until the call."""
         seen, actions = batch["observations"], batch["actions"]
-        gradients = fused.start_gradients(self.weights, seen, actions, targets, self.beta, rows)
+        arrays = seen, actions, targets
+        finish_gradients = fused.start_gradients(self.weights, *arrays, self.beta, rows)
 
         def finish() -> float:
-            total = gradients()
-            self.step(total[:-1])
-            return float(total[-1])
+            gradients_and_loss = finish_gradients()
+            self.step(gradients_and_loss[:-1])
+            return float(gradients_and_loss[-1])
 
         return finish
 
@@ -50,7 +51,7 @@ class FusedLearner:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - decay**self.steps for decay in _DECAYS]
-        _step(self._rows, gradients, self.moments, self.learning_rate, *corrections)
+        _step(self._flat, gradients, self.moments, self.learning_rate, *corrections)
 
 
 @compiled

@@ -28,19 +28,19 @@ class Contacts(NamedTuple):
     """Lists of touching boxes, one after the other in one array.
 
     The boxes above (0), below (1) or beside (2) box ``b`` are
-    ``boxes[starts[kind, b] : starts[kind, b + 1]]``.
+    ``links[starts[kind, b] : starts[kind, b + 1]]``.
 
     Attributes:
         starts: (3, n + 1) int32.
-        boxes: (m,) int32.
+        links: (m,) int32, numbers of boxes.
     """
 
     starts: np.ndarray
-    boxes: np.ndarray
+    links: np.ndarray
 
     def of(self, kind: int, box: int) -> np.ndarray:
         """The boxes that touch ``box``, (k,) int32."""
-        return self.boxes[self.starts[kind, box] : self.starts[kind, box + 1]]
+        return self.links[self.starts[kind, box] : self.starts[kind, box + 1]]
 
 
 class BoxError(ValueError):
@@ -193,9 +193,9 @@ class Load:
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:
         """All pairs of a box and one that rests on it, as two arrays."""
-        starts, boxes = self.contacts
+        starts, links = self.contacts
         lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
-        return lower, boxes[starts[ABOVE, 0] : starts[ABOVE, -1]]
+        return lower, links[starts[ABOVE, 0] : starts[ABOVE, -1]]
 
     @cached_property
     def fronts(self) -> tuple[np.ndarray, np.ndarray]:
@@ -316,7 +316,7 @@ def _find(low, high, order, ends, tolerance):
 
 @compiled(plain=True)
 def _lists(found, count):
-    """``starts`` and ``boxes`` of ``Contacts``."""
+    """``starts`` and ``links`` of ``Contacts``."""
     starts = np.zeros((3, count + 1), np.int32)
     for row in range(len(found)):
         starts[found[row, 0], found[row, 1]] += 1
@@ -325,9 +325,9 @@ def _lists(found, count):
         for box in range(count + 1):
             total += starts[kind, box]
             starts[kind, box] = total
-    boxes = np.empty(total, np.int32)
+    links = np.empty(total, np.int32)
     for row in range(len(found)):  # fills each list from its end, which leaves its start
         kind, box = found[row, 0], found[row, 1]
         starts[kind, box] -= 1
-        boxes[starts[kind, box]] = found[row, 2]
-    return starts, boxes
+        links[starts[kind, box]] = found[row, 2]
+    return starts, links

@@ -21,7 +21,7 @@ CELLS_HIGH = 10  # of a row of substacks
 CELL = task.CONTAINER[1] / CELLS_WIDE  # m
 ROWS = 3  # bottom, mid, top
 WALLS = 12  # not in the paper: gives 938 ± 40 items, in its range of 800–1000
-DEPTH = task.CONTAINER[0] / WALLS  # m, the same for every item
+DEPTH = task.CONTAINER[0] / WALLS  # m, of each box of 12 walls
 
 # Width and height of packages 0–12, in cells (Fig. 3).
 PACKAGES = np.array(
@@ -50,7 +50,9 @@ RIGHT = (
     ((2, 0, 6), (6, 4, 7), (6, 7, 7), (10, 4, 4), (1, 4, 0)),
     ((1, 0, 6), (2, 6, 6), (3, 4, 0)),
 )  # fmt: skip
-_LEFT_CELLS, _OTHER_CELLS = 6, 10  # width of a left substack, and of each other one
+# Cells from a left substack to the next one, which begins where its upper boxes end; and from
+# each other one.
+_LEFT_CELLS, _OTHER_CELLS = 6, 10
 
 
 def _columns(count: int) -> list[tuple[int, tuple]]:
@@ -80,7 +82,7 @@ def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
     """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
-    cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # the width; the height
+    cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # across and up
     columns = 1 + int((cells - _LEFT_CELLS) / _OTHER_CELLS)
     return round(WALLS / scale), int(cells / CELLS_HIGH), columns
 

@@ -41,7 +41,7 @@ class Situation:
 
     @cached_property
     def key(self) -> bytes:
-        """Equal for equal situations: its integers in a row, to look a lift up by."""
+        """Equal for equal situations: the words that ``write_key`` writes, and ``pull``."""
         floor = () if self.floor is None else (self.floor,)
         head = np.array([self.dynamic, len(floor), *floor, *self.sides], dtype=np.int32)
         return head.tobytes() + self.boxes.tobytes() + np.array(self.pull, np.int32).tobytes()

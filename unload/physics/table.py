@@ -25,7 +25,7 @@ from unload.support import files
 from unload.support.compiled import compiled
 
 _LOGGER = logging.getLogger(__name__)
-HELD_DOWN = 3  # boxes on top that no lift moves
+HELD_DOWN = 3  # so many boxes on top hold a box down
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 EMPTY = np.uint64(0)  # digest of a free slot
 _FEWEST_SLOTS = 1024

@@ -28,6 +28,7 @@ PATIENCE = 5.0  # s for which a lock may be held before it is said who holds it
 HELD = 1.0  # s for which a spreadsheet or a virus scanner may hold a file open
 ABANDONED = 3600.0  # s after which a half file that nothing was added to is nobody's
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
+POLICIES = {file.stem: file for file in sorted(SHIPPED.glob("policies/*.safetensors"))}  # by name
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
