@@ -17,7 +17,7 @@ from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.criterion import WORDS, likeness, open_course
 from studies.ties.earlier import EARLIER
 from studies.ties.laboratory import RHOS
-from studies.ties.training import TIES
+from studies.ties.training import SWEPT, TIES
 
 PICKS = 20_000_000  # of a run
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
@@ -124,12 +124,27 @@ def draw_run(curve: pd.DataFrame) -> Figure:
     return figure
 
 
+def read_by_duration() -> pd.DataFrame:
+    """All published runs of 20 million picks without the mask whose ties noise breaks, by its ρ.
+
+    Returns:
+        A row per run: ``rho``, the same along all axes, ``cell``, ``seed``, and what
+        ``criterion.likeness`` says.
+    """
+    cells = {"anew_no_mask": RHOS[0], **{f"rho_{rho}_no_mask": rho for rho in SWEPT}}
+    runs = by_run(read_grid(TIES).query("cell in @cells"), likeness)
+    runs["rho"] = runs["cell"].map(cells)
+    frozen = read_by_ties().query("ties == 'noise, frozen' and not mask")
+    return pd.concat([runs, frozen.assign(rho=RHOS[-1])], ignore_index=True)
+
+
 @styled
-def draw_duration(runs: pd.DataFrame) -> Figure:
-    """Where runs of the laboratory end, by how long an order of equals lasts.
+def draw_duration(runs: pd.DataFrame, long: pd.DataFrame) -> Figure:
+    """Where runs end, by how long an order of equals lasts.
 
     Args:
         runs: ``ties/laboratory``; of its cells, those that differ in ρ, with the mask and without.
+        long: see ``read_by_duration``.
     """
     figure, axes = plt.subplots(figsize=(5.6, 3.2))
     for ending, colour, label, shift in (
@@ -143,6 +158,9 @@ def draw_duration(runs: pd.DataFrame) -> Figure:
             axes.plot(place + np.linspace(-0.1, 0.1, len(values)), values, "o", c=colour, ms=3)
         means = [values.mean() for values in ends]
         axes.plot(places, means, "_-", c=colour, mec="k", ms=12, lw=1.2, label=label)
+    places = long["rho"].map([*RHOS].index) + 0.3
+    label = "20 million picks,\nwithout the mask"
+    axes.plot(places, 100 * long["end"], "D", c=WITHOUT_MASK, mfc="none", ms=4, label=label)
     axes.legend(loc="lower left")
     axes.set_xticks(range(len(RHOS)), [f"{correlation:g}" for correlation in RHOS])
     axes.set(xlabel="ρ: correlation of the noise from one pick to the next", ylim=(0, 103))
