@@ -1,8 +1,6 @@
 """What the tests of training share: small networks and runs, and ways to stop them."""
 
 import itertools
-import multiprocessing
-import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +13,6 @@ import pytest
 import torch
 
 from unload import PEQNetwork, TrainConfig, stack_load, train
-from unload.agent import training
 from unload.agent.training import Training
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,10 +30,6 @@ RUNS = {
 }
 
 
-class Breakdown(BaseException):
-    """A crash at a moment of the test's choosing."""
-
-
 def few_walls(rng):
     """Loads that are unloaded before an episode of many picks ends."""
     return stack_load(rng, walls=1)
@@ -48,28 +41,18 @@ def metres(run) -> None:
 
 
 @contextmanager
-def at(owner: type, method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
-    """Do something right after a call of a method; calls are counted from 1."""
-    call, count = getattr(owner, method), itertools.count(1)
+def at_step(number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Do something right after a training step; they are counted from 1."""
+    step, count = Training.step, itertools.count(1)
 
-    def watched(*arguments):
-        result = call(*arguments)
+    def watched(run):
+        step(run)
         if next(count) == number:
             action()
-        return result
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(owner, method, watched)
+        patch.setattr(Training, "step", watched)
         yield
-
-
-def at_step(number: int, action: Callable[[], None]):
-    """Do something right after a training step."""
-    return at(Training, "step", number, action)
-
-
-def crash() -> None:
-    raise Breakdown
 
 
 def interrupt() -> None:
@@ -85,27 +68,6 @@ def interrupt_run(
     with stop, pytest.raises(KeyboardInterrupt, match=message):
         train(config, folder, progress=False, **given)
     assert signal.getsignal(number) is handler
-
-
-def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
-    """Start a run in a fork of this process, which is killed at a point of its curve.
-
-    It writes a checkpoint after each step.
-    """
-
-    def kill(point):
-        if point["picks"] == picks:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-    def run():
-        torch.set_num_threads(1)  # OpenMP's threads do not live in a fork
-        training.CHECKPOINT_INTERVAL = 0
-        train(config, folder, progress=False, stack=few_walls, callback=kill)
-
-    process = multiprocessing.get_context("fork").Process(target=run, daemon=True)
-    process.start()
-    process.join(timeout=100)  # s; a fork that hangs is a failure
-    assert process.exitcode == -signal.SIGKILL
 
 
 def content(folder: Path) -> tuple[bytes, pd.DataFrame]:
