@@ -96,8 +96,6 @@ def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, 
         ({"policy": "random"}, TypeError, "policy is 'random'; expected a function"),
         ({"episodes": 10**6 + 1}, ValueError, "episodes is 1000001"),
         ({"mask": None}, TypeError, "mask is None; expected True or False"),
-        ({"physics": "none"}, ValueError, "physics is 'none'"),
-        ({"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected one of 'restore'"),
     ],
 )
 def test_bad_arguments_are_refused(kwargs, error, message):
