@@ -37,10 +37,6 @@ def test_epsilon_falls_linearly_and_stays():
     assert values == pytest.approx([0.9, 0.5, 0.1, 0.1, 0.1])
 
 
-def test_seeds_stay_as_they_were():
-    assert TrainConfig(seed=3).seeds() == (1645421708, 4294262074, 3363538554)
-
-
 COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interval", "max_picks")
 
 
