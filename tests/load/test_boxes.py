@@ -38,15 +38,7 @@ def test_a_load_cannot_be_changed(full_load):
     ("changes", "error", "message"),
     [
         ({"positions": np.zeros((0, 3))}, ValueError, "positions is empty"),
-        # Two others stick out by less than is tolerated.
-        (
-            {
-                "positions": [[0.5 - 5e-7, 0.5, 0.5], [6.5 + 5e-7, 0.5, 0.5], [3.5, 1.25, 0.4]],
-                "sizes": np.ones((3, 3)),
-            },
-            ValueError,
-            r"box \[2\]: reaches from",
-        ),
+        ({"positions": [[3.5, 1.25, 0.4]]}, ValueError, r"box \[0\]: reaches from"),
         ({"sizes": np.ones((2, 3))}, ValueError, r"sizes has shape \(2, 3\); expected \(1, 3\)"),
         ({"sizes": [[0.0009, 1, 1]]}, ValueError, r"box \[0\]: edges of .* >= 0.002 m"),
         ({"packages": [0.0]}, TypeError, "packages has dtype float64; expected integers"),
