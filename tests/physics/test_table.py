@@ -1,4 +1,4 @@
-"""Local physics with a memory."""
+"""Tables of lifts, and what they say without one."""
 
 import errno
 import os
@@ -12,55 +12,10 @@ import pytest
 
 import unload.physics.table
 from tests.load.walls import KINDS, own_load
-from tests.physics.kinds import make
-from unload import task
-from unload.load.substacks import stack_load
-from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Situation, Surroundings
-from unload.physics.table import (
-    FREE_LIFT,
-    HELD_DOWN,
-    LIFTS_FILE,
-    LiftTable,
-    TablePhysics,
-)
+from unload.physics.table import FREE_LIFT, HELD_DOWN, LIFTS_FILE, LiftTable
 from unload.support import files
-
-
-@pytest.fixture(scope="module")
-def known(situations):
-    """Situations with one or two boxes on top, and their distances in ``LocalPhysics``."""
-    local = LocalPhysics()
-    light = [each for each in situations if 0 < each.on_top < HELD_DOWN]
-    return [(situation, local.simulate(situation)) for situation in light]
-
-
-@pytest.mark.pybullet
-def test_table_equals_local_exactly(rng):
-    load = stack_load(rng, walls=1)
-    local, table = make("local", load), make("table", load)
-    for item in rng.permutation(len(load)):
-        distance = local.lift(item)
-        if local.surroundings.situation(item).on_top < HELD_DOWN:
-            assert table.lift(item) == table.lift(item) == distance
-        else:  # not simulated, because never lifted
-            assert table.lift(item) == 0 and distance < 0.02
-        if distance >= task.LIFT_THRESHOLD:
-            local.remove(item)
-            table.remove(item)
-    assert (~local.present).sum() > 10
-
-
-@pytest.mark.pybullet
-def test_a_situation_is_simulated_once(known, monkeypatch):
-    first, second = TablePhysics(), TablePhysics()
-    second.table = first.table
-    assert [first.simulate(situation) for situation, _ in known] == [d for _, d in known]
-    monkeypatch.setattr(World, "pull", lambda *_: pytest.fail("simulated again"))
-    for physics in (first, second):
-        assert [physics.simulate(situation) for situation, _ in known] == [d for _, d in known]
-    assert len(known) > 20 and 0 < len(first.table) <= len(known)
 
 
 @pytest.mark.pybullet
@@ -78,12 +33,13 @@ def test_every_box_with_nothing_on_top_moves_equally_far(kind, rng):
 
 
 @pytest.mark.pybullet
-def test_shipped_table_fits_this_physics(known):
-    shipped = LiftTable.load(LIFTS_FILE)
+def test_shipped_table_fits_this_physics(situations):
+    shipped, local = LiftTable.load(LIFTS_FILE), LocalPhysics()
     assert len(shipped) > 1000
-    found = [(shipped.find(situation), distance) for situation, distance in known]
-    assert sum(distance is not None for distance, _ in found) > 20
-    assert all(distance in (None, answer) for distance, answer in found)
+    light = [each for each in situations if 0 < each.on_top < HELD_DOWN]
+    known = [each for each in light if shipped.find(each) is not None]
+    assert len(known) > 20
+    assert all(shipped.find(each) == local.simulate(each) for each in known)
 
 
 def free_box(number: int) -> Situation:
