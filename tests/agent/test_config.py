@@ -70,14 +70,14 @@ def test_numpy_values_make_the_same_configuration():
     assert type(config.mask) is bool and type(config.ties) is str
 
 
-class Fewer(ContainerVectorEnv):
-    def __init__(self, num_envs, **settings):
-        super().__init__(num_envs, **settings)
-        self.single_action_space = gymnasium.spaces.Discrete(7)
+def fewer(num_envs: int, **settings) -> ContainerVectorEnv:
+    envs = ContainerVectorEnv(num_envs, **settings)
+    envs.single_action_space = gymnasium.spaces.Discrete(7)
+    return envs
 
 
 def test_an_environment_of_other_spaces_or_that_is_not_registered_is_refused(tmp_path):
-    gymnasium.register("tests/Fewer-v0", vector_entry_point=Fewer)
+    gymnasium.register("tests/Fewer-v0", vector_entry_point=fewer)
     config = TrainConfig("tests/Fewer-v0", num_envs=4, picks=80, batch_size=16)
     with pytest.raises(ValueError, match=r"env='tests/Fewer-v0' has Discrete\(7\); expected"):
         train(config, tmp_path, progress=False)
