@@ -2,7 +2,6 @@
 
 import errno
 import shutil
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,7 +12,7 @@ import pytest
 
 from tests.agent.runs import CONTAINER, assert_same, at_step, few_walls, interrupt_run, metres
 from unload import TrainConfig, stack_load, train
-from unload.agent.checkpoint import RunFolder, settings_of_run
+from unload.agent.checkpoint import settings_of_run
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -34,11 +33,6 @@ def test_a_killed_run_goes_on_with_the_same_bits(tmp_path, monkeypatch, picks):
         train(config, killed, progress=False, stack=few_walls)
     assert_same(straight, killed)
     assert not (killed / "checkpoint.npz").exists()
-
-
-def test_a_run_that_ends_soon_writes_no_checkpoint(tmp_path, monkeypatch):
-    monkeypatch.setattr(RunFolder, "save", lambda *_: pytest.fail("it was written"))
-    train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
 def test_a_run_is_not_gone_on_with_by_another_engine(tmp_path, monkeypatch):
@@ -71,35 +65,23 @@ def test_a_run_of_another_configuration_stack_or_change_is_refused(tmp_path, fin
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.*")} == before
 
 
-@pytest.fixture(scope="module")
-def stopped(tmp_path_factory) -> Path:
-    """The folder of a stopped run; tests write its checkpoint themselves."""
-    folder = tmp_path_factory.mktemp("stopped") / "run"
-    interrupt_run(TrainConfig(**CONTAINER), folder, 20)
-    return folder
-
-
 @pytest.fixture
-def checkpoint(stopped) -> Iterator[Path]:
-    path = stopped / "checkpoint.npz"
-    whole = path.read_bytes()
-    yield path
-    path.write_bytes(whole)
+def checkpoint(tmp_path) -> Path:
+    """That of a stopped run, in its folder."""
+    interrupt_run(TrainConfig(**CONTAINER), tmp_path / "run", 20)
+    return tmp_path / "run" / "checkpoint.npz"
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
+def test_a_checkpoint_of_another_version_is_refused(checkpoint):
+    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
+    for change, message in (
         ({"format": np.array(9)}, "is not of format 10; if another version of unload"),
         ({"version": np.array("0.1.0")}, "is of unload 0.1.0; if another version of unl"),
         ({"settings": np.array("{")}, "JSONDecodeError"),
-    ],
-)
-def test_a_checkpoint_of_another_version_is_refused(checkpoint, change, message):
-    config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
-    files.write_arrays(checkpoint, arrays | change)
-    with pytest.raises(ValueError, match=f"checkpoint.npz .*({message})"):
-        train(config, checkpoint.parent, progress=False)
+    ):
+        files.write_arrays(checkpoint, arrays | change)
+        with pytest.raises(ValueError, match=f"checkpoint.npz .*({message})"):
+            train(config, checkpoint.parent, progress=False)
 
 
 def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
@@ -114,20 +96,19 @@ def test_a_checkpoint_without_an_array_or_with_another_is_refused(checkpoint):
         train(config, checkpoint.parent, progress=False)
 
 
-@pytest.mark.parametrize(
-    ("name", "old", "new"),
-    [
+def test_a_damaged_file_of_a_finished_run_is_refused_by_name(tmp_path):
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path, progress=False)
+    for name, old, new in (
         ("policy.safetensors", b"0.", b"1."),
         ("curve.csv", b"0.", b"1."),
         ("config.json", b'"digest"', b'"other"'),
-    ],
-)
-def test_a_damaged_file_of_a_finished_run_is_refused_by_name(tmp_path, name, old, new):
-    config, path = TrainConfig(**CONTAINER), tmp_path / name
-    train(config, tmp_path, progress=False)
-    path.write_bytes(path.read_bytes().replace(old, new, 1))
-    with pytest.raises(ValueError, match=f"{name} was changed or damaged"):
-        train(config, tmp_path, progress=False)
+    ):
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(whole.replace(old, new, 1))
+        with pytest.raises(ValueError, match=f"{name} was changed or damaged"):
+            train(config, tmp_path, progress=False)
+        (tmp_path / name).write_bytes(whole)
 
 
 def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
