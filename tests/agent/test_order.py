@@ -13,7 +13,6 @@ from tests.load.walls import KINDS, own_load
 from unload import Load, picking_order, policies, read_load, stack_load
 from unload import __main__ as command
 from unload.agent.order import reachable, stops_of
-from unload.load.packing_list import EXAMPLE
 from unload.physics.local import LocalPhysics
 from unload.physics.table import FREE_LIFT
 from unload.task import LIFT_THRESHOLD
@@ -35,8 +34,10 @@ def test_every_pick_is_what_pybullet_says(policy):
     physics = LocalPhysics()
     physics.reset(load)
     for row in order.itertuples():
-        held_down = len(physics.surroundings.on_top(row.item)) > 2
-        assert row.distance == (0 if held_down else physics.lift(row.item))
+        if len(physics.surroundings.on_top(row.item)) < 3:
+            assert row.distance == physics.lift(row.item)
+        else:  # some are simulated, which takes long
+            assert row.distance == 0 and (row.pick % 20 or physics.lift(row.item) < 0.02)
         assert row.unloaded == (row.distance >= LIFT_THRESHOLD)
         assert row.behind == load.behind(physics.present)[row.item]
         if row.unloaded:
@@ -113,12 +114,7 @@ def test_what_is_no_policy_or_rule_is_refused(given, error, message):
         picking_order(**{"load": read_load()} | given)
 
 
-def test_the_command_line_prints_the_order_as_csv(capsys, tmp_path):
-    command.main([str(EXAMPLE), "--policy", "highest"])
-    printed, summary = capsys.readouterr()
-    order = picking_order(read_load(), "highest")
-    pd.testing.assert_frame_equal(pd.read_csv(io.StringIO(printed)), order)
-    assert summary == f"136 picks, 0 failed, {order['behind'].mean():.0%} behind other boxes\n"
+def test_the_command_line_writes_the_order_of_the_example(capsys, tmp_path):
     command.main(["--output", str(tmp_path / "order.csv")])
     assert capsys.readouterr() == ("", "136 picks, 0 failed, 0% behind other boxes\n")
     pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "order.csv"), picking_order(read_load()))
@@ -174,20 +170,18 @@ def test_an_order_by_stops_can_be_carried_out_and_takes_out_early_what_it_must(
     assert order["unloaded"].all() and not order["behind"].any() and len(order) == len(load)
     summary = stops_of(load, order, by)
     assert summary["stop"].tolist() == first_to_last
-    turn = [first_to_last.index(stop) for stop in load.extras[by.strip("-")].tolist()]
+    stops = load.extras[by.strip("-")].tolist()
+    turn = np.array([first_to_last.index(stop) for stop in stops])
     # For each box those that are behind it or under it.
     alone = np.eye(len(load), dtype=bool)
     waiting = np.array([load.behind(each) | load.covered(each) for each in alone])
     for number, row in enumerate(summary.itertuples()):
         # What has to be out before the last box of this stop is: all that one box leads to.
-        out, left = set(), [box for box in range(len(load)) if turn[box] <= number]
-        while left:
-            box = left.pop()
-            if box not in out:
-                out.add(box)
-                left += np.flatnonzero(waiting[:, box]).tolist()
-        assert row.boxes == turn.count(number)
-        assert row.others_first == sum(turn[box] > number for box in out)
+        out = turn <= number
+        for _ in out:
+            out = out | waiting[:, out].any(axis=1)
+        assert row.boxes == (turn == number).sum()
+        assert row.others_first == (turn[out] > number).sum()
     assert summary["others_first"].iloc[0] > 20 and summary["others_first"].iloc[-1] == 0
 
 
