@@ -92,10 +92,10 @@ ARRAY = partial(gymnasium.make_vec, num_envs=2)
         (make_env, CONTAINER, np.array([3]), TypeError, r"action is array\(\[3\]\)"),
         (ARRAY, CONTAINER, {"seed": [1, 2, 3]}, ValueError, "seed holds 3 seeds; expected 2"),
         (ARRAY, CONTAINER, {"seed": [1, -1]}, ValueError, "seed is -1; expected an integer >= 0"),
-        (ARRAY, CONTAINER, {"options": {"load": None}}, TypeError, "load is None; expected an unl"),
-        (ARRAY, CONTAINER, {"options": {"loads": 1}}, ValueError, "is {'loads': 1}; expected load"),
-        (make_env, CONTAINER, {"options": []}, TypeError, r"options is \[\]; expected a dict"),
-        (make_env, HIGHEST, {"options": {"load": 1}}, ValueError, "is {'load': 1}; expected none"),
+        (ARRAY, CONTAINER, {"seed": 3, "options": {"load": None}}, TypeError, "load is None; expe"),
+        (ARRAY, CONTAINER, {"seed": 3, "options": {"loads": 1}}, ValueError, "1}; expected load"),
+        (make_env, CONTAINER, {"seed": 3, "options": []}, TypeError, r"options is \[\]; expected"),
+        (make_env, HIGHEST, {"seed": 3, "options": {"load": 1}}, ValueError, "1}; expected none"),
     ],
 )
 def test_bad_input_changes_nothing(make, env_id, given, error, message):
