@@ -74,7 +74,7 @@ def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
         files.read_arrays(path)
 
 
-def plain(arrays: dict[str, np.ndarray]) -> dict:
+def contents(arrays: dict[str, np.ndarray]) -> dict:
     return {name: (array.dtype, array.tolist()) for name, array in arrays.items()}
 
 
@@ -86,13 +86,13 @@ def test_arrays_come_back_as_they_were_or_are_refused_by_name(tmp_path, rng):
     for place in range(len(whole)):
         path.write_bytes(whole[:place] + rng.bytes(1) + whole[place + 1 :])
         try:
-            assert plain(files.read_arrays(path)) == plain(ARRAYS)
+            assert contents(files.read_arrays(path)) == contents(ARRAYS)
         except ValueError as error:
             assert re.match(f"{path} (is not a readable .npz file|was changed or d)", str(error))
             refused += 1
     assert len(whole) / 2 < refused < len(whole)
     np.savez(path, **ARRAYS)
-    assert plain(files.read_arrays(path)) == plain(ARRAYS)
+    assert contents(files.read_arrays(path)) == contents(ARRAYS)
     with pytest.raises(ValueError, match="arrays.npz was changed or damaged: .*, expected None"):
         files.read_arrays(path, checked=True)
 
