@@ -33,10 +33,6 @@ RUNS = {
 }
 
 
-class Breakdown(BaseException):
-    """A crash at a moment of the test's choosing."""
-
-
 def few_walls(rng):
     """Loads that are unloaded before an episode of many picks ends."""
     return stack_load(rng, walls=1)
@@ -48,28 +44,18 @@ def metres(run) -> None:
 
 
 @contextmanager
-def at(owner: type, method: str, number: int, action: Callable[[], None]) -> Iterator[None]:
-    """Do something right after a call of a method; calls are counted from 1."""
-    call, count = getattr(owner, method), itertools.count(1)
+def at_step(number: int, action: Callable[[], None]) -> Iterator[None]:
+    """Do something right after a training step; they are counted from 1."""
+    step, count = Training.step, itertools.count(1)
 
-    def watched(*arguments):
-        result = call(*arguments)
+    def watched(run):
+        step(run)
         if next(count) == number:
             action()
-        return result
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(owner, method, watched)
+        patch.setattr(Training, "step", watched)
         yield
-
-
-def at_step(number: int, action: Callable[[], None]):
-    """Do something right after a training step."""
-    return at(Training, "step", number, action)
-
-
-def crash() -> None:
-    raise Breakdown
 
 
 def interrupt() -> None:

@@ -77,32 +77,22 @@ def test_an_episode_is_given_up_1280_failures_after_its_last_success():
 
 @pytest.mark.parametrize("max_picks", [200, None])
 def test_an_episode_ends_when_the_policy_knows_that_all_items_fail(monkeypatch, max_picks):
-    monkeypatch.setattr(ContainerVectorEnv, "_pick", lambda envs, *given: fail(envs, given[0]))
-
-    def fail(envs, actions):
-        envs._containers.masks[np.arange(len(actions)), actions] = 0
-        infos = {"item": np.zeros(len(actions)), "distance": np.zeros(len(actions))}
-        return np.full(len(actions), -1.0), infos
-
+    look_up, none = ContainerVectorEnv._lift, np.zeros(2)
+    monkeypatch.setattr(ContainerVectorEnv, "_lift", lambda *each: (look_up(*each)[0], none))
     frame = evaluate(policies.random, 2, max_picks=max_picks, stack=lambda rng: few_items(rng, 40))
     assert (frame["unloaded"] == 0).all() and (frame["deadlocked"] == 0).all()
     if max_picks is None:
         assert (frame["picks"] == 40).all() and not frame["emptied"].any()
 
 
-@pytest.mark.parametrize(
-    ("kwargs", "error", "message"),
-    [
-        ({"policy": "random"}, TypeError, "policy is 'random'; expected a function"),
-        ({"episodes": 10**6 + 1}, ValueError, "episodes is 1000001"),
-        ({"mask": None}, TypeError, "mask is None; expected True or False"),
-        ({"physics": "none"}, ValueError, "physics is 'none'"),
-        ({"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected one of 'restore'"),
-    ],
-)
-def test_bad_arguments_are_refused(kwargs, error, message):
-    with pytest.raises(error, match=message):
-        evaluate(**({"policy": policies.random, "episodes": 1} | kwargs))
+def test_bad_arguments_are_refused():
+    for given, message in (
+        ({"policy": "random"}, "policy is 'random'; expected a function"),
+        ({"episodes": 10**6 + 1}, "episodes is 1000001"),
+        ({"mask": None}, "mask is None; expected True or False"),
+    ):
+        with pytest.raises((TypeError, ValueError), match=message):
+            evaluate(**{"policy": policies.random, "episodes": 1} | given)
 
 
 @pytest.mark.parametrize("returned", [[3.7], [128]])

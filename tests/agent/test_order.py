@@ -13,7 +13,6 @@ from tests.load.walls import KINDS, own_load
 from unload import Load, picking_order, policies, read_load, stack_load
 from unload import __main__ as command
 from unload.agent.order import reachable, stops_of
-from unload.load.packing_list import EXAMPLE
 from unload.physics.local import LocalPhysics
 from unload.physics.table import FREE_LIFT
 from unload.task import LIFT_THRESHOLD
@@ -35,8 +34,10 @@ def test_every_pick_is_what_pybullet_says(policy):
     physics = LocalPhysics()
     physics.reset(load)
     for row in order.itertuples():
-        held_down = len(physics.surroundings.on_top(row.item)) > 2
-        assert row.distance == (0 if held_down else physics.lift(row.item))
+        if len(physics.surroundings.on_top(row.item)) < 3:
+            assert row.distance == physics.lift(row.item)
+        else:  # some are simulated, which takes long
+            assert row.distance == 0 and (row.pick % 20 or physics.lift(row.item) < 0.02)
         assert row.unloaded == (row.distance >= LIFT_THRESHOLD)
         assert row.behind == load.behind(physics.present)[row.item]
         if row.unloaded:
@@ -103,8 +104,6 @@ def test_a_box_that_failed_waits_until_another_one_is_unloaded(boxes):
         ({"rule": reachable, "policy": "highest"}, TypeError, "expected no policy beside it"),
         ({"rule": reachable, "by": "stop"}, TypeError, "expected a function, and no by beside it"),
         ({"by": "stop"}, ValueError, "by is 'stop'; expected one of"),
-        ({"force": "much"}, TypeError, "force is 'much'"),
-        ({"physics": "none"}, ValueError, "physics is 'none'; expected one of 'local', 'full', "),
         ({"physics": LocalPhysics(), "force": 30}, ValueError, "force is 30; expected it to be"),
         ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
         ({"load": Load([[3.5, 1, 0.9]], [[0.4, 0.4, 0.4]])}, ValueError, "floats in load"),
@@ -115,12 +114,7 @@ def test_what_is_no_policy_or_rule_is_refused(given, error, message):
         picking_order(**{"load": read_load()} | given)
 
 
-def test_the_command_line_prints_the_order_as_csv(capsys, tmp_path):
-    command.main([str(EXAMPLE), "--policy", "highest"])
-    printed, summary = capsys.readouterr()
-    order = picking_order(read_load(), "highest")
-    pd.testing.assert_frame_equal(pd.read_csv(io.StringIO(printed)), order)
-    assert summary == f"136 picks, 0 failed, {order['behind'].mean():.0%} behind other boxes\n"
+def test_the_command_line_writes_the_order_of_the_example(capsys, tmp_path):
     command.main(["--output", str(tmp_path / "order.csv")])
     assert capsys.readouterr() == ("", "136 picks, 0 failed, 0% behind other boxes\n")
     pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "order.csv"), picking_order(read_load()))
@@ -161,15 +155,6 @@ def test_the_command_line_says_how_many_boxes_are_left(capsys, monkeypatch):
     assert "136 boxes are left" in capsys.readouterr().err
 
 
-def must_leave(load: Load, box: int) -> np.ndarray:
-    """The boxes that stand in front of one or lie on it, found without ``Load``'s own pairs."""
-    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
-    shared = np.minimum(high[box], high) - np.maximum(low[box], low)
-    in_front = (shared[:, 1:] > 1e-6).all(axis=1) & (low[:, 0] > low[box, 0])
-    on_top = (shared[:, :2] > 1e-6).all(axis=1) & (abs(low[:, 2] - high[box, 2]) < 1e-4)
-    return np.flatnonzero(in_front | on_top)
-
-
 @pytest.mark.parametrize(
     ("by", "first_to_last"),
     [("-stop", [3, 2, 1]), ("town", ["stop 2", "stop 9", "stop 10"])],
@@ -185,17 +170,18 @@ def test_an_order_by_stops_can_be_carried_out_and_takes_out_early_what_it_must(
     assert order["unloaded"].all() and not order["behind"].any() and len(order) == len(load)
     summary = stops_of(load, order, by)
     assert summary["stop"].tolist() == first_to_last
-    turn = [first_to_last.index(stop) for stop in load.extras[by.strip("-")].tolist()]
+    stops = load.extras[by.strip("-")].tolist()
+    turn = np.array([first_to_last.index(stop) for stop in stops])
+    # For each box those that are behind it or under it.
+    alone = np.eye(len(load), dtype=bool)
+    waiting = np.array([load.behind(each) | load.covered(each) for each in alone])
     for number, row in enumerate(summary.itertuples()):
         # What has to be out before the last box of this stop is: all that one box leads to.
-        out, left = set(), [box for box in range(len(load)) if turn[box] <= number]
-        while left:
-            box = left.pop()
-            if box not in out:
-                out.add(box)
-                left += must_leave(load, box).tolist()
-        assert row.boxes == turn.count(number)
-        assert row.others_first == sum(turn[box] > number for box in out)
+        out = turn <= number
+        for _ in out:
+            out = out | waiting[:, out].any(axis=1)
+        assert row.boxes == (turn == number).sum()
+        assert row.others_first == (turn[out] > number).sum()
     assert summary["others_first"].iloc[0] > 20 and summary["others_first"].iloc[-1] == 0
 
 

@@ -7,7 +7,6 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
-from gymnasium.vector import AutoresetMode
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, make_env
 from unload import ContainerEnv, HighestItemEnv, stack_load
@@ -20,23 +19,19 @@ def container(**kwargs) -> ContainerEnv:
 
 
 ALL = [container, HighestItemEnv, ContainerVectorEnv, HighestItemVectorEnv]
-BAD_EVERYWHERE = [
-    ({"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
-    ({"ties": "coin"}, ValueError, "ties is 'coin'"),
-    ({"max_picks": 2**63}, ValueError, "max_picks is 9223372036854775808; .* <= "),
-    ({"position_noise": 1e300}, ValueError, r"position_noise is 1e\+300; .*\[0, 10.0\]"),
-    ({"render_mode": "human"}, ValueError, "render_mode is 'human'"),
-]
 
 
 @pytest.mark.parametrize(
     ("make", "kwargs", "error", "message"),
     [
-        *((make, *row) for make in ALL for row in BAD_EVERYWHERE),
+        (ContainerVectorEnv, {"equalize": 1}, TypeError, "equalize is 1; expected True or False"),
+        (ContainerVectorEnv, {"ties": "coin"}, ValueError, "ties is 'coin'"),
+        (container, {"max_picks": 2**63}, ValueError, "max_picks is 9223372036854775808; .* <= "),
+        (HighestItemEnv, {"position_noise": 1e300}, ValueError, r"is 1e\+300; .*\[0, 10.0\]"),
+        (ContainerEnv, {"render_mode": "human"}, ValueError, "render_mode is 'human'"),
         (ContainerEnv, {"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
         (ContainerEnv, {"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected 'rest"),
         (ContainerVectorEnv, {"num_envs": 0}, ValueError, "num_envs is 0"),
-        (HighestItemVectorEnv, {"num_envs": 2**16 + 1}, ValueError, "num_envs is 65537"),
         (ContainerVectorEnv, {"physics": "local"}, ValueError, "physics is 'local'; expected"),
         (ContainerEnv, {"stack": 3}, TypeError, "stack is 3"),
         (ContainerVectorEnv, {"render_mode": "rgb_array"}, ValueError, "expected one of None"),
@@ -74,14 +69,6 @@ def test_the_strongest_noise_stays_in_the_observation_space(make):
     assert env.observation_space.contains(seen) and np.abs(seen).max() == 1
 
 
-def test_spaces_and_metadata():
-    envs, single = gymnasium.make_vec(CONTAINER, 5), make_env()
-    assert envs.single_observation_space == gymnasium.spaces.Box(-1, 1, (128, 3), np.float32)
-    assert single.observation_space.shape == (128, 3) and envs.observation_space.shape[0] == 5
-    assert envs.autoreset_mode == envs.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
-    assert envs.spec.max_episode_steps is None  # but max_picks
-
-
 def test_seeds():
     envs = gymnasium.make_vec(CONTAINER, 2)
     first, _ = envs.reset(seed=0)
@@ -94,12 +81,6 @@ def test_seeds():
 
 
 ARRAY = partial(gymnasium.make_vec, num_envs=2)
-BAD_OPTIONS = [
-    (CONTAINER, {"load": None}, TypeError, "load is None; expected an unload.Load"),
-    (CONTAINER, {"loads": 1}, ValueError, "options is {'loads': 1}; expected load"),
-    (CONTAINER, [], TypeError, r"options is \[\]; expected a dict"),
-    (HIGHEST, {"load": 1}, ValueError, "options is {'load': 1}; expected none"),
-]
 
 
 @pytest.mark.parametrize(
@@ -111,11 +92,10 @@ BAD_OPTIONS = [
         (make_env, CONTAINER, np.array([3]), TypeError, r"action is array\(\[3\]\)"),
         (ARRAY, CONTAINER, {"seed": [1, 2, 3]}, ValueError, "seed holds 3 seeds; expected 2"),
         (ARRAY, CONTAINER, {"seed": [1, -1]}, ValueError, "seed is -1; expected an integer >= 0"),
-        *(
-            (make, env_id, {"seed": 3, "options": options}, *refused)
-            for env_id, options, *refused in BAD_OPTIONS
-            for make in (make_env, ARRAY)
-        ),
+        (ARRAY, CONTAINER, {"seed": 3, "options": {"load": None}}, TypeError, "load is None; expe"),
+        (ARRAY, CONTAINER, {"seed": 3, "options": {"loads": 1}}, ValueError, "1}; expected load"),
+        (make_env, CONTAINER, {"seed": 3, "options": []}, TypeError, r"options is \[\]; expected"),
+        (make_env, HIGHEST, {"seed": 3, "options": {"load": 1}}, ValueError, "1}; expected none"),
     ],
 )
 def test_bad_input_changes_nothing(make, env_id, given, error, message):
@@ -132,26 +112,21 @@ def test_bad_input_changes_nothing(make, env_id, given, error, message):
 
 
 @pytest.mark.parametrize("failing", [1, 2, 3])
-@pytest.mark.parametrize(
-    ("make", "action"),
-    [(container, 0), (partial(ContainerVectorEnv, 1), [0])],
-    ids=["single", "vector"],
-)
-def test_a_call_whose_stack_fails_needs_a_reset(make, action, failing):
+def test_a_call_whose_stack_fails_needs_a_reset(failing):
     """The first reset, the second one, and the next one, which an array makes in a step."""
     outcomes = [*[DEFAULT] * (failing - 1), OSError("full"), *[DEFAULT] * 9]
     stack = Mock(wraps=stack_load, side_effect=outcomes)
-    env, other = make(max_picks=1, stack=stack), make(max_picks=1)
+    env, other = (ContainerVectorEnv(1, max_picks=1, stack=each) for each in (stack, stack_load))
     with pytest.raises(OSError, match="full"):
         env.reset(seed=0)
         env.reset(seed=0)
-        env.step(action)
+        env.step([0])
         env.reset(seed=0)
-    for call in (lambda: env.step(action), env.action_masks):
+    for call in (lambda: env.step([0]), env.action_masks):
         with pytest.raises(ResetNeeded, match="the episode is broken off; call reset first"):
             call()
     assert_same(env.reset(seed=0), other.reset(seed=0))
-    assert_same(env.step(action), other.step(action))
+    assert_same(env.step([0]), other.step([0]))
 
 
 def test_results_are_no_views_of_what_the_environments_hold():

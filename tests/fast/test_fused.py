@@ -8,8 +8,6 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from torch.nn.functional import smooth_l1_loss
 
 from tests.agent.runs import Subclass, make_batch, peq, without_next
@@ -22,13 +20,9 @@ BATCH, ITEMS = 300, 128
 FOR_TWO_THREADS = 2 * fused.CHUNK * fused._CHUNKS_PER_THREAD + 5
 
 
-def random_batch(rng, size):
-    return without_next(make_batch(rng, size, ITEMS))
-
-
 @pytest.fixture
 def batch(rng):
-    return random_batch(rng, BATCH)
+    return without_next(make_batch(rng, BATCH, ITEMS))
 
 
 def reference(net, batch, beta=1.0):
@@ -84,7 +78,7 @@ def two_threads():
 def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
     submit = Mock(side_effect=ThreadPoolExecutor.submit)
     monkeypatch.setattr(ThreadPoolExecutor, "submit", lambda *work: submit(*work))
-    net, batch = peq(64), random_batch(rng, FOR_TWO_THREADS)
+    net, batch = peq(64), without_next(make_batch(rng, FOR_TWO_THREADS, ITEMS))
     two = gradients(net, batch).tobytes()
     assert submit.call_count == 1
     torch.set_num_threads(1)
@@ -94,7 +88,7 @@ def test_two_threads_give_the_bits_of_one(rng, two_threads, monkeypatch):
 
 @pytest.mark.needs("fork")
 def test_a_forked_process_has_threads_of_its_own(rng, two_threads):
-    net, batch = peq(8), random_batch(rng, FOR_TWO_THREADS)
+    net, batch = peq(8), without_next(make_batch(rng, FOR_TWO_THREADS, ITEMS))
     here = gradients(net, batch)[-1]
     fork = multiprocessing.get_context("fork")
     answers = fork.SimpleQueue()
@@ -120,15 +114,6 @@ def test_choice_is_that_of_the_network(batch, rng):
     best = values.detach().numpy()
     assert np.allclose(best[rows, actions], best[rows, expected], atol=1e-6)
     assert allowed[rows, actions].all()
-
-
-@pytest.mark.parametrize("place", [0, 1, 2, 3, "observations", "rewards"])
-def test_weights_and_inputs_that_are_not_finite_are_refused(batch, place):
-    net = peq(16)
-    arrays = [parameter.detach().numpy() for parameter in net.parameters()]
-    (batch[place] if place in batch else arrays[place]).flat[0] = -np.inf
-    with pytest.raises(FloatingPointError, match="expected finite"):
-        gradients(net, batch)
 
 
 @pytest.mark.parametrize(
@@ -159,20 +144,14 @@ def test_rule_of_where_it_applies(other):
         DQN(other, fused_update=True)
 
 
-@given(
-    shape=st.tuples(st.integers(1, 70), st.integers(1, 40)),  # batch, items
-    n_features=st.integers(1, 80),
-    scale=st.sampled_from([0.0, 0.1, 1.0, 4.0]),  # of the weights; with 0 the network is dead
-    bias=st.sampled_from([0.0, 3.0, -3.0]),  # of all features: then all items are active, or none
-    levels=st.sampled_from([2, 5, 1000]),  # of coordinates: few make ties
-    beta=st.floats(0.1, 2),
-    seed=st.integers(0, 2**31),
-)
-@settings(max_examples=100)
-def test_any_update_is_that_of_double_precision(shape, n_features, scale, bias, levels, beta, seed):
-    size, items = shape
+@pytest.mark.parametrize("seed", range(60))
+def test_any_update_is_that_of_double_precision(seed):
+    """Also of networks that are dead or saturated, and where all features are active or tie."""
     rng = np.random.default_rng(seed)
-    net = peq(n_features, seed)
+    size, items, n_features = rng.integers(1, (70, 40, 80), endpoint=True)
+    scale, bias = rng.choice([0.0, 0.1, 1.0, 4.0]), rng.choice([0.0, 3.0, -3.0])
+    levels = rng.choice([2, 5, 1000])  # of coordinates: few make ties
+    net = peq(int(n_features), seed)
     with torch.no_grad():
         for parameter in net.parameters():
             parameter *= scale
@@ -182,7 +161,7 @@ def test_any_update_is_that_of_double_precision(shape, n_features, scale, bias, 
         "actions": rng.integers(items, size=size),
         "rewards": rng.uniform(-1, 1, size).astype(np.float32),
     }
-    check(net, batch, beta, tolerance=1e-4)
+    check(net, batch, rng.uniform(0.1, 2), tolerance=1e-4)
 
 
 def flat(network) -> np.ndarray:
@@ -198,7 +177,7 @@ def test_steps_are_those_of_pytorch(rng, learning_rate):
     ends = np.cumsum([weight.numel() for weight in theirs.parameters()])[:-1]
     for number in range(100):
         gradients = rng.normal(size=len(before)) * 10.0 ** -(number % 7)
-        gradients[3] = 0
+        gradients[3:5] = 0, 1e-8  # which is Adam's epsilon
         learner.step(gradients)
         for weight, part in zip(theirs.parameters(), np.split(gradients, ends)):
             weight.grad = torch.from_numpy(part.copy()).reshape(weight.shape)
@@ -206,13 +185,3 @@ def test_steps_are_those_of_pytorch(rng, learning_rate):
     after = flat(ours)
     assert np.abs(after - flat(theirs)).max() < 1e-5 < np.abs(after - before).max()
     assert after[3] == before[3]
-
-
-def test_a_gradient_as_small_as_epsilon_moves_a_weight_by_half_as_much():
-    """A constant gradient g moves a weight by g / (|g| + 1e-8) of the learning rate."""
-    network = peq(1)
-    before, learner = flat(network), FusedLearner(network, 0.01, beta=1.0)
-    for _ in range(3):
-        learner.step(np.array([1.0, 1e-8, -3e-8, *np.zeros(6)]))
-    moved = flat(network) - before
-    assert moved == pytest.approx([-0.03, -0.015, 0.0225, *np.zeros(6)], rel=1e-4)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from unload import Load, read_load, stack_load
+from unload import Load, read_load
 from unload.load.boxes import _SMALLEST_EDGE
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
@@ -31,16 +31,6 @@ def test_ids_stay_as_they_are_written_and_are_else_the_rows(written):
         lines = [f"{name},{row}" for name, row in zip(ids, rows)]
         assert read_load(written(*lines)).ids.tolist() == ids
     assert read_load(written(*rows, columns=CORNERS)).ids.tolist() == ids
-
-
-def test_a_load_that_is_written_is_read_again(written, rng):
-    load = stack_load(rng, walls=4)
-    columns = "x,y,z,size_x,size_y,size_z"
-    rows = np.hstack([load.positions, load.sizes]).tolist()
-    read = read_load(written(*(",".join(map(repr, row)) for row in rows), columns=columns))
-    assert np.array_equal(read.positions, load.positions)
-    assert np.array_equal(read.sizes, load.sizes)
-    assert np.array_equal(read.walls, load.walls)
 
 
 def assert_same(one: Load, other: Load) -> None:

@@ -13,10 +13,6 @@ from unload.load.picture import COLOURS
 from unload.load.view import _OTHER_COLOURS, _PLOTLY_MIMETYPE
 
 
-def vertices(trace) -> np.ndarray:
-    return np.column_stack([trace.x, trace.y, trace.z])
-
-
 def items(trace) -> list[int]:
     """The items that a mesh draws, as its labels name them."""
     return trace.customdata[::8, 0].tolist()
@@ -28,7 +24,7 @@ def test_a_mesh_holds_the_boxes_of_one_colour(full_load):
     assert len(figure.data) == len(np.unique(full_load.packages)), "no line for other boxes"
     assert sorted(sum(map(items, figure.data), [])) == list(range(len(full_load)))
     for trace in figure.data:
-        corners = vertices(trace).reshape(-1, 8, 3)
+        corners = np.column_stack([trace.x, trace.y, trace.z]).reshape(-1, 8, 3)
         sizes = full_load.sizes[items(trace)]
         low = full_load.positions[items(trace)] - sizes / 2
         assert corners.min(axis=1) == pytest.approx(low, abs=0.01)
