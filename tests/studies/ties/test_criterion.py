@@ -13,7 +13,7 @@ from studies.ties import earlier, leak, training
 from studies.ties.criterion import FIG11, FIG12, likeness
 from studies.ties.figures import draw_ends, read_by_ties
 from studies.ties.laboratory import CELLS, mirrored_load
-from tests.studies.curves import course
+from tests.studies.test_statistics import course
 from unload import stack_load, task
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
