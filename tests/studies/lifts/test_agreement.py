@@ -31,13 +31,11 @@ def test_choice_for_full():
     why, walls = agreement.choose_for_full(frame, 30, np.random.default_rng(0))
     _, each = np.unique(states[why == "drawn"], return_counts=True)
     assert each.tolist() == [agreement.PER_STATE] * 10
-    assert set(on_top[why == "drawn"]) > {0, 1, 2}
     assert (why == "buried").sum() == 30 and on_top[why == "buried"].min() == 3
     close = (distances >= agreement.CLOSE[0]) & (distances <= agreement.CLOSE[1])
     assert (close[why == "close"]).all() and not close[why == ""].any()
-    assert ((walls == 0) == (why == "")).all()
     assert (walls[why == "drawn"] == 12).sum() == 2 * agreement.PER_STATE
-    assert (walls[np.isin(why, ("buried", "close"))] == 5).all()
+    assert (walls[np.isin(why, ("buried", "close"))] == 5).all() and not walls[why == ""].any()
 
 
 def test_a_fresh_lift_is_in_the_boxes_left_in_the_walls_around(full_load):
@@ -92,22 +90,6 @@ def test_committed_lifts_can_be_computed_again():
     columns = ["policy", "seed", "picks", "item", "on_top", "situation"]
     assert (frame[columns] == first[columns]).all(axis=None)
     assert np.allclose(frame[["table", "local"]], first[["table", "local"]], atol=1e-6)
-
-
-def test_the_table_is_filled_by_policies_that_pick_at_random_to_various_degrees(rng):
-    observations, masks = rng.random((4000, 128, 3)), np.ones((4000, 128), bool)
-    played = lifts._filling_policies(np.random.default_rng(0))
-    assert played[: lifts.RANDOM_SHARE] == [policies.random] * lifts.RANDOM_SHARE
-    directions = np.random.default_rng(0).normal(size=(12, 3))
-    expected = [
-        (favourite, share)
-        for favourite in (policies.highest, policies.nearest)
-        for share in (0.0, 0.1, 0.3, 0.6)
-    ]
-    expected += [(lambda seen, *_, d=d: (seen @ d).argmax(axis=1), 0.2) for d in directions]
-    for policy, (favourite, share) in zip(played[lifts.RANDOM_SHARE :], expected, strict=True):
-        same = policy(observations, masks, rng) == favourite(observations, masks, rng)
-        assert same.mean() == pytest.approx(1 - share * 127 / 128, abs=0.03)
 
 
 @pytest.mark.pybullet

@@ -185,9 +185,3 @@ def test_a_policy_is_judged_as_evaluate_does(monkeypatch):
         evaluate(policy, 3, 1000, mask=mask)["success_rate"].mean() for mask in (True, False)
     ]
     assert list(judged(policy, TrainConfig()).values()) == pytest.approx(expected)
-
-
-def test_the_recommended_policy_is_judged_as_the_data_say():
-    policy = load_policy("recommended")
-    first = read_table("variants/recommended").iloc[0]
-    assert judged(policy, variants.RECOMMENDED) == first[["msr_mask", "msr_no_mask"]].to_dict()
