@@ -3,9 +3,7 @@
 from dataclasses import replace
 from shutil import copytree
 
-import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies import grid, paths
@@ -45,18 +43,6 @@ def test_policies_play_elsewhere_once_their_cell_is_trained(tmp_path, monkeypatc
 
 def test_the_default_cell_has_the_defaults():
     assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
-
-
-def test_means_over_whole_episodes_are_drawn():
-    """Points of 10 of 500 steps; the last, incomplete episode is left out."""
-    picks = np.arange(1, 121) * 640
-    curve = pd.DataFrame({"picks": picks, "success_rate": np.arange(120.0)})
-    _, axes = plt.subplots()
-    training.draw_learning_curve(axes, curve, "run")
-    points, episodes = axes.lines
-    assert len(points.get_ydata()) == 120
-    assert axes.get_ylim() == (0, 1.02) and axes.get_xlim()[0] == 0
-    assert episodes.get_xydata().tolist() == [[16_000, 24.5], [48_000, 74.5]]
 
 
 def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch):
