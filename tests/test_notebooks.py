@@ -102,19 +102,6 @@ def test_unknown_names_are_refused(tmp_path, monkeypatch, capsys):
         run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
 
 
-def test_failing_cell_fails_the_run(tmp_path):
-    new = run.nbformat.v4
-    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
-    broken = new.new_notebook(metadata={"kernelspec": kernel})
-    broken.cells = [
-        new.new_code_cell("X = 1", metadata={"tags": ["parameters"]}),
-        new.new_code_cell("raise RuntimeError(f'broken with {X}')"),
-    ]
-    run.nbformat.write(broken, tmp_path / "broken.ipynb")
-    with pytest.raises(run.papermill.PapermillExecutionError, match="broken with 2"):
-        run.run(tmp_path / "broken.ipynb", tmp_path / "out.ipynb", {"X": 2})
-
-
 def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(tmp_path, monkeypatch):
     path = tmp_path / "00_some.ipynb"
     run.nbformat.write(run.nbformat.v4.new_notebook(), path)

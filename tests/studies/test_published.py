@@ -16,7 +16,6 @@ import pytest
 from PIL import Image
 
 from studies import paths, style
-from studies.falls import figures as falls
 from studies.heap.table import compared
 from studies.paper import diagrams
 from studies.play import animation
@@ -206,12 +205,3 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
             assert found.info == published.info
             both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
             assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
-
-
-@pytest.mark.parametrize(("msr", "title"), [(0.6, "60.0%: it errs"), (0.95, "95.0%: it does not")])
-def test_a_dug_load_is_drawn_with_its_preference(msr, title):
-    surface = np.arange(6.0).reshape(3, 2) / 5
-    left, right = falls.dug(surface, (0.5, -0.2), "noise", msr, np.tri(3)).axes[:2]
-    assert np.array_equal(left.images[0].get_array(), surface.T)
-    (dot,) = (line for line in right.lines if line.get_xdata().size)
-    assert dot.get_xydata().tolist() == [[0.5, -0.2]] and title in right.get_title()

@@ -123,18 +123,15 @@ def test_records_are_joined(monkeypatch):
 def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
     found = revision.__wrapped__  # what it says is kept for a process
     monkeypatch.setattr(paths, "ROOT", tmp_path)
-
-    def git(*command: str) -> str:
-        who = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
-        return subprocess.check_output(["git", *who, *command], cwd=tmp_path, text=True).strip()
-
     assert found() == "unknown"
     for name in ("unload", "studies"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "more.py").touch()
+    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false"]
     for command in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "theirs"]):
-        git(*command)
-    own = git("rev-parse", "--short=12", "HEAD")
+        subprocess.run([*git, *command], cwd=tmp_path, check=True)
+    head = subprocess.check_output([*git, "rev-parse", "HEAD"], cwd=tmp_path, text=True)
+    own = head[:12]
     (tmp_path / "README.md").write_text("not part of the code", encoding="utf-8")
     assert found() == own
     (tmp_path / "unload/more.py").write_text("changed", encoding="utf-8")

@@ -12,13 +12,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from studies.play.agent_view import agent_view, look
+from studies.play.agent_view import agent_view
 from studies.play.canvas import ABSENT, Canvas
-from studies.play.episode import Episode, Run, policy_of
+from studies.play.episode import Episode, Run
 from studies.play.explore import Explore
 from studies.play.playground import SHOWN, Playground
 from studies.play.replay import replay
-from unload import ContainerEnv, stack_load
+from unload import stack_load
 
 WIDGET = "application/vnd.jupyter.widget-view+json"
 
@@ -194,13 +194,3 @@ def test_the_settings_show_why_the_agent_is_stuck():
         assert ("item 637 of" in title) is not can
         ranks = int(title.split()[0])
         assert ranks < 30 if "ties" in changed else ranks == 128
-
-
-def test_chance_mixes_the_greedy_and_a_random_pick(full_load):
-    env = ContainerEnv(physics="table", position_noise=0)
-    env.reset(seed=0, options={"load": full_load})
-    seen = full_load.positions[env.visible], env.liftable()
-    share = seen[1].mean()
-    for epsilon, expected in ((0, 1), (1, share), (0.5, (1 + share) / 2)):
-        chance = look(*seen, policy_of("the recommended agent"), epsilon, "noise")[2]
-        assert chance == pytest.approx(expected)

@@ -4,6 +4,7 @@ from dataclasses import astuple, fields
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from studies import paths
@@ -160,21 +161,20 @@ def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
 
 
 def test_what_is_published_are_the_planned_cases():
-    def rounded(rows) -> list[tuple]:
-        return [tuple(round(x, 6) if isinstance(x, float) else x for x in row) for row in rows]
+    def rows(table, names) -> list[tuple]:
+        return [*table.drop_duplicates(names)[names].round(6).itertuples(index=False, name=None)]
 
-    names = [field.name for field in fields(Case)]
+    cases, names = [*jams.cases()], [field.name for field in fields(Case)]
     counted = read_table("seamless/jams").rename(columns={"moment": "picks"})
     assert (counted["free"][counted["walls"] == 12] == jams.MOST_LIFTS).all()
-    counted = counted[["question", *names]]
-    planned = [(kind, *astuple(case)) for kind, case in jams.cases() if kind != "lasting"]
-    assert rounded(counted.itertuples(index=False)) == rounded(planned)
+    planned = [(kind, *astuple(case)) for kind, case in cases if kind != "lasting"]
+    planned = pd.DataFrame(planned, columns=["question", *names])
+    assert len(counted) == len(planned)
+    assert rows(counted, [*planned]) == rows(planned, [*planned])
 
-    keys = ["load", "friction", "again"]
-    lasting = read_table("seamless/jam_lasting").drop_duplicates(keys)[keys]
-    planned = [case for kind, case in jams.cases() if kind == "lasting"]
-    planned = [(case.load, case.friction, case.again) for case in planned]
-    assert list(lasting.itertuples(index=False, name=None)) == planned
+    lasting = rows(read_table("seamless/jam_lasting"), ["load", "friction", "again"])
+    of = [case for kind, case in cases if kind == "lasting"]
+    assert lasting == [(case.load, case.friction, case.again) for case in of]
 
     keys = ["load", "walls", "friction", "gap", "policy", "after_pick"]
     played = read_table("seamless/jam_episodes")
@@ -183,15 +183,14 @@ def test_what_is_published_are_the_planned_cases():
         left = len(jams.load_of(Case(load, walls))) - attempts + jammed
         most = episodes.MOST_ATTEMPTS if walls == 3 else episodes.CONTAINER_ATTEMPTS
         assert left == episodes.LEFT or attempts == most
-    played = played.drop_duplicates(keys)[keys]
-    assert list(played.itertuples(index=False, name=None)) == [
+    assert rows(played, keys) == [
         (case.load, case.walls, case.friction, case.gap, policy, after_pick)
         for case, policy, after_pick in episodes.cases()
     ]
 
-    other = read_table("seamless/mujoco_jams")[["load", "friction", "gap", "settle"]]
-    planned = [(case.load, case.friction, case.gap, case.settle) for case in mujoco_jams.cases()]
-    assert list(other.itertuples(index=False, name=None)) == planned
+    other = rows(read_table("seamless/mujoco_jams"), ["load", "friction", "gap", "settle"])
+    of = mujoco_jams.cases()
+    assert other == [(case.load, case.friction, case.gap, case.settle) for case in of]
 
 
 def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too(own_data, monkeypatch):

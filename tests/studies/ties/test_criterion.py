@@ -11,7 +11,6 @@ from studies.grid import read_grid
 from studies.results import read_provenance, read_table
 from studies.ties import earlier, leak, training
 from studies.ties.criterion import FIG11, FIG12, likeness
-from studies.ties.figures import draw_ends, read_by_ties
 from studies.ties.laboratory import CELLS, mirrored_load
 from tests.studies.test_statistics import course
 from unload import stack_load, task
@@ -70,12 +69,6 @@ def test_the_runs_of_the_first_plan_are_all_there():
     twenty = table[table["cell"].isin(earlier.EARLIER.cells)].set_index(["cell", "seed"])["end"]
     late = curves[curves["picks"] > 18_000_000].groupby(["cell", "seed"])["success_rate"].mean()
     assert len(late) == 20 and np.allclose(late.sort_index(), twenty.sort_index(), atol=1e-4)
-
-
-def test_ends_are_drawn_by_mask_and_ties():
-    runs = read_by_ties()
-    dots = [sum(len(line.get_xdata()) for line in axes.lines[:-1]) for axes in draw_ends(runs).axes]
-    assert dots == [runs["mask"].sum(), (~runs["mask"]).sum()]
 
 
 @pytest.mark.parametrize("ties", ["order", "noise"])
