@@ -1,7 +1,6 @@
 """The command line, and the files it has made in ``data/``."""
 
 import sys
-from functools import partial
 from importlib.util import find_spec
 
 import pytest
@@ -19,12 +18,9 @@ def called(monkeypatch):
 
     def call(*arguments: str) -> list[tuple[str, dict]]:
         calls = []
-
-        def make(name, **given):
-            calls.append((name, given))
-
         for name, (summary, _, options) in command.PARTS.items():
-            monkeypatch.setitem(command.PARTS, name, (summary, partial(make, name), options))
+            made = summary, lambda name=name, **given: calls.append((name, given)), options
+            monkeypatch.setitem(command.PARTS, name, made)
         monkeypatch.setattr(sys, "argv", ["studies", *arguments])
         command.main()
         return calls
