@@ -28,7 +28,7 @@ def test_stable_baselines_trains_the_papers_network():
 
 
 @pytest.mark.pybullet
-def test_rates_count_what_is_done(small_load, monkeypatch):
+def test_rates_count_what_is_done(small_load, set_in):
     """Each call is made once, and said to take half a second."""
 
     def timed(calls):
@@ -36,9 +36,8 @@ def test_rates_count_what_is_done(small_load, monkeypatch):
             call()
         return dict.fromkeys(calls, 0.5)
 
-    small = {"LIFTS": {"full": 1, "local": 2, "table": 3}, "NUM_ENVS": 2, "PICKS": 4}
-    for name, value in (small | {"best_times": timed}).items():
-        monkeypatch.setattr(parts, name, value)
+    lifts = {"full": 1, "local": 2, "table": 3}
+    set_in(parts, LIFTS=lifts, NUM_ENVS=2, PICKS=4, best_times=timed)
     assert lift_rates(small_load) == {"full": 2, "local": 4, "table": 6}
     assert list(pick_rates().values()) == [6, 6, 12, 12, 12]
 
@@ -74,7 +73,7 @@ def test_no_box_of_new_loads_repeats(rng):
     assert len({tuple(size) for load in loads for size in load.sizes.round(6)}) == 2 * 672
 
 
-def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
+def test_each_update_that_is_timed_is_what_it_is_called(set_in):
     seen = {}
 
     def note(agent, batch):
@@ -85,8 +84,8 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
         seen.update({name: update() for name, update in calls.items()})
         return dict.fromkeys(calls, 1.0)
 
-    monkeypatch.setattr(unload.DQN, "update", note)
-    monkeypatch.setattr(parts, "best_times", call)
+    set_in(unload.DQN, update=note)
+    set_in(parts, best_times=call)
     assert update_times() == dict.fromkeys(seen, 1000)
     assert seen == {
         "PyTorch, whole batch": ("PlainLearner", 1, 2048, 2048),
@@ -97,7 +96,7 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
     assert torch.get_num_threads() == 1
 
 
-def test_the_first_steps_of_stable_baselines_do_not_count(monkeypatch):
+def test_the_first_steps_of_stable_baselines_do_not_count(set_in):
     """They fill its memory: a second each here, and 0.64 s each of the ten that follow."""
     config = unload.TrainConfig()
     before = config.batch_size // config.num_envs + 2
@@ -106,9 +105,8 @@ def test_the_first_steps_of_stable_baselines_do_not_count(monkeypatch):
     def learn(picks, callback):
         assert all(callback() for _ in range(picks // config.num_envs))
 
-    monkeypatch.setattr(run, "containers", lambda config: None)
-    monkeypatch.setattr(run, "dqn", lambda config, envs: SimpleNamespace(learn=learn))
-    monkeypatch.setattr(run, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    set_in(run, containers=lambda config: None, time=SimpleNamespace(perf_counter=clock.__next__))
+    set_in(run, dqn=lambda config, envs: SimpleNamespace(learn=learn))
     assert run._their_rate(10 * config.num_envs, 1) == pytest.approx(100)
 
 
@@ -134,7 +132,7 @@ def test_total():
 """
 
 
-def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys):
+def test_mutants_that_no_test_notices_are_counted(tmp_path, set_in, capsys):
     """In a project of one room; annotations, texts and raised errors are not changed."""
     room, path, table = "unload/sums", tmp_path / "unload/sums/sums.py", tmp_path / "mutants.csv"
     for file, text in {
@@ -145,10 +143,8 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     }.items():
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, encoding="utf-8")
-    project = {"ROOT": tmp_path, "PATH": table, "MODULES": [path], "ROOMS": {room: "tests/sums"}}
-    for name, value in project.items():
-        monkeypatch.setattr(mutants, name, value)
-    monkeypatch.setattr(sys, "argv", ["mutants", "--sample", "9"])
+    set_in(mutants, ROOT=tmp_path, PATH=table, MODULES=[path], ROOMS={room: "tests/sums"})
+    set_in(sys, argv=["mutants", "--sample", "9"])
     mutants.main()
     assert f"{room}: 3 of 4 survive" in capsys.readouterr().out
     assert pd.read_csv(table, keep_default_na=False).to_numpy().tolist() == [
@@ -164,14 +160,11 @@ def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys)
     assert mutants.killed_by(trees, room, path, endless, limit=2) == "time limit"
 
 
-def test_speeds_are_printed_and_published_with_ratios(own_data, monkeypatch, capsys):
-    for name, rates in {
-        "lift_rates": {"full": 2.0, "table": 12345.0},
-        "pick_rates": {"one": 4.0},
-        "update_times": {"PyTorch": 8.0, "fused": 2.0},
-        "training_rates": {"theirs": 5.0, "here": 4.0},
-    }.items():
-        monkeypatch.setattr(run, name, lambda *load, rates=rates: rates)
+def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):
+    set_in(run, lift_rates=lambda load: {"full": 2.0, "table": 12345.0})
+    set_in(run, pick_rates=lambda: {"one": 4.0})
+    set_in(run, update_times=lambda: {"PyTorch": 8.0, "fused": 2.0})
+    set_in(run, training_rates=lambda: {"theirs": 5.0, "here": 4.0})
     run.main()
     assert read_table("benchmarks/speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
     said = capsys.readouterr()

@@ -34,16 +34,15 @@ def test_a_published_run_is_trained_and_measured_again(cell):
     assert {key: row[key] for key in expected} == pytest.approx(expected, rel=1e-3)
 
 
-def test_cells_are_trained_measured_and_written(own_data, monkeypatch):
+def test_cells_are_trained_measured_and_written(own_data, monkeypatch, set_in):
     """Runs of one episode, of which a trace has two points."""
-    monkeypatch.setattr(laboratory, "training_fingerprint", lambda: "f")
     monkeypatch.setitem(measures.LOADS, "episodes", 2)
     config = replace(CONFIG, picks=32_000, seed=7)
     small = {
         name: cells.CELLS[name]._replace(config=config, seeds=[7]) for name in ("ranks", "mirrored")
     }
-    monkeypatch.setattr(laboratory, "CELLS", small)
-    monkeypatch.setattr(laboratory, "FRESH", {"ranks": small["ranks"]})
+    fresh = {"ranks": small["ranks"]}
+    set_in(laboratory, CELLS=small, FRESH=fresh, training_fingerprint=lambda: "f")
     laboratory.laboratory_data(1)
     laboratory.fresh_data(1)
     rows, trace = read_table("falls/laboratory"), read_table("falls/trace")
@@ -138,15 +137,13 @@ def test_a_slope_is_kept_from_sinking(cell, scaled):
     assert ratio == pytest.approx(1 + 0.05 * np.array(scaled), abs=0.02)
 
 
-def test_policies_and_networks_are_judged_alike(own_data, monkeypatch):
+def test_policies_and_networks_are_judged_alike(own_data, set_in):
     """One published policy and one network without training, in one container with the mask."""
-    monkeypatch.setattr(long, "UNTRAINED", 1)
     name = "paper_no_mask/seed_0"
     policy = read_policies(paths.ROOT / "data/falls/paper.safetensors")[name]
     published = {"paper": {name: policy}, "long": {}}
-    monkeypatch.setattr(long, "read_policies", lambda path: published[path.stem])
-    monkeypatch.setattr(long, "training_fingerprint", lambda: "f")
-    monkeypatch.setattr(long, "LOADS", {"episodes": 1, "seed": 0})
+    set_in(long, read_policies=lambda path: published[path.stem], training_fingerprint=lambda: "f")
+    set_in(long, UNTRAINED=1, LOADS={"episodes": 1, "seed": 0})
     long.published_data(n_jobs=1)
     trained, drawn = read_table("falls/published").itertuples()
     assert (trained.cell, drawn.cell) == ("paper_no_mask", "untrained")

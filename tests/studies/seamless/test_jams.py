@@ -83,9 +83,8 @@ def test_half_of_the_free_boxes_are_lifted_again_after_others_have_gone(simulate
 
 @pytest.mark.pybullet
 @pytest.mark.parametrize(("policy", "walls", "most"), [("random", 3, 9), ("highest", 2, 7)])
-def test_an_episode_takes_out_what_is_lifted(simulated, monkeypatch, policy, walls, most):
-    monkeypatch.setattr(episodes, "MOST_ATTEMPTS", 9)
-    monkeypatch.setattr(episodes, "CONTAINER_ATTEMPTS", 7)
+def test_an_episode_takes_out_what_is_lifted(simulated, set_in, policy, walls, most):
+    set_in(episodes, MOST_ATTEMPTS=9, CONTAINER_ATTEMPTS=7)
     rows = episodes.episode(case := Case(0, walls=walls, settle=0.3), policy, "restore")
     assert len(rows) == most and simulated.settled == [0.3]
     load, jammed, highest = jams.load_of(case), [], []
@@ -106,19 +105,19 @@ def attempt(box, out, jammed, covered=False, beside=1) -> dict:
     return {"box": box, "out": out, "covered": covered, "beside": beside, "distance": distance}
 
 
-def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
+def test_what_is_counted_of_all_cases_is_written(own_data, set_in):
     """Each case by itself; attempts by what was taken out, by place, and by what was between."""
     asked = [("fresh", Case(0)), ("lasting", Case(1)), ("width", Case(2, gap=-0.0001, picks=25))]
-    monkeypatch.setattr(jams, "cases", lambda: asked)
     lifts = [{"distance": distance} for distance in (0.1, task.LIFT_THRESHOLD, 0.46)]
     lasting = [
         {"box": box, "out": out, "before": before, "distance": distance}
         for out, distances in ((0, (0.1, 0.1, 0.2)), (5, (0.1, 0.3, 0.0)))
         for box, (before, distance) in enumerate(zip((0.1, 0.1, 0.2), distances))
     ]
-    monkeypatch.setattr(
-        jams, "answer", lambda kind, case: lasting if kind == "lasting" else lifts[: case.load + 1]
-    )
+
+    def answer(kind, case) -> list[dict]:
+        return lasting if kind == "lasting" else lifts[: case.load + 1]
+
     # Of these episodes the first three are of seamless walls, three, and restored.
     played = [
         (Case(0, friction=1.0), "random", "restore"), (Case(1, friction=1.0), "random", "restore"),
@@ -126,12 +125,12 @@ def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
         (Case(2, gap=0.001), "random", "restore"), (Case(3), "random", "keep"),
         (Case(4, walls=12), "random", "restore"),
     ]  # fmt: skip
-    monkeypatch.setattr(episodes, "cases", lambda: played)
     attempts = [
         attempt(7, 1, True), attempt(8, 1, False), attempt(7, 2, True), attempt(9, 24, False),
         attempt(7, 30, False), attempt(6, 31, True, True, 5), attempt(5, 31, False, True, 3),
     ]  # fmt: skip
-    monkeypatch.setattr(episodes, "episode", lambda *_: attempts)
+    set_in(jams, cases=lambda: asked, answer=answer)
+    set_in(episodes, cases=lambda: played, episode=lambda *_: attempts)
     jam_tables.both_data(1)
     tables = {
         name: read_table(f"seamless/{name}")
