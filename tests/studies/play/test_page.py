@@ -254,18 +254,6 @@ def test_presets_end_where_they_say(preset):
     assert ENDS[preset](end, best), f"{end:.3f} at the end, {best:.3f} at best"
 
 
-@pytest.mark.slow
-def test_a_browser_shows_it(tmp_path):
-    """The five steps do what they say at three sizes with a seed each, and the controls answer."""
-    pytest.importorskip("playwright", reason="make browser installs it")
-    from tests.browser.look import BROWSERS, browser, look_at_page
-
-    if not any(map(shutil.which, BROWSERS)):
-        pytest.skip("Chromium is not installed")
-    with browser() as chromium:
-        assert not list(look_at_page(chromium, tmp_path))
-
-
 @needs_node
 def test_slopes_are_those_of_derivatives():
     got = run_js(
