@@ -1,6 +1,5 @@
 """The benchmarks: what they measure is what they say."""
 
-import sys
 from queue import SimpleQueue
 from types import SimpleNamespace
 
@@ -111,9 +110,6 @@ def test_the_first_steps_of_stable_baselines_do_not_count(set_in):
 
 
 CODE = """
-compiled = staticmethod
-
-@compiled
 def total(a, b):
     return a + b
 
@@ -123,41 +119,24 @@ def refuse(a: list[1]):
 
 UNUSED = 1 * 2
 """
-TESTS = """
-import os
-from unload.sums.sums import total
-
-def test_total():
-    assert os.environ["NUMBA_DISABLE_JIT"] == "1" and total(2, 1) == 3
-"""
 
 
-def test_mutants_that_no_test_notices_are_counted(tmp_path, set_in, capsys):
-    """In a project of one room; annotations, texts and raised errors are not changed."""
-    room, path, table = "unload/sums", tmp_path / "unload/sums/sums.py", tmp_path / "mutants.csv"
-    for file, text in {
-        path: CODE,
-        path.parents[1] / "__init__.py": "",
-        tmp_path / "tests/sums/test_sums.py": TESTS,
-        table: f"{','.join(mutants.COLUMNS)},killed_by\nother,a,1,b,\n{room},a,1,b,\n",
-    }.items():
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding="utf-8")
-    set_in(mutants, ROOT=tmp_path, PATH=table, MODULES=[path], ROOMS={room: "tests/sums"})
-    set_in(sys, argv=["mutants", "--sample", "9"])
-    mutants.main()
-    assert f"{room}: 3 of 4 survive" in capsys.readouterr().out
-    assert pd.read_csv(table, keep_default_na=False).to_numpy().tolist() == [
-        ["other", "a", 1, "b", ""],
-        [room, "sums", 6, "a + b -> a - b", "tests/sums/test_sums.py::test_total"],
-        [room, "sums", 12, "1 * 2 -> 1 / 2", ""],
-        [room, "sums", 12, "1 -> 3", ""],
-        [room, "sums", 12, "2 -> 5", ""],
+def test_mutants_that_no_test_notices_are_counted(tmp_path, set_in):
+    """Annotations, texts and raised errors are not changed; one that subtracts is noticed."""
+    room, path = "unload/sums", tmp_path / "unload/sums/sums.py"
+    path.parent.mkdir(parents=True)
+    path.write_text(CODE, encoding="utf-8")
+
+    def killed_by(trees, room, path, code, limit) -> str:
+        return "test_total" if code and b"a - b" in code else ""
+
+    set_in(mutants, ROOT=tmp_path, MODULES=[path], killed_by=killed_by)
+    assert mutants.measure(room, 9, 0, SimpleQueue()).to_numpy().tolist() == [
+        [room, "sums", 3, "a + b -> a - b", "test_total"],
+        [room, "sums", 9, "1 * 2 -> 1 / 2", ""],
+        [room, "sums", 9, "1 -> 3", ""],
+        [room, "sums", 9, "2 -> 5", ""],
     ]
-    trees: SimpleQueue = SimpleQueue()
-    trees.put(tmp_path)
-    endless = CODE.encode() + b"while True:\n    pass\n"
-    assert mutants.killed_by(trees, room, path, endless, limit=2) == "time limit"
 
 
 def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):
