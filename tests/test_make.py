@@ -12,7 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture
-def ran(tmp_path, monkeypatch) -> list[list[str]]:
+def ran(tmp_path, set_in) -> list[list[str]]:
     """The arguments of all Pythons that are started, in a checkout of its own."""
     calls = []
 
@@ -23,10 +23,9 @@ def ran(tmp_path, monkeypatch) -> list[list[str]]:
 
     for name in ("environment.txt", "pyproject.toml"):
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
-    monkeypatch.setattr(make, "ROOT", tmp_path)
-    monkeypatch.setattr(make, "VENV", tmp_path / ".venv")
-    monkeypatch.setattr(make.subprocess, "run", run)
-    monkeypatch.setattr(make.venv, "create", lambda folder, **_: folder.mkdir(exist_ok=True))
+    set_in(make, ROOT=tmp_path, VENV=tmp_path / ".venv")
+    set_in(make.subprocess, run=run)
+    set_in(make.venv, create=lambda folder, **_: folder.mkdir(exist_ok=True))
     return calls
 
 

@@ -67,11 +67,6 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     assert torch.get_num_threads() == 1
 
 
-def test_no_box_of_new_loads_repeats(rng):
-    loads = [run.new_load(rng) for _ in range(2)]
-    assert len({tuple(size) for load in loads for size in load.sizes.round(6)}) == 2 * 672
-
-
 def test_each_update_that_is_timed_is_what_it_is_called(set_in):
     seen = {}
 

@@ -49,6 +49,8 @@ def test_the_cells_are_those_of_the_plan():
     assert not [name for name in training.CELLS if not any(fnmatch(name, p) for p in patterns)]
     assert "ρ = 0.965 along x and y and 0.997 along z" in plan
     assert training.CORRELATIONS["drifting"] == (0.965, 0.965, 0.997)
+    anew = training.CELLS["anew_mask"].change.keywords["correlation"]
+    assert not any(anew), "nothing is left of the noise before"
     seeds = {seed for cell in training.CELLS.values() for seed in cell.seeds}
     assert (min(seeds), max(seeds)) == (60, 64) and "seeds 60–64" in plan
     assert [len(CELLS[name].seeds) for name in ("rho_0.0", "positions")] == [10, 20]
@@ -87,11 +89,3 @@ def test_a_mirrored_load_exchanges_left_and_right():
     assert np.allclose(load.positions[:, 1] + mirrored.positions[:, 1], task.CONTAINER[1])
     assert np.allclose(load.positions[:, ::2], mirrored.positions[:, ::2])
     assert (load.sizes == mirrored.sizes).all()
-
-
-def test_what_is_published_was_asked_as_it_is_asked_today():
-    assert read_provenance("ties/leak")["settings"] == {
-        "loads": [leak.LOADS[0], leak.LOADS[-1]], **leak.JUDGED
-    }  # fmt: skip
-    anew = training.TIES.cells["anew_mask"].change.keywords["correlation"]
-    assert not any(anew), "nothing is left of the noise before, as PLAN.md has it"
