@@ -75,10 +75,20 @@ def run_python() -> Callable[..., tuple[str, str]]:
 
 
 @pytest.fixture
-def own_data(tmp_path, monkeypatch) -> Path:
+def set_in(monkeypatch) -> Callable[..., None]:
+    """``set_in(owner, NAME=value, ...)``: other values in a module or object, for one test."""
+
+    def change(owner: object, **values: object) -> None:
+        for name, value in values.items():
+            monkeypatch.setattr(owner, name, value)
+
+    return change
+
+
+@pytest.fixture
+def own_data(tmp_path, set_in) -> Path:
     """A new folder in the place of ``data/``; what experiments keep in ``runs/`` stands in it."""
-    monkeypatch.setattr(paths, "DATA", tmp_path)
-    monkeypatch.setattr(paths, "RUNS", tmp_path / "runs")
+    set_in(paths, DATA=tmp_path, RUNS=tmp_path / "runs")
     return tmp_path
 
 

@@ -116,7 +116,6 @@ def test_what_an_extra_brings_is_named_where_it_is_missing(monkeypatch, capsys):
     ("option", "status", "message"),
     [
         ("--learning-rate=-1", 1, "learning_rate is -1.0; expected"),
-        ("--picks=many", 2, "argument --picks: invalid int value: 'many'"),
         ("--stack=unload:stack", 2, "no attribute 'stack'; expected module:function"),
     ],
 )

@@ -4,7 +4,6 @@ import json
 import re
 import sys
 import tomllib
-from pathlib import Path
 
 import pytest
 
@@ -100,34 +99,3 @@ def test_unknown_names_are_refused(tmp_path, monkeypatch, capsys):
         assert f"no notebook starts with {name!r}" in capsys.readouterr().err
     with pytest.raises(ValueError, match="has no parameter NONSENSE"):
         run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
-
-
-def test_failing_cell_fails_the_run(tmp_path):
-    new = run.nbformat.v4
-    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
-    broken = new.new_notebook(metadata={"kernelspec": kernel})
-    broken.cells = [
-        new.new_code_cell("X = 1", metadata={"tags": ["parameters"]}),
-        new.new_code_cell("raise RuntimeError(f'broken with {X}')"),
-    ]
-    run.nbformat.write(broken, tmp_path / "broken.ipynb")
-    with pytest.raises(run.papermill.PapermillExecutionError, match="broken with 2"):
-        run.run(tmp_path / "broken.ipynb", tmp_path / "out.ipynb", {"X": 2})
-
-
-def test_a_run_in_place_that_is_stopped_leaves_the_notebook_as_it_was(tmp_path, monkeypatch):
-    path = tmp_path / "00_some.ipynb"
-    run.nbformat.write(run.nbformat.v4.new_notebook(), path)
-    before = path.read_bytes()
-
-    def execute(source: str, output: str, **settings) -> None:
-        Path(output).write_text("", encoding="utf-8")  # as papermill does first of all
-        raise KeyboardInterrupt
-
-    for name, value in {"HERE": tmp_path, "BUILD": tmp_path / "build"}.items():
-        monkeypatch.setattr(run, name, value)
-    monkeypatch.setattr(run.papermill, "execute_notebook", execute)
-    monkeypatch.setattr(sys, "argv", ["run.py", "--in-place"])
-    with pytest.raises(KeyboardInterrupt):
-        run.main()
-    assert path.read_bytes() == before

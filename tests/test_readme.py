@@ -128,14 +128,10 @@ def test_the_benchmarks_are_those_of_the_data():
     assert f"{picks:,} picks each" in " ".join(text.split())
 
 
-def text_name(path: Path) -> str:
-    return path.relative_to(ROOT).as_posix()
-
-
 TEXTS = [path for path in (run.README, *run.notebooks()) if path.parent.name != "solutions"]
 
 
-@pytest.mark.parametrize("path", TEXTS, ids=text_name)
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.stem)
 def test_sentences_are_short(path):
     """On average 15 words in README and first cells, 18 in the reports: long ones are named."""
     lengths = {each: len(each.split()) for each in run.sentences(run.opening(path))}
@@ -143,52 +139,3 @@ def test_sentences_are_short(path):
     most = 18 if path.parent.name == "report" else 15
     average = sum(lengths.values()) / len(lengths)
     assert average <= most and lengths[longest] <= 3 * most, longest
-
-
-GLOSSARY = (ROOT / "notebooks/glossary.md").read_text(encoding="utf-8")
-# Words of the glossary that are read rightly by who knows only what they mean everywhere.
-EVERYDAY = {
-    "box", "item", "package", "wall", "load", "lift", "row", "place", "pick", "step", "value",
-    "score", "run", "seed", "cell", "pair", "falls", "update", "visible", "on top", "gap", "replay",
-}  # fmt: skip
-
-
-def terms() -> dict[str, list[int]]:
-    """The other words of the glossary, longest first, and the notebooks that introduce them."""
-    rows = re.findall(r"^\| \*\*(.+?)\*\* \| .* \| (.*) \|$", GLOSSARY, re.M)
-    found = {
-        re.sub(r" \(.*\)", "", term): [int(number) for number in re.findall(r"\[(\d+)\]", places)]
-        for names, places in rows
-        for term in names.split(", ")
-    }
-    assert EVERYDAY < set(found)
-    return {name: found[name] for name in sorted(set(found) - EVERYDAY, key=len, reverse=True)}
-
-
-def unexplained(text: str, number: int) -> list[tuple[str, str]]:
-    """Terms that a text does not explain, and the sentence of each.
-
-    A term is explained where it is first used, in italics, in bold or in a link; or a notebook of
-    at most this number introduces it; or the text links the glossary.
-    """
-    if "glossary.md" in text:
-        return []
-    text, found = re.sub(r"```.*?```|`[^`]*`|!\[.*?\)", "", text, flags=re.DOTALL), []
-    marked = re.compile(r"\*+[^*\n]+\*+|\[[^\]]*\]\([^)]*\)")
-    for term, introduced in terms().items():
-        case = re.I if term.islower() else 0
-        word = re.compile(rf"(?<![\w-]){re.escape(term)}s?(?![\w-])", case)
-        use = word.search(text)
-        if use and min(introduced, default=99) > number:
-            spans = (mark.span() for mark in marked.finditer(text))
-            if not any(start <= use.start() < end for start, end in spans):
-                found.append((term, text[text.rfind(".", 0, use.start()) + 1 :].partition(".")[0]))
-        text = word.sub(lambda match: "_" * len(match[0]), text)
-    return found
-
-
-@pytest.mark.parametrize("path", TEXTS, ids=text_name)
-def test_terms_are_explained_where_they_are_met(path):
-    """In the README's first screen, the first cells of the course, and the reports."""
-    text = run.opening(path).partition("\n## Look\n")[0]
-    assert not unexplained(text, int(path.stem[:2]) if path.parent == run.HERE else -1)

@@ -37,13 +37,6 @@ def lines() -> dict[str, Requirement]:
     return {line.name: line for line in found}
 
 
-def is_wanted(line: Requirement, system: str, minor: int) -> bool:
-    """Whether its marker lets a line be installed."""
-    platform, machine, _ = SYSTEMS[system]
-    place = {"sys_platform": platform, "platform_machine": machine}
-    return not line.marker or line.marker.evaluate(place | {"python_version": f"3.{minor}"})
-
-
 @cache
 def supported(system: str, minor: int) -> set[tags.Tag]:
     """The tags of wheels that can be installed."""
@@ -52,8 +45,8 @@ def supported(system: str, minor: int) -> set[tags.Tag]:
     return found | {*tags.compatible_tags(python, abi, platforms)}
 
 
-def belongs(wheel: str, line: Requirement, system: str, minor: int) -> bool:
-    """Whether a wheel is a line's and can be installed, by its file's name."""
+def fits(wheel: str, line: Requirement, system: str, minor: int) -> bool:
+    """Whether a wheel is a line's and can be installed there, by its file's name."""
     name, version, _, own = parse_wheel_filename(wheel)
     right = name == canonicalize_name(line.name) and version in line.specifier
     return right and not own.isdisjoint(supported(system, minor))
@@ -62,9 +55,11 @@ def belongs(wheel: str, line: Requirement, system: str, minor: int) -> bool:
 def holes() -> Iterator[tuple[str, str, int]]:
     """The lines, systems and Pythons 3.x for which ``LIST`` lacks a wheel."""
     wheels = LIST.read_text(encoding="utf-8").splitlines()
-    for line, *place in product(lines().values(), SYSTEMS, PYTHONS):
-        if is_wanted(line, *place) and not any(belongs(wheel, line, *place) for wheel in wheels):
-            yield line.name, *place
+    for line, system, minor in product(lines().values(), SYSTEMS, PYTHONS):
+        place = dict(zip(("sys_platform", "platform_machine"), SYSTEMS[system]))
+        wanted = not line.marker or line.marker.evaluate(place | {"python_version": f"3.{minor}"})
+        if wanted and not any(fits(wheel, line, system, minor) for wheel in wheels):
+            yield line.name, system, minor
 
 
 def listed(line: Requirement) -> list[str]:
@@ -75,7 +70,7 @@ def listed(line: Requirement) -> list[str]:
     version = str(line.specifier).removeprefix("==")
     own = [name for name in names if f"-{version}-" in name and name.endswith(".whl")]
     places = [*product(SYSTEMS, PYTHONS)]
-    return [name for name in own if any(belongs(name, line, *place) for place in places)]
+    return [name for name in own if any(fits(name, line, *place) for place in places)]
 
 
 if __name__ == "__main__":

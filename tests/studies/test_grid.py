@@ -39,10 +39,9 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def trained(folder, monkeypatch):
-    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
-    monkeypatch.setattr(paths, "DATA", folder)
-    monkeypatch.setattr(paths, "RUNS", folder / "runs")
+def trained(folder, set_in):
+    set_in(grid, training_fingerprint=lambda networks: "f")
+    set_in(paths, DATA=folder, RUNS=folder / "runs")
     grid.train_grid(SMALL, n_jobs=1)
     return folder
 

@@ -1,7 +1,7 @@
 """The command line, and the files it has made in ``data/``."""
 
+import re
 import sys
-from functools import partial
 from importlib.util import find_spec
 
 import pytest
@@ -19,12 +19,9 @@ def called(monkeypatch):
 
     def call(*arguments: str) -> list[tuple[str, dict]]:
         calls = []
-
-        def make(name, **given):
-            calls.append((name, given))
-
         for name, (summary, _, options) in command.PARTS.items():
-            monkeypatch.setitem(command.PARTS, name, (summary, partial(make, name), options))
+            made = summary, lambda name=name, **given: calls.append((name, given)), options
+            monkeypatch.setitem(command.PARTS, name, made)
         monkeypatch.setattr(sys, "argv", ["studies", *arguments])
         command.main()
         return calls
@@ -48,18 +45,11 @@ def test_paper_makes_every_part(called):
         assert given == ({} if name == "observation" else {"n_jobs": 3})
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["training", "--cells", "none"], "argument --cells: invalid choice: 'none'"),
-        (["paper", "--jobs", "0"], "--jobs is 0; expected a number of processes"),
-    ],
-)
-def test_what_nothing_can_run_with_is_refused_in_one_line(called, arguments, message, capsys):
+def test_what_nothing_can_run_with_is_refused_in_one_line(called, capsys):
     with pytest.raises(SystemExit):
-        called(*arguments)
+        called("paper", "--jobs", "0")
     last = capsys.readouterr().err.splitlines()[-1]
-    assert last.startswith("python -m studies") and f" error: {message}" in last
+    assert re.match("python -m studies.* error: --jobs is 0; expected a number of processes", last)
 
 
 def test_every_provenance_names_a_command_of_today():

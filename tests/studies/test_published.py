@@ -1,7 +1,6 @@
 """What is published follows from the data: figures, and tables of the reports."""
 
 import ast
-import json
 import re
 from base64 import b64decode
 from contextlib import redirect_stdout
@@ -16,12 +15,13 @@ import pytest
 from PIL import Image
 
 from studies import paths, style
-from studies.falls import figures as falls
 from studies.heap.table import compared
 from studies.paper import diagrams
 from studies.play import animation
 from studies.policies.comparison import comparison_msr
 from studies.results import read_table
+from tests.test_notebooks import cells as cells_in
+from tests.test_notebooks import text as text_of
 from unload.load.view import _PLOTLY_MIMETYPE
 
 SIMULATED = {"fig02_containers"}  # the one figure for which boxes are moved
@@ -57,19 +57,13 @@ RANDOM = re.compile(r"T_[0-9a-f]{5}|( object)? at 0x[0-9a-f]+")
 
 def cells_of(notebook: str) -> dict[str, dict]:
     """The code cells of a notebook, by their ids."""
-    cells = json.loads(
-        (paths.ROOT / "notebooks" / f"{notebook}.ipynb").read_text(encoding="utf-8")
-    )["cells"]
-    return {cell["id"]: cell for cell in cells if cell["cell_type"] == "code"}
-
-
-def code_of(cell: dict) -> str:
-    return "".join(cell["source"])
+    path = paths.ROOT / "notebooks" / f"{notebook}.ipynb"
+    return {cell["id"]: cell for cell in cells_in(path, "code")}
 
 
 def saved_by(notebook: str) -> set[str]:
     """The names under which a notebook saves figures."""
-    code = "\n".join(map(code_of, cells_of(notebook).values()))
+    code = "\n".join(map(text_of, cells_of(notebook).values()))
     return set(re.findall(r"\bsave\(.*, \"(\w+)\"\)", code))
 
 
@@ -130,7 +124,7 @@ def test_figures_and_tables_are_those_that_the_data_give(notebook, monkeypatch):
     namespace: dict = {}
     with pd.option_context(*JUPYTER):
         for name in named:
-            printed, found = run(code_of(cells[name]), namespace)
+            printed, found = run(text_of(cells[name]), namespace)
             outputs = {output["output_type"]: output for output in cells[name]["outputs"]}
             assert printed == "".join(outputs.get("stream", {"text": ""})["text"]), name
             if "display_data" in outputs:  # a figure, as Jupyter shows it
@@ -197,7 +191,7 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
     monkeypatch.setattr(paths, "FIGURES", tmp_path)
     cells, namespace = cells_of("01_task"), {}
     for name in (*list(cells)[:2], "code-25"):
-        run(code_of(cells[name]), namespace)
+        run(text_of(cells[name]), namespace)
     with Image.open(tmp_path / "unloading.gif") as found, Image.open(committed) as published:
         assert found.n_frames == published.n_frames
         for number in wanted:
@@ -206,12 +200,3 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
             assert found.info == published.info
             both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
             assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
-
-
-@pytest.mark.parametrize(("msr", "title"), [(0.6, "60.0%: it errs"), (0.95, "95.0%: it does not")])
-def test_a_dug_load_is_drawn_with_its_preference(msr, title):
-    surface = np.arange(6.0).reshape(3, 2) / 5
-    left, right = falls.dug(surface, (0.5, -0.2), "noise", msr, np.tri(3)).axes[:2]
-    assert np.array_equal(left.images[0].get_array(), surface.T)
-    (dot,) = (line for line in right.lines if line.get_xdata().size)
-    assert dot.get_xydata().tolist() == [[0.5, -0.2]] and title in right.get_title()

@@ -1,6 +1,5 @@
 """The benchmarks: what they measure is what they say."""
 
-import sys
 from queue import SimpleQueue
 from types import SimpleNamespace
 
@@ -28,7 +27,7 @@ def test_stable_baselines_trains_the_papers_network():
 
 
 @pytest.mark.pybullet
-def test_rates_count_what_is_done(small_load, monkeypatch):
+def test_rates_count_what_is_done(small_load, set_in):
     """Each call is made once, and said to take half a second."""
 
     def timed(calls):
@@ -36,13 +35,10 @@ def test_rates_count_what_is_done(small_load, monkeypatch):
             call()
         return dict.fromkeys(calls, 0.5)
 
-    small = {"LIFTS": {"full": 1, "local": 2, "table": 3}, "NUM_ENVS": 2, "PICKS": 4}
-    small |= {"BATCH_SIZE": 8, "N_FEATURES": 4, "best_times": timed}
-    for name, value in small.items():
-        monkeypatch.setattr(parts, name, value)
+    lifts = {"full": 1, "local": 2, "table": 3}
+    set_in(parts, LIFTS=lifts, NUM_ENVS=2, PICKS=4, best_times=timed)
     assert lift_rates(small_load) == {"full": 2, "local": 4, "table": 6}
     assert list(pick_rates().values()) == [6, 6, 12, 12, 12]
-    assert list(update_times().values()) == [500] * 4
 
 
 def test_training_is_timed_where_it_counts(monkeypatch):
@@ -71,12 +67,7 @@ def test_training_is_timed_where_it_counts(monkeypatch):
     assert torch.get_num_threads() == 1
 
 
-def test_no_box_of_new_loads_repeats(rng):
-    loads = [run.new_load(rng) for _ in range(2)]
-    assert len({tuple(size) for load in loads for size in load.sizes.round(6)}) == 2 * 672
-
-
-def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
+def test_each_update_that_is_timed_is_what_it_is_called(set_in):
     seen = {}
 
     def note(agent, batch):
@@ -87,9 +78,9 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
         seen.update({name: update() for name, update in calls.items()})
         return dict.fromkeys(calls, 1.0)
 
-    monkeypatch.setattr(unload.DQN, "update", note)
-    monkeypatch.setattr(parts, "best_times", call)
-    update_times()
+    set_in(unload.DQN, update=note)
+    set_in(parts, best_times=call)
+    assert update_times() == dict.fromkeys(seen, 1000)
     assert seen == {
         "PyTorch, whole batch": ("PlainLearner", 1, 2048, 2048),
         "PyTorch, chunks of 64": ("PlainLearner", 1, 64, 2048),
@@ -99,7 +90,7 @@ def test_each_update_that_is_timed_is_what_it_is_called(monkeypatch):
     assert torch.get_num_threads() == 1
 
 
-def test_the_first_steps_of_stable_baselines_do_not_count(monkeypatch):
+def test_the_first_steps_of_stable_baselines_do_not_count(set_in):
     """They fill its memory: a second each here, and 0.64 s each of the ten that follow."""
     config = unload.TrainConfig()
     before = config.batch_size // config.num_envs + 2
@@ -108,16 +99,12 @@ def test_the_first_steps_of_stable_baselines_do_not_count(monkeypatch):
     def learn(picks, callback):
         assert all(callback() for _ in range(picks // config.num_envs))
 
-    monkeypatch.setattr(run, "containers", lambda config: None)
-    monkeypatch.setattr(run, "dqn", lambda config, envs: SimpleNamespace(learn=learn))
-    monkeypatch.setattr(run, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    set_in(run, containers=lambda config: None, time=SimpleNamespace(perf_counter=clock.__next__))
+    set_in(run, dqn=lambda config, envs: SimpleNamespace(learn=learn))
     assert run._their_rate(10 * config.num_envs, 1) == pytest.approx(100)
 
 
 CODE = """
-compiled = staticmethod
-
-@compiled
 def total(a, b):
     return a + b
 
@@ -127,62 +114,31 @@ def refuse(a: list[1]):
 
 UNUSED = 1 * 2
 """
-TESTS = """
-import os
-import pytest
-from unload.sums.sums import total
-
-def test_it_runs_as_plain_python():
-    assert os.environ["NUMBA_DISABLE_JIT"] == "1"
-
-def test_total():
-    assert total(2, 1) == 3
-
-@pytest.mark.slow
-def test_in_vain():
-    raise AssertionError("left out, because it takes long")
-"""
 
 
-def test_mutants_that_no_test_notices_are_counted(tmp_path, monkeypatch, capsys):
-    """In a project of one room; annotations, texts and raised errors are not changed."""
-    room, path, table = "unload/sums", tmp_path / "unload/sums/sums.py", tmp_path / "mutants.csv"
-    for folder in ("unload/sums", "tests/sums"):
-        (tmp_path / folder).mkdir(parents=True)
-    (tmp_path / "unload/__init__.py").touch()
+def test_mutants_that_no_test_notices_are_counted(tmp_path, set_in):
+    """Annotations, texts and raised errors are not changed; one that subtracts is noticed."""
+    room, path = "unload/sums", tmp_path / "unload/sums/sums.py"
+    path.parent.mkdir(parents=True)
     path.write_text(CODE, encoding="utf-8")
-    (tmp_path / "tests/sums/test_sums.py").write_text(TESTS, encoding="utf-8")
-    table.write_text(
-        f"{','.join(mutants.COLUMNS)},killed_by\nother,a,1,b,\n{room},a,1,b,\n", encoding="utf-8"
-    )
-    project = {"ROOT": tmp_path, "PATH": table, "MODULES": [path], "ROOMS": {room: "tests/sums"}}
-    for name, value in project.items():
-        monkeypatch.setattr(mutants, name, value)
-    monkeypatch.setattr(sys, "argv", ["mutants", "--sample", "9"])
-    mutants.main()
-    assert f"{room}: 3 of 4 survive" in capsys.readouterr().out
-    assert pd.read_csv(table, keep_default_na=False).to_numpy().tolist() == [
-        ["other", "a", 1, "b", ""],
-        [room, "sums", 6, "a + b -> a - b", "tests/sums/test_sums.py::test_total"],
-        [room, "sums", 12, "1 * 2 -> 1 / 2", ""],
-        [room, "sums", 12, "1 -> 3", ""],
-        [room, "sums", 12, "2 -> 5", ""],
+
+    def killed_by(trees, room, path, code, limit) -> str:
+        return "test_total" if code and b"a - b" in code else ""
+
+    set_in(mutants, ROOT=tmp_path, MODULES=[path], killed_by=killed_by)
+    assert mutants.measure(room, 9, 0, SimpleQueue()).to_numpy().tolist() == [
+        [room, "sums", 3, "a + b -> a - b", "test_total"],
+        [room, "sums", 9, "1 * 2 -> 1 / 2", ""],
+        [room, "sums", 9, "1 -> 3", ""],
+        [room, "sums", 9, "2 -> 5", ""],
     ]
-    trees: SimpleQueue = SimpleQueue()
-    trees.put(tmp_path)
-    endless = CODE.encode() + b"while True:\n    pass\n"
-    assert mutants.killed_by(trees, room, path, endless, limit=2) == "time limit"
-    assert path.read_text(encoding="utf-8") == CODE and trees.get() == tmp_path
 
 
-def test_speeds_are_printed_and_published_with_ratios(own_data, monkeypatch, capsys):
-    for name, rates in {
-        "lift_rates": {"full": 2.0, "table": 12345.0},
-        "pick_rates": {"one": 4.0},
-        "update_times": {"PyTorch": 8.0, "fused": 2.0},
-        "training_rates": {"theirs": 5.0, "here": 4.0},
-    }.items():
-        monkeypatch.setattr(run, name, lambda *load, rates=rates: rates)
+def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):
+    set_in(run, lift_rates=lambda load: {"full": 2.0, "table": 12345.0})
+    set_in(run, pick_rates=lambda: {"one": 4.0})
+    set_in(run, update_times=lambda: {"PyTorch": 8.0, "fused": 2.0})
+    set_in(run, training_rates=lambda: {"theirs": 5.0, "here": 4.0})
     run.main()
     assert read_table("benchmarks/speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
     said = capsys.readouterr()

@@ -5,7 +5,18 @@ from scipy import stats
 
 from studies import statistics
 from studies.statistics import fell, resembles_fig11, resembles_fig12
-from tests.studies.curves import course, curve
+
+
+def course(msr, loss) -> pd.DataFrame:
+    """A run whose windows of half a million picks have these means."""
+    picks = np.arange(1, len(msr) + 1) * 500_000
+    return pd.DataFrame({"picks": picks, "success_rate": msr, "loss": loss})
+
+
+def curve(msr, loss=(0.5, 0.3, 0.5, 0.3)) -> pd.DataFrame:
+    """A run of 20 million picks, its MSR and loss straight from one given value to the next."""
+    place = np.linspace(0, 1, 40)
+    return course(*(np.interp(place, np.linspace(0, 1, len(ends)), ends) for ends in (msr, loss)))
 
 
 def test_a_window_ends_with_its_last_pick():

@@ -1,20 +1,17 @@
 """Cells that need PyBullet, where it is missing."""
 
-import json
 import re
 import symtable
 from types import SimpleNamespace
 
 import pytest
 
-from studies import paths, stored
-
-NOTEBOOKS = sorted((paths.ROOT / "notebooks").rglob("*.ipynb"))
+from studies import stored
+from tests.test_notebooks import NOTEBOOKS, cells, text
 
 
 def sources(path) -> list[str]:
-    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-    return ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+    return [text(cell) for cell in cells(path, "code")]
 
 
 MARKED = {

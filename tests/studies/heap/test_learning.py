@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from studies.heap.learning import (
-    Learned,
-    Picks,
-    batch_loss,
-    fit,
-    holds_box,
-)
+from studies.heap.learning import Learned, Picks, batch_loss, fit, holds_box
 from studies.heap.network import FateNetwork
 from studies.heap.observation import COLUMN, COLUMNS, ROWS, SEEN, visible_boxes
 from studies.heap.policies import RULES, Oracle, best, linear, play
@@ -39,6 +33,8 @@ def test_rules_pick_what_their_names_say_and_nothing_that_is_masked(rng):
     score = linear({"z": -1, "behind": -1})
     assert score(observations)[0, :3] == pytest.approx([-1.0, -2.5, -2.1])
     assert best(score)(observations, masks, rng).tolist() == [0]
+    with pytest.raises(ValueError, match="a column is 'colour'; expected one of 'behind'"):
+        linear({"colour": 1})
     masks[0, [0, 1]] = 0
     assert [rule(observations, masks, rng).item() for rule in RULES.values()] == [2] * len(RULES)
 

@@ -1,12 +1,12 @@
-"""The heaps, recorded picks, learning and comparison at reduced size; and the figures."""
+"""The heaps, recorded picks, learning and comparison at reduced size."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 import torch
 
 from studies import paths
+from studies.heap import env as heap_env
 from studies.heap import generate, picture, recording
 from studies.heap import table as study
 from studies.heap.learning import load_networks, save_networks
@@ -18,31 +18,15 @@ from studies.results import read_provenance, read_table
 from unload.load.picture import COLOURS
 
 
-def test_the_best_rule_depends_on_the_weight_of_falls():
-    columns = ["rule", "heaps", "boxes", "falls"]
-    rows = [("bold", 20, 2.0, 1.0), ("lucky", 4, 5.0, 0.0), ("shy", 20, 1.2, 0.0)]
-    rules = pd.DataFrame(rows, columns=columns)
-    assert [best_rule(rules, weight) for weight in (0.0, 1.0)] == ["bold", "shy"]
-
-
 @pytest.mark.pybullet
-def test_all_policies_play_the_same_heaps_and_are_kept(own_data, monkeypatch, pile):
+def test_all_policies_play_the_same_heaps_and_are_kept(own_data, set_in, pile):
     small = [pile, pile.only(np.arange(8))]
-    for name, value in {
-        "stored_heaps": lambda split: small,
-        "MAX_PICKS": 1,
-        "PHYSICS": "coarse",
-        "FIRST_HEAPS": 1,
-        "RULE_HEAPS": 2,
-        "TEST_HEAPS": 2,
-        "WEIGHTS": (0.0, 1.0),
-        "KEPT": 1,
-        "RULES": {name: study.RULES[name] for name in ("random", "lowest", "highest")},
-    }.items():
-        monkeypatch.setattr(study, name, value)
+    rules = {name: study.RULES[name] for name in ("random", "lowest", "highest")}
     some = dict(list(family().items())[:2])
-    monkeypatch.setattr(study, "family", lambda: some)
-    monkeypatch.setattr("studies.heap.env.stored_heaps", study.stored_heaps)
+    set_in(study, stored_heaps=lambda split: small, family=lambda: some, RULES=rules)
+    set_in(study, MAX_PICKS=1, PHYSICS="coarse", WEIGHTS=(0.0, 1.0), KEPT=1)
+    set_in(study, FIRST_HEAPS=1, RULE_HEAPS=2, TEST_HEAPS=2)
+    set_in(heap_env, stored_heaps=study.stored_heaps)
     study.choose_rules()
     rules = read_table("heap/rules")
     assert rules["rule"].tolist() == ["lowest", "highest", *some]
@@ -72,8 +56,9 @@ def test_data_of_heaps_are_those_that_are_read():
     assert recorded.items() <= networks.items()
     counts = [study.FIRST_HEAPS, study.RULE_HEAPS]
     assert (rules["heaps"], rules["picks"]) == (counts, study.MAX_PICKS)
-    played = pd.read_csv(paths.DATA / "heap" / "rules.csv")["rule"]
-    assert played.tolist() == list(study.candidates())
+    played, best = read_table("heap/rules"), read_provenance("heap/table")["settings"]["best rules"]
+    assert played["rule"].tolist() == list(study.candidates())
+    assert best == {str(weight): best_rule(played, weight) for weight in study.WEIGHTS}
 
 
 @pytest.mark.pybullet
@@ -89,19 +74,13 @@ def test_a_published_episode_is_played_again():
     )
 
 
-def test_a_box_is_drawn_in_the_colour_of_what_a_pick_does_to_it(cubes):
-    """The one that is nearer to the eye is drawn last, and is dragged; the other comes or falls."""
-    heap, both = cubes((5, 1, 0), (6, 2, 0)), np.array([True, True])
-    axes = plt.figure().add_subplot()
-    falls = picture.outcome_colours(Outcome(heap, both, both, 0.7, True), box=1)
-    assert (falls[0] == COLOURS["failed"]).all()
-    colours = picture.outcome_colours(Outcome(heap, both, ~both, 0.7, True), box=1)
-    picture.draw_heap(axes, heap, colours)
-    painted = axes.collections[0].get_facecolors()[:, :3]
-    assert len(painted) == 6, "three faces of a box are turned to the eye"
-    along, dragged = (np.array(COLOURS[name]) for name in ("liftable", "tried"))
-    for face, colour in zip(painted, [along] * 3 + [dragged] * 3):
-        assert face / face.max() == pytest.approx(colour / colour.max(), abs=0.02)
+def test_a_box_has_the_colour_of_what_a_pick_does_to_it(pile):
+    """The dragged one; the others come along or fall."""
+    every, expected = np.ones(len(pile), bool), np.tile(COLOURS["tried"], (len(pile), 1))
+    for fallen, name in ((every, "failed"), (~every, "liftable")):
+        found = picture.outcome_colours(Outcome(pile, every, fallen, 0.7, True), box=1)
+        expected[np.arange(len(pile)) != 1] = COLOURS[name]
+        assert (found == expected).all()
 
 
 class Notes(list):
@@ -112,23 +91,17 @@ class Notes(list):
 
 
 @pytest.mark.pybullet
-def test_both_rounds_are_recorded_and_learned_and_kept(own_data, monkeypatch, pile):
-    for name, value in {
-        "stored_heaps": lambda split: [pile, pile.only(np.arange(8))],
-        "MAX_PICKS": 3,
-        "PICKS": 12,
-        "NETWORKS": 2,
-        "STEPS": 2,
-    }.items():
-        monkeypatch.setattr(recording, name, value)
-    monkeypatch.setattr("studies.heap.env.stored_heaps", recording.stored_heaps)
+def test_both_rounds_are_recorded_and_learned_and_kept(own_data, set_in, pile):
+    heaps = [pile, pile.only(np.arange(8))]
+    set_in(recording, stored_heaps=lambda split: heaps, MAX_PICKS=3, PICKS=12, NETWORKS=2, STEPS=2)
+    set_in(heap_env, stored_heaps=recording.stored_heaps)
     fit, learned = recording.fit, Notes()
 
     def noted_fit(picks, seed, steps):
         learned.append(picks)
         return fit(picks, seed, steps)
 
-    monkeypatch.setattr(recording, "fit", noted_fit)
+    set_in(recording, fit=noted_fit)
     make_networks()
     assert [len(picks) for picks in learned] == [6, 6, 12, 12], "of both rounds in the second"
     picks = learned[-1]

@@ -3,9 +3,7 @@
 from dataclasses import replace
 from shutil import copytree
 
-import matplotlib.pyplot as plt
 import numpy as np
-import pandas as pd
 import pytest
 
 from studies import grid, paths
@@ -18,12 +16,10 @@ from unload import TrainConfig, load_policy, task
 from unload.support import files
 
 
-def test_what_differs_does_not_agree(monkeypatch):
+def test_what_differs_does_not_agree(set_in):
     """Neither values instead of ranks nor lifts that differ by a little."""
-    monkeypatch.setattr(numbers, "CONTAINERS", 2)
-    monkeypatch.setattr(numbers, "equalize", lambda values: values)
-    monkeypatch.setattr(numbers, "lifted_distance", lambda stack: {1: 0.466, 2: 0.0096}[stack])
-    monkeypatch.setattr(numbers, "CHANCE_ERROR", 0.1)
+    set_in(numbers, lifted_distance={1: 0.466, 2: 0.0096}.get, equalize=lambda values: values)
+    set_in(numbers, CONTAINERS=2, CHANCE_ERROR=0.1)
     agrees = numbers.measured(1, 1, 5)["agrees"]
     assert agrees.tolist()[1:4] == ["no"] * 3 and agrees["MSR of random picks"] == "yes"
 
@@ -47,24 +43,11 @@ def test_the_default_cell_has_the_defaults():
     assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
 
 
-def test_means_over_whole_episodes_are_drawn():
-    """Points of 10 of 500 steps; the last, incomplete episode is left out."""
-    picks = np.arange(1, 121) * 640
-    curve = pd.DataFrame({"picks": picks, "success_rate": np.arange(120.0)})
-    _, axes = plt.subplots()
-    training.draw_learning_curve(axes, curve, "run")
-    points, episodes = axes.lines
-    assert len(points.get_ydata()) == 120
-    assert axes.get_ylim() == (0, 1.02) and axes.get_xlim()[0] == 0
-    assert episodes.get_xydata().tolist() == [[16_000, 24.5], [48_000, 74.5]]
-
-
-def test_a_search_is_published_in_two_tables_a_batch_size(own_data, monkeypatch):
+def test_a_search_is_published_in_two_tables_a_batch_size(own_data, set_in):
     """Of two batch sizes, two runs each."""
-    monkeypatch.setattr(grid, "training_fingerprint", lambda networks: "f")
+    set_in(grid, training_fingerprint=lambda networks: "f")
     small = tuning_grid([1e-3], [8, 16], runs=2, equalize=[True], steps=20)
-    monkeypatch.setattr(tuning, "TUNING", small)
-    monkeypatch.setattr(tuning, "SHOWN", (("with", "loss", 8, 1e-3, 1),))
+    set_in(tuning, TUNING=small, SHOWN=(("with", "loss", 8, 1e-3, 1),))
     tuning.tuning_data(n_jobs=1)
     names = {path.name for path in (own_data / "tuning").iterdir()}
     tables = {f"b{size}_{column}.csv" for size in (8, 16) for column in ("loss", "success_rate")}

@@ -254,18 +254,6 @@ def test_presets_end_where_they_say(preset):
     assert ENDS[preset](end, best), f"{end:.3f} at the end, {best:.3f} at best"
 
 
-@pytest.mark.slow
-def test_a_browser_shows_it(tmp_path):
-    """The five steps do what they say at three sizes with a seed each, and the controls answer."""
-    pytest.importorskip("playwright", reason="make browser installs it")
-    from tests.browser.look import BROWSERS, browser, look_at_page
-
-    if not any(map(shutil.which, BROWSERS)):
-        pytest.skip("Chromium is not installed")
-    with browser() as chromium:
-        assert not list(look_at_page(chromium, tmp_path))
-
-
 @needs_node
 def test_slopes_are_those_of_derivatives():
     got = run_js(
@@ -288,27 +276,22 @@ def test_slopes_are_those_of_derivatives():
 
 
 @needs_node
-def test_the_seed_decides_all_and_the_replay_changes_places_only():
+def test_the_replay_changes_places_only():
+    """Runs of one seed are the same otherwise."""
     got = run_js(
         """
         const task = { ...given.task, num_envs: 5 };
-        const start = (settings) =>
-          new Training(fromText(`equalize=true&${settings}`).config, task);
-        const changed = ["seed=3&replay=shuffled", "seed=3&replay=mirrored"];
-        result.runs = ["seed=3", "seed=3", "seed=4", ...changed].map(start).map((run) => {
-          const first = [...run.network.parameters.slice(0, 5)];
+        result.runs = ["as_is", "shuffled", "mirrored"].map((replay) => {
+          const run = new Training(fromText(`equalize=true&replay=${replay}`).config, task);
           run.step();
-          return { first, memory: run.memory.map((pick) => [...pick.observation]) };
+          return run.memory.map((pick) => [...pick.observation]);
         });
         """
     )
-    same, again, other, shuffled, mirrored = got["runs"]
-    assert same == again and same["first"] == shuffled["first"] != other["first"]
-    before, after = (np.array(run["memory"]).reshape(5, -1, 3) for run in (same, shuffled))
-    assert (before[..., 2] == after[..., 2]).all() and (before != after).mean() > 0.6
-    for old, new in zip(before[..., :2], after[..., :2]):
+    before, shuffled, mirrored = np.array(got["runs"]).reshape(3, 5, -1, 3)
+    assert (before[..., 2] == shuffled[..., 2]).all() and (before != shuffled).mean() > 0.6
+    for old, new in zip(before[..., :2], shuffled[..., :2]):
         assert sorted(map(tuple, old)) == sorted(map(tuple, new))
-    after = np.array(mirrored["memory"]).reshape(5, -1, 3)
-    flipped = (before == -after).all(axis=1)
-    assert (flipped | (before == after).all(axis=1)).all()
+    flipped = (before == -mirrored).all(axis=1)
+    assert (flipped | (before == mirrored).all(axis=1)).all()
     assert flipped.any(axis=0).tolist() == [True, True, False]

@@ -4,9 +4,9 @@ from dataclasses import astuple, fields
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from studies import paths
 from studies.results import read_table
 from studies.seamless import episodes, jam_tables, jams, mujoco_jams
 from studies.seamless.jams import Case, SeamlessPhysics
@@ -82,9 +82,8 @@ def test_half_of_the_free_boxes_are_lifted_again_after_others_have_gone(simulate
 
 @pytest.mark.pybullet
 @pytest.mark.parametrize(("policy", "walls", "most"), [("random", 3, 9), ("highest", 2, 7)])
-def test_an_episode_takes_out_what_is_lifted(simulated, monkeypatch, policy, walls, most):
-    monkeypatch.setattr(episodes, "MOST_ATTEMPTS", 9)
-    monkeypatch.setattr(episodes, "CONTAINER_ATTEMPTS", 7)
+def test_an_episode_takes_out_what_is_lifted(simulated, set_in, policy, walls, most):
+    set_in(episodes, MOST_ATTEMPTS=9, CONTAINER_ATTEMPTS=7)
     rows = episodes.episode(case := Case(0, walls=walls, settle=0.3), policy, "restore")
     assert len(rows) == most and simulated.settled == [0.3]
     load, jammed, highest = jams.load_of(case), [], []
@@ -105,19 +104,19 @@ def attempt(box, out, jammed, covered=False, beside=1) -> dict:
     return {"box": box, "out": out, "covered": covered, "beside": beside, "distance": distance}
 
 
-def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
+def test_what_is_counted_of_all_cases_is_written(own_data, set_in):
     """Each case by itself; attempts by what was taken out, by place, and by what was between."""
     asked = [("fresh", Case(0)), ("lasting", Case(1)), ("width", Case(2, gap=-0.0001, picks=25))]
-    monkeypatch.setattr(jams, "cases", lambda: asked)
     lifts = [{"distance": distance} for distance in (0.1, task.LIFT_THRESHOLD, 0.46)]
     lasting = [
         {"box": box, "out": out, "before": before, "distance": distance}
         for out, distances in ((0, (0.1, 0.1, 0.2)), (5, (0.1, 0.3, 0.0)))
         for box, (before, distance) in enumerate(zip((0.1, 0.1, 0.2), distances))
     ]
-    monkeypatch.setattr(
-        jams, "answer", lambda kind, case: lasting if kind == "lasting" else lifts[: case.load + 1]
-    )
+
+    def answer(kind, case) -> list[dict]:
+        return lasting if kind == "lasting" else lifts[: case.load + 1]
+
     # Of these episodes the first three are of seamless walls, three, and restored.
     played = [
         (Case(0, friction=1.0), "random", "restore"), (Case(1, friction=1.0), "random", "restore"),
@@ -125,20 +124,17 @@ def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
         (Case(2, gap=0.001), "random", "restore"), (Case(3), "random", "keep"),
         (Case(4, walls=12), "random", "restore"),
     ]  # fmt: skip
-    monkeypatch.setattr(episodes, "cases", lambda: played)
     attempts = [
         attempt(7, 1, True), attempt(8, 1, False), attempt(7, 2, True), attempt(9, 24, False),
         attempt(7, 30, False), attempt(6, 31, True, True, 5), attempt(5, 31, False, True, 3),
     ]  # fmt: skip
-    monkeypatch.setattr(episodes, "episode", lambda *_: attempts)
+    set_in(jams, cases=lambda: asked, answer=answer)
+    set_in(episodes, cases=lambda: played, episode=lambda *_: attempts)
     jam_tables.both_data(1)
     tables = {
         name: read_table(f"seamless/{name}")
         for name in ("jams", "jam_lasting", "jam_episodes", "jam_first", "jam_again")
     }
-    for name, table in tables.items():
-        committed = paths.ROOT / f"data/seamless/{name}.csv"
-        assert committed.read_text(encoding="utf-8").startswith(",".join(table) + "\n")
     counted = tables["jams"][["question", "load", "gap", "moment", "free", "jammed", "median"]]
     assert counted.to_numpy().tolist() == [
         ["fresh", 0, 0, 0, 1, 1, 0.1], ["width", 2, -0.0001, 25, 3, 1, 0.2],
@@ -160,21 +156,20 @@ def test_what_is_counted_of_all_cases_is_written(own_data, monkeypatch):
 
 
 def test_what_is_published_are_the_planned_cases():
-    def rounded(rows) -> list[tuple]:
-        return [tuple(round(x, 6) if isinstance(x, float) else x for x in row) for row in rows]
+    def rows(table, names) -> list[tuple]:
+        return [*table.drop_duplicates(names)[names].round(6).itertuples(index=False, name=None)]
 
-    names = [field.name for field in fields(Case)]
+    cases, names = [*jams.cases()], [field.name for field in fields(Case)]
     counted = read_table("seamless/jams").rename(columns={"moment": "picks"})
     assert (counted["free"][counted["walls"] == 12] == jams.MOST_LIFTS).all()
-    counted = counted[["question", *names]]
-    planned = [(kind, *astuple(case)) for kind, case in jams.cases() if kind != "lasting"]
-    assert rounded(counted.itertuples(index=False)) == rounded(planned)
+    planned = [(kind, *astuple(case)) for kind, case in cases if kind != "lasting"]
+    planned = pd.DataFrame(planned, columns=["question", *names])
+    assert len(counted) == len(planned)
+    assert rows(counted, [*planned]) == rows(planned, [*planned])
 
-    keys = ["load", "friction", "again"]
-    lasting = read_table("seamless/jam_lasting").drop_duplicates(keys)[keys]
-    planned = [case for kind, case in jams.cases() if kind == "lasting"]
-    planned = [(case.load, case.friction, case.again) for case in planned]
-    assert list(lasting.itertuples(index=False, name=None)) == planned
+    lasting = rows(read_table("seamless/jam_lasting"), ["load", "friction", "again"])
+    of = [case for kind, case in cases if kind == "lasting"]
+    assert lasting == [(case.load, case.friction, case.again) for case in of]
 
     keys = ["load", "walls", "friction", "gap", "policy", "after_pick"]
     played = read_table("seamless/jam_episodes")
@@ -183,15 +178,14 @@ def test_what_is_published_are_the_planned_cases():
         left = len(jams.load_of(Case(load, walls))) - attempts + jammed
         most = episodes.MOST_ATTEMPTS if walls == 3 else episodes.CONTAINER_ATTEMPTS
         assert left == episodes.LEFT or attempts == most
-    played = played.drop_duplicates(keys)[keys]
-    assert list(played.itertuples(index=False, name=None)) == [
+    assert rows(played, keys) == [
         (case.load, case.walls, case.friction, case.gap, policy, after_pick)
         for case, policy, after_pick in episodes.cases()
     ]
 
-    other = read_table("seamless/mujoco_jams")[["load", "friction", "gap", "settle"]]
-    planned = [(case.load, case.friction, case.gap, case.settle) for case in mujoco_jams.cases()]
-    assert list(other.itertuples(index=False, name=None)) == planned
+    other = rows(read_table("seamless/mujoco_jams"), ["load", "friction", "gap", "settle"])
+    of = mujoco_jams.cases()
+    assert other == [(case.load, case.friction, case.gap, case.settle) for case in of]
 
 
 def test_free_boxes_with_a_gap_are_lifted_by_the_second_engine_too(own_data, monkeypatch):

@@ -24,11 +24,6 @@ def test_a_world_settles_and_goes_on(monkeypatch):
     assert (offsets[1:, still] != offsets[0, still]).any(), "nobody touches them, and they creep"
 
 
-def test_five_loads_are_played_by_both():
-    played = {(world.load, world.policy) for world in creep.worlds() if world.walls == 3}
-    assert played == {(load, policy) for load in range(5) for policy in ("highest", "random")}
-
-
 def test_the_order_of_equals_is_followed_among_untouched_boxes():
     """Offsets of a world that is made up: along x kept, along y reversed at each pick."""
     world = creep.World(0)

@@ -11,9 +11,8 @@ from studies.grid import read_grid
 from studies.results import read_provenance, read_table
 from studies.ties import earlier, leak, training
 from studies.ties.criterion import FIG11, FIG12, likeness
-from studies.ties.figures import draw_ends, read_by_ties
 from studies.ties.laboratory import CELLS, mirrored_load
-from tests.studies.curves import course
+from tests.studies.test_statistics import course
 from unload import stack_load, task
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
@@ -50,6 +49,8 @@ def test_the_cells_are_those_of_the_plan():
     assert not [name for name in training.CELLS if not any(fnmatch(name, p) for p in patterns)]
     assert "ρ = 0.965 along x and y and 0.997 along z" in plan
     assert training.CORRELATIONS["drifting"] == (0.965, 0.965, 0.997)
+    anew = training.CELLS["anew_mask"].change.keywords["correlation"]
+    assert not any(anew), "nothing is left of the noise before"
     seeds = {seed for cell in training.CELLS.values() for seed in cell.seeds}
     assert (min(seeds), max(seeds)) == (60, 64) and "seeds 60–64" in plan
     assert [len(CELLS[name].seeds) for name in ("rho_0.0", "positions")] == [10, 20]
@@ -72,12 +73,6 @@ def test_the_runs_of_the_first_plan_are_all_there():
     assert len(late) == 20 and np.allclose(late.sort_index(), twenty.sort_index(), atol=1e-4)
 
 
-def test_ends_are_drawn_by_mask_and_ties():
-    runs = read_by_ties()
-    dots = [sum(len(line.get_xdata()) for line in axes.lines[:-1]) for axes in draw_ends(runs).axes]
-    assert dots == [runs["mask"].sum(), (~runs["mask"]).sum()]
-
-
 @pytest.mark.parametrize("ties", ["order", "noise"])
 def test_order_tells_which_box_is_the_upper_one(ties):
     told = leak.told_by_rank(leak.LOADS[0], ties)
@@ -94,11 +89,3 @@ def test_a_mirrored_load_exchanges_left_and_right():
     assert np.allclose(load.positions[:, 1] + mirrored.positions[:, 1], task.CONTAINER[1])
     assert np.allclose(load.positions[:, ::2], mirrored.positions[:, ::2])
     assert (load.sizes == mirrored.sizes).all()
-
-
-def test_what_is_published_was_asked_as_it_is_asked_today():
-    assert read_provenance("ties/leak")["settings"] == {
-        "loads": [leak.LOADS[0], leak.LOADS[-1]], **leak.JUDGED
-    }  # fmt: skip
-    anew = training.TIES.cells["anew_mask"].change.keywords["correlation"]
-    assert not any(anew), "nothing is left of the noise before, as PLAN.md has it"
