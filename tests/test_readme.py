@@ -139,3 +139,47 @@ def test_sentences_are_short(path):
     most = 18 if path.parent.name == "report" else 15
     average = sum(lengths.values()) / len(lengths)
     assert average <= most and lengths[longest] <= 3 * most, longest
+
+
+GLOSSARY = (ROOT / "notebooks/glossary.md").read_text(encoding="utf-8")
+# Words of the glossary that are read rightly by who knows only what they mean everywhere.
+EVERYDAY = {
+    "box", "item", "package", "wall", "load", "lift", "row", "place", "pick", "step", "value",
+    "score", "run", "seed", "cell", "pair", "falls", "update", "visible", "on top", "gap", "replay",
+}  # fmt: skip
+
+
+def terms() -> dict[str, list[int]]:
+    """The other words of the glossary, longest first, and the notebooks that introduce them."""
+    rows = re.findall(r"^\| \*\*(.+?)\*\* \| .* \| (.*) \|$", GLOSSARY, re.M)
+    found = {
+        re.sub(r" \(.*\)", "", term): [int(number) for number in re.findall(r"\[(\d+)\]", places)]
+        for names, places in rows
+        for term in names.split(", ")
+    }
+    assert EVERYDAY < set(found)
+    return {name: found[name] for name in sorted(set(found) - EVERYDAY, key=len, reverse=True)}
+
+
+def unexplained(text: str, number: int) -> list[str]:
+    """Terms that a text uses first without italics, bold or a link, and that no notebook of at
+    most this number introduces; none where the text links the glossary.
+    """
+    text, found = re.sub(r"```.*?```|`[^`]*`|!\[.*?\)", "", text, flags=re.DOTALL), []
+    marks = [*re.finditer(r"\*+[^*\n]+\*+|\[[^\]]*\]\([^)]*\)", text)]
+    for term, introduced in terms().items():
+        case = re.I if term.islower() else 0
+        word = re.compile(rf"(?<![\w-]){re.escape(term)}s?(?![\w-])", case)
+        use = word.search(text)
+        if use and min(introduced, default=99) > number and "glossary.md" not in text:
+            if not any(mark.start() <= use.start() < mark.end() for mark in marks):
+                found.append(term)
+        text = word.sub(lambda match: "_" * len(match[0]), text)
+    return found
+
+
+@pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.stem)
+def test_terms_are_explained_where_they_are_met(path):
+    """In the README's first screen, the first cells of the course, and the reports."""
+    text = run.opening(path).partition("\n## Look\n")[0]
+    assert not unexplained(text, int(path.stem[:2]) if path.parent == run.HERE else -1)
