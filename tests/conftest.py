@@ -14,7 +14,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import torch
-from hypothesis import settings
 
 import unload
 from studies import paths
@@ -22,15 +21,9 @@ from unload.physics.situation import Situation, Surroundings
 
 matplotlib.use("Agg")  # without a screen
 torch.set_num_threads(1)
-# The same examples every time, however slow the machine is, and none kept from run to run.
-settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
-settings.load_profile("repeatable")
-
 
 # What some systems lack that some tests need.
 AVAILABLE = {
-    "/proc": os.path.exists("/proc/self/statm"),
-    "SIGKILL": hasattr(signal, "SIGKILL"),
     "SIGPIPE": hasattr(signal, "SIGPIPE"),
     "fork": hasattr(os, "fork"),
     "mkfifo": hasattr(os, "mkfifo"),
