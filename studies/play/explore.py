@@ -3,6 +3,7 @@
 import base64
 import io
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 
 import anywidget
@@ -68,7 +69,11 @@ class Explore(widgets.VBox):
     def _show(self) -> None:
         self._busy.value = "computing …"
         values = {name: control.value for name, control in self._controls.items()}
-        self._figure, content = self._draw(**values), io.BytesIO()
+        try:
+            self._figure, content = self._draw(**values), io.BytesIO()
+        except Exception as error:  # which Jupyter keeps for its log
+            self._busy.value = escape(f"{type(error).__name__}: {error}")
+            raise
         # Margins stay where the picture is clicked, so that its shares are those of the figure.
         whole = {"savefig.bbox": "standard"} if self._clickable else {}
         with plt.style.context([STYLE, whole]):

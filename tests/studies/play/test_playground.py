@@ -112,8 +112,9 @@ def test_a_deadlock_is_seen_and_the_mask_ends_it():
 
 def test_a_figure_under_sliders_is_drawn_at_each_change():
     def draw(end):
+        high = 1 / (9 - end)
         figure, axes = plt.subplots(figsize=(1, 1))
-        axes.set(ylim=(0, end))
+        axes.set(ylim=(0, high))
         return figure
 
     end = widgets.IntSlider(3, max=9)
@@ -126,6 +127,9 @@ def test_a_figure_under_sliders_is_drawn_at_each_change():
     bundle = view._repr_mimebundle_()
     assert WIDGET in bundle and base64.b64decode(bundle["image/png"]) == before
     assert not plt.get_fignums(), "a figure that is open is shown twice"
+    with pytest.raises(ZeroDivisionError):
+        end.value = 9
+    assert view._busy.value == "ZeroDivisionError: division by zero"
 
 
 def test_a_click_on_a_figure_sets_a_control_or_says_why_not():
