@@ -29,7 +29,7 @@ from unload.fast import fused
 COMMAND = "python -m studies.speed.run"
 # Picks that count, of ours with the fused update, of ours with plain PyTorch's, and of theirs.
 FUSED, PLAIN, THEIRS = 256_000, 3_200, 960
-NEW = 25_600  # of ours on loads that never repeat, with as many before, in which processes start
+NEW = 25_600  # of ours on loads that never repeat, with as many before that do not count
 THREADS = {1: "1 thread", 2: "2 threads"}
 
 
