@@ -63,16 +63,19 @@ def test_the_answer_is_that_of_the_data():
     masked = runs[runs["cell"].str.endswith("_mask") & ~runs["cell"].str.endswith("_no_mask")]
     assert f"{masked['fell'].sum()} of {len(masked)} reach 95–100 % and fall below 80 %" in text
     published = read_table("falls/published").query("cell in @PAPER_CELLS")
-    assert f"With x and y hidden, all {len(published)} miss nothing" in text
+    assert f"Without x and y, all {len(published)} miss nothing" in text
     assert (published["judged_place"] == 1).all()
     shared = paper[paper["cell"].isin(["averaged_mask", "averaged_b2048_mask"])]
     ordered = read_table("ties/earlier").query("cell == 'ties_by_order_mask'")
     both = len(shared) + len(ordered)
-    assert f"nor do {both} with the mask and ties averaged or by order" in text
+    assert f"of {both} with the mask and ties averaged or by order, none" in text
     every = [paper, *(by_run(read_grid(grid), likeness) for grid in (LONG, SEAMLESS, TIES))]
     anew = every[-1].query("cell in ['anew_mask', 'anew_no_mask']")
     assert "With noise anew at each pick, none of six falls" in text and len(anew) == 6
     assert not any(runs["fell"].any() for runs in (shared, ordered, anew))
+    drifting = every[-1].query("cell in ['drifting_mask', 'drifting_no_mask']")
+    assert "PyBullet's, four of five;" in text
+    assert (drifting["fell"].sum(), len(drifting)) == (4, 5)
     assert f"Of {sum(map(len, every))} runs one, with jams and ties by order, is like its" in text
     (alike,) = pd.concat(every).query("both")["cell"]
     assert alike == "b2048_mask_order"

@@ -1,4 +1,7 @@
-"""Diagrams: the task as a Markov decision process (Fig. 1), substacks (3), the network (7)."""
+"""Diagrams: the task as a Markov decision process (Fig. 1), substacks (3), the network (7).
+
+Notebooks 01 and 03 draw and save them.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -90,27 +93,27 @@ def fig03_substacks() -> Figure:
     Numbers are packages 0–12; everything is drawn to the same scale.
     """
     figure, axes = plt.subplots(figsize=(8.2, 6.6))
-    across, down, gap = 0.0, 0.88, 0.3  # m
+    across, pitch, gap = 0.0, 0.88, 0.3  # m; the pitch from one variant to the next
     for name, variants in SUBSTACKS.items():
         package, left, _ = np.concatenate(variants).T
         width = (left + PACKAGES[package, 0]).max() * CELL
         for variant, boxes in enumerate(variants):
-            _draw_substack(axes, boxes, across, (3 - variant) * down)
-        axes.text(across + width / 2, 4 * down - 0.1, name, ha="center", fontweight="bold")
+            _draw_substack(axes, boxes, across, (3 - variant) * pitch)
+        axes.text(across + width / 2, 4 * pitch - 0.1, name, ha="center", fontweight="bold")
         across += width + gap
     for variant in range(3):
-        middle = (3 - variant) * down + CELLS_HIGH * CELL / 2
+        middle = (3 - variant) * pitch + CELLS_HIGH * CELL / 2
         axes.text(-0.08, middle, f"variant {variant}", ha="right", va="center")
     bar = across - gap + 0.14
-    axes.plot([bar, bar], [down, down + 0.5], color=INK, lw=2, solid_capstyle="butt")
-    axes.text(bar + 0.05, down + 0.25, "0.5 m", va="center")
+    axes.plot([bar, bar], [pitch, pitch + 0.5], color=INK, lw=2, solid_capstyle="butt")
+    axes.text(bar + 0.05, pitch + 0.25, "0.5 m", va="center")
     # One row of a wall: a variant in each column.
     low = -0.12
     for (left, variants), number in zip(COLUMNS, (0, 1, 2, 0)):
         _draw_substack(axes, variants[number], left * CELL, low)
     label = "left 0, mid 1, mid 2, right 0\nform one row of a wall,\n2.5 m wide, 0.69 m high"
     axes.text(CELLS_WIDE * CELL + 0.08, low + CELLS_HIGH * CELL / 2, label, va="center")
-    axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(low - 0.02, 4 * down + 0.02))
+    axes.set(xlim=(-0.48, CELLS_WIDE * CELL + 1.1), ylim=(low - 0.02, 4 * pitch + 0.02))
     axes.set_aspect("equal")
     axes.axis("off")
     return figure
@@ -246,7 +249,7 @@ def _draw_border(axes: Axes, boxes, x: float, z: float) -> None:
     style = {"color": INK, "lw": 1.8, "solid_capstyle": "projecting"}
     for column, row in np.argwhere(inside[1:] != inside[:-1]):
         across, up = x + column * CELL, z + row * CELL
-        axes.plot([across, across], [up - CELL, up], **style)
+        axes.plot([across, across], [up - CELL, up], **style)  # row 0 is the margin
     for column, row in np.argwhere(inside[:, 1:] != inside[:, :-1]):
         across, up = x + column * CELL, z + row * CELL
         axes.plot([across - CELL, across], [up, up], **style)

@@ -189,7 +189,7 @@ def draw_answer() -> Figure:
     left.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", ms=12, clip_on=False, zorder=5)
     _label(left, (0.04, 0.04), "the paper", "black")
     left.set_title(
-        "The paper's configuration, ties broken\nby frozen noise: runs rise, and fall", loc="left"
+        "The paper's configuration, ties broken\nby frozen noise: runs rise, and sink", loc="left"
     )
 
     drifting = _draw_runs(middle, ties, ["drifting_mask"], ranks)

@@ -67,7 +67,7 @@ class RunFolder:
             raise ValueError(f"run_dir is {str(run_dir)!r}; {wanted}")
         self.path = path.absolute()
         self._paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
-        self._checkpoint, self.policy, self._curve, self._config = self._paths
+        self._checkpoint_file, self.policy, self._curve_file, self._config_file = self._paths
 
     def check_foreign(self, name: str, value: object) -> Path:
         """Return the absolute path of a file that is an argument; raise if it is one of these."""
@@ -87,7 +87,7 @@ class RunFolder:
     @property
     def finished(self) -> bool:
         """Whether the run has ended, and its policy is whole."""
-        return self._config.exists()
+        return self._config_file.exists()
 
     def check_room(self, run) -> None:
         """Raise OSError unless the disk has room for the checkpoints of a fresh ``Training``.
@@ -96,7 +96,7 @@ class RunFolder:
         """
         arrays = [*gather(run).values(), *run.replay.arrays.values()]
         needed = 2 * sum(array.nbytes for array in arrays)
-        there = self._checkpoint.stat().st_size if self._checkpoint.exists() else 0
+        there = self._checkpoint_file.stat().st_size if self._checkpoint_file.exists() else 0
         room = shutil.disk_usage(self.path).free + there
         if room < needed:
             reason = (
@@ -109,50 +109,51 @@ class RunFolder:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": FORMAT, "version": task.VERSION, "settings": json.dumps(run.settings)}
         arrays = {name: np.array(mark) for name, mark in marks.items()}
-        files.write_arrays(self._checkpoint, gather(run) | arrays)
+        files.write_arrays(self._checkpoint_file, gather(run) | arrays)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
-        files.write_text(self._curve, run.curve.table().to_csv(index=False, lineterminator="\n"))
+        table = run.curve.table()
+        files.write_text(self._curve_file, table.to_csv(index=False, lineterminator="\n"))
 
     def restore(self, run) -> None:
         """Let a ``Training`` go on from the checkpoint, if there is one."""
-        if not self._checkpoint.exists():
+        if not self._checkpoint_file.exists():
             return
         try:
-            stored = files.read_arrays(self._checkpoint, checked=True)
+            stored = files.read_arrays(self._checkpoint_file, checked=True)
         except ValueError as error:
             raise ValueError(f"{error}; {OTHER}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
-            raise ValueError(f"{self._checkpoint} is not of format {FORMAT}; {OTHER}")
+            raise ValueError(f"{self._checkpoint_file} is not of format {FORMAT}; {OTHER}")
         if (version := str(stored.pop("version", None))) != task.VERSION:
-            raise ValueError(f"{self._checkpoint} is of unload {version}; {OTHER}")
+            raise ValueError(f"{self._checkpoint_file} is of unload {version}; {OTHER}")
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
             put_back(run, stored)
         except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
             reason = f"{type(error).__name__}: {error}"
-            raise ValueError(f"{self._checkpoint} does not fit this run: {reason}") from error
+            raise ValueError(f"{self._checkpoint_file} does not fit this run: {reason}") from error
 
     def finish(self, run) -> None:
         """Keep what a ``Training`` leaves at its end."""
         save_policy(run.policy(), self.policy)
         self.save_curve(run)
-        marks = {path.name: files.digest(path) for path in (self.policy, self._curve)}
+        marks = {path.name: files.digest(path) for path in (self.policy, self._curve_file)}
         # Last, because it marks the run as finished.
-        files.write_json(self._config, run.settings | {"marks": marks}, checked=True)
+        files.write_json(self._config_file, run.settings | {"marks": marks}, checked=True)
 
     def result(self, config: TrainConfig, settings: dict) -> TrainResult:
         """Read back what a finished run of ``training.train`` has left; see ``settings_of_run``."""
-        stored = files.read_json(self._config, checked=True)
+        stored = files.read_json(self._config_file, checked=True)
         marks = stored.pop("marks", {})
         self._check_same(stored, settings)
-        for path in (self.policy, self._curve):
+        for path in (self.policy, self._curve_file):
             files.check_digest(path, marks.get(path.name))
         with suppress(OSError):  # it is gone already, or the folder is read-only
-            self._checkpoint.unlink()
+            self._checkpoint_file.unlink()
         network = make_network(config.network, config.n_features)
-        return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve))
+        return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve_file))
 
     def _check_same(self, stored: dict, settings: dict) -> None:
         # As text, in which 1, 1.0 and True are told apart, and not-a-number is itself.

@@ -52,7 +52,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
-        change: is made at the end, see ``train``.
+        change: is called with this, once it is complete, see ``train``.
 
     Attributes:
         settings: what the run is, as JSON can hold it.

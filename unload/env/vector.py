@@ -133,10 +133,11 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        # Also where nothing is playing; what that does goes with the next ``_fill``.
+        # Not asked who is playing: ``step`` drops what is done in the others, and fills them anew.
         items, distances = self._lift(actions)
-        lifted = self._containers, actions, distances
-        rewards = containers.unload_lifted(*lifted, *self._how_observed)
+        rewards = containers.unload_lifted(
+            self._containers, actions, distances, *self._how_observed
+        )
         return rewards, {"item": items, "distance": distances}
 
     def _lift(self, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

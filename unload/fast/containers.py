@@ -144,8 +144,9 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
         starts, links = containers.starts[env], containers.links[env]
         present, right = containers.present[env], containers.widths[env]
         dynamic = find_movers(starts, links, present, items[env], members, HELD_DOWN + 1)
-        if dynamic == 1 or dynamic > HELD_DOWN:
-            distances[env] = FREE_LIFT if dynamic == 1 else 0.0
+        on_top = dynamic - 1
+        if on_top == 0 or on_top >= HELD_DOWN:
+            distances[env] = FREE_LIFT if on_top == 0 else 0.0
             continue
 
         words = write_key(starts, links, present, geometry, right, members, dynamic, key)
@@ -178,7 +179,8 @@ def unload_lifted(containers, actions, distances, equalize, average, tolerance):
         for i in range(row, _N_VISIBLE - 1):
             visible[i] = visible[i + 1]
 
-        # The last row goes to the nearest item that has not been seen yet, if there is one.
+        # The last row goes to the nearest item that has not been seen yet, if there is one: all
+        # before it in the order are visible, or have been unloaded.
         if rows == _N_VISIBLE:
             item = containers.by_distance[env, containers.unloaded[env] + _N_VISIBLE - 1]
             visible[_N_VISIBLE - 1] = item

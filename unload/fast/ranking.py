@@ -33,14 +33,14 @@ def rank(values, ranks):
 @compiled
 def replace(values, ranks, row, value):
     """Take the item in ``row`` out, move the later ones up, and add one at the end."""
-    left, last = ranks[row], len(values) - 1
+    gone, last = ranks[row], len(values) - 1
     for i in range(row, last):
         values[i], ranks[i] = values[i + 1], ranks[i + 1]
     values[last] = value
     smaller = np.int32(0)
     for i in range(last):
         above = values[i] > value
-        ranks[i] += np.int32(above) - np.int32(ranks[i] > left)
+        ranks[i] += np.int32(above) - np.int32(ranks[i] > gone)
         smaller += not above
     ranks[last] = smaller
 
@@ -48,11 +48,11 @@ def replace(values, ranks, row, value):
 @compiled
 def remove(values, ranks, row):
     """Take the item in ``row`` out and move the later ones up; the last place is void then."""
-    left, last = ranks[row], len(values) - 1
+    gone, last = ranks[row], len(values) - 1
     for i in range(row, last):
         values[i], ranks[i] = values[i + 1], ranks[i + 1]
     for i in range(last):
-        ranks[i] -= np.int32(ranks[i] > left)
+        ranks[i] -= np.int32(ranks[i] > gone)
 
 
 @compiled

@@ -52,12 +52,12 @@ RIGHT = (
 )  # fmt: skip
 # Cells from a left substack to the next one, which begins where its upper boxes end; and from
 # each other one.
-_LEFT_CELLS, _OTHER_CELLS = 6, 10
+_LEFT_STEP, _OTHER_STEP = 6, 10
 
 
 def _columns(count: int) -> list[tuple[int, tuple]]:
     """One row of a wall, from left to right: (left edge in cells, variants of the substack)."""
-    edges = [0, *(_LEFT_CELLS + _OTHER_CELLS * number for number in range(count - 1))]
+    edges = [0, *(_LEFT_STEP + _OTHER_STEP * number for number in range(count - 1))]
     return list(zip(edges, (LEFT, *[MID] * (count - 2), RIGHT)))
 
 
@@ -83,7 +83,7 @@ def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
 def _substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
     """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
     cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # across and up
-    columns = 1 + int((cells - _LEFT_CELLS) / _OTHER_CELLS)
+    columns = 1 + int((cells - _LEFT_STEP) / _OTHER_STEP)
     return round(WALLS / scale), int(cells / CELLS_HIGH), columns
 
 

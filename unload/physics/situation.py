@@ -129,6 +129,9 @@ def find_movers(starts, links, present, item, members, most):
 def write_key(starts, links, present, geometry, right, members, dynamic, key):
     """Write the words of ``Situation.key``; return how many there are.
 
+    They are how many boxes move, 1 if there is a floor and else 0, its z, up to two sides, and six
+    words for each box.
+
     Args:
         starts, links, present: as for ``find_movers``.
         geometry: (n, 6) float64, centre and edge lengths of each box in m.
@@ -194,12 +197,12 @@ def situation_in(
 
     # What stands between its head and the boxes, six words each, are the floor and the sides.
     first = 2 + key[1]
-    sides = (len(key) - first) % 6
+    side_count = (len(key) - first) % 6
     return Situation(
-        boxes=key[first + sides :].reshape(-1, 6),
+        boxes=key[first + side_count :].reshape(-1, 6),
         dynamic=int(key[0]),
         floor=int(key[2]) if key[1] else None,
-        sides=tuple(key[first : first + sides].tolist()),
+        sides=tuple(key[first : first + side_count].tolist()),
     )
 
 
