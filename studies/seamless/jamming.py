@@ -132,7 +132,7 @@ def weigh(run: Training, z: float) -> None:
         distances = (task.VIEWPOINT - load.positions - blur) ** 2 @ weights
         order = np.argsort(distances, kind="stable")
         envs._containers.by_distance[env, : len(load)] = order
-        containers.show_nearest(envs._containers, env, *envs._features)
+        containers.show_nearest(envs._containers, env, *envs._how_observed)
 
     envs._put_load = put_in_order
     run.rollout._see(*envs.reset(seed=run.config.seeds()[0]))
