@@ -125,7 +125,7 @@ def draw_run(curve: pd.DataFrame) -> Figure:
 
 
 def read_by_duration() -> pd.DataFrame:
-    """All published runs of 20 million picks without the mask whose ties noise breaks, by its ρ.
+    """The published runs of b = 256 without the mask whose ties noise breaks, by its ρ.
 
     Returns:
         A row per run: ``rho``, the same along all axes, ``cell``, ``seed``, and what
