@@ -22,6 +22,10 @@ NAMES = {  # of what ``PUPILS`` see and store, in their order
     "averaged": "ties averaged",
     "level": "level loads",
 }
+PAPER_KINDS = {  # what the paper's four cells are called
+    name: f"mask {'on' if cell.config.mask else 'off'}, b = {cell.config.batch_size}"
+    for name, cell in PAPER_CELLS.items()
+}
 
 
 @styled
@@ -32,7 +36,7 @@ def four_cells(curves: pd.DataFrame) -> Figure:
         curves: see ``read_grid``; other cells are left out.
     """
     figure, panels = plt.subplots(2, 2, figsize=(7, 4.6), sharex=True, sharey=True)
-    for axes, (name, cell) in zip(panels.flat, PAPER_CELLS.items()):
+    for axes, (name, kind) in zip(panels.flat, PAPER_KINDS.items()):
         runs = [run for _, run in curves[curves["cell"] == name].groupby("seed")]
         for run in runs:
             axes.plot(run["picks"] / 1e6, 100 * run["success_rate"], "C1", lw=0.5, alpha=0.5)
@@ -44,7 +48,6 @@ def four_cells(curves: pd.DataFrame) -> Figure:
             fmt="k_", capsize=3,
         )  # fmt: skip
         axes.axhline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
-        kind = f"mask {'on' if cell.config.mask else 'off'}, b = {cell.config.batch_size}"
         axes.set(title=f"{kind}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
     figure.supxlabel("million picks; dots: mean over the last tenth, with its 95 % t interval")
     figure.supylabel("MSR while training (%)")

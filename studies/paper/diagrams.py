@@ -26,8 +26,8 @@ from unload.load.substacks import (
 
 INK = "#333333"
 PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
-WIDTH, HEIGHT = 14, 6.5  # of a block of Fig. 1
-LEFT_EDGES = (15, 35, 55, 75)  # left edges of the blocks
+WIDTH, HEIGHT = 17, 6.5  # of a block of Fig. 1
+LEFT_EDGES = (13.5, 33.5, 53.5, 73.5)  # left edges of the blocks
 # From left to right: what a block is called, and what it does.
 AGENT = (
     ("equalization", "ranks, Alg. 1"),
@@ -51,7 +51,7 @@ BLUE, GREEN, RED, OCHRE, PURPLE = "#2878b5", "#45a661", "#de5638", "#c98a1b", "#
 @styled
 def fig01_mdp() -> Figure:
     """Fig. 1: agent and environment of the task, and what passes between them."""
-    figure, axes = plt.subplots(figsize=(10.4, 3.7))
+    figure, axes = plt.subplots(figsize=(9.2, 3.3))
     axes.set(xlim=(0, 104), ylim=(0, 37), aspect="equal")
     axes.axis("off")
     for name, (low, colour) in PANELS.items():
@@ -63,23 +63,23 @@ def fig01_mdp() -> Figure:
             _rounded(axes, x, low, WIDTH, HEIGHT, fc="white", ec=INK, lw=1)
             style = {"ha": "center", "va": "center"}
             axes.text(x + WIDTH / 2, low + 4.2, title, fontweight="bold", fontsize=9, **style)
-            axes.text(x + WIDTH / 2, low + 1.9, text, fontsize=7.5, color="#555555", **style)
+            axes.text(x + WIDTH / 2, low + 1.9, text, fontsize=8, color="#555555", **style)
     middle, below = upper + HEIGHT / 2, lower + HEIGHT / 2
     for left, right in zip(LEFT_EDGES, LEFT_EDGES[1:]):
         _path(axes, [(left + WIDTH, middle), (right, middle)])
         _path(axes, [(right, below), (left + WIDTH, below)])
     axes.text(52, middle + 0.5, r"$\hat{q}$", ha="center", va="bottom", color=INK)
-    _rounded(axes, 20, 20.2, 32, 3, fc="white", ec=INK)
+    _rounded(axes, 19, 20.2, 34, 3, fc="white", ec=INK)
     text = r"learning: replay buffer, smooth-$L_1$ loss ($\gamma = 0$)"
     axes.text(36, 21.7, text, ha="center", va="center", fontsize=8)
     _path(axes, [(42, 23.2), (42, upper)], (0, (3, 2)))
 
     # Action on the right, observation on the left, reward and mask between the panels.
-    _path(axes, [(89, middle), (98, middle), (98, below), (89, below)])
+    _path(axes, [(90.5, middle), (98, middle), (98, below), (90.5, below)])
     axes.text(99, 17.5, "action\n$u_k$: row of\nthe item\nto pick", va="center")
-    _path(axes, [(15, below), (6, below), (6, middle), (15, middle)])
+    _path(axes, [(13.5, below), (6, below), (6, middle), (13.5, middle)])
     axes.text(5, 17.5, "next\nobservation\n$x_{k+1}$", va="center", ha="right")
-    _path(axes, [(58, lower + HEIGHT), (58, 21.7), (52, 21.7)])
+    _path(axes, [(58, lower + HEIGHT), (58, 21.7), (53, 21.7)])
     axes.text(57, 14, r"reward $r_{k+1} = \pm 1$", va="center", ha="right")
     _path(axes, [(66, lower + HEIGHT), (66, upper)])
     axes.text(67, 14, "mask of failed items", va="center")

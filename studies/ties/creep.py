@@ -149,22 +149,21 @@ def draw_durations(table: pd.DataFrame, drift: Sequence[float]) -> Figure:
         table: as ``creep_data`` writes it.
         drift: of this noise, the correlation from one pick to the next along x, y and z.
     """
-    figure, panels = plt.subplots(1, 3, figsize=(8.4, 2.7), sharey=True)
+    figure, panels = plt.subplots(1, 3, figsize=(8.4, 3), sharey=True)
     found, lags = durations(table)["spearman"], np.arange(1, LAGS[-1] + 1)
     for axes, axis, correlation in zip(panels, "xyz", drift):
         for walls, marker, label in ((3, "o-", "three walls"), (12, "s-", "a whole container")):
             measured = found[walls, axis]
             hollow = None if walls == 3 else "none"
             axes.plot(measured.index, measured, marker, color="0.25", mfc=hollow, ms=4, label=label)
-        label = f"drift, ρ = {correlation:g}"
-        axes.plot(lags, correlation**lags, "--", color=COLOURS["ranks"], label=label)
+        axes.plot(lags, correlation**lags, "--", color=COLOURS["ranks"], label="drifting noise")
         axes.axhline(0, color="0.6", linewidth=0.8)
-        axes.set(title=f"along {axis}", xscale="log", xticks=LAGS[::2], ylim=(-0.2, 1.05))
+        axes.set(title=f"along {axis}; drift: ρ = {correlation:g}", xscale="log", xticks=LAGS[::2], ylim=(-0.2, 1.05))
         axes.xaxis.set_major_formatter(ScalarFormatter())
         axes.minorticks_off()
-        axes.legend(fontsize=7, loc="lower left")
     panels[0].set_ylabel("rank correlation")
     panels[1].set_xlabel("picks in between")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 

@@ -62,9 +62,8 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
     Args:
         runs: see ``read_by_ties``.
     """
-    figure, panels = plt.subplots(1, 2, figsize=(9.4, 3.9), sharey=True)
+    figure, panels = plt.subplots(2, 1, figsize=(6.8, 5.6), sharex=True, sharey=True)
     for axes, mask in zip(panels, (True, False)):
-        labels = []
         for place, label in enumerate(KINDS):
             group = runs[(runs["ties"] == label.replace("\n", " ")) & (runs["mask"] == mask)]
             spread = np.linspace(-0.25, 0.25, len(group)) if len(group) > 1 else [0.0] * len(group)
@@ -74,11 +73,11 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
                     place + np.asarray(spread)[shown], 100 * group["end"][shown], "o",
                     markersize=5, markeredgecolor="C1", markerfacecolor=face,
                 )  # fmt: skip
-            labels.append(f"{label}\n({len(group)})")
+            axes.text(place, 4, f"{len(group)} runs", ha="center", fontsize=9)
         axes.axhline(100 * PAPER_MSR, color="0.4", linestyle=":", linewidth=1)
-        axes.set_xticks(range(len(KINDS)), labels, fontsize=7)
+        axes.set_xticks(range(len(KINDS)), KINDS, fontsize=9)
         axes.set(title=f"{'with' if mask else 'without'} the mask", ylim=(0, 103))
-    panels[0].set_ylabel("MSR over the last tenth of the picks (%)")
+    figure.supylabel("MSR over the last tenth of the picks (%)", fontsize=10)
     return figure
 
 
@@ -98,7 +97,7 @@ def draw_words(axes: Axes, scale: Callable = lambda msr: msr) -> None:
 
 @styled
 def draw_run(curve: pd.DataFrame) -> Figure:
-    """A run beside what the paper says of its own, and which parts of the criterion hold.
+    """A run beside what the paper says of its own, and which parts of the criterion it meets.
 
     Args:
         curve: of one run, with ``cell`` and ``seed``.
@@ -114,7 +113,7 @@ def draw_run(curve: pd.DataFrame) -> Figure:
     first = curve.iloc[0]
     said = [
         f"{mark} {', '.join(part for part in WORDS if holds[part] == wanted) or 'none'}"
-        for mark, wanted in (("holds:", True), ("missed:", False))
+        for mark, wanted in (("met:", True), ("missed:", False))
     ]
     title = f"{first['cell']}, seed {first['seed']}\n{'; '.join(said)}"
     axes.set(xlim=(0, PICKS), xticks=np.arange(5) * 5e6, xlabel="picks")
