@@ -83,6 +83,7 @@ def agent_view(
     axes.set_title(
         f"{len(np.unique(ranks))} different ranks in height; the greedy choice, item {item} of "
         f"rank {ranks[greedy]:.1f}, {'can' if liftable[greedy] else 'cannot'} be lifted\n"
-        f"the next pick succeeds with probability {chance:.2f}, and over {DRAWS} draws of the noise with {others:.2f}"
+        f"the next pick succeeds with probability {chance:.2f}, "
+        f"on average over {DRAWS} draws of the noise with {others:.2f}"
     )
     return figure
