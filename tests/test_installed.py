@@ -101,6 +101,8 @@ def test_names_are_where_type_checkers_find_them():
     del found["__builtins__"]
     assert found.keys() == set(unload.__all__) - {"__version__"} == unload._PLACES.keys()
     assert all(getattr(unload, name) is value for name, value in found.items())
+    # Without ``as`` the names would not be exported for a strict type checker.
+    assert all(name.asname == name.name for line in typed.body for name in line.names)
     assert set(unload.__all__) <= set(dir(unload))
     with pytest.raises(AttributeError, match="module 'unload' has no attribute 'lift'"):
         _ = unload.lift

@@ -12,23 +12,26 @@ from typing import TYPE_CHECKING
 from unload.support.checks import needed_for
 from unload.task import VERSION as __version__
 
-# ruff: noqa: F401
 if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
-    from unload.agent import policies
-    from unload.agent.config import TrainConfig
-    from unload.agent.dqn import DQN
-    from unload.agent.evaluation import evaluate, success_rate
-    from unload.agent.greedy import Greedy, load_policy, save_policy
-    from unload.agent.order import picking_order
-    from unload.agent.training import train
-    from unload.env.container import ContainerEnv
-    from unload.env.equalization import equalize
-    from unload.env.highest_item import HighestItemEnv
-    from unload.load.boxes import Load
-    from unload.load.packing_list import read_load
-    from unload.load.substacks import build_load, stack_load
-    from unload.load.view import view
-    from unload.network.peq import PEQNetwork
+    from unload.agent import policies as policies
+    from unload.agent.config import TrainConfig as TrainConfig
+    from unload.agent.dqn import DQN as DQN
+    from unload.agent.evaluation import evaluate as evaluate
+    from unload.agent.evaluation import success_rate as success_rate
+    from unload.agent.greedy import Greedy as Greedy
+    from unload.agent.greedy import load_policy as load_policy
+    from unload.agent.greedy import save_policy as save_policy
+    from unload.agent.order import picking_order as picking_order
+    from unload.agent.training import train as train
+    from unload.env.container import ContainerEnv as ContainerEnv
+    from unload.env.equalization import equalize as equalize
+    from unload.env.highest_item import HighestItemEnv as HighestItemEnv
+    from unload.load.boxes import Load as Load
+    from unload.load.packing_list import read_load as read_load
+    from unload.load.substacks import build_load as build_load
+    from unload.load.substacks import stack_load as stack_load
+    from unload.load.view import view as view
+    from unload.network.peq import PEQNetwork as PEQNetwork
 
 # Where each public name is defined; a module has itself.
 _PLACES = {

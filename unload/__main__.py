@@ -129,7 +129,10 @@ def _write(order, output, form: str) -> None:
 
 
 def _force(text: str) -> float | str:
-    return text if text == "auto" else float(text)
+    try:
+        return text if text == "auto" else float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"is {text!r}; expected a number >= 0, or auto") from None
 
 
 def _as_text(cell):

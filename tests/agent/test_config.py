@@ -7,11 +7,11 @@ from functools import partial
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from unload import TrainConfig, train
+from unload import ContainerEnv, TrainConfig, train
 from unload.agent.config import ENVS, EPSILON_FALLS
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.table import TablePhysics
 
 
 def test_the_papers_configuration_is_the_default():
@@ -76,11 +76,33 @@ def fewer(num_envs: int, **settings) -> ContainerVectorEnv:
     return envs
 
 
-def test_an_environment_of_other_spaces_or_that_is_not_registered_is_refused(tmp_path):
-    gymnasium.register("tests/Fewer-v0", vector_entry_point=fewer)
-    config = TrainConfig("tests/Fewer-v0", num_envs=4, picks=80, batch_size=16)
-    with pytest.raises(ValueError, match=r"env='tests/Fewer-v0' has Discrete\(7\); expected"):
-        train(config, tmp_path, progress=False)
+def late(num_envs: int, **settings) -> ContainerVectorEnv:
+    return ContainerVectorEnv(num_envs, autoreset_mode=AutoresetMode.NEXT_STEP, **settings)
+
+
+def singles(num_envs: int, **settings) -> SyncVectorEnv:
+    one = partial(ContainerEnv, "table", **settings)
+    return SyncVectorEnv([one] * num_envs, autoreset_mode=AutoresetMode.SAME_STEP)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (fewer, r"has Discrete\(7\); expected"),
+        # A run that was stopped once went on with containers other than those it had seen.
+        (singles, "makes SyncVectorEnv.*; expected a ContainerVectorEnv"),
+        # The steps in which an environment is reset once counted as picks.
+        (late, "makes ContainerVectorEnv.*, in SAME_STEP"),
+    ],
+)
+def test_an_environment_that_cannot_be_trained_in_is_refused(tmp_path, make, message):
+    gymnasium.register("tests/Own-v0", vector_entry_point=make)
+    config = TrainConfig("tests/Own-v0", num_envs=4, picks=80, batch_size=16)
+    try:
+        with pytest.raises(ValueError, match=f"env='tests/Own-v0' {message}"):
+            train(config, tmp_path, progress=False)
+    finally:
+        del gymnasium.registry["tests/Own-v0"]
     for env in ("tests/Missing-v0", "Acrobot-v1", 3):
         with pytest.raises(ValueError, match="env is .*; expected 'unload/Container-v0', .*, or"):
             TrainConfig(env)
@@ -92,7 +114,6 @@ def test_the_physics_in_the_docstring_trains(full_load, tmp_path, monkeypatch):
     code = textwrap.dedent(example.partition("\n\nArgs:")[0])
     size = {"num_envs": 2, "picks": 16, "batch_size": 4, "n_features": 4}
     given = {"TrainConfig": partial(TrainConfig, **size), "train": partial(train, progress=False)}
-    given |= {"ContainerVectorEnv": ContainerVectorEnv, "TablePhysics": TablePhysics}
     monkeypatch.chdir(tmp_path)
     exec(code, given | {"gymnasium": gymnasium})
     assert (tmp_path / "runs/gripper/policy.safetensors").exists()

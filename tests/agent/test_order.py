@@ -103,7 +103,7 @@ def test_a_box_that_failed_waits_until_another_one_is_unloaded(boxes):
         ({"policy": lambda *_: 0}, ValueError, r"what policy returned has shape \(\)"),
         ({"rule": reachable, "policy": "highest"}, TypeError, "expected no policy beside it"),
         ({"rule": reachable, "by": "stop"}, TypeError, "expected a function, and no by beside it"),
-        ({"by": "stop"}, ValueError, "by is 'stop'; expected one of"),
+        ({"by": "stop"}, ValueError, "by is 'stop'; expected None, because the list has no other"),
         ({"physics": LocalPhysics(), "force": 30}, ValueError, "force is 30; expected it to be"),
         ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
         ({"load": Load([[3.5, 1, 0.9]], [[0.4, 0.4, 0.4]])}, ValueError, "floats in load"),

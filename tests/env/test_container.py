@@ -15,6 +15,7 @@ from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.picture import snapshot
 from unload.load.substacks import build_load
 from unload.physics.local import LocalPhysics
+from unload.physics.table import TablePhysics
 
 
 @pytest.mark.parametrize("equalize", [False, True])
@@ -22,6 +23,11 @@ from unload.physics.local import LocalPhysics
 def test_check_env(env_id, equalize):
     env = gymnasium.make(env_id, equalize=equalize)
     check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_a_physics_of_ones_own_stands_in_the_spec():
+    """Gymnasium copies it, which the table's lock once forbade."""
+    assert gymnasium.make(CONTAINER, physics=TablePhysics()).spec is not None
 
 
 @pytest.mark.parametrize("env_id", [CONTAINER, HIGHEST])

@@ -161,6 +161,7 @@ def test_two_units_leave_that_of_a_third_column_open(written, caplog):
         ({"tolerance": 1}, r"tolerance is 1; expected a number in \[0, 0.1\]"),
         ({"x_from": "front"}, "x_from is 'front'; expected one of 'rear', 'door'"),
         ({"container": (1, 2)}, "container has shape"),
+        ({"ignore": "weight"}, "ignore is 'weight'; expected a list"),
         ({"ignore": ["wight"]}, "has no column 'wight'; expected one of .*'x_min'"),
         ({"columns": {"size_x": ["id"]}}, r"columns is \['id'\]; expected one of 'id', 'size_x'"),
     ],

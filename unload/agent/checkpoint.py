@@ -47,7 +47,7 @@ def settings_of_run(
     """
     change = None if change is unchanged else identity(change)
     own = {"change": change, "stack": None if stack is None else identity(stack)}
-    other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env == ENVS[0] else {}
+    other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}
     return config.plain() | own | other
 
 

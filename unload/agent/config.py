@@ -36,8 +36,8 @@ class TrainConfig:
 
     Attributes:
         env: the task, ``"unload/Container-v0"``, ``"unload/HighestItem-v0"``, or an id of your own
-            with the same spaces, registered with a ``vector_entry_point``, such as a subclass of
-            ``ContainerVectorEnv`` with other rewards. A run knows it by its id alone.
+            with the same spaces, registered with a ``vector_entry_point``: a subclass of
+            ``ContainerVectorEnv``, with other rewards, say. A run knows it by its id alone.
         picks: K, over all environments; a multiple of ``num_envs``.
         seed: * of loads, exploration, replay and weights.
         num_envs: environments side by side (Fig. 2).

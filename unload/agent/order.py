@@ -255,6 +255,8 @@ def stop_numbers(load: Load, by: str) -> tuple[np.ndarray, np.ndarray]:
         by: the name of one, or that with a minus before it, see ``picking_order``.
     """
     checks.instance("by", by, str, "a name in the load's extras")
+    if not load.extras:
+        raise ValueError(f"by is {by!r}; expected None, because the list has no other columns")
     falling = by not in load.extras and by.startswith("-")
     name = checks.one_of("by", by[1:] if falling else by, load.extras)
     values = load.extras[name]

@@ -6,10 +6,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete
+from gymnasium.vector import AutoresetMode
 
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.policies import choosable
+from unload.env.base import PickingVectorEnv
 
 
 class Rollout:
@@ -40,6 +42,11 @@ class Rollout:
             position_noise=config.position_noise,
             **own,
         )
+        # A checkpoint holds no others, and a reset must not count as a pick.
+        mode = getattr(self.envs, "autoreset_mode", None)
+        if not isinstance(self.envs, PickingVectorEnv) or mode is not AutoresetMode.SAME_STEP:
+            kinds = "a ContainerVectorEnv or another PickingVectorEnv, in SAME_STEP"
+            raise ValueError(f"env={config.env!r} makes {self.envs}; expected {kinds}")
         for space, wanted in (
             (self.envs.single_observation_space, Box(-1, 1, (task.N_VISIBLE, 3), np.float32)),
             (self.envs.single_action_space, Discrete(task.N_VISIBLE)),

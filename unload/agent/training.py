@@ -131,7 +131,7 @@ class Training:
         config, settings = self.config, dict(self.settings)
         card = {
             "change": settings.pop("change"),
-            "loads": settings.pop("stack") or "the paper's",
+            "loads": settings.pop("stack") or ("the paper's" if config.env in ENVS else config.env),
             **{name: settings.pop(name) for name in ("engine",) if name in settings},
             "configuration": settings,
             "picks": self.rollout.picks,
@@ -158,6 +158,9 @@ def train(
     Lifts by a physics of your own are a task of your own: a run knows it by the id under which it
     is registered, and another version of it needs another id::
 
+        from unload.env.vector import ContainerVectorEnv
+        from unload.physics.table import TablePhysics
+
         class Gripper(TablePhysics):  # cannot hold what is wider than 0.4 m
             def simulate(self, situation):
                 wide = situation.boxes[0, 4] > 400_000  # µm
@@ -173,7 +176,7 @@ def train(
         config: what to train.
         run_dir: folder of the run alone: its checkpoint, and what it leaves.
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
-        stack: makes the loads, as in ``ContainerEnv``; the paper's if None.
+        stack: makes the loads, as in ``ContainerEnv``, of boxes of 1 kg; the paper's if None.
         lifts: ``.npz`` file of lifts that were simulated, for runs, also side by side, to share.
         callback: is called with each new point of the curve, a dict by the columns of
             ``TrainResult.curve``. If it returns False, the run ends there, and is finished.

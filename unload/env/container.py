@@ -76,7 +76,7 @@ class ContainerEnv(PickingEnv):
 
     Args:
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
-            ``"full"`` (every box, slow) or ``"table"`` (``"local"``, remembered). ``"table"``
+            ``"full"`` (every box: seconds a pick) or ``"table"`` (``"local"``, remembered), which
             answers without a simulation if nothing rests on the chosen box, which then moves by
             0.463053 m, and if three boxes or more do: it moves by 0 m. Or a ``Physics`` of your
             own, which the environment leaves open.

@@ -28,8 +28,9 @@ class ContainerVectorEnv(PickingVectorEnv):
     Args:
         physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Unless it is a
             plain ``TablePhysics`` of full force, its ``simulate`` is asked about each pick whose
-            outcome neither an earlier failure nor the ceiling says. With
-            ``gymnasium.make_vec(..., vectorization_mode="sync")`` any ``Physics`` will do.
+            outcome neither an earlier failure nor the ceiling says, and none of its other methods.
+            Single environments take any ``Physics``, each one of its own:
+            ``SyncVectorEnv([lambda: ContainerEnv(Mine())] * num_envs)``.
 
     Attributes:
         physics: what lifts.
@@ -89,7 +90,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
         """Fill one container."""
         if (other := load.masses[load.masses != task.MASS]).size:
-            wanted = f"expected {task.MASS} kg each in arrays; physics='local' lifts others"
+            wanted = f"expected {task.MASS} kg each in arrays, as of read_load(ignore=['weight'])"
             raise ValueError(f"a load holds a box of {other[0]} kg; {wanted}")
         self._put_boxes(env, load, blur)
 

@@ -123,7 +123,7 @@ class Load:
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
         masses = np.full(count, task.MASS) if self.masses is None else self.masses
-        masses = checks.finite_array("masses", np.array(masses, np.float64), (count,))
+        masses = checks.finite_array("masses", masses, (count,))
         if (light := np.flatnonzero(masses < _LIGHTEST)).size:
             raise BoxError(light, f"a mass of {masses[light[0]]} kg; expected >= {_LIGHTEST} kg")
         checks.entries("extras", given := {} if self.extras is None else self.extras, ())
@@ -238,7 +238,7 @@ def check_stacked(load: Load, name: str = "load") -> None:
 def check_stack(stack: object) -> None:
     """Raise TypeError unless ``stack`` is callable, as what makes a load must be."""
     if not callable(stack):
-        raise TypeError(f"stack is {stack!r}; expected a function from a Generator to a Load")
+        raise TypeError(f"stack is {stack!r}; expected a function such as lambda rng: load")
 
 
 def slabs(low: np.ndarray, high: np.ndarray) -> np.ndarray:

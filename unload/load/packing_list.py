@@ -51,9 +51,10 @@ def read_load(
     - ``weight`` or ``mass``: 1 kg each if missing, as in the task;
     - ``rotation``, ``yaw``, ``pitch``, ``roll``, ``tilt`` or ``angle``, in degrees: quarter turns.
 
-    Capitals and spaces make no difference, and ``unload.load.columns`` lists further names, also
-    German, French and Spanish ones. A name may end in its unit: ``length_mm``, ``x (cm)``,
-    ``weight_lb``. Other columns become ``Load.extras``. What was understood is logged.
+    A line is one box, whatever a quantity says. Capitals and spaces make no difference, and
+    ``unload.load.columns`` lists further names, also German, French and Spanish ones. A name may
+    end in its unit: ``length_mm``, ``x (cm)``, ``weight_lb``. Other columns become
+    ``Load.extras``. What was understood is logged.
 
     Args:
         path: of the file, by default an example; or a table.
@@ -85,7 +86,8 @@ def read_load(
     container = task.CONTAINER if container is None else container
     container = checks.finite_array("container", container, (3,))
     checks.entries("columns", renamed := {} if columns is None else columns, ())
-    checks.instance("ignore", ignore, Iterable, "names of columns")
+    if isinstance(ignore, str) or not isinstance(ignore, Iterable):
+        raise TypeError(f"ignore is {ignore!r}; expected a list of names of columns")
     table = read_table(path, lambda name: name in renamed or is_known(name))
     known = Columns(table, dict(renamed), ignore)
 

@@ -87,6 +87,9 @@ class LiftTable:
     def __len__(self) -> int:
         return self._count
 
+    def __deepcopy__(self, memo: dict) -> "LiftTable":
+        return self  # it is shared; Gymnasium copies what it is given
+
     def find(self, situation: Situation) -> float | None:
         """Return the distance in m that the table holds for a situation, or None."""
         digests, micrometres = self.slots
