@@ -179,9 +179,8 @@ def run_record(seconds: float) -> dict:
     """Record of the process that has computed a result, in so many seconds of wall time.
 
     Returns:
-        ``wall_time_s``, ``peak_memory_mib`` of the process so far, None on Windows, ``revision`` of
-        the code, ``versions`` of the packages, ``engine`` that decides lifts, ``python`` and
-        ``machine``.
+        ``wall_time_s``, ``revision`` of the code, ``versions`` of the packages, ``engine`` that
+        decides lifts, ``python`` and ``machine``.
     """
     versions = {}
     for package in PACKAGES:
@@ -189,7 +188,6 @@ def run_record(seconds: float) -> dict:
             versions[package] = version(package)
     return {
         "wall_time_s": round(seconds, 1),
-        "peak_memory_mib": _peak_memory(),
         "revision": revision(),
         "versions": versions,
         "engine": engine_of(),
@@ -201,8 +199,8 @@ def run_record(seconds: float) -> dict:
 def joined(records: Iterable[dict]) -> dict:
     """Return one record of several runs.
 
-    Their number, the sum of their wall times, the highest peak of memory; and of the rest the
-    one value that all share, or the list of those that occur.
+    Their number, the sum of their wall times; and of the rest the one value that all share, or
+    the list of those that occur.
     """
     # Records that were kept while there was one engine do not name it.
     records, rest = [{"engine": ENGINES[0]} | record for record in records], {}
@@ -212,7 +210,6 @@ def joined(records: Iterable[dict]) -> dict:
     return {
         "runs": len(records),
         "wall_time_s": round(sum(record["wall_time_s"] for record in records), 1),
-        "peak_memory_mib": max(filter(None, (r["peak_memory_mib"] for r in records)), default=None),
         **rest,
     }
 
@@ -237,16 +234,6 @@ def revision() -> str:
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return commit + ("+" if changed else "")
-
-
-def _peak_memory() -> int | None:
-    """The peak memory of this process in MiB, None on Windows."""
-    try:
-        import resource
-    except ModuleNotFoundError:
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB, but on macOS bytes
-    return peak // (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def _cpu() -> str:
