@@ -19,14 +19,7 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.results import (
-    joined,
-    provenance_file,
-    read_provenance,
-    read_table,
-    write_provenance,
-    write_table,
-)
+from studies.results import joined, read_provenance, read_table, write_provenance, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
@@ -119,7 +112,7 @@ def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
 
 def _check_count(name: str, kept: Path, runs: int) -> None:
     """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
-    there = read_provenance(name)["runs"] if provenance_file(name).exists() else 0
+    there = read_provenance(name).get("runs", 0)
     if runs < there:
         raise ValueError(
             f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "

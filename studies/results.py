@@ -1,8 +1,8 @@
 """One way to keep a result, to publish it, and to read it back.
 
 A result that took long is kept in ``runs/`` under the question that it answers; a published
-one is a table in ``data/`` with its provenance beside it, as JSON: command, settings, code,
-versions, machine and time.
+one is a table in ``data/``, with its provenance in the ``provenance.json`` of its folder: command,
+settings, code, versions, machine and time.
 """
 
 import json
@@ -155,24 +155,28 @@ def read_table(name: str | Path) -> pd.DataFrame:
     """The table ``data/<name>.csv``; what publishes it says what its columns are."""
     path = paths.DATA / f"{name}.csv"
     if not path.is_file():
-        said = f"the command that makes it stands in a {path.parent}/*.provenance.json"
+        said = f"the command that makes it stands in {provenance_file(name)}"
         raise FileNotFoundError(f"{path} is missing; {said}")
     return pd.read_csv(path)
 
 
 def write_provenance(name: str | Path, command: str, settings: dict, record: dict) -> None:
     """Write the provenance of data, see ``publish``; the record is ``joined``."""
-    files.write_json(provenance_file(name), {"command": command, "settings": settings, **record})
+    path, own = provenance_file(name), {"command": command, "settings": settings, **record}
+    with files.locked(paths.RUNS / "provenance", wait=True):  # two parts may end at the same time
+        there = files.read_json(path) if path.exists() else {}
+        files.write_json(path, dict(sorted((there | {Path(name).name: own}).items())))
 
 
 def read_provenance(name: str | Path) -> dict:
-    """Return the provenance of data."""
-    return files.read_json(provenance_file(name))
+    """Return the provenance of data, empty if there is none."""
+    path = provenance_file(name)
+    return files.read_json(path).get(Path(name).name, {}) if path.exists() else {}
 
 
 def provenance_file(name: str | Path) -> Path:
-    """Of data in ``data/``, or of a file elsewhere if ``name`` is an absolute path."""
-    return paths.DATA / f"{name}.provenance.json"
+    """Of data in a folder of ``data/``, or elsewhere if ``name`` is an absolute path."""
+    return (paths.DATA / name).with_name("provenance.json")
 
 
 def run_record(seconds: float) -> dict:

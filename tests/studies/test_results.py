@@ -1,7 +1,6 @@
 """Results: kept, published, read back; and the records of where they come from."""
 
 import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
@@ -9,6 +8,7 @@ from unittest.mock import Mock
 import numpy as np
 import pandas as pd
 import pytest
+from joblib import Parallel, delayed
 
 from studies import paths, results
 from studies.falls.long import LONG
@@ -89,6 +89,13 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     assert (tea["command"], tea["settings"]) == (command, settings)
     assert (tea["runs"], more["runs"]) == (2, 1)
     assert "fingerprint" not in tea and more["fingerprint"] == "f00"
+    assert not read_provenance("t/none")
+
+
+def test_parts_that_end_at_the_same_time_lose_no_record(own_data):
+    names, result = [f"t/{number}" for number in range(6)], measured(int)
+    Parallel(6, "threading")(delayed(publish)(name, {}, "make", {}, [result]) for name in names)
+    assert [read_provenance(name)["runs"] for name in names] == [1] * 6
 
 
 def test_records_are_joined():

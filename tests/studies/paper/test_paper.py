@@ -51,7 +51,7 @@ def test_a_search_is_published_in_two_tables_a_batch_size(own_data, set_in):
     tuning.tuning_data(n_jobs=1)
     names = {path.name for path in (own_data / "tuning").iterdir()}
     tables = {f"b{size}_{column}.csv" for size in (8, 16) for column in ("loss", "success_rate")}
-    assert names == tables | {"tuning.provenance.json"}
+    assert names == tables | {"provenance.json"}
     table = read_table("tuning/b8_success_rate")
     assert table.shape == (20, 1 + 2)
     curves = tuning.read_curves("success_rate", 8, 1e-3)
