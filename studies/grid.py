@@ -2,11 +2,11 @@
 
 An experiment is a grid: named cells, each a configuration that is trained with several seeds,
 and perhaps something changed in its runs that no configuration offers. All runs of a grid are
-published together: a table of each measure, in which a run is a column; one file of policies;
-one record of where they come from.
+published together: a table of their curves, in which each measure of a run is a column; one file of
+policies; one record of where they come from.
 
 A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<table>/<name>``, its
-curves are in tables of that name, so that no table of a large grid becomes large.
+curves are in a table of that name, so that no table of a large grid becomes large.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,14 +19,7 @@ import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
-from studies.results import (
-    joined,
-    provenance_file,
-    read_provenance,
-    read_table,
-    write_provenance,
-    write_table,
-)
+from studies.results import joined, read_provenance, read_table, write_provenance, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
@@ -37,7 +30,7 @@ from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
 
 # Of a curve, what is published, and its digits: a success rate of 64 picks needs six.
-COLUMNS = {"success_rate": "%.6g", "loss": "%.5g"}
+COLUMNS = {"success_rate": "{:.6g}", "loss": "{:.5g}"}
 
 
 class Cell(NamedTuple):
@@ -119,7 +112,7 @@ def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
 
 def _check_count(name: str, kept: Path, runs: int) -> None:
     """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
-    there = read_provenance(name)["runs"] if provenance_file(name).exists() else 0
+    there = read_provenance(name).get("runs", 0)
     if runs < there:
         raise ValueError(
             f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "
@@ -141,14 +134,7 @@ def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
         settings = settings_of_run(config, change=grid.cells[cell_of(name)].change)
         policies[name], curves[name] = RunFolder(kept / name).result(config, settings)
     if grid.measure is None:
-        picks = next(iter(curves.values()))["picks"]  # the same for all
-        for column, digits in COLUMNS.items():
-            tables: dict[Path, dict[str, pd.Series]] = {}
-            for name, curve in curves.items():
-                table = _table_name(grid, cell_of(name), column)
-                tables.setdefault(table, {"picks": picks})[name] = curve[column]
-            for table, content in tables.items():
-                write_table(table, pd.DataFrame(content), digits)
+        write_curves(grid, curves)
         if grid.policies:
             write_policies(paths.DATA / f"{grid.name}.safetensors", policies)
     else:
@@ -172,10 +158,21 @@ def cell_of(run: str) -> str:
     return run.rpartition("/seed_")[0]
 
 
-def _table_name(grid: Grid, cell: str, column: str) -> Path:
-    """Of the table of a column of a cell's curves: a row per point, a column per run."""
+def _table_name(grid: Grid, cell: str) -> Path:
+    """Of the table of a cell's curves: a row per point, a column per measure and run."""
     place = Path(grid.name)
-    return place.with_name(f"{cell.rpartition('/')[0] or place.name}_{column}")
+    return place.with_name(cell.rpartition("/")[0] or place.name)
+
+
+def write_curves(grid: Grid, curves: Mapping[str, pd.DataFrame]) -> None:
+    """Publish curves of a grid, by the names of their runs; all have the same picks."""
+    tables: dict[Path, dict[str, pd.Series]] = {}
+    for name, curve in curves.items():
+        table = tables.setdefault(_table_name(grid, cell_of(name)), {"picks": curve["picks"]})
+        for column, digits in COLUMNS.items():
+            table[f"{column} {name}"] = curve[column].map(digits.format, na_action="ignore")
+    for place, table in tables.items():
+        write_table(place, pd.DataFrame(table))
 
 
 def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
@@ -192,19 +189,16 @@ def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
-    columns = []
-    for column in COLUMNS:
-        parts = []
-        for name in dict.fromkeys(_table_name(grid, cell, column) for cell in wanted):
-            table = read_table(name)
-            table = table[[name for name in table if name == "picks" or cell_of(name) in wanted]]
-            parts.append(table.melt("picks", var_name="run", value_name=column))
-        columns.append(pd.concat(parts, ignore_index=True))
-    curves = columns[0].assign(loss=columns[1]["loss"])
-    names = curves.pop("run").str.rpartition("/seed_")
-    curves.insert(0, "cell", names[0])
-    curves.insert(1, "seed", names[2].astype(int))
-    return curves
+    curves = []
+    for place in dict.fromkeys(_table_name(grid, cell) for cell in wanted):
+        table = read_table(place)
+        for run in dict.fromkeys(column.partition(" ")[2] for column in table.columns[1:]):
+            cell, _, seed = run.rpartition("/seed_")
+            if cell in wanted:
+                curve = {"cell": cell, "seed": int(seed), "picks": table["picks"]}
+                curve |= {column: table[f"{column} {run}"] for column in COLUMNS}
+                curves.append(pd.DataFrame(curve))
+    return pd.concat(curves, ignore_index=True)
 
 
 def write_policies(path: str | Path, policies: Mapping[str, Greedy]) -> None:

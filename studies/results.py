@@ -1,8 +1,8 @@
 """One way to keep a result, to publish it, and to read it back.
 
 A result that took long is kept in ``runs/`` under the question that it answers; a published
-one is a table in ``data/`` with its provenance beside it, as JSON: command, settings, code,
-versions, machine and time.
+one is a table in ``data/``, with its provenance in the ``provenance.json`` of its folder: command,
+settings, code, versions, machine and time.
 """
 
 import json
@@ -155,33 +155,36 @@ def read_table(name: str | Path) -> pd.DataFrame:
     """The table ``data/<name>.csv``; what publishes it says what its columns are."""
     path = paths.DATA / f"{name}.csv"
     if not path.is_file():
-        said = f"the command that makes it stands in a {path.parent}/*.provenance.json"
+        said = f"the command that makes it stands in {provenance_file(name)}"
         raise FileNotFoundError(f"{path} is missing; {said}")
     return pd.read_csv(path)
 
 
 def write_provenance(name: str | Path, command: str, settings: dict, record: dict) -> None:
     """Write the provenance of data, see ``publish``; the record is ``joined``."""
-    files.write_json(provenance_file(name), {"command": command, "settings": settings, **record})
+    path, own = provenance_file(name), {"command": command, "settings": settings, **record}
+    with files.locked(paths.RUNS / "provenance", wait=True):  # two parts may end at the same time
+        there = files.read_json(path) if path.exists() else {}
+        files.write_json(path, dict(sorted((there | {Path(name).name: own}).items())))
 
 
 def read_provenance(name: str | Path) -> dict:
-    """Return the provenance of data."""
-    return files.read_json(provenance_file(name))
+    """Return the provenance of data, empty if there is none."""
+    path = provenance_file(name)
+    return files.read_json(path).get(Path(name).name, {}) if path.exists() else {}
 
 
 def provenance_file(name: str | Path) -> Path:
-    """Of data in ``data/``, or of a file elsewhere if ``name`` is an absolute path."""
-    return paths.DATA / f"{name}.provenance.json"
+    """Of data in a folder of ``data/``, or elsewhere if ``name`` is an absolute path."""
+    return (paths.DATA / name).with_name("provenance.json")
 
 
 def run_record(seconds: float) -> dict:
     """Record of the process that has computed a result, in so many seconds of wall time.
 
     Returns:
-        ``wall_time_s``, ``peak_memory_mib`` of the process so far, None on Windows, ``revision`` of
-        the code, ``versions`` of the packages, ``engine`` that decides lifts, ``python`` and
-        ``machine``.
+        ``wall_time_s``, ``revision`` of the code, ``versions`` of the packages, ``engine`` that
+        decides lifts, ``python`` and ``machine``.
     """
     versions = {}
     for package in PACKAGES:
@@ -189,7 +192,6 @@ def run_record(seconds: float) -> dict:
             versions[package] = version(package)
     return {
         "wall_time_s": round(seconds, 1),
-        "peak_memory_mib": _peak_memory(),
         "revision": revision(),
         "versions": versions,
         "engine": engine_of(),
@@ -201,8 +203,8 @@ def run_record(seconds: float) -> dict:
 def joined(records: Iterable[dict]) -> dict:
     """Return one record of several runs.
 
-    Their number, the sum of their wall times, the highest peak of memory; and of the rest the
-    one value that all share, or the list of those that occur.
+    Their number, the sum of their wall times; and of the rest the one value that all share, or
+    the list of those that occur.
     """
     # Records that were kept while there was one engine do not name it.
     records, rest = [{"engine": ENGINES[0]} | record for record in records], {}
@@ -212,7 +214,6 @@ def joined(records: Iterable[dict]) -> dict:
     return {
         "runs": len(records),
         "wall_time_s": round(sum(record["wall_time_s"] for record in records), 1),
-        "peak_memory_mib": max(filter(None, (r["peak_memory_mib"] for r in records)), default=None),
         **rest,
     }
 
@@ -237,16 +238,6 @@ def revision() -> str:
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
     return commit + ("+" if changed else "")
-
-
-def _peak_memory() -> int | None:
-    """The peak memory of this process in MiB, None on Windows."""
-    try:
-        import resource
-    except ModuleNotFoundError:
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # KiB, but on macOS bytes
-    return peak // (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def _cpu() -> str:

@@ -53,8 +53,8 @@ FE_COLOURS = {"with FE": COLOURS["ranks"], "without FE": COLOURS["positions"]}
 
 
 def tuning_cell(batch_size: int, learning_rate: float, equalize: bool) -> str:
-    """The name of a cell of the search, such as ``b64/with_fe_lr_0.1``."""
-    return f"b{batch_size}/{'with' if equalize else 'without'}_fe_lr_{learning_rate:g}"
+    """The name of a cell of the search, such as ``b64_with_fe/lr_0.1``."""
+    return f"b{batch_size}_{'with' if equalize else 'without'}_fe/lr_{learning_rate:g}"
 
 
 def tuning_grid(

@@ -6,8 +6,8 @@
 Each mutant is one change to a module in a copy of the tree, where the tests of its room run, those
 of the module first. Raised errors, annotations, decorators and texts are not changed. A module of
 compiled functions runs as plain Python, except in ``unload/fast``, whose kernel has instructions
-that Python does not have. ``data/benchmarks/mutants.csv`` says which test has killed each mutant,
-if any. Many survivors are equivalent: no result depends on the change beyond rounding.
+that Python does not have. ``build/mutants.csv`` says which test has killed each mutant, if any.
+Many survivors are equivalent: no result depends on the change beyond rounding.
 """
 
 import argparse
@@ -30,7 +30,7 @@ import pandas as pd
 
 from studies.paths import ROOT
 
-PATH = ROOT / "data" / "benchmarks" / "mutants.csv"
+PATH = ROOT / "build" / "mutants.csv"
 COLUMNS = ["room", "module", "line", "mutation"]  # and "killed_by"
 WORKERS = 2  # processes side by side
 MODULES = sorted((ROOT / "unload").rglob("*.py")) + sorted((ROOT / "studies").rglob("*.py"))
@@ -146,7 +146,8 @@ def main() -> None:
     parser.add_argument("--rooms", nargs="+", choices=ROOMS, default=tuple(ROOMS), metavar="ROOM")
     parser.add_argument("--sample", type=int, default=20, help="mutants of a room")
     parser.add_argument("--seed", type=int, default=0, help="of the sample")
-    options, trees = parser.parse_args(), SimpleQueue()
+    options, trees, tables = parser.parse_args(), SimpleQueue(), []
+    PATH.parent.mkdir(exist_ok=True)
     left_out = shutil.ignore_patterns(".git", ".venv", "*cache*", "build", "runs")
     with tempfile.TemporaryDirectory() as folder:
         for number in range(WORKERS):
@@ -154,10 +155,8 @@ def main() -> None:
         for room in options.rooms:
             table = measure(room, options.sample, options.seed, trees)
             print(f"{room}: {(table['killed_by'] == '').sum()} of {len(table)} survive", flush=True)
-            old = pd.read_csv(PATH, keep_default_na=False)
-            pd.concat([old[old["room"] != room], table]).to_csv(
-                PATH, index=False, lineterminator="\n"
-            )
+            tables.append(table)
+            pd.concat(tables).to_csv(PATH, index=False, lineterminator="\n")
 
 
 if __name__ == "__main__":

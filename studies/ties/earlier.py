@@ -14,7 +14,7 @@ from io import StringIO
 import pandas as pd
 
 from studies import paths
-from studies.grid import COLUMNS, Cell, Grid
+from studies.grid import Cell, Grid, write_curves
 from studies.paper.training import PAPER
 from studies.results import joined, write_provenance, write_table
 from studies.statistics import end_msr, fell
@@ -25,7 +25,7 @@ FOLDER = "data/answer"
 NAME, COMMAND = "ties/earlier", "python -m studies.ties.earlier"
 # Whose curves are published; how their ties are broken no configuration says any more.
 EARLIER = Grid(
-    NAME,
+    f"{NAME}_runs",
     COMMAND,
     {
         f"ties_by_{ties}_{mask}": Cell(PAPER.cells[f"paper_{mask}"].config, range(5))
@@ -46,7 +46,7 @@ def earlier_data() -> None:
 
     The rows hold ``cell``, ``seed`` and ``criterion.likeness``; of a run that went on from another
     one after 12 million picks (``interventions/…``) the ``end`` and whether it ``fell`` alone. The
-    curves stand in ``ties/earlier_success_rate.csv`` and ``ties/earlier_loss.csv``.
+    curves stand in ``ties/earlier_runs.csv``.
     """
     listed = git("ls-tree", "-r", "--name-only", REVISION, f"{FOLDER}/").split()
     rows, runs, records = [], {}, []
@@ -64,10 +64,7 @@ def earlier_data() -> None:
         if cell in EARLIER.cells:
             runs[f"{cell}/seed_{seed}"] = curve
     write_table(NAME, pd.DataFrame(rows))
-    for column, digits in COLUMNS.items():
-        curves = {name: run[column] for name, run in runs.items()}
-        picks = next(iter(runs.values()))["picks"]
-        write_table(f"{NAME}_{column}", pd.DataFrame({"picks": picks} | curves), digits)
+    write_curves(EARLIER, runs)
     settings = {"from": f"{REVISION}:{FOLDER}", "made by": records[0]["command"].split(" --")[0]}
     settings["fingerprints then"] = sorted({record["fingerprint"] for record in records})
     write_provenance(NAME, COMMAND, settings, joined(records))

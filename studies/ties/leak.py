@@ -11,7 +11,7 @@ from scipy.stats import spearmanr
 
 from studies import paths
 from studies.grid import cell_of, read_policies
-from studies.results import COMMAND, keep_all, measured, publish
+from studies.results import COMMAND, keep_all, publish
 from studies.seamless.training import SEAMLESS
 from unload.agent.evaluation import evaluate
 from unload.env.equalization import equalize
@@ -60,12 +60,11 @@ def judged(name: str, ties: str, mask: bool) -> float:
 
 
 def leak_data(n_jobs: int = -1) -> None:
-    """Write ``ties/leak_ranks.csv``, see ``told_by_rank``, and ``ties/leak.csv``.
+    """Write ``ties/leak.csv``.
 
-    The latter has a row per network of the jams by order with the paper's batch, way to break
-    ties, and mask: its ``msr`` in fresh containers without jams.
+    A row per network of the jams by order with the paper's batch, way to break ties, and mask: its
+    ``msr`` in fresh containers without jams.
     """
-    ranks = measured(lambda: [told_by_rank(*each) for each in product(LOADS, NOISE)])
     runs = [name for name in SEAMLESS.configs() if cell_of(name) in CELLS]
     cases = list(product(runs, NOISE, (True, False)))
     asked = [
@@ -78,6 +77,4 @@ def leak_data(n_jobs: int = -1) -> None:
          "msr": result.value}
         for (run, ties, mask), result in zip(cases, results)
     ]  # fmt: skip
-    tables = {"leak": pd.DataFrame(rows), "leak_ranks": pd.DataFrame(ranks.value)}
-    settings = {"loads": [LOADS[0], LOADS[-1]], **JUDGED}
-    publish("ties/leak", tables, f"{COMMAND} leak", settings, [ranks, *results])
+    publish("ties/leak", {"leak": pd.DataFrame(rows)}, f"{COMMAND} leak", JUDGED, results)

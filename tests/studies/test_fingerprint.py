@@ -19,15 +19,17 @@ NOT_TRAINED = {
 
 def test_data_is_of_todays_training():
     """Of the networks that a result rests on."""
-    suffix = ".provenance.json"
+    records = {
+        (path.parent / name).relative_to(paths.DATA).as_posix(): record
+        for path in paths.DATA.rglob("provenance.json")
+        for name, record in files.read_json(path).items()
+    }
     of_today = {}
-    for path in paths.DATA.rglob(f"*{suffix}"):
-        name = path.relative_to(paths.DATA).as_posix().removesuffix(suffix)
+    for name, record in records.items():
         if not NOT_TRAINED & {name, name.split("/")[0]}:
             grid = GRIDS.get(name.removeprefix("variants/"))
             networks = {cell.config.network for cell in grid.cells.values()} if grid else {"peq"}
-            wanted = training_fingerprint(networks)
-            of_today[name] = files.read_json(path).get("fingerprint") == wanted
+            of_today[name] = record.get("fingerprint") == training_fingerprint(networks)
     differing = {name for name, same in of_today.items() if not same}
     assert of_today
     assert not differing, "made by code that trained otherwise: make it again"

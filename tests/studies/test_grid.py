@@ -63,7 +63,7 @@ def test_a_grid_is_read_as_it_was_trained(trained):
 
 
 def test_published_runs_are_not_replaced_by_fewer(trained, monkeypatch):
-    names = ("some/small_loss.csv", "some/small.safetensors")
+    names = ("some/small.csv", "some/small.safetensors")
     before = [(trained / name).read_bytes() for name in names]
     message = "would hold 2 finished runs; expected at least as many as the 4"
     with monkeypatch.context() as patch, pytest.raises(ValueError, match=message):

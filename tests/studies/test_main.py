@@ -53,14 +53,14 @@ def test_what_nothing_can_run_with_is_refused_in_one_line(called, capsys):
 
 
 def test_every_provenance_names_a_command_of_today():
-    for path in paths.DATA.rglob("*.provenance.json"):
-        record = files.read_json(path)
-        today = record.get("present_command", record["command"]).split()
-        assert today[:2] == ["python", "-m"], path
-        if today[2] == "studies":
-            assert today[3] in command.PARTS, path
-        else:
-            assert find_spec(today[2]), path
+    for path in paths.DATA.rglob("provenance.json"):
+        for name, record in files.read_json(path).items():
+            today = record.get("present_command", record["command"]).split()
+            assert today[:2] == ["python", "-m"], (path, name)
+            if today[2] == "studies":
+                assert today[3] in command.PARTS, (path, name)
+            else:
+                assert find_spec(today[2]), (path, name)
 
 
 def test_no_committed_file_is_too_large():

@@ -1,7 +1,6 @@
 """Results: kept, published, read back; and the records of where they come from."""
 
 import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
@@ -9,6 +8,7 @@ from unittest.mock import Mock
 import numpy as np
 import pandas as pd
 import pytest
+from joblib import Parallel, delayed
 
 from studies import paths, results
 from studies.falls.long import LONG
@@ -89,18 +89,21 @@ def test_what_is_published_says_where_it_comes_from(own_data):
     assert (tea["command"], tea["settings"]) == (command, settings)
     assert (tea["runs"], more["runs"]) == (2, 1)
     assert "fingerprint" not in tea and more["fingerprint"] == "f00"
+    assert not read_provenance("t/none")
 
 
-def test_records_are_joined(monkeypatch):
+def test_parts_that_end_at_the_same_time_lose_no_record(own_data):
+    names, result = [f"t/{number}" for number in range(6)], measured(int)
+    Parallel(6, "threading")(delayed(publish)(name, {}, "make", {}, [result]) for name in names)
+    assert [read_provenance(name)["runs"] for name in names] == [1] * 6
+
+
+def test_records_are_joined():
     first = results.run_record(9.96)
     assert first["engine"] == engine_of() and first["wall_time_s"] == 10.0
-    monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
-    nowhere = results.run_record(10.0)
-    assert nowhere["peak_memory_mib"] is results.joined([nowhere])["peak_memory_mib"] is None
-    second = first | {"wall_time_s": 20.54, "peak_memory_mib": 10**6, "revision": "another"}
-    together = results.joined([first, second, nowhere])
-    assert (together["runs"], together["wall_time_s"]) == (3, 40.5)
-    assert together["peak_memory_mib"] == 10**6
+    second = first | {"wall_time_s": 20.54, "revision": "another"}
+    together = results.joined([first, second])
+    assert (together["runs"], together["wall_time_s"]) == (2, 30.5)
     assert together["revision"] == [first["revision"], "another"]
 
 

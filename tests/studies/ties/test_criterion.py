@@ -76,8 +76,6 @@ def test_the_runs_of_the_first_plan_are_all_there():
 @pytest.mark.parametrize("ties", ["order", "noise"])
 def test_order_tells_which_box_is_the_upper_one(ties):
     told = leak.told_by_rank(leak.LOADS[0], ties)
-    table = read_table("ties/leak_ranks").query("ties == @ties").iloc[0]
-    assert (told["pairs"], told["upper"]) == (table["pairs"], table["upper"])
     if ties == "order":
         assert told["upper"] == told["pairs"] and told["spearman"] < -0.8
     else:
