@@ -9,7 +9,7 @@ from studies.grid import train_grid
 from studies.heap import table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
-from studies.policies import comparison, robustness, variants
+from studies.policies import comparison, variants
 from studies.results import COMMAND
 from studies.seamless import jam_tables
 from studies.seamless import training as seamless
@@ -36,10 +36,9 @@ def lifts(n_jobs: int) -> None:
 
 
 def policies(n_jobs: int) -> None:
-    """Measure policies, and compare them by the lift table, and with every box simulated."""
+    """Measure policies, and compare them."""
     comparison.write_cards()
     comparison.comparison_data(n_jobs=n_jobs)
-    robustness.robustness_data(n_jobs=n_jobs)
 
 
 def sb3(n_jobs: int) -> None:
