@@ -9,11 +9,11 @@ from studies.grid import train_grid
 from studies.heap import table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
-from studies.policies import comparison, robustness, variants
+from studies.policies import comparison, variants
 from studies.results import COMMAND
-from studies.seamless import jam_tables
+from studies.seamless import jam_tables, mujoco_jams
 from studies.seamless import training as seamless
-from studies.ties import creep, leak
+from studies.ties import creep, earlier, leak
 from studies.ties import laboratory as ties_laboratory
 from studies.ties import training as ties
 
@@ -36,10 +36,9 @@ def lifts(n_jobs: int) -> None:
 
 
 def policies(n_jobs: int) -> None:
-    """Measure policies, and compare them by the lift table, and with every box simulated."""
+    """Measure policies, and compare them."""
     comparison.write_cards()
     comparison.comparison_data(n_jobs=n_jobs)
-    robustness.robustness_data(n_jobs=n_jobs)
 
 
 def sb3(n_jobs: int) -> None:
@@ -62,6 +61,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
+    "mujoco_jams": ("the same with MuJoCo", mujoco_jams.mujoco_data, JOBS),
     "seamless": (
         "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.CELLS)
     ),
@@ -72,6 +72,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     ),
     "ties": ("how equal coordinates are ranked", partial(train_grid, ties.TIES), some(ties.CELLS)),
     "falls": ("why runs fall: the long runs", long.falls_data, some(long.LONG.cells)),
+    "earlier": ("runs of the first plan, from this repository's history", earlier.earlier_data, {}),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
 }  # fmt: skip
 

@@ -155,14 +155,14 @@ def left(policy: Policy, picks: int, seed: int) -> Load:
 
 
 @cache
-def dug_loads(preference: float, count: int = 128, seed: int = 0) -> list[Load]:
-    """Loads of which the policy of ``best_actions`` has unloaded up to 475 boxes, on ranks."""
+def dug_loads(preference: float) -> list[Load]:
+    """128 loads of which the policy of ``best_actions`` has unloaded up to 475 boxes, on ranks."""
 
     def policy(observations: np.ndarray, masks: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         return best_actions(equalize(observations), masks.astype(bool), preference)
 
-    depths = np.random.default_rng(seed).integers(DEEPEST + 1, size=count)
-    return [left(policy, int(depth), seed + each) for each, depth in enumerate(depths)]
+    depths = np.random.default_rng(0).integers(DEEPEST + 1, size=128)
+    return [left(policy, int(depth), seed) for seed, depth in enumerate(depths)]
 
 
 def dug(run: Training, preference: float) -> None:

@@ -5,31 +5,26 @@ one is a table in ``data/``, with its provenance in the ``provenance.json`` of i
 settings, code, versions, machine and time.
 """
 
-import json
 import os
 import platform
 import subprocess
 import sys
 import time
-from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
-from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
-from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import Memory, Parallel, delayed
 from tqdm import tqdm
 
 from studies import paths
 from unload.agent.identity import identity
 from unload.physics.bullet import ENGINES, engine_of
-from unload.support import checks, files
+from unload.support import files
 
 PACKAGES = ("gymnasium", "joblib", "mujoco-core", "numba", "numpy", "pandas", "pybullet", "torch")
 COMMAND = "python -m studies"
@@ -50,48 +45,21 @@ def measured(compute: Callable[[], Any]) -> Result:
 
 
 def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Result:
-    """The answer to a question, computed once and kept in ``folder``.
+    """The answer to a question, computed once and kept in ``folder`` by joblib.
 
     Args:
-        question: all that the answer depends on, as JSON can hold it: an answer to another
-            question is not taken.
-        compute: gives the answer, a value that JSON can hold.
+        question: all that the answer depends on: an answer to another question is not taken.
+        compute: gives the answer, a value that can be pickled.
 
     Returns:
         The answer and its record, the same whether it was kept or has just been computed.
-
-    Raises:
-        TypeError: JSON cannot hold the question or the answer.
-        ValueError: a kept file is damaged or lacks an entry; the message names it.
     """
-    question = json.loads(json.dumps(question, sort_keys=True))
-    path = Path(folder) / f"{digest(question)}.json"
-    stored = files.read_json(path) if path.exists() else {}
-    if stored.get("question") != question:
-        value, record = measured(compute)
-        content = {"question": question, "value": value, "record": record}
-        files.write_json(path, content, checked=True)
-        stored = files.read_json(path)
-    checks.entries(str(path), stored, ("value", "record"))
-    return Result(stored["value"], stored["record"])
+    return Memory(folder, verbose=0).cache(_answer, ignore=["compute"])(question, compute)
 
 
-def digest(value: Any) -> str:
-    """Digest of what JSON can hold, 16 hexadecimal digits."""
-    return blake2b(json.dumps(value).encode(), digest_size=8).hexdigest()
-
-
-def packed(arrays: Mapping[str, np.ndarray]) -> str:
-    """Named arrays as a text, so that an answer can hold them; see ``unpacked``."""
-    buffer = BytesIO()
-    np.savez_compressed(buffer, **arrays)
-    return b64encode(buffer.getvalue()).decode()
-
-
-def unpacked(text: str) -> dict[str, np.ndarray]:
-    """The arrays of ``packed``."""
-    with np.load(BytesIO(b64decode(text))) as stored:
-        return dict(stored)
+def _answer(question: dict, compute: Callable[[], Any]) -> Result:
+    """What joblib keeps under the question; a function of the module, because it goes by name."""
+    return measured(compute)
 
 
 def keep_all(

@@ -66,39 +66,18 @@ def loss_peak(loss: pd.Series) -> int | None:
     return None if risen.empty else int(risen.idxmax())
 
 
-def after_loss_peak(curve: pd.DataFrame) -> tuple[bool, bool]:
-    """Return whether the MSR rises more slowly and is noisier after the loss's peak than before.
-
-    Compared are the mean and the standard deviation of its changes from window to window; both
-    are False if there are fewer than two changes before the peak or after it.
-    """
-    means = windows(curve)
-    peak = loss_peak(means["loss"].dropna())
-    if peak is None:
-        return False, False
-    changes = means["success_rate"].diff().dropna()
-    before, after = changes[changes.index <= peak], changes[changes.index > peak]
-    if min(len(before), len(after)) < 2:
-        return False, False
-    return bool(after.mean() < before.mean()), bool(after.std() > before.std())
-
-
 def first_plan(curve: pd.DataFrame) -> dict:
     """Return the measures of one run in ``data/falls/FIRST_PLAN.md``.
 
     Returns:
         ``end``, the MSR over the last tenth; whether the run ``fell`` at least once and rises
-        ``steady``; ``slower`` and ``noisier``, see ``after_loss_peak``; whether it is like the
-        paper's ``fig11``, ``fig12`` and ``both``.
+        ``steady``; whether it is like the paper's ``fig11``, ``fig12`` and ``both``.
     """
     fig11, fig12 = resembles_fig11(curve), resembles_fig12(curve)
-    slower, noisier = after_loss_peak(curve)
     return {
         "end": end_msr(curve),
         "fell": fell(curve),
         "steady": steady(curve),
-        "slower": slower,
-        "noisier": noisier,
         "fig11": fig11,
         "fig12": fig12,
         "both": fig11 and fig12,

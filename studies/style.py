@@ -23,9 +23,9 @@ WITHOUT_MASK = "0.6"
 styled = plt.style.context(STYLE)  # lets a function draw in the repository's style
 
 
-def save(figure: Figure, name: str, folder: Path = paths.FIGURES) -> None:
-    """Write ``folder/name.png`` and ``.pdf``, the same bytes for the same figure."""
-    folder.mkdir(parents=True, exist_ok=True)
+def save(figure: Figure, name: str) -> None:
+    """Write ``figures/name.png`` and ``.pdf``, the same bytes for the same figure."""
+    paths.FIGURES.mkdir(parents=True, exist_ok=True)
     with plt.style.context(STYLE):  # says the resolution and the margins
-        figure.savefig(folder / f"{name}.png", metadata={"Software": None})
-        figure.savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+        figure.savefig(paths.FIGURES / f"{name}.png", metadata={"Software": None})
+        figure.savefig(paths.FIGURES / f"{name}.pdf", metadata={"CreationDate": None})

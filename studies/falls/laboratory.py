@@ -99,17 +99,15 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
     return {"row": row, "trace": trace if name in TRACED else []}
 
 
-def keep_cells(
-    place: str, cells: Mapping[str, Cell], n_jobs: int, run: Callable = run_cell
-) -> list[Result]:
-    """What ``run`` returns of each seed of some cells, see ``results.kept``."""
+def keep_cells(place: str, cells: Mapping[str, Cell], n_jobs: int) -> list[Result]:
+    """What ``run_cell`` returns of each seed of some cells, see ``results.kept``."""
     asked, fingerprint = [], training_fingerprint()
     for name, cell in cells.items():
         question = {"cell": name, "change": identity(cell.change), "fingerprint": fingerprint}
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
             asked.append((question | config, (name, cell, seed)))
-    return keep_all(place, run, asked, n_jobs)
+    return keep_all(place, run_cell, asked, n_jobs)
 
 
 def laboratory_data(n_jobs: int = -1) -> None:
@@ -125,7 +123,7 @@ def laboratory_data(n_jobs: int = -1) -> None:
     results = keep_cells("laboratory", CELLS, n_jobs)
     trace = pd.DataFrame([point for result in results for point in result.value["trace"]])
     trace = trace[["cell", "seed", *POINT]].astype({"picks": int})
-    _publish("laboratory", COLUMNS, results, {"trace": trace})
+    publish_cells("falls/laboratory", "laboratory", COLUMNS, results, trace=trace)
 
 
 def fresh_data(n_jobs: int = -1) -> None:
@@ -134,15 +132,17 @@ def fresh_data(n_jobs: int = -1) -> None:
     Its columns are those of ``falls/laboratory.csv``, and ``judged_averaged_x``: the MSR in fresh
     containers if equal x share one rank when the trained network chooses.
     """
-    _publish("fresh", FRESH_COLUMNS, keep_cells("fresh", FRESH, n_jobs), {})
+    publish_cells("falls/fresh", "fresh", FRESH_COLUMNS, keep_cells("fresh", FRESH, n_jobs))
 
 
-def _publish(name: str, columns: list[str], results: list[Result], more: dict) -> None:
-    """Write a table with the rows of ``run_cell``, and perhaps more tables."""
+def publish_cells(
+    name: str, part: str, columns: list[str], results: list[Result], **more: pd.DataFrame
+) -> None:
+    """Write columns of the rows of ``run_cell``, which a part makes, and perhaps more tables."""
     table = pd.DataFrame([result.value["row"] for result in results])[columns]
     settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
-    place, command = f"falls/{name}", f"{COMMAND} {name}"
-    publish(place, {name: table} | more, command, settings, results, fingerprint, "%.4g")
+    tables = {name.rpartition("/")[2]: table} | more
+    publish(name, tables, f"{COMMAND} {part}", settings, results, fingerprint, "%.4g")
 
 
 def predicted(table: pd.DataFrame, config: TrainConfig = CONFIG) -> pd.Series:

@@ -146,12 +146,11 @@ def rules(ties: str, preferences: np.ndarray, containers: int = 4) -> np.ndarray
     return successes.reshape(*along_x.shape, containers).mean(axis=-1) / task.MAX_PICKS
 
 
-def surface(policy: Policy, picks: int = 300, containers: int = 8) -> np.ndarray:
-    """How high a policy leaves the loads, seen from above.
+def surface(policy: Policy, containers: int = 8) -> np.ndarray:
+    """How high a policy leaves the loads after 300 picks, seen from above.
 
     Args:
         policy: see ``unload.policies``; it plays with the mask on.
-        picks: in each container.
         containers: how many.
 
     Returns:
@@ -161,7 +160,7 @@ def surface(policy: Policy, picks: int = 300, containers: int = 8) -> np.ndarray
     along, across = ((np.arange(count) + 0.5) / 10 for count in (70, 25))
     heights = np.zeros((containers, len(along), len(across)))
     for seed, highest in enumerate(heights):
-        load = left(policy, picks, seed=seed)
+        load = left(policy, 300, seed)
         for centre, size in zip(load.positions, load.sizes):
             deep, wide = np.abs(along - centre[0]), np.abs(across - centre[1])
             covered = np.outer(deep < size[0] / 2, wide < size[1] / 2)

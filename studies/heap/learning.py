@@ -8,7 +8,7 @@ import torch
 from torch.nn.functional import binary_cross_entropy_with_logits as cross_entropy
 from torch.nn.functional import poisson_nll_loss
 
-from studies.heap.network import FATES, FEATURES, FateNetwork
+from studies.heap.network import FATES, FateNetwork
 from studies.heap.observation import COLUMN, FELL, UNLOADED
 from studies.heap.policies import Picks
 from unload.network.weights import read_weights, write_weights
@@ -167,7 +167,7 @@ def load_networks(path: str | Path) -> list[FateNetwork]:
     return read_weights(path, "heap networks", networks)
 
 
-def network_of(weights: dict[str, torch.Tensor], n_features: int = FEATURES) -> FateNetwork:
+def network_of(weights: dict[str, torch.Tensor], n_features: int) -> FateNetwork:
     """The network with these weights; RuntimeError if they are not those of so many features."""
     network = FateNetwork(n_features)
     network.load_state_dict(weights)

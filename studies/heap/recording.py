@@ -10,13 +10,13 @@ import numpy as np
 import torch
 
 from studies import paths
-from studies.heap.boxes import Heap, package_sizes
+from studies.heap.boxes import Heap
 from studies.heap.env import MAX_PICKS, HeapEnv
 from studies.heap.generate import BOXES, settled_heap, stored_heaps, write_heaps
-from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
+from studies.heap.learning import STEPS, Learned, Picks, fit, joined, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.policies import RULES, best, linear, play
-from studies.results import COMMAND, Result, digest, keep_all, packed, publish, unpacked
+from studies.results import COMMAND, Result, keep_all, publish
 from unload.agent.identity import identity
 
 NAME = "heap"
@@ -40,29 +40,26 @@ def make_heaps(n_jobs: int = 1) -> None:
     answers = keep_all(f"{NAME}/heaps", _new_heap, asked, n_jobs)
     heaps: dict[str, list[Heap]] = {split: [] for split in HEAPS}
     for (split, _), answer in zip(names, answers):
-        arrays = unpacked(answer.value)
-        heaps[split].append(Heap(**arrays, sizes=package_sizes(arrays["packages"])))
+        heaps[split].append(answer.value)
     write_heaps(paths.DATA / NAME / "heaps.npz", heaps)
     settings = {"heaps": HEAPS, "seeds": SEEDS, "boxes dropped": BOXES}
     publish(f"{NAME}/heaps", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
-def _new_heap(seed: int, number: int) -> str:
-    """A new heap: ``positions``, ``orientations`` and ``packages``, see ``packed``."""
-    heap = settled_heap(np.random.default_rng([seed, number]))
-    return packed({name: getattr(heap, name) for name in ("positions", "orientations", "packages")})
+def _new_heap(seed: int, number: int) -> Heap:
+    return settled_heap(np.random.default_rng([seed, number]))
 
 
 def make_networks(n_jobs: int = 1) -> None:
     """Record and learn in both rounds; write ``heap/networks.safetensors`` and its provenance."""
     episodes = -(-PICKS // ROUNDS // MAX_PICKS)
     heaps = stored_heaps("train")
-    recorded: list[str] = []
-    learned: list[str] = []
+    recorded: list[Picks] = []
+    learned: list[FateNetwork] = []
     answers: list[Result] = []
     for round_number in range(ROUNDS):
         # Each episode explores around one of the networks that were learned in the round before.
-        question, asked = {"round": round_number, "explorers": digest(learned)}, []
+        question, asked = {"round": round_number, "explorers": identity(learned)}, []
         for number in range(episodes):
             one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
@@ -72,20 +69,20 @@ def make_networks(n_jobs: int = 1) -> None:
         recorded += [answer.value for answer in found]
 
         # All networks learn from the picks of all rounds so far.
-        question = {"picks": digest(recorded), "steps": STEPS}
+        question = {"picks": identity(recorded), "steps": STEPS}
         asked = [(question | {"seed": seed}, (recorded, seed)) for seed in range(NETWORKS)]
         found = keep_all(f"{NAME}/networks", _learn, asked, n_jobs)
         answers += found
         learned = [answer.value for answer in found]
-    save_networks(list(map(_network, learned)), paths.DATA / NAME / "networks.safetensors")
+    save_networks(learned, paths.DATA / NAME / "networks.safetensors")
     settings = {
         "picks": PICKS, "physics": PHYSICS, "rounds": ROUNDS, "networks": NETWORKS, "steps": STEPS,
     }  # fmt: skip
     publish(f"{NAME}/networks", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
-def _record(round_number: int, number: int, explorer: str | None) -> str:
-    """The picks of one exploring episode, see ``packed``; its number chooses the training heap.
+def _record(round_number: int, number: int, explorer: FateNetwork | None) -> Picks:
+    """The picks of one exploring episode; its number chooses the training heap.
 
     Half of the picks are random, because every box must be tried. The others are those of a
     network, or of a rule with normally distributed weights of ``EXPLORED``.
@@ -95,7 +92,7 @@ def _record(round_number: int, number: int, explorer: str | None) -> str:
     if explorer is None:
         favourite = best(linear({name: rng.normal() for name in EXPLORED}))
     else:
-        favourite = Learned([_network(explorer)], float(rng.choice(WEIGHTS)))
+        favourite = Learned([explorer], float(rng.choice(WEIGHTS)))
 
     def policy(observations, masks, rng):
         chosen = RULES["random"] if rng.random() < 0.5 else favourite
@@ -104,16 +101,10 @@ def _record(round_number: int, number: int, explorer: str | None) -> str:
     env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
     heap = env.heaps[number % len(env.heaps)]
     episode = play(env, policy, heap, int(rng.integers(2**32)))
-    return packed(vars(joined([episode])))
+    return joined([episode])
 
 
-def _learn(recorded: Sequence[str], seed: int) -> str:
-    """The weights of one network that has learned from recorded picks, see ``packed``."""
+def _learn(recorded: Sequence[Picks], seed: int) -> FateNetwork:
+    """A network that has learned from recorded picks."""
     torch.set_num_threads(1)
-    network = fit(joined([Picks(**unpacked(each)) for each in recorded]), seed, STEPS)
-    return packed({name: weight.numpy() for name, weight in network.state_dict().items()})
-
-
-def _network(weights: str) -> FateNetwork:
-    """The network of ``_learn``."""
-    return network_of({name: torch.from_numpy(each) for name, each in unpacked(weights).items()})
+    return fit(joined(recorded), seed, STEPS)

@@ -8,7 +8,7 @@ hard cases, with one or two boxes on top. ``full`` is slow and asked about some 
 a few of each of many states, drawn without looking at any answer; as many with three or more
 boxes on top, which ``table`` answers without a simulation; and all that are close, for which
 ``local`` finds a distance near the threshold. These worlds are fresh; what drift does to the picks
-of a policy, ``studies.policies.robustness`` tells.
+of a policy, ``studies.policies.comparison`` tells.
 """
 
 from collections.abc import Iterator

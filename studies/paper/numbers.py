@@ -15,9 +15,7 @@ import pandas as pd
 from scipy import stats
 
 from studies import statistics
-from studies.grid import read_grid
 from studies.paper import tuning as search
-from studies.paper.training import PAPER, PAPER_CELLS
 from studies.paper.visible_items import BINS
 from unload import task
 from unload.agent import policies
@@ -231,65 +229,3 @@ def _noise(curves: Iterable[np.ndarray]) -> np.ndarray:
 
 def _steps(reached: dict[str, float]) -> str:
     return f"{reached['step']:.0f} ({reached['low']:.0f}–{reached['high']:.0f})"
-
-
-def training() -> pd.DataFrame:
-    """The training, by the first plan's measures, see ``studies.statistics``.
-
-    Returns:
-        ``where`` and ``paper``, and a column for each of ``PAPER_CELLS``: ours, and whether it
-        agrees.
-    """
-    paper = read_grid(PAPER, cells=PAPER_CELLS)
-    runs = statistics.by_run(paper, statistics.first_plan)
-    picks = task.NUM_ENVS * np.arange(1, search.STEPS + 1)
-    losses = search.read_curves("loss", 2048, 1e-3).values()
-    tuned = [pd.Series(search.running_mean(loss), picks).dropna() for loss in losses]
-    tuned = np.mean([decrease(loss) for loss in tuned])
-
-    given = [
-        ("MSR (mean reward) at the start, first episodes", "IV-B, Fig. 12", "15 % (-0.7)"),
-        ("MSR (mean reward) at the end", "abstract, IV-B, V, Fig. 12", "60 % (around 0.2)"),
-        ("steady rise", "IV-B", "yes"),
-        ("… slower and noisier after the loss's peak", "IV-B", "yes"),
-        ("loss", "IV-B, Fig. 11", "falls, rises, falls"),
-        ("… its decrease slower than in tuning", "IV-B", "much lower slope"),
-    ]
-    frame = pd.DataFrame(given, columns=["number", "where", "paper"]).set_index("number")
-
-    for cell in statistics.by_cell(runs).itertuples():
-        curves = [curve for _, curve in paper[paper["cell"] == cell.Index].groupby("seed")]
-        start = np.mean([curve["success_rate"].iloc[0] for curve in curves])
-        holds, half = bool(cell.low <= statistics.PAPER_MSR <= cell.high), cell.runs / 2
-        reproduced = holds if cell.both >= half or not holds else "in part"  # the plan's rule
-        end = f"{cell.end:.0%}, interval {cell.low:.0%} to {cell.high:.0%} "
-        end += f"({2 * cell.end - 1:.2f}); {cell.both} of {cell.runs} runs like the paper's"
-        own = runs[runs["cell"] == cell.Index]
-        joint = (own["slower"] & own["noisier"]).sum()
-        later = f"slower in {cell.slower}, noisier in {cell.noisier}, both in {joint} "
-        later += f"of {cell.runs} runs"
-        losses = [statistics.windows(curve)["loss"].dropna() for curve in curves]
-        ends_at = statistics.WINDOW_PICKS  # windows are numbered from 0
-        slopes = [decrease(loss.set_axis(ends_at * (loss.index + 1))) for loss in losses]
-        slower = f"{np.mean(slopes):.3f} per million picks, {tuned:.2f} in tuning"
-        here = [
-            (f"{start:.1%} ({2 * start - 1:.2f})", abs(start - 0.15) < CHANCE_ERROR),
-            (end, reproduced),
-            (f"{cell.steady} of {cell.runs} runs", cell.steady >= half),
-            (later, joint >= half),
-            (f"{cell.fig11} of {cell.runs} runs", cell.fig11 >= half),
-            (slower, max(slopes) < tuned),
-        ]
-        config = PAPER_CELLS[cell.Index].config
-        reading = f"{'with' if config.mask else 'without'} the mask, b = {config.batch_size}"
-        frame[reading] = [f"{text}: {word(agrees)}" for text, agrees in here]
-    return frame
-
-
-def decrease(loss: pd.Series) -> float:
-    """Return the mean slope of the decrease after the peak, per million picks.
-
-    The peak is where the largest rise ends; the loss is indexed by picks.
-    """
-    peak = (loss - loss.cummin()).idxmax()
-    return 1e6 * (loss[peak] - loss.iloc[-1]) / max(loss.index[-1] - peak, 1)

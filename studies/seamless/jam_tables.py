@@ -32,13 +32,14 @@ def jams_data(n_jobs: int) -> None:
     counts, lasting = [], []
     for (kind, case), result in zip(cases, results):
         if kind == "lasting":
-            lasting += lasting_rows(case, result.value)
+            about = {"load": case.load, "friction": case.friction, "again": case.again}
+            lasting.append(pd.DataFrame(result.value).assign(**about))
         else:
             distances = [lift["distance"] for lift in result.value]
             about = {"question": kind, "walls": case.walls}
             counts.append(about | count_row(case, distances))
     counts = pd.DataFrame(counts).rename(columns={"picks": "moment"})
-    tables = {"jams": counts, "jam_lasting": pd.DataFrame(lasting)}
+    tables = {"jams": counts, "jam_lasting": lasting_counts(pd.concat(lasting))}
     settings = {"loads": len(jams.LOADS), "cases": len(cases)}
     publish("seamless/jams", tables, MADE_BY, settings, results)
 
@@ -52,20 +53,14 @@ def count_row(case: Case, distances: Sequence[float]) -> dict:
     }
 
 
-def lasting_rows(case: Case, lifts: list[dict]) -> list[dict]:
-    """The rows of a case in ``jam_lasting.csv``, see ``jams_data``."""
-    table = pd.DataFrame(lifts)
-    table["was"] = table["before"] < task.LIFT_THRESHOLD
-    table["is"] = table["distance"] < task.LIFT_THRESHOLD
-    rows = []
-    for out, group in table.groupby("out"):
-        rows.append({
-            "load": case.load, "friction": case.friction, "again": case.again, "out": out,
-            "boxes": len(group), "jammed_before": int(group["was"].sum()),
-            "again_jammed": int((group["was"] & group["is"]).sum()),
-            "newly_jammed": int((~group["was"] & group["is"]).sum()),
-        })  # fmt: skip
-    return rows
+def lasting_counts(lifts: pd.DataFrame) -> pd.DataFrame:
+    """``jam_lasting.csv``, see ``jams_data``."""
+    before, now = (lifts[name] < task.LIFT_THRESHOLD for name in ("before", "distance"))
+    counts = {"jammed_before": before, "again_jammed": before & now, "newly_jammed": ~before & now}
+    groups = lifts.assign(boxes=1, **counts).groupby(
+        ["load", "friction", "again", "out"], sort=False
+    )
+    return groups[["boxes", *counts]].sum().reset_index()
 
 
 def episodes_data(n_jobs: int) -> None:
@@ -84,33 +79,25 @@ def episodes_data(n_jobs: int) -> None:
         question = {"case": asdict(case), "policy": policy, "after_pick": after_pick}
         asked.append((question, (case, policy, after_pick)))
     results = keep_all("seamless/episodes", episodes.episode, asked, n_jobs)
-    rows, attempts = [], []
-    for (case, policy, after_pick), result in zip(cases, results):
-        rows += episode_rows(case, policy, after_pick, result.value)
-        if case.walls == 3 and case.gap == 0 and after_pick == "restore":
-            about = {"load": case.load, "friction": case.friction, "policy": policy}
-            attempts.append(pd.DataFrame(result.value).assign(**about))
-    attempts = in_classes(pd.concat(attempts, ignore_index=True))
+    played = [
+        pd.DataFrame(result.value).assign(
+            load=case.load, walls=case.walls, friction=case.friction, gap=case.gap,
+            policy=policy, after_pick=after_pick,
+        )
+        for (case, policy, after_pick), result in zip(cases, results)
+    ]  # fmt: skip
+    attempts = in_classes(pd.concat(played, ignore_index=True))
+    episode = ["load", "walls", "friction", "gap", "policy", "after_pick"]
+    groups = attempts.groupby([*episode, attempts["out"] // OUT_STEP * OUT_STEP], sort=False)
+    rows = groups["jammed"].agg(attempts="size", jammed="sum").reset_index()
+    attempts = attempts.query("walls == 3 and gap == 0 and after_pick == 'restore'")
     first = first_attempts(attempts)
     tables = {
-        "jam_episodes": pd.DataFrame(rows), "jam_first": first,
+        "jam_episodes": rows, "jam_first": first,
         "jam_again": again(attempts[attempts["policy"] == "random"], first),
     }  # fmt: skip
     settings = {"episodes": len(cases)}
     publish("seamless/jam_episodes", tables, MADE_BY, settings, results)
-
-
-def episode_rows(case: Case, policy: str, after_pick: str, attempts: list[dict]) -> list[dict]:
-    """The rows of an episode in ``jam_episodes.csv``."""
-    table = pd.DataFrame(attempts)
-    jammed = table["distance"] < task.LIFT_THRESHOLD
-    counts = jammed.groupby(table["out"] // OUT_STEP * OUT_STEP).agg(["size", "sum"])
-    about = {"load": case.load, "walls": case.walls, "friction": case.friction, "gap": case.gap}
-    about |= {"policy": policy, "after_pick": after_pick}
-    return [
-        {**about, "out": int(out), "attempts": int(size), "jammed": int(count)}
-        for out, size, count in counts.itertuples()
-    ]
 
 
 def in_classes(attempts: pd.DataFrame) -> pd.DataFrame:

@@ -1,6 +1,6 @@
 """The fresh seamless walls of ``jams`` in a second engine, MuJoCo.
 
-    python -m studies.seamless.mujoco_jams
+    python -m studies mujoco_jams
 
 MuJoCo's contacts are soft, and the friction of a contact is the larger one of both bodies.
 """
@@ -18,7 +18,7 @@ from unload import task
 from unload.physics.bullet import TIME_STEP
 
 NAME = "mujoco_jams"
-MADE_BY = f"{COMMAND}.seamless.{NAME}"
+MADE_BY = f"{COMMAND} {NAME}"
 WALL = 0.5  # m, half the thickness of the container's walls
 COLUMNS = ["load", "friction", "gap", "settle", "free", "jammed", "median"]
 
@@ -92,7 +92,3 @@ def mujoco_data(n_jobs: int = -1) -> None:
     rows = [count_row(case, result.value) for case, result in zip(cases(), results)]
     table = {NAME: pd.DataFrame(rows)[COLUMNS]}
     publish(f"seamless/{NAME}", table, MADE_BY, {"loads": 3}, results)
-
-
-if __name__ == "__main__":
-    mujoco_data()

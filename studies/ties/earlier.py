@@ -1,6 +1,6 @@
 """The runs of the first plan, taken out of this repository's history.
 
-    python -m studies.ties.earlier
+    python -m studies earlier
 
 Twenty of them differ from the paper's configuration in their ties alone, which are broken by the
 items' order, or by the creep of settled PyBullet walls, measured once and frozen for a load. The
@@ -16,17 +16,17 @@ import pandas as pd
 from studies import paths
 from studies.grid import Cell, Grid, write_curves
 from studies.paper.training import PAPER
-from studies.results import joined, write_provenance, write_table
+from studies.results import COMMAND, joined, write_provenance, write_table
 from studies.statistics import end_msr, fell
 from studies.ties.criterion import likeness
 
 REVISION = "c062fca"
 FOLDER = "data/answer"
-NAME, COMMAND = "ties/earlier", "python -m studies.ties.earlier"
+NAME, MADE_BY = "ties/earlier", f"{COMMAND} earlier"
 # Whose curves are published; how their ties are broken no configuration says any more.
 EARLIER = Grid(
     f"{NAME}_runs",
-    COMMAND,
+    MADE_BY,
     {
         f"ties_by_{ties}_{mask}": Cell(PAPER.cells[f"paper_{mask}"].config, range(5))
         for ties in ("order", "drift")
@@ -67,8 +67,4 @@ def earlier_data() -> None:
     write_curves(EARLIER, runs)
     settings = {"from": f"{REVISION}:{FOLDER}", "made by": records[0]["command"].split(" --")[0]}
     settings["fingerprints then"] = sorted({record["fingerprint"] for record in records})
-    write_provenance(NAME, COMMAND, settings, joined(records))
-
-
-if __name__ == "__main__":
-    earlier_data()
+    write_provenance(NAME, MADE_BY, settings, joined(records))

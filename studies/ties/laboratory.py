@@ -9,15 +9,11 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pandas as pd
 
 from studies.falls.cells import CONFIG
-from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
-from studies.fingerprint import training_fingerprint
+from studies.falls.laboratory import SLOPES, keep_cells, publish_cells
 from studies.grid import Cell
-from studies.results import COMMAND, publish
 from studies.seamless.jamming import weigh
-from studies.statistics import end_msr
 from studies.ties.noise import drifting
 from unload import task
 from unload.agent.training import Training
@@ -59,19 +55,11 @@ CELLS = {
 }
 
 
-def run_cell(name: str, cell: Cell, seed: int) -> dict:
-    """Train a run: its MSR over the last tenth, slopes and tilt before its last pick."""
-    last: dict[str, float] = {}
-    config = replace(cell.config, seed=seed)
-    run = train_in_laboratory(config, cell.change, lambda run: last.update(point(run)))
-    row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
-    return row | {measure: last[measure] for measure in (*SLOPES, *TILTS)}
-
-
 def laboratory_data(n_jobs: int = -1) -> None:
-    """Train all cells; write ``ties/laboratory.csv``, a row per run, see ``run_cell``."""
-    results = keep_cells("ties/laboratory", CELLS, n_jobs, run_cell)
-    table = pd.DataFrame([result.value for result in results])
-    settings, fingerprint = {"config": CONFIG.plain(), "runs": len(table)}, training_fingerprint()
-    name, command = "ties/laboratory", f"{COMMAND} ties_laboratory"
-    publish(name, {"laboratory": table}, command, settings, results, fingerprint, "%.4g")
+    """Train all cells; write ``ties/laboratory.csv``, a row per run.
+
+    It has ``cell`` and ``seed``, the MSR over the last tenth (``end``), and the slopes before the
+    last pick.
+    """
+    results, columns = keep_cells("ties/laboratory", CELLS, n_jobs), ["cell", "seed", "end"]
+    publish_cells("ties/laboratory", "ties_laboratory", [*columns, *SLOPES], results)

@@ -15,7 +15,6 @@ from studies.paper.training import B2048
 from studies.results import COMMAND
 from studies.seamless.jamming import jam
 from studies.ties.noise import drifting
-from unload.agent.config import TrainConfig
 
 SEEDS, FEW_SEEDS = range(60, 65), range(60, 63)
 RANKED_HERE = replace(B2048, batch_size=256, position_noise=0.0)
@@ -34,8 +33,8 @@ def _cell(ties: str, seeds: Sequence[int] = SEEDS, share: float = 0.0, **fields)
     return Cell(replace(RANKED_HERE, **fields), seeds, change)
 
 
-def _frozen(config: TrainConfig = B2048, **fields) -> Cell:
-    return Cell(replace(config, **fields), SEEDS)
+def _frozen(**fields) -> Cell:
+    return Cell(replace(B2048, **fields), SEEDS)
 
 
 CELLS = {

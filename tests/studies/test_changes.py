@@ -9,6 +9,7 @@ import pytest
 from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
+from tests.agent.runs import assert_same, at_step, interrupt
 from unload.agent.identity import unchanged
 from unload.agent.training import Training, train
 
@@ -125,14 +126,8 @@ def test_choices_see_other_signs_than_the_memory_holds(asking, given, axes):
 def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, makes):
     """Otherwise the long runs would depend on where they were stopped."""
     config, change = replace(SMALL, max_picks=25), partial(changes.several, makes=makes)
-    whole = train(config, tmp_path / "whole", progress=False, change=change)
-
-    def stop(point):
-        if point["picks"] == 3840:
-            raise SystemExit
-
-    with pytest.raises(SystemExit):
-        train(config, tmp_path / "stopped", progress=False, callback=stop, change=change)
-    resumed = train(config, tmp_path / "stopped", progress=False, change=change)
-    columns = ["picks", "success_rate", "loss"]
-    assert resumed.curve[columns].equals(whole.curve[columns])
+    train(config, tmp_path / "whole", progress=False, change=change)
+    with at_step(60, interrupt), pytest.raises(KeyboardInterrupt):
+        train(config, tmp_path / "stopped", progress=False, change=change)
+    train(config, tmp_path / "stopped", progress=False, change=change)
+    assert_same(tmp_path / "whole", tmp_path / "stopped")

@@ -5,7 +5,6 @@ import pytest
 import torch
 
 from studies.networks import NETWORKS, EquivariantStack, TwoLayerScorer
-from tests.agent.runs import CONTAINER, assert_same, interrupt_run
 from tests.network.test_peq import (  # noqa: F401
     make,
     test_bad_arguments_are_refused,
@@ -16,7 +15,7 @@ from tests.network.test_peq import (  # noqa: F401
     test_weights_are_drawn_from_plus_minus_one_over_root_inputs,
     test_what_absent_rows_hold_has_no_influence,
 )
-from unload import Greedy, TrainConfig, load_policy, train
+from unload import Greedy
 from unload.agent.learner import best_actions
 from unload.task import PADDING
 
@@ -30,16 +29,6 @@ def kind(request) -> type:
 def items(rng):
     """``items(batch, count)``: random observations."""
     return lambda *shape: torch.from_numpy(rng.uniform(-1, 1, (*shape, 3)).astype(np.float32))
-
-
-def test_their_runs_go_on_and_their_policies_come_back(kind, tmp_path):
-    config = TrainConfig(**CONTAINER | {"network": kind})
-    train(config, tmp_path / "straight", progress=False)
-    interrupt_run(config, tmp_path / "broken", 17)
-    train(config, tmp_path / "broken", progress=False)
-    assert_same(tmp_path / "straight", tmp_path / "broken")
-    loaded = load_policy(tmp_path / "broken" / "policy.safetensors", kind(4))
-    assert type(loaded.network) is kind
 
 
 def test_rows_without_an_item_have_no_part_in_the_choice(kind, rng):

@@ -163,11 +163,12 @@ def test_each_published_figure_is_drawn_by_a_notebook():
     assert {f"fig{number:02d}" for number in range(1, 13)} <= {name[:5] for name in published}
 
 
-def test_figures_are_saved_as_the_same_bytes(tmp_path):
+def test_figures_are_saved_as_the_same_bytes(tmp_path, monkeypatch):
     draws = {"one": comparison_msr, "other": partial(diagrams.fig07_network, 4)}
     for name, draw in draws.items():
         for folder in ("a", "b"):
-            style.save(draw(), name, tmp_path / "figures" / folder)
+            monkeypatch.setattr(paths, "FIGURES", tmp_path / "figures" / folder)
+            style.save(draw(), name)
         for suffix in ("png", "pdf"):
             both = [tmp_path / "figures" / folder / f"{name}.{suffix}" for folder in "ab"]
             assert both[0].read_bytes() == both[1].read_bytes()

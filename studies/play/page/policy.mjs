@@ -1,5 +1,5 @@
 // How a network chooses a box, how often it is right in containers that it has never seen, and what
-// it prefers: see studies/falls/measures.py and fresh.py.
+// it prefers: see studies/falls/measures.py.
 
 import { Container, Generator, stackLoad } from "./container.mjs";
 

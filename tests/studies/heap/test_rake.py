@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from studies.heap import recording
-from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap, package_sizes
+from studies.heap.boxes import DOOR, FARTHEST_EDGE, REAR, WIDTH, Heap
 from studies.heap.generate import _accepted, stored_heaps, write_heaps
 from studies.heap.rake import PHYSICS, Rake
-from studies.results import unpacked
 from unload import task
 from unload.agent.identity import identity
 
@@ -71,8 +70,7 @@ def test_the_edge_is_at_the_front_but_does_not_give_way_beyond_the_door(cubes):
 @pytest.fixture(scope="module")
 def real_heap() -> Heap:
     """A new heap; in the last round of settling boxes were still leaving."""
-    made = unpacked(recording._new_heap(recording.SEEDS["train"], 60))
-    return Heap(**made, sizes=package_sizes(made["packages"]))
+    return recording._new_heap(recording.SEEDS["train"], 60)
 
 
 def test_the_shipped_heaps_are_what_the_generator_makes(real_heap):

@@ -1,7 +1,6 @@
 """Policies compared, by the table and with all boxes simulated; cards, margin, and the outlook."""
 
 from dataclasses import replace
-from functools import partial
 from itertools import islice, product
 
 import numpy as np
@@ -9,25 +8,22 @@ import pandas as pd
 import pytest
 import torch
 
-from studies.policies import comparison, robustness, sb3, variants
-from studies.policies.comparison import PLAYERS, comparison_data, digests
+from studies.policies import comparison, sb3, variants
+from studies.policies.comparison import FRONT_WALLS, PLAYED, PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
-from studies.policies.robustness import FRONT_WALLS, front_walls
 from studies.policies.variants import judged
 from studies.results import read_provenance, read_table
-from tests.agent.runs import lowest
 from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
 from unload.env.observation import nearest
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
-from unload.physics.bullet import World
 from unload.physics.situation import Surroundings
 from unload.support import files
 
 
 def test_a_comparison_holds_the_rows_of_evaluate(own_data, set_in):
     conditions = {"500 picks": {}, "σ 5 cm": {"position_noise": 0.05}}
-    set_in(comparison, LOADS=1, CONDITIONS=conditions)
+    set_in(comparison, LOADS=1, CONDITIONS=conditions, PLAYED=dict.fromkeys(conditions, PLAYERS))
     comparison_data(n_jobs=1)
     table = read_table("policies/comparison")
     played = table[["condition", "policy", "mask"]].itertuples(index=False, name=None)
@@ -39,29 +35,27 @@ def test_a_comparison_holds_the_rows_of_evaluate(own_data, set_in):
     assert read_provenance("policies/comparison")["settings"]["loads"] == 1
 
 
-@pytest.mark.parametrize("condition", comparison.CONDITIONS)
+@pytest.mark.parametrize("condition", [name for name in PLAYED if "full" not in name])
 def test_the_first_containers_of_a_condition_are_those_of_the_committed_data(
     condition, monkeypatch
 ):
     monkeypatch.setattr(comparison, "LOADS", 2)
-    rows = comparison.read_comparison().query("policy == 'nearest' and condition == @condition")
-    found = comparison.compare("nearest", policies.nearest, True, condition)["success_rate"]
+    rows = read_table("policies/comparison").query(
+        "policy == 'nearest' and condition == @condition"
+    )
+    found = comparison.compare("nearest", True, condition)["success_rate"]
     assert rows["success_rate"].head(2).tolist() == pytest.approx(found.tolist(), abs=1e-5)
 
 
 def test_committed_data_is_of_the_committed_policies_and_of_the_plan():
-    settings = {
-        "comparison": {"loads": comparison.LOADS, "seed": comparison.SEED},
-        "robustness": {
-            "episodes": robustness.EPISODES, "picks": robustness.PICKS, "seed": robustness.SEED,
-            "front walls": FRONT_WALLS,
-        },
-    }  # fmt: skip
-    for name, planned in settings.items():
-        found = read_provenance(f"policies/{name}")["settings"]
-        assert found == {"policies": digests()} | planned
-    played = read_table("policies/robustness")[["policy", "after_pick"]]
-    assert [*played.drop_duplicates().itertuples(index=False, name=None)] == [*robustness.PLAYED]
+    settings = read_provenance("policies/comparison")["settings"]
+    full = settings.pop("full")
+    assert full.pop("front walls") == FRONT_WALLS and full.items() <= comparison.FULL.items()
+    planned = {"policies": digests(), "loads": comparison.LOADS, "seed": comparison.SEED}
+    assert settings == planned and len(full) == 3
+    played = read_table("policies/comparison")[["condition", "policy", "mask"]].drop_duplicates()
+    planned = [(name, *player) for name, players in PLAYED.items() for player in players]
+    assert [*played.itertuples(index=False, name=None)] == planned
 
 
 def test_cards_are_measured_and_written(tmp_path, set_in):
@@ -101,35 +95,24 @@ def test_the_recommended_policy_does_not_miss():
 
 
 @pytest.mark.pybullet
-@pytest.mark.parametrize(("policy", "free"), [(policies.highest, 1.0), (lowest, 0.0)])
-def test_only_free_boxes_that_fail_are_jammed(monkeypatch, policy, free):
-    """In 140 piles of two cubes each, none of which is lifted far."""
-    x, y, z = np.meshgrid(0.5 * np.arange(14) + 0.25, 0.25 * np.arange(10) + 0.125, (0.1, 0.3))
-    piles = Load(np.column_stack([x.ravel(), y.ravel(), z.ravel()]), np.full((280, 3), 0.2))
-    monkeypatch.setattr(World, "pull", lambda *_: 0.1)
-    row = robustness.play(policy, "restore", 0, 20, lambda rng: piles)
-    assert row == {"success_rate": 0, "free": free, "jammed": free}
+def test_with_every_box_simulated_a_condition_has_containers_of_its_own(own_data, set_in):
+    def stack(rng):
+        return comparison.front_walls(stack_load(rng), 1)
 
-
-@pytest.mark.pybullet
-def test_all_play_the_same_containers(own_data, set_in):
-    play = partial(robustness.play, stack=lambda rng: front_walls(stack_load(rng), 1))
-    played = ("highest", "keep"), ("highest", "restore")
-    set_in(robustness, PLAYED=played, EPISODES=2, PICKS=2, play=play)
-    robustness.robustness_data()
-    table = read_table("policies/robustness")
-    assert table["after_pick"].tolist() == ["keep", "keep", "restore", "restore"]
-    assert table["episode"].tolist() == [0, 1, 0, 1]
-    seeds = np.random.SeedSequence(robustness.SEED).generate_state(2).tolist()
-    again = play(policies.highest, "restore", seeds[1], 2)
-    assert table.iloc[-1][[*again]].tolist() == pytest.approx([*again.values()])
-    assert read_provenance("policies/robustness")["settings"]["episodes"] == 2
+    few = {"episodes": 2, "max_picks": 3, "stack": stack}
+    condition = comparison.CONDITIONS["full, kept"] | few
+    played = {"full, kept": (("highest", True),)}
+    set_in(comparison, CONDITIONS={"full, kept": condition}, PLAYED=played)
+    comparison_data(n_jobs=1)
+    expected = evaluate(policies.highest, **condition)
+    rows = read_table("policies/comparison")
+    pd.testing.assert_frame_equal(rows[expected.columns], expected, rtol=1e-5, check_dtype=False)
 
 
 def test_the_boxes_of_100_picks_are_in_front_of_the_spare_wall(rng):
     for _ in range(50):
         load = stack_load(rng)
-        seen = nearest(load.positions, task.N_VISIBLE + robustness.PICKS)
+        seen = nearest(load.positions, task.N_VISIBLE + comparison.FULL["max_picks"])
         assert load.walls[seen].min() > 12 - FRONT_WALLS
 
 
