@@ -195,6 +195,7 @@ def draw_answer() -> Figure:
     anew = _draw_runs(middle, ties, ["anew_mask"], COLOURS["level"])
     ordered = _draw_runs(middle, earlier, ["ties_by_order_mask"], shared)
     count = _draw_runs(middle, paper, ["averaged_mask", "averaged_b2048_mask"], shared)
+    count += _draw_runs(middle, ties, ["averaged_mask"], shared)
     _label(middle, (0.98, 0.36), f"by noise that drifts ({drifting})", ranks)
     _label(middle, (0.98, 0.26), f"by noise drawn anew at each pick ({anew})", COLOURS["level"])
     said = f"by the items' order ({ordered}), or averaged ({count})"
