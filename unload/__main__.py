@@ -41,6 +41,13 @@ those that are the package's own choice.
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a formula in a spreadsheet begins with
 
 
+def command() -> None:
+    """Run the command line as a program."""
+    if hasattr(signal, "SIGPIPE"):  # not on Windows
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # "| head" ends it without an error
+    main()
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line with these arguments, those of the process if None."""
     arguments = sys.argv[1:] if arguments is None else arguments
@@ -197,13 +204,6 @@ def _explained(kind: type) -> dict[str, str]:
         for names, meaning in entries
         for name in names.split(", ")
     }
-
-
-def command() -> None:
-    """Run the command line as a program."""
-    if hasattr(signal, "SIGPIPE"):  # not on Windows
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # "| head" ends it without an error
-    main()
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ def fig01_mdp() -> Figure:
 
 @styled
 def fig03_substacks() -> Figure:
-    """Fig. 3: the nine substacks, and how four of them interlock to a row of a wall.
+    """Fig. 3: the nine substacks that ``build_load`` places, and how four interlock to a row.
 
     Numbers are packages 0–12; everything is drawn to the same scale.
     """
