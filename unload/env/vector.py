@@ -147,8 +147,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         What is not known, ``physics`` simulates; a ``TablePhysics`` adds it to its table.
         """
         state = self._containers
-        slots = self.table.slots
-        items, distances = containers.look_up(state, actions, self._always_simulate, *slots)
+        known = self.table.entries
+        items, distances = containers.look_up(state, actions, self._always_simulate, *known)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)

@@ -13,11 +13,10 @@ from unload import task
 from unload.fast.ranking import features, rank, remove, replace
 from unload.load.boxes import OVERLAP
 from unload.physics.situation import digest_of, find_movers, key_length, write_key
-from unload.physics.table import FREE_LIFT, HELD_DOWN, slot_of
+from unload.physics.table import FREE_LIFT, HELD_DOWN, UNKNOWN, find_distance
 from unload.support.compiled import compiled
 
 _N_VISIBLE = task.N_VISIBLE
-UNKNOWN = -1.0  # in place of a distance that is not in the table
 
 
 class Containers(NamedTuple):
@@ -150,10 +149,8 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             continue
 
         words = write_key(starts, links, present, geometry, right, members, dynamic, key)
-        digest = digest_of(key[:words])
-        slot = slot_of(digests, digest)
-        known = digests[slot] == digest  # see LiftTable.find
-        distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
+        found = find_distance(digests, micrometres, digest_of(key[:words]))
+        distances[env] = UNKNOWN if found == UNKNOWN else found / 1e6
     return items, distances
 
 

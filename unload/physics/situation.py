@@ -239,7 +239,7 @@ def _absorb(digest, word):
 
 @compiled(plain=True)
 def digest_of(words):
-    """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
+    """The digest of a situation's key, (k,) int32: never 0."""
     digest = np.uint64(len(words))
     for word in words:
         digest = _absorb(digest, word)
