@@ -185,11 +185,6 @@ class Load:
         lower, upper = self.covers
         return np.bincount(lower[present[upper]], minlength=len(self)) > 0
 
-    @property
-    def headroom(self) -> np.ndarray:
-        """(n,) float64, from the top of each box to the ceiling, in m."""
-        return self.ceiling - (self.positions[:, 2] + self.sizes[:, 2] / 2)
-
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:
         """All pairs of a box and one that rests on it, as two arrays."""
