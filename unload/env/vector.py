@@ -8,11 +8,11 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingVectorEnv, stacked
+from unload.env.base import PickingVectorEnv
 from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import drift, scale
 from unload.fast import containers
-from unload.load.boxes import Load, check_stack
+from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import situation_in
@@ -84,7 +84,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = stacked(self.stack, rng) if load is None else load
+            chosen = self.stack(rng) if load is None else load
+            check_stacked(chosen, "what stack returned")
             self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
