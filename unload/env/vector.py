@@ -9,7 +9,6 @@ import numpy as np
 from unload import task
 from unload.env import observation
 from unload.env.base import PickingVectorEnv
-from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import drift, scale
 from unload.fast import containers
 from unload.load.boxes import Load, check_stack, check_stacked
@@ -50,7 +49,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     ) -> None:
         super().__init__(num_envs, **settings)
         check_stack(stack)
-        self._how_observed = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
+        self._how_observed = self.equalize, self.ties == "average"
         self.stack, self._lent = stack, isinstance(physics, LocalPhysics)
         if isinstance(physics, str):
             checks.one_of("physics", physics, ("table",))
