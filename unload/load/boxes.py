@@ -248,12 +248,7 @@ def _find_contacts(
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
         raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected none")
-    # By kind and box, and of one box the last found first; a list ends where the next one starts.
-    found = found[::-1]
-    places = found[:, 0] * len(low) + found[:, 1]
-    ends = np.append(0, np.cumsum(np.bincount(places, minlength=3 * len(low)))).astype(np.int32)
-    starts = np.stack([ends[kind * len(low) :][: len(low) + 1] for kind in range(3)])
-    return Contacts(starts, found[np.argsort(places, kind="stable"), 2])
+    return Contacts(*_lists(found, len(low)))
 
 
 @compiled(plain=True)
@@ -299,3 +294,22 @@ def _find(low, high, order, ends, tolerance):
                 count += 1
         start = end
     return found[:count], 0, 0
+
+
+@compiled(plain=True)
+def _lists(found, count):
+    """``starts`` and ``links`` of ``Contacts``."""
+    starts = np.zeros((3, count + 1), np.int32)
+    for row in range(len(found)):
+        starts[found[row, 0], found[row, 1]] += 1
+    total = 0
+    for kind in range(3):  # from the number of a box's contacts to the end of its list
+        for box in range(count + 1):
+            total += starts[kind, box]
+            starts[kind, box] = total
+    links = np.empty(total, np.int32)
+    for row in range(len(found)):  # fills each list from its end, which leaves its start
+        kind, box = found[row, 0], found[row, 1]
+        starts[kind, box] -= 1
+        links[starts[kind, box]] = found[row, 2]
+    return starts, links
