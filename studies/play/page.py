@@ -17,8 +17,8 @@ from pathlib import Path
 from studies import paths
 from studies.falls.laboratory import ERRS, THRESHOLDS
 from unload import task
-from unload.env.equalization import TIE_TOLERANCE
 from unload.env.observation import POSITION_NOISE, SINK
+from unload.fast.ranking import TIE_TOLERANCE
 from unload.load import substacks
 from unload.support import files
 

@@ -8,6 +8,7 @@ unload the same containers: in the conditions of the training, with blurred posi
 of other sizes, and with every box simulated.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from hashlib import blake2b
@@ -20,6 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from studies.paper import training
+from studies.policies.scaled import scaled_load
 from studies.policies.variants import GRIDS, RECOMMENDED
 from studies.results import COMMAND, keep_all, publish, read_provenance, read_table
 from studies.statistics import t_interval
@@ -37,8 +39,11 @@ from unload.support import files
 
 # Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
 CARD_LOADS, CARD_SEED = 200, 5000
-# What a card calls the measures on the paper's loads, and on those with boxes of another scale.
-SCALES = {1.0: "on the paper's loads", 0.8: "on boxes × 0.8", 1.2: "on boxes × 1.2"}
+# Who stacks the loads, by what a card calls the measures on them.
+SMALLER, LARGER = partial(scaled_load, 0.8), partial(scaled_load, 1.2)
+STACKS = {
+    "on the paper's loads": stack_load, "on boxes × 0.8": SMALLER, "on boxes × 1.2": LARGER,
+}  # fmt: skip
 _DEFAULT = training.PAPER.cells[training.DEFAULTS].config
 # By name: the grid whose run it is, and the run's configuration.
 ORIGINS: dict[str, tuple[str, TrainConfig]] = {
@@ -71,8 +76,8 @@ CONDITIONS = {
     "σ 0.5 cm": {"position_noise": 0.005},
     "σ 2 cm": {"position_noise": 0.02},
     "σ 5 cm": {"position_noise": 0.05},
-    "boxes × 0.8": {"stack": partial(stack_load, scale=0.8)},
-    "boxes × 1.2": {"stack": partial(stack_load, scale=1.2)},
+    "boxes × 0.8": {"stack": SMALLER},
+    "boxes × 1.2": {"stack": LARGER},
     # Boxes drift, and one on which nothing lies may be jammed between its neighbours.
     "full, kept": FULL | {"after_pick": "keep"},
     "full, restored": FULL,
@@ -108,22 +113,21 @@ def write_cards() -> None:
             "loads": "the paper's",
             "picks": config.picks,
             "fingerprint": read_provenance(grid)["fingerprint"],
-            **{name: measure(policy, scale) for scale, name in SCALES.items()},
+            **{name: measure(policy, stack) for name, stack in STACKS.items()},
         }
         save_policy(policy, path)
 
 
-def measure(policy: Policy, scale: float) -> dict[str, float]:
+def measure(policy: Policy, stack: Callable[[np.random.Generator], Load]) -> dict[str, float]:
     """How a policy does in fresh containers, each for 500 picks or until it is empty.
 
     Args:
         policy: see ``unload.policies``.
-        scale: of the boxes, see ``unload.stack_load``.
+        stack: makes the loads, see ``unload.evaluate``.
 
     Returns:
         ``msr``, ``misses`` and ``picks`` with the mask, and ``msr_no_mask``.
     """
-    stack = partial(stack_load, scale=scale)
     masked, free = (
         evaluate(policy, CARD_LOADS, CARD_SEED, mask=mask, stack=stack) for mask in (True, False)
     )

@@ -8,6 +8,7 @@ a case varies stands in ``Case``, the cases in ``cases``.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from unload.load.boxes import BESIDE, CONTACT_TOLERANCE, Load
 from unload.load.substacks import stack_load
 from unload.physics.bullet import ITERATIONS, TIME_STEP, World
 from unload.physics.full import FullPhysics
+from unload.physics.situation import RESOLUTION
 
 LOADS = range(5)
 FRICTIONS = (0.25, 0.36, 0.49, 0.64, 1.0)  # of a contact; Bullet's own is 0.25 here
@@ -61,19 +63,15 @@ class SeamlessPhysics(FullPhysics):
         super().__init__("restore")
         self.case = case
 
-    def _make_world(self) -> World:
+    def _reset(self, load: Load) -> None:
         case = self.case
-        return World(case.time_step, case.maximal, case.iterations)
-
-    def _slim(self, sizes: np.ndarray) -> np.ndarray:
-        case = self.case
-        widths = np.random.default_rng(case.load).normal(0, case.spread, len(sizes))
-        gaps = np.array([case.gap, case.gap, 0.0])
-        return sizes - gaps + np.stack([0 * widths, widths, 0 * widths], axis=1)
-
-    def _add_box(self, position, size, mass: float) -> int:
+        world = World(case.time_step, case.maximal, case.iterations)
         # Bullet multiplies the friction of the two bodies.
-        return self._world.add_box(position, size, mass, friction=self.case.friction**0.5)
+        world.add_box = partial(world.add_box, friction=case.friction**0.5)
+        widths = np.random.default_rng(case.load).normal(0, case.spread, len(load))
+        gaps = np.array([case.gap, case.gap, 0.0])
+        sizes = np.rint(load.sizes / RESOLUTION) * RESOLUTION
+        self._fill(load, world, sizes - gaps + np.stack([0 * widths, widths, 0 * widths], axis=1))
 
 
 def load_of(case: Case) -> Load:

@@ -68,7 +68,7 @@ def new_load(rng: np.random.Generator) -> unload.Load:
     sizes[..., 2] = 0.95 * height * rng.dirichlet(np.full(8, 20.0), (12, 7))
     ends = [sizes[..., axis].cumsum(axis=axis) for axis in range(3)]
     corners = np.stack(ends, axis=-1) - sizes
-    return unload.Load.from_corners(corners.reshape(-1, 3), sizes.reshape(-1, 3))
+    return unload.Load((corners + sizes / 2).reshape(-1, 3), sizes.reshape(-1, 3))
 
 
 def _our_rate(

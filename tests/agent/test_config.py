@@ -50,6 +50,7 @@ COUNTS = ("picks", "num_envs", "batch_size", "n_features", "target_update_interv
         ("picks", 2048),  # not enough for an update by 2048
         ("replay_size", 63),  # less than a step of all environments
         ("gamma", 1.1),
+        ("learning_rate", 1e38),  # beyond what Adam can take
         ("network", "mlp"),
     ],
 )

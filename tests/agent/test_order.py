@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.load.walls import KINDS, own_load
+from tests.load.walls import KINDS, of_corners, own_load
 from unload import Load, picking_order, policies, read_load, stack_load
 from unload import __main__ as command
 from unload.agent.order import reachable, stops_of
@@ -219,7 +219,7 @@ def test_boxes_that_nobody_can_lift_are_named_and_tried_last(boxes, caplog, monk
 def test_nothing_comes_out_early_for_boxes_that_nobody_can_lift():
     base, heavy, in_front, beside = range(4)
     corners = [(0, 0, 0), (0, 0, 0.4), (0.5, 0, 0), (0, 1, 0)]
-    load = Load.from_corners(
+    load = of_corners(
         corners, np.full((4, 3), 0.4), masses=[1, 25, 1, 1], extras={"stop": [1, 1, 3, 2]}
     )
     assert picking_order(load, by="stop")["item"].tolist() == [beside, in_front, heavy]
@@ -235,7 +235,7 @@ def test_where_boxes_block_each_other_in_a_circle_none_is_lifted_with_another_on
     tall, foot, plank, high, far = range(5)
     corners = [(2, 0, 0), (3, 0, 0), (1, 1, 0.5), (1, 0.5, 0.8), (1, 1, 0)]
     sizes = [(1, 1, 1.5), (1, 2, 0.5), (2.5, 1, 0.3), (1, 1.1, 0.5), (0.5, 1, 0.5)]
-    order = picking_order(Load.from_corners(corners, sizes))
+    order = picking_order(of_corners(corners, sizes))
     assert order["item"].tolist() == [tall, high, plank, foot, far] and order["unloaded"].all()
     assert order["behind"].tolist() == [True, False, False, False, False]
 

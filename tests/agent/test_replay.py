@@ -6,12 +6,11 @@ from unload.agent.replay import ReplayBuffer
 
 
 @pytest.mark.parametrize("next_state", [False, True])
-def test_samples_are_those_of_the_picks_that_were_added(rng, next_state):
+def test_picks_are_kept_as_they_were_added(rng, next_state):
     replay, batch = ReplayBuffer(100, 4, next_state), make_batch(rng, 40, 4)
     batch = batch if next_state else without_next(batch)
     replay.add(**batch)
-    assert {*replay.sample_rows(500, rng).tolist()} == {*range(40)}
-    assert replay.arrays.keys() == batch.keys()
+    assert len(replay) == 40 and replay.arrays.keys() == batch.keys()
     for name, array in replay.arrays.items():
         assert array[:40].tobytes() == batch[name].tobytes()
 
@@ -21,6 +20,5 @@ def test_the_oldest_picks_are_overwritten(rng):
     for first in range(0, 24, 6):
         replay.add(**{name: array[first : first + 6] for name, array in batch.items()})
     assert len(replay) == 11 and replay.total == 24
-    assert {*replay.sample_rows(300, rng).tolist()} == {*range(11)}
     for name, array in replay.arrays.items():
         assert array[np.arange(13, 24) % 11].tobytes() == batch[name][13:].tobytes()

@@ -26,7 +26,6 @@ def own_network(n_features, generator):
 
 
 HIGHEST = TrainConfig(**RUNS["highest item"])
-ADAM = TrainConfig(**CONTAINER | {"network": own_network}, learning_rate=1e39)
 LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 
 
@@ -163,7 +162,7 @@ def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
 def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monkeypatch):
     """It once wrote infinite weights and counted as finished."""
     monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)
-    config = TrainConfig(**CONTAINER, learning_rate=1e39)
+    config = TrainConfig(**CONTAINER, learning_rate=1e37)
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
@@ -180,7 +179,6 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
         ({"change": None}, TypeError, "change is None; expected a function of a Training"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
-        ({"config": ADAM}, ValueError, r"learning_rate is 1e\+39; expected one that PyTorch's Ada"),
         ({"lifts": "run/checkpoint.npz"}, ValueError, "lifts is 'run/checkpoint.npz', a file of"),
         ({"lifts": "run/../run/config.json"}, ValueError, "lifts is .*, a file of the run; expec"),
         ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
@@ -194,8 +192,7 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message)
     usual = {"config": TrainConfig(**CONTAINER), "run_dir": tmp_path / "run", "progress": False}
     with pytest.raises(error, match=message):
         train(**usual | given)
-    assert (tmp_path / "run").exists() == ("learning_rate" in message), "known when it is asked for"
-    assert not list(tmp_path.glob("*/*.*"))
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.needs("mkfifo")

@@ -2,12 +2,11 @@
 
 import sys
 from dataclasses import FrozenInstanceError, replace
-from decimal import Decimal
 
 import numpy as np
 import pytest
 
-from tests.load.walls import KINDS, crossed_bars, own_load
+from tests.load.walls import KINDS, crossed_bars, of_corners, own_load
 from unload import task
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load, _find_contacts
 
@@ -83,7 +82,7 @@ def test_a_box_that_reaches_into_another_is_refused(side, axis, reach):
     other = low[13].copy()
     other[axis] += side * (0.3 - reach)
     with pytest.raises(ValueError, match=r"boxes \[13, 27\]: overlap by .* m; expected none"):
-        Load.from_corners([*low, other], np.full((28, 3), 0.3))
+        of_corners([*low, other], np.full((28, 3), 0.3))
 
 
 @pytest.mark.parametrize("tolerance", [CONTACT_TOLERANCE, 0.003])
@@ -92,7 +91,7 @@ def test_boxes_above_one_another_touch_up_to_the_tolerance_of_their_load(toleran
     for share, touches in ((0.99, True), (1.01, False)):
         above, beside = 1 + share * tolerance, 1 + share * CONTACT_TOLERANCE
         corners = [(0, 0, 0), (0, 0, above), (0, beside, 0)]
-        load = Load.from_corners(corners, np.ones((3, 3)), contact_tolerance=tolerance)
+        load = of_corners(corners, np.ones((3, 3)), contact_tolerance=tolerance)
         assert load.contacts.of(ABOVE, 0).tolist() == [1] * touches
         assert load.contacts.of(BESIDE, 0).tolist() == [2] * touches
 
@@ -114,15 +113,6 @@ def test_the_container_is_the_papers_or_ones_own():
             one_box(positions=deep, container=container)
 
 
-def test_what_a_packer_returns_becomes_a_load_in_one_call():
-    """Corners, and numbers that are decimals, as those of ``py3dbp`` are."""
-    low = [[Decimal(0)] * 3, [Decimal(0), Decimal(0), Decimal("0.3")]]
-    sizes = [[Decimal("0.5"), Decimal("0.4"), Decimal("0.3")], [Decimal(1)] * 3]
-    load = Load.from_corners(low, sizes, ids=["a", "b"], extras={"stop": [2, 1]})
-    assert load.positions.tolist() == [[0.25, 0.2, 0.15], [0.5, 0.5, 0.8]]
-    assert load.ids.tolist() == ["a", "b"] and load.extras["stop"].tolist() == [2, 1]
-
-
 def test_contacts_without_numba_are_the_same(full_load, monkeypatch):
     low, high = full_load.positions - full_load.sizes / 2, full_load.positions + full_load.sizes / 2
     monkeypatch.delitem(sys.modules, "numba", raising=False)
@@ -130,7 +120,7 @@ def test_contacts_without_numba_are_the_same(full_load, monkeypatch):
         assert np.array_equal(one, other) and one.dtype == other.dtype == np.int32
 
 
-def test_masses_are_those_of_the_task_unless_given_and_headroom_ends_at_the_ceiling():
+def test_masses_are_those_of_the_task_unless_given_and_the_ceiling_is_infinite():
     assert one_box().masses.tolist() == [1.0] and one_box(masses=[3]).masses.tolist() == [3.0]
-    assert one_box().headroom.tolist() == replace(one_box()).headroom.tolist() == [np.inf]
-    assert one_box(ceiling=1.1).headroom == pytest.approx([0.1])
+    assert one_box().ceiling == replace(one_box()).ceiling == np.inf
+    assert one_box(ceiling=1.1).ceiling == 1.1

@@ -3,7 +3,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from unload import Load, task
+from tests.load.walls import of_corners
+from unload import task
 from unload.load import picture
 from unload.load.picture import (
     COLOURS,
@@ -90,6 +91,6 @@ def test_numbers_stand_on_the_first_picks_that_are_seen(boxes, monkeypatch):
     for text, item in (("1", 1), ("2", 0), ("3", 2)):
         assert any(np.allclose(written[text], face) for face in faces[item])
     written.clear()
-    wall = Load.from_corners([[0, 1, 0], [3, 0, 0]], [[1, 0.3, 0.3], [1, 2.4, 2.4]])
+    wall = of_corners([[0, 1, 0], [3, 0, 0]], [[1, 0.3, 0.3], [1, 2.4, 2.4]])
     picture.numbered(wall, np.array([0, 1]))
     assert [*written] == ["2"]

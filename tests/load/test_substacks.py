@@ -9,9 +9,7 @@ from unload.load.substacks import (
     CELL,
     CELLS_HIGH,
     CELLS_WIDE,
-    DEPTH,
     PACKAGES,
-    _substacks_that_fit,
     build_load,
     stack_load,
 )
@@ -54,35 +52,13 @@ def test_a_load_of_exactly_as_many_items_as_allowed_is_kept(monkeypatch, bound):
     assert len(stack_load(np.random.default_rng(5))) != len(first)
 
 
-@pytest.mark.parametrize(
-    ("scale", "fit"),
-    [(1, (12, 3, 4)), (0.8, (15, 4, 4)), (1.2, (10, 3, 3)), (0.5, (24, 7, 7)), (1.5, (8, 2, 2))],
-)
-def test_a_load_of_another_scale_fills_what_it_can(rng, scale, fit):
-    walls, rows, columns = fit
-    assert _substacks_that_fit(scale) == fit
-    load = stack_load(rng, scale=scale)
-    reach = (load.positions + load.sizes / 2).max(axis=0)
-    width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale
-    height = rows * CELLS_HIGH * CELL * scale
-    assert reach == pytest.approx([7.0, width, height])
-    # Boxes do not overlap, or there were no load: so they leave no hole.
-    assert load.sizes.prod(axis=1).sum() == pytest.approx(7.0 * width * height)
-    assert len(np.unique(load.walls)) == walls
-    # No further substack would fit.
-    assert width + 10 * CELL * scale > 2.5 and height + CELLS_HIGH * CELL * scale > 2.5
-    expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
-    assert load.sizes == pytest.approx(scale * expected)
-
-
 BAD_INPUT = {
-    r"expected \(any, any, 3\)": lambda rng: build_load(np.zeros((1, 3, 4), int), scale=1.2),
+    r"expected \(any, any, 4\)": lambda rng: build_load(np.zeros((1, 3, 3), int)),
     r"shape \(0, 3, 4\); expected a wall": lambda rng: build_load(np.zeros((0, 3, 4), int)),
     "variants holds 3 to 3; expected 0 to 2": lambda rng: build_load(np.full((1, 3, 4), 3)),
     "inside the container": lambda rng: build_load(np.zeros((1, 4, 4), int)),
     "rng is 0; expected a numpy.random.Generator": lambda rng: stack_load(0),
     "walls is 0": lambda rng: stack_load(rng, walls=0),
-    r"scale is 0.1; expected .*\[0.5, 1.5\]": lambda rng: stack_load(rng, scale=0.1),
 }
 
 

@@ -12,6 +12,11 @@ MEASURED = 0.003  # m, heights of boxes side by side may differ by so much
 KINDS = ("continuous sizes", "narrow gaps", "few sizes", "measured heights")
 
 
+def of_corners(low: np.ndarray, sizes: np.ndarray, **fields) -> Load:
+    """The load of boxes that are given by their corners nearest to the origin, (n, 3) in m."""
+    return Load(np.array(low) + np.array(sizes) / 2, sizes, **fields)
+
+
 def own_load(rng: np.random.Generator, kind: str) -> Load:
     """A full container of one of ``KINDS``.
 

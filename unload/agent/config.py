@@ -17,7 +17,10 @@ ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 OPTIONS = {"ties": TIES, "network": tuple(NETWORKS)}
 MAY_BE_ZERO = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
 # Of the real numbers, which are 0 or larger.
-HIGHEST = {"position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0}
+HIGHEST = {
+    "position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0,
+    "learning_rate": 1e37,  # Adam's steps have to fit into float32
+}  # fmt: skip
 EPSILON_FALLS = 0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
 
 
@@ -42,7 +45,7 @@ class TrainConfig:
         seed: * of loads, exploration, replay and weights.
         num_envs: environments side by side (Fig. 2).
         max_picks: of an episode (Sec. III-C).
-        learning_rate: μ, of Adam.
+        learning_rate: μ, of Adam, at most 1e37.
         batch_size: b, picks per update.
         replay_size: picks that the replay memory holds.
         epsilon_init, epsilon_final: exploration rate at the start, and from half of the picks on.

@@ -27,21 +27,12 @@ class PlainLearner:
     def __init__(self, network: torch.nn.Module, learning_rate: float, beta: float) -> None:
         self.network, self.beta = network, beta
         self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
-        self._start_moments(learning_rate)
-
-    @torch.no_grad()
-    def _start_moments(self, learning_rate: float) -> None:
-        """Let Adam have its moments before the first step: by one that changes nothing."""
-        for weight in self.network.parameters():
+        # Adam has its moments before the first step: by one that changes nothing.
+        for weight in network.parameters():
             weight.grad = torch.zeros_like(weight)
-        try:
-            self.optimizer.step()
-        except RuntimeError as error:  # its step is too long for the weights' precision
-            wanted = "expected one that PyTorch's Adam can take"
-            raise ValueError(f"learning_rate is {learning_rate}; {wanted} ({error})") from error
+        self.optimizer.step()
         for moments in self.optimizer.state.values():
             moments["step"].zero_()
-        self.optimizer.zero_grad()
 
     def best_actions(self, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
         """Return the allowed action of the highest value, (batch,) int64."""

@@ -4,7 +4,6 @@ import numpy as np
 
 from unload import task
 from unload.agent.config import TrainConfig
-from unload.support import checks
 
 
 class ReplayBuffer:
@@ -50,21 +49,9 @@ class ReplayBuffer:
         return min(self.total, self.size)
 
     def add(self, **batch: np.ndarray) -> None:
-        """Add a batch of picks; the names are those of ``arrays``, the first axis the batch.
-
-        Raises:
-            ValueError: a name is missing or unknown, or a shape does not fit. Nothing is added.
-        """
-        if batch.keys() != self.arrays.keys():
-            raise ValueError(f"batch has {sorted(batch)}; expected {sorted(self.arrays)}")
+        """Add a batch of picks; the names are those of ``arrays``, the first axis the batch."""
         count = len(batch["actions"])
-        for name, array in self.arrays.items():
-            checks.shaped(name, batch[name], (count, *array.shape[1:]))
         slots = np.arange(self.total, self.total + count) % self.size
         for name, array in self.arrays.items():
             array[slots] = batch[name]
         self.total += count
-
-    def sample_rows(self, batch_size: int, rng: np.random.Generator) -> np.ndarray:
-        """Draw slots of picks that were added, uniformly, with replacement, (batch_size,) int64."""
-        return rng.integers(len(self), size=batch_size)

@@ -123,7 +123,7 @@ class Training:
 
     def start_update(self) -> Callable[[], float]:
         """Begin an update by a batch of the replay, see ``DQN.start_update``."""
-        rows = self.replay.sample_rows(self.config.batch_size, self.rng)
+        rows = self.rng.integers(len(self.replay), size=self.config.batch_size)
         return self.agent.start_update(self.replay.arrays, rows)
 
     def policy(self) -> Greedy:

@@ -10,7 +10,7 @@ episode there, whatever their own ``max_picks`` is.
 
 import sys
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -40,13 +40,6 @@ def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Loa
             raise ValueError(f"options is {options!r}; expected {', '.join(known) or 'none'}")
         check_stacked(value)
     return dict(options)
-
-
-def stacked(stack: Callable, rng: np.random.Generator) -> Load:
-    """A load of ``stack``; raise unless it is one."""
-    load = stack(rng)
-    check_stacked(load, "what stack returned")
-    return load
 
 
 class InOrder:

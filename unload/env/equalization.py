@@ -3,18 +3,15 @@
 import numpy as np
 
 from unload import task
+from unload.fast.ranking import TIE_TOLERANCE
 from unload.support import checks
 
 TIES = ("noise", "average")
-# Suits scaled positions: noise of a few mm is bridged, the 3.5 cm between the grid's heights
-# (0.028 scaled) are not.
-TIE_TOLERANCE = 0.005
 
 
 def equalize(
     positions: np.ndarray,
     ties: str = "noise",
-    tolerance: float = TIE_TOLERANCE,
     present: np.ndarray | None = None,
 ) -> np.ndarray:
     """Replace each coordinate by its rank among the items, spread evenly over [-1, 1].
@@ -29,8 +26,7 @@ def equalize(
             ``"noise"``: each has a rank of its own, as in the paper, where the
             simulator's inaccuracy decides among them; exactly equal values are ranked
             in the order of the items. ``"average"``: items whose sorted neighbours
-            differ by at most ``tolerance`` share the mean of their ranks.
-        tolerance: for ``ties="average"``, in the unit of ``positions``.
+            differ by at most 0.005 share the mean of their ranks.
         present: (..., items) bool, the rows that hold an item; all if None. The others do
             not count among the N items and get ``task.PADDING``, -1.
 
@@ -43,7 +39,6 @@ def equalize(
             ``present`` is of another shape.
     """
     checks.one_of("ties", ties, TIES)
-    checks.real("tolerance", tolerance, 0)
     positions = np.asarray(positions)
     if positions.ndim < 2 or positions.shape[-2] < 2:
         raise ValueError(
@@ -62,7 +57,7 @@ def equalize(
     order = np.argsort(positions, axis=-2, kind="stable")
     sorted_ranks = np.arange(positions.shape[-2], dtype=np.float64)[:, None]
     if ties == "average":
-        sorted_ranks = _shared_ranks(np.take_along_axis(positions, order, axis=-2), tolerance)
+        sorted_ranks = _shared_ranks(np.take_along_axis(positions, order, axis=-2))
     ranks = np.empty(positions.shape)
     np.put_along_axis(ranks, order, sorted_ranks, axis=-2)
 
@@ -70,13 +65,13 @@ def equalize(
     return (even if present is None else np.where(present, even, task.PADDING)).astype(np.float32)
 
 
-def _shared_ranks(ordered: np.ndarray, tolerance: float) -> np.ndarray:
-    """The mean rank of each run of values at most ``tolerance`` apart, sorted on axis -2."""
+def _shared_ranks(ordered: np.ndarray) -> np.ndarray:
+    """The mean rank of each run of values at most ``TIE_TOLERANCE`` apart, sorted on axis -2."""
     items = ordered.shape[-2]
     index = np.broadcast_to(np.arange(items)[:, None], ordered.shape)
     opens = np.ones(ordered.shape, dtype=bool)
     with np.errstate(invalid="ignore"):  # inf - inf, between rows without an item
-        opens[..., 1:, :] = np.diff(ordered, axis=-2) > tolerance
+        opens[..., 1:, :] = np.diff(ordered, axis=-2) > TIE_TOLERANCE
     closes = np.ones(ordered.shape, dtype=bool)
     closes[..., :-1, :] = opens[..., 1:, :]
     first = np.maximum.accumulate(np.where(opens, index, 0), axis=-2)

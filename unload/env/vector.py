@@ -8,11 +8,10 @@ import numpy as np
 
 from unload import task
 from unload.env import observation
-from unload.env.base import PickingVectorEnv, stacked
-from unload.env.equalization import TIE_TOLERANCE
+from unload.env.base import PickingVectorEnv
 from unload.env.observation import drift, scale
 from unload.fast import containers
-from unload.load.boxes import Load, check_stack
+from unload.load.boxes import Load, check_stack, check_stacked
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import situation_in
@@ -50,7 +49,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     ) -> None:
         super().__init__(num_envs, **settings)
         check_stack(stack)
-        self._how_observed = (self.equalize, self.ties == "average", np.float32(TIE_TOLERANCE))
+        self._how_observed = self.equalize, self.ties == "average"
         self.stack, self._lent = stack, isinstance(physics, LocalPhysics)
         if isinstance(physics, str):
             checks.one_of("physics", physics, ("table",))
@@ -84,7 +83,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = stacked(self.stack, rng) if load is None else load
+            chosen = self.stack(rng) if load is None else load
+            check_stacked(chosen, "what stack returned")
             self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
@@ -147,8 +147,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         What is not known, ``physics`` simulates; a ``TablePhysics`` adds it to its table.
         """
         state = self._containers
-        slots = self.table.slots
-        items, distances = containers.look_up(state, actions, self._always_simulate, *slots)
+        known = self.table.entries
+        items, distances = containers.look_up(state, actions, self._always_simulate, *known)
         unknown = np.flatnonzero(distances == containers.UNKNOWN)
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)

@@ -13,11 +13,10 @@ from unload import task
 from unload.fast.ranking import features, rank, remove, replace
 from unload.load.boxes import OVERLAP
 from unload.physics.situation import digest_of, find_movers, key_length, write_key
-from unload.physics.table import FREE_LIFT, HELD_DOWN, slot_of
+from unload.physics.table import FREE_LIFT, HELD_DOWN, UNKNOWN, find_distance
 from unload.support.compiled import compiled
 
 _N_VISIBLE = task.N_VISIBLE
-UNKNOWN = -1.0  # in place of a distance that is not in the table
 
 
 class Containers(NamedTuple):
@@ -82,7 +81,7 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
 
 
 @compiled
-def show_nearest(containers, env, equalize, average, tolerance):
+def show_nearest(containers, env, equalize, average):
     """Show the nearest items of a container, by ``by_distance`` behind those unloaded."""
     first = containers.unloaded[env]
     rows = min(containers.left[env], _N_VISIBLE)
@@ -94,18 +93,16 @@ def show_nearest(containers, env, equalize, average, tolerance):
     containers.visible[env, rows:] = -1
     for axis in range(3):
         rank(containers.values[env, axis, :rows], containers.ranks[env, axis, :rows])
-    _show(containers, env, rows, equalize, average, tolerance)
+    _show(containers, env, rows, equalize, average)
 
 
 @compiled
-def _show(containers, env, rows, equalize, average, tolerance):
+def _show(containers, env, rows, equalize, average):
     """Write the observation and the mask of a container that has changed."""
     containers.masks[env, :rows] = 1
     containers.masks[env, rows:] = 0
-    features(
-        containers.values[env], containers.ranks[env], equalize, average, tolerance,
-        containers.observations[env], rows,
-    )  # fmt: skip
+    values, ranks = containers.values[env], containers.ranks[env]
+    features(values, ranks, equalize, average, containers.observations[env], rows)
 
 
 @compiled
@@ -150,15 +147,13 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             continue
 
         words = write_key(starts, links, present, geometry, right, members, dynamic, key)
-        digest = digest_of(key[:words])
-        slot = slot_of(digests, digest)
-        known = digests[slot] == digest  # see LiftTable.find
-        distances[env] = micrometres[slot] / 1e6 if known else UNKNOWN
+        found = find_distance(digests, micrometres, digest_of(key[:words]))
+        distances[env] = UNKNOWN if found == UNKNOWN else found / 1e6
     return items, distances
 
 
 @compiled
-def unload_lifted(containers, actions, distances, equalize, average, tolerance):
+def unload_lifted(containers, actions, distances, equalize, average):
     """Unload the items that moved far enough; the rewards, (E,) float64."""
     rewards = np.empty(len(actions))
     for env in range(len(actions)):
@@ -196,5 +191,5 @@ def unload_lifted(containers, actions, distances, equalize, average, tolerance):
                 remove(values[: rows + 1], ranks[: rows + 1], row)
 
         # After a success no row counts as failed.
-        _show(containers, env, rows, equalize, average, tolerance)
+        _show(containers, env, rows, equalize, average)
     return rewards

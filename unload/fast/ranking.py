@@ -12,6 +12,9 @@ import numpy as np
 from unload import task
 from unload.support.compiled import compiled
 
+# Suits scaled positions: noise of a few mm is bridged, the 3.5 cm between the grid's heights
+# (0.028 scaled) are not.
+TIE_TOLERANCE = 0.005
 # The equalized coordinate (2 r - (N-1)) / (N-1) by N and by twice the rank, which ties make
 # odd. An item that is alone gets 0.
 _LEVELS = np.zeros((task.N_VISIBLE + 1, 2 * task.N_VISIBLE - 1), np.float32)
@@ -56,28 +59,27 @@ def remove(values, ranks, row):
 
 
 @compiled
-def _twice_shared_ranks(values, ranks, tolerance, twice):
-    """Fill ``twice`` by twice the mean rank of each run of sorted values in ``tolerance``."""
+def _twice_shared_ranks(values, ranks, twice):
+    """Fill ``twice`` by twice the mean rank of each run of sorted values in ``TIE_TOLERANCE``."""
     order = np.empty(len(values), np.int32)
     for i in range(len(values)):
         order[ranks[i]] = i
     first = 0
     for r in range(len(values)):
-        if r + 1 == len(values) or values[order[r + 1]] - values[order[r]] > tolerance:
+        if r + 1 == len(values) or values[order[r + 1]] - values[order[r]] > TIE_TOLERANCE:
             for member in range(first, r + 1):
                 twice[order[member]] = first + r
             first = r + 1
 
 
 @compiled
-def features(values, ranks, equalize, average, tolerance, observation, items=task.N_VISIBLE):
+def features(values, ranks, equalize, average, observation, items=task.N_VISIBLE):
     """Write an observation: the values themselves, or equalized; then padding.
 
     Args:
         values, ranks: (axes, rows) float32 and int32.
         equalize: whether to equalize, and, if so,
         average: whether items in a tie share their mean rank.
-        tolerance: float32, see ``unload.equalize``.
         observation: (rows, axes) float32, filled.
         items: how many of the rows, the first ones, hold an item.
     """
@@ -91,7 +93,7 @@ def features(values, ranks, equalize, average, tolerance, observation, items=tas
                 observation[i, axis] = values[axis, i]
             continue
         if average:
-            _twice_shared_ranks(values[axis, :items], ranks[axis, :items], tolerance, twice)
+            _twice_shared_ranks(values[axis, :items], ranks[axis, :items], twice)
         else:
             for i in range(items):
                 twice[i] = 2 * ranks[axis, i]

@@ -7,7 +7,7 @@ A ``Load`` holds centres and sizes. Overlaps and contacts are computed from lowe
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -159,19 +159,6 @@ class Load:
         for name, value in {**fields, **rest}.items():
             object.__setattr__(self, name, value)
 
-    @classmethod
-    def from_corners(cls, corners: Any, sizes: Any, **fields: Any) -> "Load":
-        """The load of boxes that are given by their corners nearest to the origin.
-
-        Args:
-            corners, sizes: (n, 3) in m; numbers of any kind that ``float`` takes, such as the
-                decimals of ``py3dbp``.
-            **fields: the other attributes.
-        """
-        corners = checks.finite_array("corners", np.array(corners, np.float64), (None, 3))
-        sizes = checks.finite_array("sizes", np.array(sizes, np.float64), corners.shape)
-        return cls(corners + sizes / 2, sizes, **fields)
-
     def behind(self, present: np.ndarray) -> np.ndarray:
         """Which boxes stand behind one of the present ones, (n,) bool each.
 
@@ -184,11 +171,6 @@ class Load:
         """Which boxes lie under one of the present ones, (n,) bool each."""
         lower, upper = self.covers
         return np.bincount(lower[present[upper]], minlength=len(self)) > 0
-
-    @property
-    def headroom(self) -> np.ndarray:
-        """(n,) float64, from the top of each box to the ceiling, in m."""
-        return self.ceiling - (self.positions[:, 2] + self.sizes[:, 2] / 2)
 
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:

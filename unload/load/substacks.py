@@ -4,11 +4,7 @@ Sec. III-A and Fig. 3 of the paper. The figure is drawn on a grid whose cell is 
 its units; all numbers below count cells, so that every substack is exact. Neighbouring
 substacks interlock like the steps of a stair, and the four of a row together fill 36 cells
 of width, which we take to be the container's 2.5 m.
-
-Boxes of another scale are not in the paper: they show how a policy fares elsewhere.
 """
-
-from functools import cache
 
 import numpy as np
 
@@ -50,95 +46,59 @@ RIGHT = (
     ((2, 0, 6), (6, 4, 7), (6, 7, 7), (10, 4, 4), (1, 4, 0)),
     ((1, 0, 6), (2, 6, 6), (3, 4, 0)),
 )  # fmt: skip
-# Cells from a left substack to the next one, which begins where its upper boxes end; and from
-# each other one.
-_LEFT_STEP, _OTHER_STEP = 6, 10
+# One row of a wall, from left to right: (left edge in cells, variants of the substack). A left
+# substack's upper boxes end where the next one begins.
+COLUMNS = ((0, LEFT), (6, MID), (16, MID), (26, RIGHT))
+# Of each column and variant, (4, 3), the number of items; and (4, 3, m, 3) int64, each item's
+# package, left edge in the row and lower edge, filled up with zeros.
+_COUNTS = np.array([[len(variant) for variant in variants] for _, variants in COLUMNS])
+_CELLS = np.zeros((*_COUNTS.shape, _COUNTS.max(), 3), np.int64)
+for _column, (_left, _variants) in enumerate(COLUMNS):
+    for _number, _variant in enumerate(_variants):
+        _CELLS[_column, _number, : len(_variant)] = np.array(_variant) + (0, _left, 0)
 
 
-def _columns(count: int) -> list[tuple[int, tuple]]:
-    """One row of a wall, from left to right: (left edge in cells, variants of the substack)."""
-    edges = [0, *(_LEFT_STEP + _OTHER_STEP * number for number in range(count - 1))]
-    return list(zip(edges, (LEFT, *[MID] * (count - 2), RIGHT)))
-
-
-COLUMNS = _columns(4)
-
-
-@cache
-def _row(columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """A row with one left substack, ``columns - 2`` mid ones and one right one, in arrays.
-
-    (columns, 3) int64, the number of items of each variant; and (columns, 3, m, 3) int64, each
-    item's package, left edge in the row and lower edge, filled up with zeros.
-    """
-    substacks = _columns(columns)
-    counts = np.array([[len(variant) for variant in variants] for _, variants in substacks])
-    cells = np.zeros((*counts.shape, counts.max(), 3), np.int64)
-    for column, (left, variants) in enumerate(substacks):
-        for number, variant in enumerate(variants):
-            cells[column, number, : len(variant)] = np.array(variant) + (0, left, 0)
-    return counts, cells
-
-
-def _substacks_that_fit(scale: float = 1.0) -> tuple[int, int, int]:
-    """Walls, rows and columns of substacks of a full container; 12, 3 and 4 at scale 1."""
-    cells = CELLS_WIDE / checks.real("scale", scale, 0.5, 1.5) + 1e-9  # across and up
-    columns = 1 + int((cells - _LEFT_STEP) / _OTHER_STEP)
-    return round(WALLS / scale), int(cells / CELLS_HIGH), columns
-
-
-def build_load(variants: np.ndarray, scale: float = 1.0) -> Load:
+def build_load(variants: np.ndarray) -> Load:
     """The load with the given substacks.
 
     Args:
-        variants: (walls, rows, columns) int, variant 0–2 of each substack, rear wall and
-            bottom row first. There are as many columns as fit, 4 at scale 1; the rows must fit
-            into the container's height, too.
-        scale: of the boxes' widths and heights, 0.5 to 1.5. Their depth is that of the walls.
+        variants: (walls, rows, 4) int, variant 0–2 of each substack, rear wall and bottom row
+            first. The rows must fit into the container's height.
 
     Returns:
-        The load, its walls filling the container from the rear to the entrance. They begin
-        at y = 0 and, except at scale 1, leave a gap at the other side wall.
+        The load, its walls filling the container from the rear to the entrance.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
-    columns = _substacks_that_fit(scale)[2]
-    variants = checks.integer_array("variants", variants, (None, None, columns), 2)
+    variants = checks.integer_array("variants", variants, (None, None, len(COLUMNS)), 2)
     if not variants.size:
         raise ValueError(f"variants has shape {variants.shape}; expected a wall and a row at least")
-    counts, cells = (each[np.arange(columns), variants] for each in _row(columns))
+    counts, cells = (each[np.arange(len(COLUMNS)), variants] for each in (_COUNTS, _CELLS))
     filled = np.arange(cells.shape[3]) < counts[..., np.newaxis]
     walls, rows, _, _ = np.nonzero(filled)
     packages, left, low = cells[filled].T
     # In walls and cells, and in m: a wall is as deep as each of its boxes.
     edges = np.insert(PACKAGES, 0, 1, axis=1)[packages]
-    units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL * scale, CELL * scale])
+    units = np.array([task.CONTAINER[0] / (walls[-1] + 1), CELL, CELL])
     positions = (np.column_stack([walls, left, low + rows * CELLS_HIGH]) + edges / 2) * units
     return Load(positions, edges * units, packages, walls)
 
 
-def stack_load(rng: np.random.Generator, walls: int | None = None, scale: float = 1.0) -> Load:
+def stack_load(rng: np.random.Generator, walls: int = WALLS) -> Load:
     """Draw a random load (Sec. III-A): a variant for each substack of each wall.
 
     Args:
         rng: the source of randomness.
-        walls: number of item walls; by default as many as keep the boxes' proportions, 12
-            at scale 1. A load of 12 walls at scale 1 with fewer than 800 or more than 1000
+        walls: number of item walls. A load of 12 walls with fewer than 800 or more than 1000
             items is drawn anew, so that the paper's range is kept.
-        scale: of the boxes, 0.5 to 1.5, see ``build_load``. The container stays as it is:
-            it holds more substacks of small boxes, 15 walls × 4 rows × 4 columns at 0.8
-            with a gap of 0.5 m, and fewer of large ones, 10 × 3 × 3 at 1.2 with a gap of
-            0.33 m.
 
     Raises:
         TypeError, ValueError: an argument is not as described.
     """
     checks.generator("rng", rng)
-    most, rows, columns = _substacks_that_fit(scale)
-    walls = most if walls is None else checks.integer("walls", walls, 1, 100)
+    checks.integer("walls", walls, 1, 100)
     while True:
-        load = build_load(rng.integers(3, size=(walls, rows, columns)), scale)
-        of_the_paper = scale == 1 and walls == WALLS
-        if not of_the_paper or task.MIN_ITEMS <= len(load) <= task.MAX_ITEMS:
+        load = build_load(rng.integers(3, size=(walls, ROWS, len(COLUMNS))))
+        if walls != WALLS or task.MIN_ITEMS <= len(load) <= task.MAX_ITEMS:
             return load

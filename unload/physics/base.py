@@ -20,7 +20,8 @@ Force = float | Literal["auto"]  # N, or as much as a box needs
 
 def low_ceiling(load: Load) -> np.ndarray:
     """(n,) bool, True for boxes that the ceiling lets nobody lift by ``task.LIFT_THRESHOLD``."""
-    return load.headroom < task.LIFT_THRESHOLD - OVERLAP
+    headroom = load.ceiling - (load.positions[:, 2] + load.sizes[:, 2] / 2)
+    return headroom < task.LIFT_THRESHOLD - OVERLAP
 
 
 class Physics(ABC):

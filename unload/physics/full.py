@@ -36,8 +36,15 @@ class FullPhysics(Physics):
         self.exact = after_pick == "restore"
 
     def _reset(self, load: Load) -> None:
+        # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
+        # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
+        world = World(maximal_coordinates=self.after_pick == "keep")
+        self._fill(load, world, slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION))
+
+    def _fill(self, load: Load, world: World, sizes: np.ndarray) -> None:
+        """Put the boxes of a load into an empty world, as bodies of ``sizes``, (n, 3) in m."""
         self._stop()
-        self._world = self._make_world()
+        self._world = world
         length, width, height = self._container = load.container
         for position, size in (
             ((length / 2, width / 2, -0.5), (length + 2, width + 2, 1)),  # floor
@@ -46,25 +53,12 @@ class FullPhysics(Physics):
             ((-0.5, width / 2, height / 2), (1, width + 2, height)),  # rear wall
             ((0, 0, _DEPOT - 0.5), (2000, 2000, 1)),
         ):
-            self._add_box(position, size, 0)
-        sizes = self._slim(np.rint(load.sizes / RESOLUTION) * RESOLUTION)
+            world.add_box(position, size, 0)
         self._bodies = [
-            self._add_box(position, size, mass)
+            world.add_box(position, size, mass)
             for position, size, mass in zip(load.positions, sizes, load.masses.tolist())
         ]
         self._poses: list[tuple] = [(place, UPRIGHT) for place in load.positions.tolist()]
-
-    def _make_world(self) -> World:
-        # Rigid bodies are twice as fast to lift, but moving them far, as putting boxes back does,
-        # rebuilds a part of Bullet's search tree. Where nothing is put back, they pay.
-        return World(maximal_coordinates=self.after_pick == "keep")
-
-    def _slim(self, sizes: np.ndarray) -> np.ndarray:
-        """(n, 3) edges of the bodies that stand for boxes of ``sizes``, in m."""
-        return slim(sizes)
-
-    def _add_box(self, position, size, mass: float) -> int:
-        return self._world.add_box(position, size, mass)
 
     def _park(self, body: int) -> None:
         """Move a body to a place of its own in the depot."""

@@ -231,16 +231,10 @@ def _insert(members, first, end, box):
 
 
 @compiled(plain=True)
-def _absorb(digest, word):
-    """Add one int32 word to a digest: a multiplication and a shift that mix all bits."""
-    digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
-    return digest ^ (digest >> np.uint64(29))
-
-
-@compiled(plain=True)
 def digest_of(words):
-    """The digest of a situation's key, (k,) int32: never 0, the mark of a free slot."""
+    """The digest of a situation's key, (k,) int32: never 0."""
     digest = np.uint64(len(words))
-    for word in words:
-        digest = _absorb(digest, word)
+    for word in words:  # a multiplication and a shift mix all bits
+        digest = (digest ^ np.uint64(np.uint32(word))) * np.uint64(0x9E3779B97F4A7C15)
+        digest ^= digest >> np.uint64(29)
     return max(digest, np.uint64(1))

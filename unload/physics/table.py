@@ -25,10 +25,9 @@ from unload.support import files
 from unload.support.compiled import compiled
 
 _LOGGER = logging.getLogger(__name__)
+UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
-EMPTY = np.uint64(0)  # digest of a free slot
-_FEWEST_SLOTS = 1024
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 _FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
 
@@ -62,19 +61,17 @@ FREE_LIFT = free_lift()
 class LiftTable:
     """Distances in micrometres by the digest of a situation; empty at first.
 
-    A hash table in two arrays, so that compiled code can look into it, too. Among a
-    million situations two share a 64-bit digest with a probability of 3e-8.
+    Two arrays, so that compiled code can look into them, too. Among a million situations two
+    share a 64-bit digest with a probability of 3e-8.
 
-    Any number of threads may find and add at the same time. Only adding takes a lock: a distance
-    is written before the digest that leads to it, and arrays that are too small are replaced, both
-    at once, so that whoever still reads the old ones misses a new entry at most.
+    Any number of threads may find and add at the same time. Only adding takes a lock, and replaces
+    both arrays at once, so that whoever still reads the old ones misses a new entry at most.
 
     Args:
         engine: whose lifts it holds, see ``LocalPhysics``.
 
     Attributes:
-        slots: digests, (n,) uint64, 0 in free slots, and their distances in micrometres,
-            (n,) int32. n is a power of two, and at least half of the slots are free.
+        entries: all digests, (n,) uint64 in increasing order, and their distances, (n,) int32.
         foreign: digests of another engine's lifts, which are answers here and never written.
     """
 
@@ -82,61 +79,38 @@ class LiftTable:
         self.engine = engine_of(engine)
         self._adding = Lock()
         self.foreign = np.zeros(0, np.uint64)
-        self._start_slots(np.zeros(0, np.uint64), np.zeros(0, np.int32))
+        self.entries = np.zeros(0, np.uint64), np.zeros(0, np.int32)
 
     def __len__(self) -> int:
-        return self._count
+        return len(self.entries[0])
 
     def __deepcopy__(self, memo: dict) -> "LiftTable":
         return self  # it is shared; Gymnasium copies what it is given
 
     def find(self, situation: Situation) -> float | None:
         """Return the distance in m that the table holds for a situation, or None."""
-        digests, micrometres = self.slots
-        digest = _digest(situation)
-        slot = slot_of(digests, digest)
-        # Not "is free": another thread may have filled a free slot since, for another situation.
-        return int(micrometres[slot]) / 1e6 if digests[slot] == digest else None
+        micrometres = find_distance(*self.entries, _digest(situation))
+        return None if micrometres == UNKNOWN else int(micrometres) / 1e6
 
     def add(self, situation: Situation, distance: float) -> None:
         """Remember a distance in m, to the micrometre. A situation that is known keeps its own."""
-        digest = _digest(situation)
+        new = np.array([_digest(situation)]), np.array([round(distance * 1e6)], np.int32)
         with self._adding:
-            digests, micrometres = self.slots
-            slot = slot_of(digests, digest)
-            if digests[slot] != EMPTY:
-                return
-            micrometres[slot] = round(distance * 1e6)
-            digests[slot] = digest
-            self._count += 1
-            if 2 * self._count > len(digests):
-                self._start_slots(*self.entries())
-
-    def entries(self) -> tuple[np.ndarray, np.ndarray]:
-        """All digests (n,) uint64 in increasing order, and their distances (n,) int32."""
-        digests, micrometres = self.slots
-        filled = np.flatnonzero(digests)
-        order = filled[np.argsort(digests[filled])]
-        return digests[order], micrometres[order]
+            self._take_in(new)
 
     def own(self) -> tuple[np.ndarray, np.ndarray]:
         """The entries without the foreign ones."""
-        digests, micrometres = self.entries()
+        digests, micrometres = self.entries
         kept = ~np.isin(digests, self.foreign)
         return digests[kept], micrometres[kept]
 
-    def _start_slots(self, digests: np.ndarray, micrometres: np.ndarray) -> None:
-        """Start new arrays with these entries."""
-        size = max(_FEWEST_SLOTS, 1 << (2 * len(digests)).bit_length())
-        slots = np.full(size, EMPTY), np.zeros(size, np.int32)
-        _fill(*slots, digests, micrometres)
-        self.slots, self._count = slots, len(digests)
-
-    def _take_in(self, entries: tuple[np.ndarray, np.ndarray]) -> None:
-        """Add entries; a situation that is known keeps its own."""
-        digests, micrometres = map(np.concatenate, zip(self.entries(), entries))
-        digests, first = np.unique(digests, return_index=True)
-        self._start_slots(digests, micrometres[first])
+    def _take_in(self, new: tuple[np.ndarray, np.ndarray]) -> None:
+        """Add entries in increasing order; a situation that is known keeps its own."""
+        digests, micrometres = self.entries
+        places = np.searchsorted(digests, new[0])
+        unknown = np.append(digests, np.uint64(0))[places] != new[0]  # 0 is no digest
+        digests = np.insert(digests, places[unknown], new[0][unknown])
+        self.entries = digests, np.insert(micrometres, places[unknown], new[1][unknown])
 
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
@@ -164,7 +138,7 @@ class LiftTable:
                 "Remove it to fill a new one"
             )
 
-        table._start_slots(arrays["digests"], arrays["micrometres"])
+        table.entries = arrays["digests"], arrays["micrometres"]
         return table
 
     def exchange(self, path: str | Path) -> None:
@@ -190,7 +164,7 @@ class LiftTable:
                 count = len(stored)
                 with self._adding:
                     stored._take_in(self.own())
-                    self._take_in(stored.entries())
+                    self._take_in(stored.entries)
                 if len(stored) > count:
                     stored.save(path)
         except OSError as error:
@@ -236,7 +210,7 @@ def shared_table() -> LiftTable:
     """The lifts known to this process: PyBullet's in ``LIFTS_FILE``, and all made since."""
     table = LiftTable.load(LIFTS_FILE, ENGINES[0])
     if table.engine != engine_of():  # PyBullet's answers serve where it is missing, too
-        table.engine, table.foreign = engine_of(), table.entries()[0]
+        table.engine, table.foreign = engine_of(), table.entries[0]
     return table
 
 
@@ -245,23 +219,8 @@ def _digest(situation: Situation) -> np.uint64:
 
 
 @compiled(plain=True)
-def slot_of(digests, digest):
-    """The slot of a digest, or the free one where it belongs."""
-    last = np.uint64(len(digests) - 1)
-    slot = (digest ^ (digest >> np.uint64(32))) & last
-    while digests[slot] != EMPTY and digests[slot] != digest:
-        slot = (slot + np.uint64(1)) & last
-    return slot
-
-
-def _fill(digests, micrometres, new_digests, new_micrometres):
-    """Put entries into the slots of empty arrays, each into the first free one from its own on."""
-    last = np.uint64(len(digests) - 1)
-    # Of several that want the same slot the last one has it; the others go on to the next.
-    left, slots = np.arange(len(new_digests)), (new_digests ^ (new_digests >> np.uint64(32))) & last
-    while left.size:
-        free = digests[slots] == EMPTY
-        digests[slots[free]] = new_digests[left[free]]
-        placed = digests[slots] == new_digests[left]
-        micrometres[slots[placed]] = new_micrometres[left[placed]]
-        left, slots = left[~placed], (slots[~placed] + np.uint64(1)) & last
+def find_distance(digests, micrometres, digest):
+    """The distance of a digest in micrometres, or ``UNKNOWN``."""
+    place = np.searchsorted(digests, digest)
+    known = place < len(digests) and digests[place] == digest
+    return micrometres[place] if known else UNKNOWN

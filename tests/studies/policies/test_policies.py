@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import torch
 
-from studies.policies import comparison, sb3, variants
+from studies.policies import comparison, sb3, scaled, variants
 from studies.policies.comparison import FRONT_WALLS, PLAYED, PLAYERS, comparison_data, digests
 from studies.policies.margin import containers, own_scores, pairs_in_sight, steps_of
 from studies.policies.variants import judged
@@ -16,7 +16,7 @@ from studies.results import read_provenance, read_table
 from unload import PEQNetwork, TrainConfig, evaluate, load_policy, policies, task
 from unload.env.observation import nearest
 from unload.load.boxes import Load
-from unload.load.substacks import stack_load
+from unload.load.substacks import CELL, CELLS_HIGH, CELLS_WIDE, DEPTH, PACKAGES, stack_load
 from unload.physics.situation import Surroundings
 from unload.support import files
 
@@ -47,6 +47,23 @@ def test_the_first_containers_of_a_condition_are_those_of_the_committed_data(
     assert rows["success_rate"].head(2).tolist() == pytest.approx(found.tolist(), abs=1e-5)
 
 
+@pytest.mark.parametrize("scale", scaled.FITTING)
+def test_a_load_of_another_scale_fills_what_it_can(rng, scale):
+    walls, rows, columns = scaled.FITTING[scale]
+    load = scaled.scaled_load(scale, rng)
+    reach = (load.positions + load.sizes / 2).max(axis=0)
+    width = (CELLS_WIDE + 10 * (columns - 4)) * CELL * scale
+    height = rows * CELLS_HIGH * CELL * scale
+    assert reach == pytest.approx([7.0, width, height])
+    # Boxes do not overlap, or there were no load: so they leave no hole.
+    assert load.sizes.prod(axis=1).sum() == pytest.approx(7.0 * width * height)
+    assert len(np.unique(load.walls)) == walls
+    # No further substack would fit.
+    assert width + 10 * CELL * scale > 2.5 and height + CELLS_HIGH * CELL * scale > 2.5
+    expected = np.column_stack([np.full(len(load), DEPTH), PACKAGES[load.packages] * CELL])
+    assert load.sizes == pytest.approx(scale * expected)
+
+
 def test_committed_data_is_of_the_committed_policies_and_of_the_plan():
     settings = read_provenance("policies/comparison")["settings"]
     full = settings.pop("full")
@@ -70,8 +87,8 @@ def test_cards_are_measured_and_written(tmp_path, set_in):
     assert card.pop("configuration").items() <= shipped.pop("configuration").items()
     assert card.pop("version") == task.VERSION and shipped.pop("version")
     assert card == shipped | {
-        name: comparison.measure(load_policy("paper"), scale)
-        for scale, name in comparison.SCALES.items()
+        name: comparison.measure(load_policy("paper"), stack)
+        for name, stack in comparison.STACKS.items()
     }
     known = card["on the paper's loads"]
     assert known["picks"] == 1000 and known["misses"] == round(1000 * (1 - known["msr"]))
@@ -89,7 +106,7 @@ def test_what_ships_is_of_the_training_of_its_grid(name):
 
 def test_the_recommended_policy_does_not_miss():
     card = load_policy("recommended").card
-    measured = [card[name] for name in comparison.SCALES.values()]
+    measured = [card[name] for name in comparison.STACKS]
     assert [each["misses"] for each in measured] == [0, 0, 0]
     assert measured[0]["picks"] == 500 * comparison.CARD_LOADS
 
