@@ -83,8 +83,10 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = self.stack(rng) if load is None else load
-            check_stacked(chosen, "what stack returned")
+            chosen = load
+            if chosen is None:
+                chosen = self.stack(rng)
+                check_stacked(chosen, "what stack returned")
             self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
 
     def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
