@@ -5,8 +5,7 @@ and perhaps something changed in its runs that no configuration offers. All runs
 published together: a table of their curves, in which each measure of a run is a column; one file of
 policies; one record of where they come from.
 
-A run is called ``<cell>/seed_<seed>``. Where a cell's name has a folder, ``<table>/<name>``, its
-curves are in a table of that name, so that no table of a large grid becomes large.
+A run is called ``<cell>/seed_<seed>``.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -158,21 +157,13 @@ def cell_of(run: str) -> str:
     return run.rpartition("/seed_")[0]
 
 
-def _table_name(grid: Grid, cell: str) -> Path:
-    """Of the table of a cell's curves: a row per point, a column per measure and run."""
-    place = Path(grid.name)
-    return place.with_name(cell.rpartition("/")[0] or place.name)
-
-
 def write_curves(grid: Grid, curves: Mapping[str, pd.DataFrame]) -> None:
     """Publish curves of a grid, by the names of their runs; all have the same picks."""
-    tables: dict[Path, dict[str, pd.Series]] = {}
+    table = {"picks": next(iter(curves.values()))["picks"]}
     for name, curve in curves.items():
-        table = tables.setdefault(_table_name(grid, cell_of(name)), {"picks": curve["picks"]})
         for column, digits in COLUMNS.items():
             table[f"{column} {name}"] = curve[column].map(digits.format, na_action="ignore")
-    for place, table in tables.items():
-        write_table(place, pd.DataFrame(table))
+    write_table(grid.name, pd.DataFrame(table))
 
 
 def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
@@ -185,19 +176,22 @@ def read_grid(grid: Grid, cells: Iterable[str] | None = None) -> pd.DataFrame:
     Returns:
         A row per point: ``cell``, ``seed``, ``picks``, ``success_rate`` (MSR while training since
         the point before) and ``loss``.
+
+    Raises:
+        ValueError: there is no such cell, or none of its runs is published.
     """
     wanted = list(grid.cells if cells is None else cells)
     for cell in wanted:
         checks.one_of("cells", cell, grid.cells)
-    curves = []
-    for place in dict.fromkeys(_table_name(grid, cell) for cell in wanted):
-        table = read_table(place)
-        for run in dict.fromkeys(column.partition(" ")[2] for column in table.columns[1:]):
-            cell, _, seed = run.rpartition("/seed_")
-            if cell in wanted:
-                curve = {"cell": cell, "seed": int(seed), "picks": table["picks"]}
-                curve |= {column: table[f"{column} {run}"] for column in COLUMNS}
-                curves.append(pd.DataFrame(curve))
+    table, curves = read_table(grid.name), []
+    for run in dict.fromkeys(column.partition(" ")[2] for column in table.columns[1:]):
+        cell, _, seed = run.rpartition("/seed_")
+        if cell in wanted:
+            curve = {"cell": cell, "seed": int(seed), "picks": table["picks"]}
+            curve |= {column: table[f"{column} {run}"] for column in COLUMNS}
+            curves.append(pd.DataFrame(curve))
+    if not curves:
+        raise ValueError(f"data/{grid.name}.csv has no run of the cells {wanted}")
     return pd.concat(curves, ignore_index=True)
 
 

@@ -55,6 +55,9 @@ def test_a_grid_is_read_as_it_was_trained(trained):
     assert all(run["picks"].max() == 640 for run in runs.values())
     plain, changed = (runs[cell, 0]["loss"].dropna().tolist() for cell in ("plain", "shuffled"))
     assert plain != changed
+    more = SMALL._replace(cells=CELLS | {"planned": CELLS["plain"]})
+    with pytest.raises(ValueError, match=r"some/small.csv has no run of the cells \['planned'\]"):
+        grid.read_grid(more, ["planned"])
     policies = grid.read_policies(trained / "some/small.safetensors")
     assert list(policies) == list(SMALL.configs())
     assert policies["averaged_mask/seed_3"].ties == "average"

@@ -43,16 +43,16 @@ def test_the_default_cell_has_the_defaults():
     assert replace(PAPER.cells[training.DEFAULTS].config, seed=0) == TrainConfig()
 
 
-def test_a_search_is_published_in_a_table_a_batch_size_and_observation(own_data, set_in):
+def test_a_search_is_published_as_one_table(own_data, set_in):
     """Of two batch sizes, two runs each."""
     set_in(grid, training_fingerprint=lambda networks: "f")
     small = tuning_grid([1e-3], [8, 16], runs=2, equalize=[True], steps=20)
     set_in(tuning, TUNING=small, SHOWN=(("with", "loss", 8, 1e-3, 1),))
     tuning.tuning_data(n_jobs=1)
     names = {path.name for path in (own_data / "tuning").iterdir()}
-    assert names == {"b8_with_fe.csv", "b16_with_fe.csv", "provenance.json"}
-    table = read_table("tuning/b8_with_fe")
-    assert table.shape == (20, 1 + 2 * 2)
+    assert names == {"tuning.csv", "provenance.json"}
+    table = read_table("tuning/tuning")
+    assert table.shape == (20, 1 + 2 * 2 * 2)
     curves = tuning.read_curves("success_rate", 8, 1e-3)
     assert np.array_equal(curves[1], table["success_rate b8_with_fe/lr_0.001/seed_1"])
     summary = tuning.tuning_summary().set_index("batch_size")
