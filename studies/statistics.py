@@ -1,11 +1,14 @@
 """How a run ends and falls, whether it is like the paper's, and how sure means and shares are."""
 
+import re
 import warnings
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
 from scipy import stats
+
+from studies import paths
 
 END = 0.1  # share of the picks at the end of a run
 WINDOW_PICKS = 500_000
@@ -205,3 +208,9 @@ def share_interval(count: int, total: int) -> tuple[float, float]:
     """
     interval = stats.binomtest(count, total).proportion_ci(LEVEL, method="exact")
     return float(interval.low), float(interval.high)
+
+
+def predictions(plan: str) -> pd.Series:
+    """What ``data/<plan>/PLAN.md`` predicts in its tables, by names such as ``"A1"``."""
+    text = (paths.DATA / plan / "PLAN.md").read_text(encoding="utf-8")
+    return pd.Series(dict(re.findall(r"^\| ([A-Z]\d) \| (.+?) \|", text, re.M)), name="predicted")

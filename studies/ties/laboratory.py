@@ -15,6 +15,7 @@ from studies.falls.laboratory import SLOPES, keep_cells, publish_cells
 from studies.grid import Cell
 from studies.seamless.jamming import weigh
 from studies.ties.noise import drifting
+from studies.ties.renewed import renewed
 from unload import task
 from unload.agent.training import Training
 from unload.load.boxes import Load
@@ -46,6 +47,8 @@ def _ties(rho: float, mask: bool) -> Cell:
 CELLS = {
     **{f"rho_{rho}_no_mask": _ties(rho, False) for rho in RHOS},
     **{f"rho_{rho}": _ties(rho, True) for rho in RHOS},
+    "renewed_no_mask": Cell(replace(CONFIG, position_noise=0.0, mask=False), SEEDS, renewed),
+    "renewed": Cell(replace(CONFIG, position_noise=0.0, mask=True), SEEDS, renewed),
     "positions": Cell(POSITIONS, SIGN_SEEDS),
     "positions_mirrored": Cell(POSITIONS, SIGN_SEEDS, mirror_loads),
     "positions_whole_walls": Cell(POSITIONS, SIGN_SEEDS, partial(weigh, z=0.0)),

@@ -15,6 +15,7 @@ from studies.paper.training import B2048
 from studies.results import COMMAND
 from studies.seamless.jamming import jam
 from studies.ties.noise import drifting
+from studies.ties.renewed import renewed
 
 SEEDS, FEW_SEEDS = range(60, 65), range(60, 63)
 RANKED_HERE = replace(B2048, batch_size=256, position_noise=0.0)
@@ -66,5 +67,9 @@ CELLS = {
         for ties in CORRELATIONS
     },
     **{f"{ties}_jams_0.4_mask": _cell(ties, share=0.4, mask=True) for ties in CORRELATIONS},
+    **{
+        f"renewed_{name}": Cell(replace(RANKED_HERE, mask=mask), SEEDS, renewed)
+        for name, mask in MASKS.items()
+    },
 }
 TIES = Grid("ties/runs", f"{COMMAND} ties", CELLS)

@@ -72,3 +72,9 @@ def test_pairs_make_the_interval_of_a_ratio_narrow():
     assert np.isnan(statistics.ratio_interval(reference, -reference)).all()
     assert np.array_equal(statistics.mean_interval([0.7]), [0.7, np.nan, np.nan], equal_nan=True)
     assert np.isnan(statistics.ratio_interval(reference, np.array([-9.0, 9, 2, 0]))).all()
+
+
+def test_what_a_plan_predicts_is_read_from_its_tables():
+    predicted = statistics.predictions("ties")
+    assert list(predicted.index) == [*(f"N{number}" for number in range(1, 10)), "P1", "P2"]
+    assert predicted["N3"] == "drifting with the mask: at least 3 of 5 fall"

@@ -8,6 +8,7 @@ import pytest
 
 from studies.falls.cells import CONFIG
 from studies.ties.noise import DriftingTies, drifting
+from studies.ties.renewed import renewed
 from tests.agent.runs import assert_same, at_step, interrupt
 from unload import train
 from unload.agent.training import Training
@@ -65,8 +66,21 @@ def test_what_is_chosen_by_is_what_is_learned_from():
     run.rollout.close()
 
 
-def test_a_resumed_run_has_the_same_bits(tmp_path):
-    change = partial(drifting, correlation=(0.9, 0.9, 0.99))
+def test_noise_is_renewed_by_a_success_alone():
+    run = Training(replace(SMALL, max_picks=20), change=renewed)
+    for step in range(25):  # afterwards hardly a pick fails
+        before, first = run.kept["seen"].copy(), len(run.replay)
+        failed = run.kept["failed"].copy() & (step % 20 > 0)
+        run.step()
+        now, stored = run.kept["seen"], run.replay.arrays["observations"][first : first + 64]
+        assert (stored == now).all()
+        assert ((now == before).all(axis=(1, 2)) == failed).all()
+        assert failed.any() == (step not in (0, 20)) and not failed.all()
+    run.rollout.close()
+
+
+@pytest.mark.parametrize("change", [partial(drifting, correlation=(0.9, 0.9, 0.99)), renewed])
+def test_a_resumed_run_has_the_same_bits(tmp_path, change):
     train(SMALL, tmp_path / "whole", progress=False, change=change)
     with at_step(41, interrupt), pytest.raises(KeyboardInterrupt):
         train(SMALL, tmp_path / "parts", progress=False, change=change)
