@@ -26,6 +26,7 @@ KINDS: dict[str, list[tuple[Grid, str]]] = {
     "items' order": [(EARLIER, "ties_by_order")],
     "averaged": [(PAPER, "averaged"), (TIES, "averaged")],
     "noise anew\nat each pick": [(TIES, "anew")],
+    "noise renewed\nby a success": [(TIES, "renewed")],
     "noise that\ndrifts": [(TIES, "drifting")],
     "settled walls,\nfrozen": [(EARLIER, "ties_by_drift")],
     "noise,\nfrozen": [(PAPER, "paper"), (LONG, "ranks"), (TIES, "frozen")],
@@ -62,7 +63,7 @@ def draw_ends(runs: pd.DataFrame) -> Figure:
     Args:
         runs: see ``read_by_ties``.
     """
-    figure, panels = plt.subplots(2, 1, figsize=(6.8, 5.6), sharex=True, sharey=True)
+    figure, panels = plt.subplots(2, 1, figsize=(7.6, 5.6), sharex=True, sharey=True)
     for axes, mask in zip(panels, (True, False)):
         for place, label in enumerate(KINDS):
             group = runs[(runs["ties"] == label.replace("\n", " ")) & (runs["mask"] == mask)]
