@@ -10,7 +10,7 @@ import unload
 from notebooks import run
 from studies import paths
 from studies.falls.long import LONG
-from studies.grid import read_grid, read_policies
+from studies.grid import cell_of, read_grid, read_policies
 from studies.paper.training import PAPER, PAPER_CELLS
 from studies.results import read_provenance, read_table
 from studies.seamless.training import SEAMLESS
@@ -75,13 +75,22 @@ def test_the_answer_is_that_of_the_data():
     both = len(shared) + len(ordered)
     assert f"of {both} with the mask and ties averaged or by order, none" in text
     anew = every[-1].query("cell in ['anew_mask', 'anew_no_mask']")
-    assert "With noise anew at each pick, none of six falls, but the networks err, too" in text
+    assert "With noise anew at each pick none of six falls;" in text
     assert len(anew) == 6
     assert not any(runs["fell"].any() for runs in (shared, ordered, anew))
-    policies = read_policies(paths.DATA / "ties/runs.safetensors")
-    for cell, seed in zip(anew["cell"], anew["seed"]):
-        agent = unload.Greedy(policies[f"{cell}/seed_{seed}"].network, equalize=False)
-        assert unload.evaluate(agent, 8, mask=True, equalize=True)["success_rate"].mean() < 0.8
+    assert "frozen noise misleads such networks, too." in text
+    for grid, cells in ((TIES, ("anew_mask", "anew_no_mask")), (PAPER, ("averaged_mask",))):
+        policies = read_policies(paths.DATA / f"{grid.name}.safetensors")
+        agents = [
+            unload.Greedy(policy.network, equalize=False)
+            for name, policy in policies.items()
+            if cell_of(name) in cells
+        ]
+        msr = [
+            unload.evaluate(agent, 4, mask=True, equalize=True)["success_rate"].mean()
+            for agent in agents
+        ]
+        assert len(msr) >= 6 and max(msr) < 0.97 and sum(msr) / len(msr) < 0.85
     assert f"Of {sum(map(len, every))} runs one, with jams and ties by order, is like its" in text
     (alike,) = pd.concat(every).query("both")["cell"]
     assert alike == "b2048_mask_order"

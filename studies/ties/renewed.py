@@ -15,9 +15,9 @@ def renewed(run: Training) -> None:
     """Let ties be broken by noise that lasts until a success, in choosing and in learning alike.
 
     Args:
-        run: see ``DriftingTies``. What its containers show is kept in ``seen``, (num_envs, 128, 3)
-            float32, and whether their last pick has failed in ``failed``, (num_envs,) bool; both
-            are parts of its state.
+        run: see ``drifting``, with γ = 0. What its containers show is kept in ``seen``,
+            (num_envs, 128, 3) float32, and whether their last pick has failed in ``failed``,
+            (num_envs,) bool; both are parts of its state.
     """
     ties, num_envs = DriftingTies(run, (0.0, 0.0, 0.0)), run.config.num_envs
     choose, add = run.agent.choose, run.replay.add
