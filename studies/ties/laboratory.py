@@ -5,6 +5,7 @@
 ``data/ties/PLAN.md`` says what was expected of its cells.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -39,16 +40,20 @@ def mirror_loads(run: Training) -> None:
     run.rollout._see(*run.rollout.envs.reset(seed=run.config.seeds()[0]))
 
 
-def _ties(rho: float, mask: bool) -> Cell:
-    config = replace(CONFIG, position_noise=0.0, mask=mask)
-    return Cell(config, SEEDS, partial(drifting, correlation=(rho, rho, rho)))
+def _ties(change: Callable[[Training], None], mask: bool) -> Cell:
+    """A cell in which a change breaks the ties."""
+    return Cell(replace(CONFIG, position_noise=0.0, mask=mask), SEEDS, change)
+
+
+def _by_rho(rho: float, mask: bool) -> Cell:
+    return _ties(partial(drifting, correlation=(rho, rho, rho)), mask)
 
 
 CELLS = {
-    **{f"rho_{rho}_no_mask": _ties(rho, False) for rho in RHOS},
-    **{f"rho_{rho}": _ties(rho, True) for rho in RHOS},
-    "renewed_no_mask": Cell(replace(CONFIG, position_noise=0.0, mask=False), SEEDS, renewed),
-    "renewed": Cell(replace(CONFIG, position_noise=0.0, mask=True), SEEDS, renewed),
+    **{f"rho_{rho}_no_mask": _by_rho(rho, False) for rho in RHOS},
+    **{f"rho_{rho}": _by_rho(rho, True) for rho in RHOS},
+    "renewed_no_mask": _ties(renewed, False),
+    "renewed": _ties(renewed, True),
     "positions": Cell(POSITIONS, SIGN_SEEDS),
     "positions_mirrored": Cell(POSITIONS, SIGN_SEEDS, mirror_loads),
     "positions_whole_walls": Cell(POSITIONS, SIGN_SEEDS, partial(weigh, z=0.0)),
