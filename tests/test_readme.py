@@ -124,13 +124,13 @@ def mean_and_half(rates: pd.Series) -> str:
 
 def test_the_benchmarks_are_those_of_the_data():
     text = (ROOT / "notebooks/benchmarks.md").read_text(encoding="utf-8")
-    rows, played = [], read_table("policies/comparison").query("condition == '500 picks'")
+    rows, played = [], read_table("policies").query("condition == '500 picks'")
     for (policy, mask), each in played.groupby(["policy", "mask"]):
         longest, numbers = each["longest_deadlock"].max(), mean_and_half(each["success_rate"])
         asked = "yes" if mask else "no"
         rows.append(rf"^\| {policy} \| .* \| {asked} \| {numbers} \| {longest} \|$")
     assert len(played) == 100 * len(rows) == 900
-    runs = read_table("policies/sb3")
+    runs = read_table("sb3")
     for (agent, seen), each in runs.groupby(["agent", "seen"]):
         row = rf"^\| {agent} \| {seen} \| {each['cpu_s'].median():.0f} \|"
         for mask in (True, False):
@@ -139,7 +139,7 @@ def test_the_benchmarks_are_those_of_the_data():
             row += rf" {mean_and_half(rates)} {ends} \|"
         rows.append(f"{row}$")
     assert len(rows) == 9 + 6 and not [row for row in rows if not re.search(row, text, re.M)]
-    picks = read_provenance("policies/sb3")["settings"]["configuration"]["picks"]
+    picks = read_provenance("sb3")["settings"]["configuration"]["picks"]
     assert f"{picks:,} picks each" in " ".join(text.split())
 
 

@@ -26,14 +26,14 @@ from unload.physics.local import LocalPhysics, settings_of_lifts
 from unload.physics.situation import Situation, Surroundings
 from unload.physics.table import LiftTable
 
-NAME, MSR_NAME = "lifts/engines", "lifts/engines_msr"
+NAME, MSR_NAME = "engines", "engines_msr"
 LIFTS = paths.RUNS / "lifts" / "mujoco.npz"  # computed so far
 # Notebook 12 applies its ten policies to these containers.
 APPLIED = {"episodes": 50, "seed": 1000}
 
 
 def engines_data(n_jobs: int = -1) -> None:
-    """Ask both engines: ``lifts/engines.csv`` and ``lifts/engines_msr.csv``."""
+    """Ask both engines: ``engines.csv`` and ``engines_msr.csv``."""
     lifts = measured(compare_lifts)
     command, tables = f"{COMMAND} engines", {"engines": lifts.value}
     publish(NAME, tables, command, engine_settings(), [lifts], float_format="%.6f")
@@ -64,7 +64,7 @@ def situations() -> Iterator[tuple[int, Situation]]:
 
 
 def compare_lifts() -> pd.DataFrame:
-    """How far each engine moves the box of each situation: the rows of ``lifts/engines.csv``.
+    """How far each engine moves the box of each situation: the rows of ``engines.csv``.
 
     ``situation`` is its number in ``lift_agreement.csv``, ``on_top`` how many boxes rest on the
     chosen one; by engine, how far this one moved, in m.

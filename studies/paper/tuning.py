@@ -77,7 +77,7 @@ def tuning_grid(
                 config = replace(CONFIG, picks=steps * task.NUM_ENVS, equalize=equalized, **fields)
                 name = tuning_cell(batch_size, learning_rate, equalized)
                 cells[name] = Cell(config, range(runs))
-    return Grid("tuning/tuning", f"{COMMAND} tuning", cells, policies=False)
+    return Grid("tuning", f"{COMMAND} tuning", cells, policies=False)
 
 
 TUNING = tuning_grid()

@@ -141,7 +141,7 @@ def measure(policy: Policy, stack: Callable[[np.random.Generator], Load]) -> dic
 
 
 def comparison_data(n_jobs: int = -1) -> None:
-    """Let policies unload the same containers under each condition: ``policies/comparison.csv``.
+    """Let policies unload the same containers under each condition: ``policies.csv``.
 
     One row per policy, condition and container, with the columns of ``compare``. The learned
     policies are compared twice, with and without the mask. A run that was stopped goes on.
@@ -157,11 +157,11 @@ def comparison_data(n_jobs: int = -1) -> None:
         for case in cases
     ]
     results = keep_all("comparison", compare, asked, n_jobs)
-    tables = {"comparison": pd.concat([result.value for result in results])}
+    tables = {"policies": pd.concat([result.value for result in results])}
     full = {name: FULL[name] for name in ("episodes", "seed", "max_picks")}
     settings = {"policies": weights, "loads": LOADS, "seed": SEED}
     settings["full"] = full | {"front walls": FRONT_WALLS}
-    publish("policies/comparison", tables, f"{COMMAND} policies", settings, results)
+    publish("policies", tables, f"{COMMAND} policies", settings, results)
 
 
 def compare(name: str, mask: bool, condition: str) -> pd.DataFrame:
@@ -197,7 +197,7 @@ def comparison_msr() -> Figure:
 
     Hollow dots are played without the mask.
     """
-    table = read_table("policies/comparison")
+    table = read_table("policies")
     figure, panels = plt.subplots(3, 3, figsize=(8.4, 6.2), sharex=True, sharey=True)
     for axes, condition in zip(panels.flat, PANELS):
         _panel(axes, table[table["condition"] == condition])

@@ -136,7 +136,7 @@ def trained(agent: str, seen: str, seed: int) -> list[dict]:
 
 
 def sb3_data(n_jobs: int = 1) -> None:
-    """Train all agents: ``policies/sb3.csv``, a row per agent, what it sees, seed and mask."""
+    """Train all agents: ``sb3.csv``, a row per agent, what it sees, seed and mask."""
     runs = [dict(zip(("agent", "seen", "seed"), run)) for run in product(AGENTS, SEEN, SEEDS)]
     settings = {"configuration": CONFIG.plain(), "rollout": ROLLOUT}
     settings |= {"loads": LOADS, "seed of the loads": SEED}
@@ -145,4 +145,4 @@ def sb3_data(n_jobs: int = 1) -> None:
     answers = keep_all("sb3", trained, asked, n_jobs)
     rows = [run | row for run, answer in zip(runs, answers) for row in answer.value]
     settings["seeds"] = [*SEEDS]
-    publish("policies/sb3", {"sb3": pd.DataFrame(rows)}, f"{COMMAND} sb3", settings, answers)
+    publish("sb3", {"sb3": pd.DataFrame(rows)}, f"{COMMAND} sb3", settings, answers)

@@ -62,9 +62,9 @@ REWARDS = {
 PARTS = {"networks": NETWORKS, "rewards": CONTROL | REWARDS}
 _grid = partial(Grid, command=f"{COMMAND} variants", measure=judged)
 GRIDS = {
-    "variants": _grid("variants/variants", cells=NETWORKS | CONTROL | REWARDS),
+    "variants": _grid("variants", cells=NETWORKS | CONTROL | REWARDS),
     # The paper's configuration but for one thing, and shorter: positions, not ranks.
-    "recommended": _grid("variants/recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
+    "recommended": _grid("recommended", cells={"positions": Cell(RECOMMENDED, range(5))}),
 }
 
 

@@ -38,7 +38,7 @@ MODULES = sorted((ROOT / "unload").rglob("*.py")) + sorted((ROOT / "studies").rg
 ROOMS = dict.fromkeys(path.parent.relative_to(ROOT).as_posix() for path in MODULES)
 ROOMS = {room: f"tests/{room.removeprefix('unload/')}" for room in ROOMS} | {
     "unload": "tests/test_main.py tests/load tests/env tests/agent/test_[op]*.py",
-    "unload/fast": "tests/fast tests/env/test_vector.py",
+    "unload/fast": "tests/fast tests/env/test_[ev]*.py",
     "studies": "tests/studies/test_*.py tests/studies/policies/test_policies.py",
     "studies/speed": "tests/studies/test_speed.py",
 }

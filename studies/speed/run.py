@@ -1,4 +1,4 @@
-"""How fast the parts are: measured, printed and kept in data/benchmarks.
+"""How fast the parts are: measured, printed and kept in ``data/speeds.csv``.
 
     python -m studies.speed.run            in about five minutes
 
@@ -131,7 +131,7 @@ def main() -> None:
     result = measured(speeds)
     show(result.value)
     settings = {"date": date.today().isoformat(), "stable-baselines3": version("stable-baselines3")}
-    publish("benchmarks/benchmarks", {"speeds": result.value}, COMMAND, settings, [result])
+    publish("speeds", {"speeds": result.value}, COMMAND, settings, [result])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,7 @@
-"""The paper's network. What holds for every ``kind`` is tested of those of the studies, too."""
+"""The paper's network, and how networks are made.
+
+What holds for every ``kind`` is tested of those of the studies, too.
+"""
 
 from collections.abc import Callable
 
@@ -6,7 +9,9 @@ import numpy as np
 import pytest
 import torch
 
+from tests.agent.runs import HeightNetwork
 from unload import PEQNetwork
+from unload.network.factory import make_network
 
 ITEMS = torch.zeros(2, 4, 3)
 
@@ -145,3 +150,33 @@ def test_bad_numbers_of_features_are_refused(kind):
     for number, error in ((0, ValueError), (1.5, TypeError)):
         with pytest.raises(error, match=f"n_features is {number}"):
             kind(number)
+
+
+def test_a_network_is_in_single_precision_whatever_pytorchs_default_is():
+    torch.set_default_dtype(torch.float64)
+    try:
+        assert make_network("peq", 4).extractor.weight.dtype == torch.float32
+        assert torch.get_default_dtype() == torch.float64
+    finally:
+        torch.set_default_dtype(torch.float32)
+
+
+@pytest.mark.parametrize(
+    ("returned", "error", "message"),
+    [
+        (None, TypeError, "what network returned is None; expected a torch.nn.Module"),
+        (HeightNetwork().double(), TypeError, "weight of dtype torch.float64; expected torch.floa"),
+        (HeightNetwork(torch.ones(2, 1, 1)), ValueError, r"\(2, 2, 3\); expected \(2, 3\)"),
+    ],
+)
+def test_a_network_of_ones_own_that_cannot_be_trained_is_refused(returned, error, message):
+    with pytest.raises(error, match=message):
+        make_network(lambda n_features, generator: returned, 4)
+
+
+@pytest.mark.parametrize("network", [int, lambda: None])
+def test_a_function_of_other_arguments_is_refused_by_name(network):
+    """It once was a TypeError of its own words."""
+    message = "network is <.*; expected a function of n_features and a generator"
+    with pytest.raises(TypeError, match=message):
+        make_network(network, 4)

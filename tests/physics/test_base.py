@@ -1,18 +1,37 @@
 """What all three physics have in common: lifts, masses, forces, ceilings, and one's own."""
 
+from functools import partial
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from tests.physics.kinds import EACH, KINDS, ONE_BOX, TWO_BOXES, lifts, make
 from unload import ContainerEnv, Load, evaluate, picking_order, policies, task
 from unload.env.vector import ContainerVectorEnv
 from unload.load.substacks import build_load
+from unload.physics.base import Physics
 from unload.physics.bullet import World
+from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import Surroundings
 from unload.physics.table import FREE_LIFT, LiftTable, TablePhysics
+
+KINDS = {"full": FullPhysics, "local": LocalPhysics, "table": TablePhysics}
+KINDS["mujoco"] = partial(LocalPhysics, "mujoco")
+# The same as parameters of tests.
+EACH = [pytest.param("full", marks=pytest.mark.pybullet), "local", "table", "mujoco"]
+ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg
+
+
+def make(kind: str, load: Load, **kwargs) -> Physics:
+    """A physics that holds ``load``."""
+    physics = KINDS[kind](**kwargs)
+    physics.reset(load)
+    return physics
+
+
+def lifts(physics: Physics, items) -> list[float]:
+    return [physics.lift(int(item)) for item in items]
 
 
 @pytest.mark.parametrize("kind", EACH)

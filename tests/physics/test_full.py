@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.physics.kinds import ONE_BOX, lifts, make
+from tests.physics.test_base import ONE_BOX, lifts, make
 from unload import Load, task
 from unload.load.substacks import build_load
 

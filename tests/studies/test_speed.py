@@ -140,7 +140,7 @@ def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):
     set_in(run, update_times=lambda: {"PyTorch": 8.0, "fused": 2.0})
     set_in(run, training_rates=lambda: {"theirs": 5.0, "here": 4.0})
     run.main()
-    assert read_table("benchmarks/speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
+    assert read_table("speeds")["ratio"].tolist() == [1, 6172.5, 1, 1, 4, 1, 0.8]
     said = capsys.readouterr()
     assert "12,300 lifts/s 6,170 ×" in said.out and "measuring: training" in said.err
-    assert read_provenance("benchmarks/benchmarks")["runs"] == 1
+    assert read_provenance("speeds")["runs"] == 1

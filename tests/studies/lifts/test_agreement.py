@@ -131,7 +131,7 @@ def test_committed_rates_are_those_of_the_published_policies():
     table, names = read_table(engines.MSR_NAME), ["policy", "mask", "condition"]
     assert table[names].to_dict("records") == [case for case, _ in engines.played()]
     assert read_provenance(engines.MSR_NAME)["settings"]["notebook 12"] == engines.APPLIED
-    played = read_table("policies/comparison").query("condition in @table.condition")
+    played = read_table("policies").query("condition in @table.condition")
     published = played.groupby(names)["success_rate"].mean()
     both = table.merge(published.reset_index(), on=names)
     assert len(both) == len(published) > 50

@@ -25,14 +25,14 @@ def test_a_comparison_holds_the_rows_of_evaluate(own_data, set_in):
     conditions = {"500 picks": {}, "σ 5 cm": {"position_noise": 0.05}}
     set_in(comparison, LOADS=1, CONDITIONS=conditions, PLAYED=dict.fromkeys(conditions, PLAYERS))
     comparison_data(n_jobs=1)
-    table = read_table("policies/comparison")
+    table = read_table("policies")
     played = table[["condition", "policy", "mask"]].itertuples(index=False, name=None)
     assert list(played) == [(name, *player) for name in conditions for player in PLAYERS]
     rows = table.query("policy == 'highest' and condition == 'σ 5 cm'").reset_index()
     expected = evaluate(policies.highest, 1, comparison.SEED, position_noise=0.05)
     pd.testing.assert_frame_equal(rows[expected.columns], expected, rtol=1e-5)
     assert table["load"].unique().tolist() == [0]
-    assert read_provenance("policies/comparison")["settings"]["loads"] == 1
+    assert read_provenance("policies")["settings"]["loads"] == 1
 
 
 @pytest.mark.parametrize("condition", [name for name in PLAYED if "full" not in name])
@@ -40,9 +40,7 @@ def test_the_first_containers_of_a_condition_are_those_of_the_committed_data(
     condition, monkeypatch
 ):
     monkeypatch.setattr(comparison, "LOADS", 2)
-    rows = read_table("policies/comparison").query(
-        "policy == 'nearest' and condition == @condition"
-    )
+    rows = read_table("policies").query("policy == 'nearest' and condition == @condition")
     found = comparison.compare("nearest", True, condition)["success_rate"]
     assert rows["success_rate"].head(2).tolist() == pytest.approx(found.tolist(), abs=1e-5)
 
@@ -65,12 +63,12 @@ def test_a_load_of_another_scale_fills_what_it_can(rng, scale):
 
 
 def test_committed_data_is_of_the_committed_policies_and_of_the_plan():
-    settings = read_provenance("policies/comparison")["settings"]
+    settings = read_provenance("policies")["settings"]
     full = settings.pop("full")
     assert full.pop("front walls") == FRONT_WALLS and full.items() <= comparison.FULL.items()
     planned = {"policies": digests(), "loads": comparison.LOADS, "seed": comparison.SEED}
     assert settings == planned and len(full) == 3
-    played = read_table("policies/comparison")[["condition", "policy", "mask"]].drop_duplicates()
+    played = read_table("policies")[["condition", "policy", "mask"]].drop_duplicates()
     planned = [(name, *player) for name, players in PLAYED.items() for player in players]
     assert [*played.itertuples(index=False, name=None)] == planned
 
@@ -122,7 +120,7 @@ def test_with_every_box_simulated_a_condition_has_containers_of_its_own(own_data
     set_in(comparison, CONDITIONS={"full, kept": condition}, PLAYED=played)
     comparison_data(n_jobs=1)
     expected = evaluate(policies.highest, **condition)
-    rows = read_table("policies/comparison")
+    rows = read_table("policies")
     pd.testing.assert_frame_equal(rows[expected.columns], expected, rtol=1e-5, check_dtype=False)
 
 
@@ -160,7 +158,7 @@ def test_agents_of_another_library_are_trained_and_measured(own_data, set_in):
     small = replace(TrainConfig(), picks=128, num_envs=4, batch_size=16, replay_size=128)
     set_in(sb3, CONFIG=small, ROLLOUT=64, SEEDS=[1], LOADS=1)
     sb3.sb3_data(n_jobs=1)
-    rows = read_table("policies/sb3")
+    rows = read_table("sb3")
     runs = rows[["agent", "seen", "mask"]].itertuples(index=False, name=None)
     assert [*runs] == [*product(sb3.AGENTS, sb3.SEEN, (True, False))]
     assert (rows.loc[rows["mask"], "longest_deadlock"] == 0).all()
