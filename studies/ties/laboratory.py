@@ -54,6 +54,8 @@ CELLS = {
     **{f"rho_{rho}": _by_rho(rho, True) for rho in RHOS},
     "renewed_no_mask": _ties(renewed, False),
     "renewed": _ties(renewed, True),
+    "renewed_0.965_no_mask": _ties(partial(renewed, correlation=(0.965,) * 3), False),
+    "renewed_0.965": _ties(partial(renewed, correlation=(0.965,) * 3), True),
     "positions": Cell(POSITIONS, SIGN_SEEDS),
     "positions_mirrored": Cell(POSITIONS, SIGN_SEEDS, mirror_loads),
     "positions_whole_walls": Cell(POSITIONS, SIGN_SEEDS, partial(weigh, z=0.0)),

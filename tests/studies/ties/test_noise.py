@@ -66,14 +66,18 @@ def test_what_is_chosen_by_is_what_is_learned_from():
     run.rollout.close()
 
 
-def test_noise_is_renewed_by_a_success_alone():
-    run = Training(replace(SMALL, max_picks=20), change=renewed)
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_noise_is_renewed_by_a_success_alone(correlation):
+    """What is not renewed keeps its offsets, too, from which a drift goes on."""
+    change = partial(renewed, correlation=(correlation,) * 3)
+    run = Training(replace(SMALL, max_picks=20), change=change)
     for step in range(25):  # afterwards hardly a pick fails
         before, first = run.kept["seen"].copy(), len(run.replay)
-        failed = run.kept["failed"].copy() & (step % 20 > 0)
+        failed, offsets = run.kept["failed"].copy() & (step % 20 > 0), run.kept["ties"].copy()
         run.step()
         now, stored = run.kept["seen"], run.replay.arrays["observations"][first : first + 64]
         assert (stored == now).all()
+        assert ((run.kept["ties"] == offsets).all(axis=(1, 2)) == failed).all()
         assert ((now == before).all(axis=(1, 2)) == failed).all()
         assert failed.any() == (step not in (0, 20)) and not failed.all()
     run.rollout.close()
