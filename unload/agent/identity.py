@@ -6,11 +6,10 @@ identity, a finished run would be taken for another one that was made by a diffe
 What counts of a function is the file of its module and where it stands there, or its code if it was
 typed; the files of all that these import as long as they are the caller's; what it encloses; and
 the values of the names that it uses, by content, because a program can set them. So its runs are
-trained again after any change of these files, also after one that it would not feel: to see that it
-would not takes a reader. Libraries count by name and version, and ``unload`` by name, because a
+trained again after any change to these files, even one without effect: to see that takes a
+reader. Libraries count by name and version, and ``unload`` by name, because a
 version of the package is one behaviour. What a program sets in a module that a function uses
-through others is not seen. What cannot be written down is another one each time, and never taken
-for the same.
+through others is not seen. What cannot be written down counts as different each time.
 """
 
 import ast

@@ -63,7 +63,7 @@ def picking_order(
 
     A policy sees the 128 nearest boxes, each exactly where it is; a rule knows the load. A box
     that has failed is not picked again before another one has been unloaded. How many boxes the
-    ceiling or their weight lets nobody lift is logged first; rules pick these last, and nothing
+    ceiling or their weight makes unliftable is logged first; rules pick these last, and nothing
     that lies under them.
 
     Args:
@@ -248,7 +248,7 @@ def _by_stop(load: Load, by: str, hopeless: np.ndarray) -> Rule:
 
 
 def stop_numbers(load: Load, by: str) -> tuple[np.ndarray, np.ndarray]:
-    """The stops in their order, (k,), and the number of each box's own in it, (n,) int64.
+    """The stops in order, (k,), and the index of each box's stop, (n,) int64.
 
     Args:
         load: with extras.

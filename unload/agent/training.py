@@ -37,7 +37,7 @@ INSTRUCTIONS = ("AVX2", "AVX512")
 
 @cache  # once; Python's own filter forgets where another module changes filters
 def warn_of_other_bits(instructions: str) -> None:
-    """Warn where PyTorch draws other first weights from a seed than on most processors."""
+    """Warn where PyTorch's initial weights for a seed differ from those on most processors."""
     if instructions not in INSTRUCTIONS:
         warnings.warn(
             f"PyTorch uses {instructions} instructions of this processor; with the same seed a run "
@@ -149,10 +149,10 @@ def train(
     callback: Callable[[dict[str, float]], bool | None] | None = None,
     change: Callable[[Training], None] = unchanged,
 ) -> TrainResult:
-    """Train an agent; go on where ``run_dir`` holds a checkpoint of the same run.
+    """Train an agent; resume where ``run_dir`` holds a checkpoint of the same run.
 
-    A run that was stopped or killed and goes on gives the same weights and curve, bit by bit, as
-    one in a single piece. A finished run is not repeated. The book's page "Training runs" says
+    A run that was stopped or killed and resumed gives the same weights and curve, bit for bit, as
+    an uninterrupted one. A finished run is not repeated. The book's page "Training runs" says
     what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do.
 
     Lifts by a physics of your own are a task of your own: a run knows it by the id under which it

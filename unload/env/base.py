@@ -1,8 +1,9 @@
-"""The bases of the environments, single ones and arrays of them: settings and order of calls.
+"""The bases of single and vector environments: settings and order of calls.
 
-``gymnasium.make_vec(id, num_envs)`` makes an array of environments. It behaves, bit for bit, as
+``gymnasium.make_vec(id, num_envs)`` makes a vector environment. It behaves, bit for bit, as
 Gymnasium's ``SyncVectorEnv`` of the single environments with the same ``autoreset_mode``: same
-seeds, same actions, same observations, rewards, masks and infos. A single one is an array of one.
+seeds, same actions, same observations, rewards, masks and infos. A single one is a vector
+environment of one.
 
 They are registered without Gymnasium's ``max_episode_steps``, which would wrap them and cut every
 episode there, whatever their own ``max_picks`` is.
@@ -89,9 +90,9 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
             ``SAME_STEP``, ``NEXT_STEP``, in which the action is not used and the reward is 0, as
             most of Gymnasium's vector wrappers want it, or ``DISABLED``, by the caller's
             ``reset(options={"reset_mask": mask})``. Gymnasium takes ``vector_kwargs`` only for its
-            own arrays: ``make_vec(id, num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)``.
+            own ones: ``make_vec(id, num_envs, autoreset_mode=AutoresetMode.NEXT_STEP)``.
         equalize, ties, max_picks, position_noise: as for the single environment.
-        render_mode: None; there are no pictures of arrays.
+        render_mode: None; there are no pictures of vector environments.
 
     Attributes:
         options: names of the options that ``reset`` takes.
@@ -270,10 +271,10 @@ def _flagged(infos: dict[str, np.ndarray], where: np.ndarray) -> dict[str, np.nd
 
 
 class PickingEnv(EpisodeEnv):
-    """A single environment: an array of one, without its first axis.
+    """A single environment: a vector environment of one, without its first axis.
 
     Args:
-        envs: the array, which leaves the next reset to its caller.
+        envs: the vector environment, which leaves the next reset to its caller.
         render_mode: one of ``metadata["render_modes"]``, or None.
     """
 

@@ -77,8 +77,8 @@ class ContainerEnv(PickingEnv):
     Args:
         physics: what is simulated at a lift: ``"local"`` (the situation of the chosen box),
             ``"full"`` (every box: seconds a pick) or ``"table"`` (``"local"``, remembered), which
-            answers without a simulation if nothing rests on the chosen box, which then moves by
-            0.463053 m, and if three boxes or more do: it moves by 0 m. Or a ``Physics`` of your
+            answers without a simulation if nothing rests on the chosen box (it moves by
+            0.463053 m) or if three boxes or more do (0 m). Or a ``Physics`` of your
             own, which the environment leaves open.
         after_pick: for ``physics="full"``: ``"restore"`` or ``"keep"``.
         equalize: give equalized observations (Alg. 1).
@@ -162,7 +162,7 @@ class ContainerEnv(PickingEnv):
 
 
 class _OneContainer(ContainerVectorEnv):
-    """An array of one container, whose lifts its own ``physics`` decides."""
+    """A vector environment of one container, whose lifts its own ``physics`` decides."""
 
     def __init__(self, physics: Name | Physics, after_pick: str, settings: dict[str, Any]) -> None:
         super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)

@@ -26,8 +26,8 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     Args:
         physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Unless it is a
-            plain ``TablePhysics`` of full force, its ``simulate`` is asked about each pick whose
-            outcome neither an earlier failure nor the ceiling says, and none of its other methods.
+            plain ``TablePhysics`` of full force, its ``simulate``, and no other method, is asked
+            about each pick whose outcome neither an earlier failure nor the ceiling decides.
             Single environments take any ``Physics``, each one of its own:
             ``SyncVectorEnv([lambda: ContainerEnv(Mine())] * num_envs)``.
 

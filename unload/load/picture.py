@@ -1,6 +1,6 @@
-"""Still pictures of a load: boxes drawn from the back, so that nearer ones cover farther ones.
+"""Still pictures of a load, drawn back to front, so that nearer boxes cover farther ones.
 
-They are what environments render, and stand where plotly is not drawn. This module takes a third
+They are what environments render, and stand in where plotly is not drawn. This module takes a third
 of a second to import, because Matplotlib does: import it where something is drawn.
 """
 

@@ -140,7 +140,7 @@ def mesh(
     Args:
         load, items: (k,) int, numbers of items in the load; may be empty.
         name, legend: of the group, in the label of a box; whether the legend names it, too.
-        seam: how much smaller than they are they are drawn, in m.
+        seam: by how much the drawing shrinks them, in m.
     """
     low, high = picture.corners(load, items, seam)
     vertices = low[:, None] + picture.CORNERS * (high - low)[:, None]

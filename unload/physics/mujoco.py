@@ -1,7 +1,7 @@
 """MuJoCo, which simulates lifts where PyBullet is missing; the only file that imports it.
 
-Its contacts are softer than PyBullet's, and so a box that is held down moves a few millimetres
-otherwise. Where this decides a lift, near the threshold, the two may differ: lifts of both are
+Its contacts are softer than PyBullet's, so a box that is held down moves differently, by a few
+millimetres. Where this decides a lift, near the threshold, the two may differ: lifts of both are
 never kept in one file.
 """
 
