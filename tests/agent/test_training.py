@@ -1,6 +1,7 @@
 import os
 import signal
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pandas as pd
@@ -32,7 +33,8 @@ LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
 def test_what_a_run_leaves(tmp_path, fields):
     config = TrainConfig(**fields, epsilon_final=0.9)  # so that its points differ to the end
-    curve = train(config, tmp_path, progress=False).curve
+    curve = train(config, tmp_path, progress=(log := StringIO())).curve
+    assert "100%" in log.getvalue() and "MSR=" in log.getvalue()
     assert {path.name for path in tmp_path.iterdir()} == LEFT
     assert tuple(curve.columns) == Point._fields
     interval = config.log_interval * config.num_envs
