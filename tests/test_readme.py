@@ -74,18 +74,19 @@ def test_the_answer_is_that_of_the_data():
     ordered = read_table("ties/earlier").query("cell == 'ties_by_order_mask'")
     both = len(shared) + len(ordered)
     assert f"of {both} with the mask and ties averaged or by order, none" in text
-    anew = every[-1].query("cell in ['anew_mask', 'anew_no_mask']")
-    assert "With noise anew at each pick none of six falls;" in text
-    assert len(anew) == 6
+    cells = ["anew_mask", "anew_no_mask", "b2048_anew_no_mask"]
+    anew = every[-1].query("cell in @cells")
+    assert "With noise anew at each pick none of seven falls;" in text
+    assert len(anew) == 7
     assert not any(runs["fell"].any() for runs in (shared, ordered, anew))
-    assert "frozen noise misleads such networks, too." in text
-    for grid, cells in ((TIES, ("anew_mask", "anew_no_mask")), (PAPER, ("averaged_mask",))):
+    assert "frozen noise misleads most such networks." in text
+    for grid, chosen, knowing in ((TIES, cells, 1), (PAPER, ["averaged_mask"], 0)):
         policies = read_policies(paths.DATA / f"{grid.name}.safetensors").items()
-        networks = [policy.network for name, policy in policies if cell_of(name) in cells]
+        networks = [policy.network for name, policy in policies if cell_of(name) in chosen]
         agents = [unload.Greedy(network, equalize=False) for network in networks]
         played = [unload.evaluate(agent, 4, mask=True, equalize=True) for agent in agents]
         msr = [table["success_rate"].mean() for table in played]
-        assert len(msr) >= 6 and max(msr) < 0.97 and sum(msr) / len(msr) < 0.85
+        assert len(msr) >= 7 and sum(rate >= 0.95 for rate in msr) == knowing
     assert f"Of {sum(map(len, every))} runs one, with jams and ties by order, is like its" in text
     (alike,) = pd.concat(every).query("both")["cell"]
     assert alike == "b2048_mask_order"
