@@ -73,20 +73,21 @@ def test_the_answer_is_that_of_the_data():
     shared = pd.concat(every).query("cell in ['averaged_mask', 'averaged_b2048_mask']")
     ordered = read_table("ties/earlier").query("cell == 'ties_by_order_mask'")
     both = len(shared) + len(ordered)
-    assert f"of {both} with the mask and ties averaged or by order, none" in text
+    assert f"of {both} with the mask and ties averaged or by order, none falls" in text
     cells = ["anew_mask", "anew_no_mask", "b2048_anew_no_mask"]
     anew = every[-1].query("cell in @cells")
-    assert "With noise anew at each pick none of seven falls;" in text
-    assert len(anew) == 7
+    assert "With noise anew at each pick seven end at 91–99.8 %;" in text
+    assert len(anew) == 7 and anew["end"].between(0.91, 0.9985).all()
     assert not any(runs["fell"].any() for runs in (shared, ordered, anew))
-    assert "frozen noise misleads most such networks." in text
-    for grid, chosen, knowing in ((TIES, cells, 1), (PAPER, ["averaged_mask"], 0)):
-        policies = read_policies(paths.DATA / f"{grid.name}.safetensors").items()
-        networks = [policy.network for name, policy in policies if cell_of(name) in chosen]
-        agents = [unload.Greedy(network, equalize=False) for network in networks]
-        played = [unload.evaluate(agent, 4, mask=True, equalize=True) for agent in agents]
-        msr = [table["success_rate"].mean() for table in played]
-        assert len(msr) >= 7 and sum(rate >= 0.95 for rate in msr) == knowing
+    assert "Frozen noise misleads 27 of 28 networks tested." in text
+    tested, msr = [*cells, "averaged_mask", "averaged_b2048_mask"], []
+    for grid in (TIES, PAPER):
+        for name, policy in read_policies(paths.DATA / f"{grid.name}.safetensors").items():
+            if cell_of(name) in tested:
+                agent = unload.Greedy(policy.network, equalize=False)
+                played = unload.evaluate(agent, 4, mask=True, equalize=True)
+                msr.append(played["success_rate"].mean())
+    assert len(msr) == 28 and sum(rate < 0.95 for rate in msr) == 27
     assert f"Of {sum(map(len, every))} runs one, with jams and ties by order, is like its" in text
     (alike,) = pd.concat(every).query("both")["cell"]
     assert alike == "b2048_mask_order"
