@@ -23,7 +23,9 @@ from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 
 RHOS = (0.0, 0.8, 0.9, 0.965, 0.985, 0.997, 1.0)
-SEEDS, SIGN_SEEDS = range(4000, 4010), range(4100, 4120)
+# The plan's seeds, and those of its deviation 10.
+SEEDS = (*range(4000, 4010), *range(5000, 5020))
+SIGN_SEEDS = (*range(4100, 4120), *range(5100, 5120))
 POSITIONS = replace(CONFIG, equalize=False)
 
 

@@ -53,7 +53,7 @@ def test_the_cells_are_those_of_the_plan():
     assert not any(anew), "nothing is left of the noise before"
     seeds = {seed for cell in training.CELLS.values() for seed in cell.seeds}
     assert (min(seeds), max(seeds)) == (60, 64) and "seeds 60–64" in plan
-    assert [len(CELLS[name].seeds) for name in ("rho_0.0", "positions")] == [10, 20]
+    assert [len(CELLS[name].seeds) for name in ("rho_0.0", "positions")] == [30, 40]
 
 
 def test_published_runs_are_whole_ones_of_the_grid():
