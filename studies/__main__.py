@@ -13,7 +13,7 @@ from studies.policies import comparison, variants
 from studies.results import COMMAND
 from studies.seamless import jam_tables, mujoco_jams
 from studies.seamless import training as seamless
-from studies.ties import creep, earlier, leak
+from studies.ties import choice, creep, earlier, leak
 from studies.ties import laboratory as ties_laboratory
 from studies.ties import training as ties
 
@@ -72,6 +72,11 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     ),
     "ties": ("how equal coordinates are ranked", partial(train_grid, ties.TIES), some(ties.CELLS)),
     "falls": ("why runs fall: the long runs", long.falls_data, some(long.LONG.cells)),
+    "choice": ("published networks with other noise and other masks", choice.choice_data, JOBS),
+    "choice_laboratory": (
+        "noise at the choice or in the memory, the mask in training: the laboratory",
+        choice.choice_laboratory_data, JOBS,
+    ),
     "earlier": ("runs of the first plan, from this repository's history", earlier.earlier_data, {}),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
 }  # fmt: skip

@@ -29,6 +29,7 @@ class DriftingTies:
     Args:
         run: in containers, with ``equalize`` and with ``position_noise`` 0.
         correlation: ρ of the offsets along x, y and z from one pick to the next.
+        name: of the offsets in ``run.kept``, where a run has several.
 
     Attributes:
         offsets: (num_envs, ``MOST_ITEMS``, 3) float32, of each item in units of ``SPREAD``; a part
@@ -38,21 +39,21 @@ class DriftingTies:
         ValueError: the run's own noise would be added.
     """
 
-    def __init__(self, run: Training, correlation: Sequence[float]) -> None:
+    def __init__(self, run: Training, correlation: Sequence[float], name: str = "ties") -> None:
         config = run.config
         if config.position_noise or not config.equalize:
             raise ValueError(
                 f"position_noise is {config.position_noise} and equalize {config.equalize}; "
                 "expected 0 and True, because the ties of equalized positions are broken here"
             )
-        self._run = run
+        self._run, self._name = run, name
         self._kept = np.asarray(correlation, np.float32)
         self._drawn = np.sqrt(1 - self._kept**2)
-        run.kept["ties"] = np.zeros((config.num_envs, MOST_ITEMS, 3), np.float32)
+        run.kept[name] = np.zeros((config.num_envs, MOST_ITEMS, 3), np.float32)
 
     @property
     def offsets(self) -> np.ndarray:
-        return self._run.kept["ties"]  # another array in a run that goes on
+        return self._run.kept[self._name]  # another array in a run that goes on
 
     def observations(self) -> np.ndarray:
         """Observe the containers after the offsets have moved on by a pick, float32 in [-1, 1].

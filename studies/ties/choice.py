@@ -1,0 +1,274 @@
+"""What noise does at the choice, what it does in the replay memory, and what the mask does.
+
+    python -m studies choice
+
+The published networks are evaluated with noise that is frozen for a load and with noise that is
+drawn anew at each pick; nothing is trained. The laboratory parts the noise that a network chooses
+by from the noise that it learns from, and takes the mask in training apart. The last section of
+``data/ties/PLAN.md`` says what was expected.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from itertools import product
+
+import numpy as np
+import pandas as pd
+import torch
+
+from studies import paths
+from studies.changes import without
+from studies.falls.cells import CONFIG
+from studies.falls.laboratory import SLOPES, TILTS, point, train_in_laboratory
+from studies.falls.long import LONG, UNTRAINED
+from studies.fingerprint import training_fingerprint
+from studies.grid import Cell, cell_of, read_policies
+from studies.paper.training import PAPER
+from studies.results import COMMAND, keep_all, publish
+from studies.statistics import end_msr
+from studies.ties.noise import SPREAD, DriftingTies, drifting
+from studies.ties.training import TIES
+from unload import task
+from unload.agent.config import TrainConfig
+from unload.agent.greedy import Greedy, greedy_actions
+from unload.agent.identity import identity
+from unload.agent.policies import choosable
+from unload.agent.training import Training
+from unload.env.equalization import equalize
+from unload.env.observation import POSITION_NOISE
+from unload.env.vector import ContainerVectorEnv
+from unload.network.peq import PEQNetwork
+
+NOISE = ("frozen", "anew")  # for a load, or at each pick
+WAYS = list(product(NOISE, (False, True)))  # noise and mask
+PLACE = (0, 1)  # the axes x and y
+LOADS = {"episodes": 100, "seed": 1000}  # containers that published networks choose in
+FEW_LOADS = LOADS | {"episodes": 16}  # and those of the laboratory
+CHOICE_SEEDS, MASK_SEEDS = range(7000, 7020), range(8000, 8020)
+COUNTS = ["msr", "failures", "deadlocked", "preference"]
+
+
+def evaluate_choice(
+    policy: Greedy, noise: str, mask: bool, place: bool = True, episodes: int = 100, seed: int = 0
+) -> dict[str, float]:
+    """Let a network choose in fresh containers, 500 picks each, and sort its failures.
+
+    Args:
+        policy: of the network; says whether it sees ranks, and how ties are broken.
+        noise: ``"frozen"``, drawn once for a load as the environments do, or ``"anew"``, drawn
+            at each pick.
+        mask: whether items that failed since the last success are excluded.
+        place: whether the network sees x and y; they are 0 if not.
+        episodes: number of containers.
+        seed: of the loads, which are those of ``unload.evaluate``, and of the noise.
+
+    Returns:
+        ``msr``; the number of ``failures``; of them the ``deadlocked`` ones, whose item had failed
+        since the last success, and of the others those by ``preference``: the network chooses an
+        item that cannot be lifted also where ties share their mean rank.
+    """
+    if noise not in NOISE:
+        raise ValueError(f"noise is {noise!r}; expected one of {NOISE}")
+    seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
+    envs = ContainerVectorEnv(episodes, position_noise=POSITION_NOISE if noise == "frozen" else 0.0)
+    rng, rows = np.random.default_rng(seed), np.arange(episodes)
+
+    def choose(positions: np.ndarray, allowed: np.ndarray, ties: str) -> np.ndarray:
+        seen = equalize(positions, ties) if policy.equalize else positions
+        return greedy_actions(policy.network, seen if place else without(seen, PLACE), allowed)
+
+    counts = dict.fromkeys(COUNTS, 0)
+    observations, infos = envs.reset(seed=seeds)
+    for _ in range(task.MAX_PICKS):
+        failed_before, present = infos["action_mask"] == 0, infos["item_mask"].astype(bool)
+        allowed = choosable(~failed_before & present, present) if mask else present
+        positions = observations
+        if noise == "anew":
+            positions = observations + SPREAD * rng.standard_normal(observations.shape)
+        actions = choose(positions, allowed, policy.ties)
+
+        # What a choice without noise could lift is asked before the pick changes the containers.
+        deadlocked, shared = failed_before[rows, actions], actions.copy()
+        sorted_out = (envs._lift(actions)[1] < task.LIFT_THRESHOLD) & ~deadlocked
+        if sorted_out.any():
+            shared[sorted_out] = choose(positions[sorted_out], allowed[sorted_out], "average")
+        preference = sorted_out & (envs._lift(shared)[1] < task.LIFT_THRESHOLD)
+        observations, rewards, _, _, infos = envs.step(actions)
+        counts["msr"] += int((rewards > 0).sum())
+        counts["failures"] += int((rewards <= 0).sum())
+        counts["deadlocked"] += int(deadlocked.sum())
+        counts["preference"] += int(preference.sum())
+    envs.close()
+    return counts | {"msr": counts["msr"] / (episodes * task.MAX_PICKS)}
+
+
+def published_networks() -> dict[str, Greedy]:
+    """All published networks that were trained without jams, and some that were not trained."""
+    policies = {
+        name: policy
+        for grid in (PAPER, LONG, TIES)
+        for name, policy in read_policies(paths.DATA / f"{grid.name}.safetensors").items()
+        if "jams" not in name
+    }
+    for seed in range(UNTRAINED):
+        network = PEQNetwork(generator=torch.Generator().manual_seed(seed))
+        policies[f"untrained/seed_{seed}"] = Greedy(network, equalize=True)
+    return policies
+
+
+def ask_network(name: str, policy: Greedy) -> list[dict]:
+    """Rows of ``ties/choice.csv``: a network, with noise, mask and place in all ways."""
+    torch.set_num_threads(1)
+    named = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
+    return [
+        named
+        | {"noise": noise, "mask": mask, "place": place}
+        | evaluate_choice(policy, noise, mask, place, **LOADS)
+        for (noise, mask), place in product(WAYS, (True, False))
+    ]
+
+
+def parted(run: Training, choice: float, memory: float) -> None:
+    """Let a network choose by other noise than it learns from.
+
+    Args:
+        run: see ``DriftingTies``.
+        choice: correlation from pick to pick of the noise that breaks ties at the choice.
+        memory: of that in the replay memory.
+    """
+    add = run.replay.add
+    drifting(run, (choice,) * 3)
+    stored, choose = DriftingTies(run, (memory,) * 3, "ties of the memory"), run.agent.choose
+    seen = np.empty(0)
+
+    def choose_and_note(observations: np.ndarray, *rest) -> np.ndarray:
+        nonlocal seen
+        seen = stored.observations()
+        return choose(observations, *rest)
+
+    run.agent.choose = choose_and_note
+    run.replay.add = lambda observations, **rest: add(observations=seen, **rest)
+
+
+def choice_change(choice: str, memory: str) -> Callable[[Training], None]:
+    """The change of a laboratory run by its kinds of noise."""
+    correlations = {"frozen": 1.0, "anew": 0.0}
+    if choice == memory:
+        return partial(drifting, correlation=(correlations[choice],) * 3)
+    return partial(parted, choice=correlations[choice], memory=correlations[memory])
+
+
+def no_deadlocks_stored(run: Training) -> None:
+    """Store no deadlocked pick; other picks of the same step are stored twice in their place.
+
+    Where all of a step are deadlocked, what was stored last is stored again.
+    """
+    choose, add, replay = run.agent.choose, run.replay.add, run.replay
+    deadlocked = np.zeros(run.config.num_envs, bool)
+
+    def choose_and_note(*arguments) -> np.ndarray:
+        nonlocal deadlocked
+        actions = choose(*arguments)
+        deadlocked = run.rollout.deadlocked(actions)
+        return actions
+
+    def add_others(**picks: np.ndarray) -> None:
+        others = np.flatnonzero(~deadlocked)
+        if len(others):
+            rows = np.resize(others, len(deadlocked))
+        else:
+            picks = replay.arrays
+            rows = np.arange(replay.total - len(deadlocked), replay.total)
+        add(**{name: values.take(rows, axis=0, mode="wrap") for name, values in picks.items()})
+
+    run.agent.choose, run.replay.add = choose_and_note, add_others
+
+
+def filled_at_deadlocks(run: Training) -> None:
+    """Fill a container anew as soon as a pick in it is deadlocked."""
+    rollout, envs = run.rollout, run.rollout.envs.unwrapped
+    pick = rollout.pick
+
+    def pick_and_fill(actions: np.ndarray):
+        deadlocked = rollout.deadlocked(actions)
+        picked = pick(actions)
+        if deadlocked.any():
+            elapsed = envs._picks.copy()  # episodes go on together
+            observations, _ = envs.reset(options={"reset_mask": deadlocked})
+            envs._picks[:] = elapsed
+            rollout._see(observations, envs._infos())
+        return picked
+
+    rollout.pick = pick_and_fill
+
+
+B256 = replace(CONFIG, batch_size=256)
+CHOICE_CELLS = {
+    f"choice_{choice}_memory_{memory}{'' if mask else '_no_mask'}": Cell(
+        replace(CONFIG, position_noise=0.0, mask=mask), CHOICE_SEEDS, choice_change(choice, memory)
+    )
+    for choice, memory, mask in product(NOISE, NOISE, (False, True))
+}
+MASK_CELLS = {
+    **{
+        f"episodes_{picks}{'' if mask else '_no_mask'}": Cell(
+            replace(B256, max_picks=picks, mask=mask), MASK_SEEDS
+        )
+        for picks, mask in product((25, 500), (False, True))
+    },
+    "no_deadlocks_stored_no_mask": Cell(replace(B256, mask=False), MASK_SEEDS, no_deadlocks_stored),
+    "filled_at_deadlocks_no_mask": Cell(replace(B256, mask=False), MASK_SEEDS, filled_at_deadlocks),
+}
+
+
+def run_laboratory(name: str, config: TrainConfig, change: Callable[[Training], None]) -> dict:
+    """Train a run of the laboratory, and evaluate its network in all ways."""
+    trace: list[dict[str, float]] = []
+    run = train_in_laboratory(config, change, lambda run: trace.append(point(run)))
+    points, policy = pd.DataFrame(trace), run.policy()
+    row = {"cell": name, "seed": config.seed, "end": end_msr(run.curve.table())}
+    for noise, mask in WAYS:
+        choices = evaluate_choice(policy, noise, mask, **FEW_LOADS)
+        row[f"{noise}_{'mask' if mask else 'no_mask'}"] = choices["msr"]
+    row |= points[SLOPES].iloc[-1].to_dict() | points[TILTS].mean().to_dict()
+    return row | {"tilt": float(points[TILTS].abs().mean().max())}
+
+
+def choice_data(n_jobs: int = -1) -> None:
+    """Write ``ties/choice.csv``: a row per network and way to ask it, see ``evaluate_choice``."""
+    fingerprint, questions = training_fingerprint(), []
+    for name, policy in published_networks().items():
+        question = {"name": name, "weights": identity(policy.network), "fingerprint": fingerprint}
+        questions.append((question | LOADS, (name, policy)))
+    results = keep_all("ties/choice", ask_network, questions, n_jobs)
+    rows = pd.DataFrame([row for result in results for row in result.value])
+    publish("ties/choice", {"choice": rows}, f"{COMMAND} choice", LOADS, results, fingerprint)
+
+
+def choice_laboratory_data(n_jobs: int = -1) -> None:
+    """Write ``ties/choice_laboratory.csv`` and ``ties/mask_laboratory.csv``, a row per run.
+
+    ``cell`` and ``seed``; ``end``, the MSR while training over the last tenth; the MSR of its
+    network in fresh containers by noise and mask; and its slopes at the end. The second has the
+    tilt of the containers, too: ``tilt_x`` and ``tilt_y``, means over the training, and ``tilt``,
+    the larger one of the mean sizes of both.
+    """
+    fingerprint = training_fingerprint()
+    for name, cells in {"choice_laboratory": CHOICE_CELLS, "mask_laboratory": MASK_CELLS}.items():
+        questions = []
+        for cell_name, cell in cells.items():
+            question = {"cell": cell_name, "change": identity(cell.change)}
+            for seed in cell.seeds:
+                config = replace(cell.config, seed=seed)
+                arguments = cell_name, config, cell.change
+                question |= {"fingerprint": fingerprint, **config.plain()}
+                questions.append((dict(question), arguments))
+        results = keep_all(f"ties/{name}", run_laboratory, questions, n_jobs)
+        rows = pd.DataFrame([result.value for result in results])
+        if name == "choice_laboratory":  # its environments show ties in the items' order
+            rows = rows.drop(columns=[*TILTS, "tilt"])
+        config = next(iter(cells.values())).config
+        settings = {"config": config.plain(), "runs": len(rows)} | FEW_LOADS
+        command = f"{COMMAND} choice_laboratory"
+        publish(f"ties/{name}", {name: rows}, command, settings, results, fingerprint, "%.5g")
