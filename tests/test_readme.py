@@ -74,7 +74,8 @@ def test_what_came_out_is_what_the_data_say():
     rising = started[started["steady"]]
     other = [name for name in (*FIG12, *FIG11) if name != "noisier"]
     alike = rising[other].all(axis=1).sum()
-    assert f"In {len(started)} other trainings" in text and not runs["starts"].any()
+    assert f"We have {len(started)} other trainings that start at 15 %" in text
+    assert started["cell"].str.startswith("weight").sum() == 1 and not runs["starts"].any()
     assert f"Of these, {len(rising)} rise steadily, and {alike} of the {len(rising)} look" in text
 
     positions = paper[paper["cell"].str.startswith("positions")]
