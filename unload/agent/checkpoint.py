@@ -13,9 +13,8 @@ import numpy as np
 import pandas as pd
 
 from unload import task
-from unload.agent.config import ENVS, TrainConfig
+from unload.agent.config import ENVS, TrainConfig, plain
 from unload.agent.greedy import Greedy, load_policy, save_policy
-from unload.agent.identity import identity, unchanged
 from unload.agent.state import gather, put_back
 from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
@@ -39,14 +38,13 @@ class TrainResult(NamedTuple):
 
 
 def settings_of_run(
-    config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
+    config: TrainConfig, stack: Callable | None = None, change: Callable | None = None
 ) -> dict:
-    """What a run is: its configuration, and the identity of its change and stack, None without.
+    """What a run is: its configuration, and the names of its change and stack, None without.
 
     Also the engine, where lifts are decided by another one than PyBullet.
     """
-    change = None if change is unchanged else identity(change)
-    own = {"change": change, "stack": None if stack is None else identity(stack)}
+    own = plain({"change": change, "stack": stack})
     other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}
     return config.plain() | own | other
 
@@ -88,6 +86,15 @@ class RunFolder:
     def finished(self) -> bool:
         """Whether the run has ended, and its policy is whole."""
         return self._config_file.exists()
+
+    def check_code(self, **functions: object) -> None:
+        """Refuse to go on with a run of the caller's functions, of which only names are kept."""
+        own = [name for name, value in functions.items() if callable(value)]
+        if own and (self.finished or self._checkpoint_file.exists()):
+            raise ValueError(
+                f"run_dir {str(self.path)!r} holds a run with its own {' and '.join(own)}, whose "
+                "code is not kept; expected same_code=True if it is the same, or another folder"
+            )
 
     def check_room(self, run) -> None:
         """Raise OSError unless the disk has room for the checkpoints of a fresh ``Training``.
