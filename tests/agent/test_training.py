@@ -26,7 +26,7 @@ def own_network(n_features, generator):
 
 
 HIGHEST = TrainConfig(**RUNS["highest item"])
-LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
+LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
 
 
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
@@ -167,7 +167,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
-    left = {"checkpoint.npz", "curve.csv", "lock", "owner"}
+    left = {"checkpoint.npz", "curve.csv", "lock"}
     assert {path.name for path in tmp_path.iterdir()} <= left
     stored = files.read_arrays(tmp_path / "checkpoint.npz")
     assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
@@ -326,7 +326,7 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
 
     with pytest.raises(FloatingPointError, match="scorer.bias is not finite"):
         train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
-    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock", "owner"}
+    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock"}
     assert started[0].rollout.envs.closed
 
 

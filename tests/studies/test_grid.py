@@ -117,13 +117,15 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     assert [path.stat().st_mtime_ns for path in written] == before
 
 
-def test_a_run_of_other_code_is_reported(configs, tmp_path):
+def test_a_run_of_other_code_is_reported(configs, tmp_path, monkeypatch):
     """The arguments of a change count, and the file that it stands in."""
     one, other = (dict.fromkeys(configs, partial(height_reward, share=s)) for s in (0.5, 0.25))
-    assert (sweep.run_sweep(configs, tmp_path, 1, one)["error"] == "").all()
-    assert (sweep.run_sweep(configs, tmp_path, 1, one)["error"] == "").all()
-    errors = sweep.run_sweep(configs, tmp_path, 1, other)["error"]
-    assert errors.str.contains("holds a run of other code").all()
+    for _ in range(2):
+        assert (sweep.run_sweep(configs, tmp_path, 1, one)["error"] == "").all()
+    message = "holds a run that was begun with other code"
+    assert sweep.run_sweep(configs, tmp_path, 1, other)["error"].str.contains(message).all()
+    monkeypatch.setattr("studies.results.getsourcefile", lambda function: __file__)
+    assert sweep.run_sweep(configs, tmp_path, 1, one)["error"].str.contains(message).all()
 
 
 def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):

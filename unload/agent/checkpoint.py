@@ -1,10 +1,8 @@
 """The folder of a training run: checkpoint, policy, curve and configuration."""
 
-import errno
 import json
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -74,14 +72,6 @@ class RunFolder:
             raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
         return file
 
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Lock the folder, and remove what a killed process has left half written of its files."""
-        with files.locked(self.path):
-            for name in FILES:
-                files.remove_partial(self.path / name)
-            yield
-
     @property
     def finished(self) -> bool:
         """Whether the run has ended, and its policy is whole."""
@@ -95,22 +85,6 @@ class RunFolder:
                 f"run_dir {str(self.path)!r} holds a run with its own {' and '.join(own)}, whose "
                 "code is not kept; expected same_code=True if it is the same, or another folder"
             )
-
-    def check_room(self, run) -> None:
-        """Raise OSError unless the disk has room for the checkpoints of a fresh ``Training``.
-
-        There are two versions of them while one replaces the other, with a full replay memory.
-        """
-        arrays = [*gather(run).values(), *run.replay.arrays.values()]
-        needed = 2 * sum(array.nbytes for array in arrays)
-        there = self._checkpoint_file.stat().st_size if self._checkpoint_file.exists() else 0
-        room = shutil.disk_usage(self.path).free + there
-        if room < needed:
-            reason = (
-                f"the disk has {room / 1e9:.2f} GB for checkpoints; expected {needed / 1e9:.2f} GB,"
-                " for one and the next one that replaces it"
-            )
-            raise OSError(errno.ENOSPC, reason, str(self.path))
 
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
@@ -157,8 +131,10 @@ class RunFolder:
         self._check_same(stored, settings)
         for path in (self.policy, self._curve_file):
             files.check_digest(path, marks.get(path.name))
-        with suppress(OSError):  # it is gone already, or the folder is read-only
-            self._checkpoint_file.unlink()
+        # A finished run needs neither its checkpoint nor what a killed process wrote of one.
+        for path in (self._checkpoint_file, files.partial_of(self._checkpoint_file)):
+            with suppress(OSError):  # it is gone already, or the folder is read-only
+                path.unlink()
         network = make_network(config.network, config.n_features)
         return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve_file))
 

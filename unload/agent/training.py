@@ -26,7 +26,7 @@ from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
 from unload.physics.table import shared_table
-from unload.support import checks
+from unload.support import checks, files
 
 CHECKPOINT_INTERVAL = 600.0  # seconds between two of them
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
@@ -192,7 +192,7 @@ def train(
     Raises:
         TypeError, ValueError: an argument is not as described; ``run_dir`` holds another run, or
             a damaged file.
-        OSError: a file cannot be read or written, or there is no room for checkpoints.
+        OSError: a file cannot be read or written.
         RuntimeError: another process is training in ``run_dir``.
         FloatingPointError: the loss or a weight is no longer finite.
         KeyboardInterrupt: after Ctrl-C or SIGTERM, and a checkpoint; a second one stops at once.
@@ -224,12 +224,11 @@ def train(
     if folder.finished:  # to be read only, perhaps where nothing can be written
         return folder.result(config, settings_of_run(config, stack, change))
     keep_lifts()
-    with folder.locked(), deferred_signals() as signals:
+    with files.locked(folder.path), deferred_signals() as signals:
         if folder.finished:  # by another process meanwhile
             return folder.result(config, settings_of_run(config, stack, change))
         run = Training(config, stack, change)
         try:
-            folder.check_room(run)
             folder.restore(run)
             with closing(_points(run, folder, keep_lifts, progress, signals)) as points:
                 for point in points:
