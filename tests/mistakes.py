@@ -14,7 +14,6 @@ unload.read_laod()  # type: ignore[attr-defined]
 unload.policies.highst(np.ones((1, 128, 3)), np.ones((1, 128)), rng)  # type: ignore[attr-defined]
 unload.picking_order("boxes.csv")  # type: ignore[arg-type]
 unload.picking_order(load, polcy="highest")  # type: ignore[call-arg]
-unload.picking_order(load, force="much")  # type: ignore[arg-type]
 unload.picking_order(load, by=3)  # type: ignore[arg-type]
 unload.evaluate("highest")  # type: ignore[arg-type]
 unload.evaluate(unload.policies.random, episode=5)  # type: ignore[call-arg]
@@ -27,4 +26,4 @@ unload.train(unload.TrainConfig(), 3)  # type: ignore[arg-type]
 
 # These are none.
 unload.evaluate(unload.policies.random, 5, physics=LocalPhysics(), ties="average")
-unload.picking_order(load, by="stop", force="auto", physics="local")
+unload.picking_order(load, by="stop")

@@ -29,7 +29,7 @@ def test_example_prints_what_it_says(capsys, tmp_path, monkeypatch):
     exec(EXAMPLE, {"__name__": "__main__"})
     lines = capsys.readouterr().out.splitlines()
     printed = [line for line in lines if line and "pick/s" not in line]  # no progress bar
-    assert printed == promised == ["136 True", "1.0", "1.0 128"]
+    assert printed == promised == ["136 False", "1.0", "1.0 128"]
 
 
 def test_links_lead_to_files():

@@ -2,7 +2,7 @@
 
 Read ``policies``, ``learner`` (the update in plain PyTorch), ``dqn`` and ``greedy``; then
 ``config``, ``replay``, ``rollout``, ``curve`` and ``training``; what keeps a run: ``state`` and
-``checkpoint`` (its folder); then ``evaluation`` and ``order``. ``unload.fast``
+``checkpoint`` (its folder); then ``evaluation``. ``unload.fast``
 holds the compiled twin of the learner.
 
 An argument that is not as described is a TypeError or ValueError that names it; values or weights

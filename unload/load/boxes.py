@@ -42,6 +42,12 @@ class Contacts(NamedTuple):
         """The boxes that touch ``box``, (k,) int32."""
         return self.links[self.starts[kind, box] : self.starts[kind, box + 1]]
 
+    def pairs(self, kind: int) -> tuple[np.ndarray, np.ndarray]:
+        """All pairs of a box and one that touches it, (k,) int each."""
+        starts = self.starts[kind]
+        boxes = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        return boxes, self.links[starts[0] : starts[-1]]
+
 
 class BoxError(ValueError):
     """Boxes that no load can hold: ``boxes``, their numbers, and the ``problem`` of the first."""
@@ -168,27 +174,33 @@ class Load:
         return np.bincount(box[present[front]], minlength=len(self)) > 0
 
     def covered(self, present: np.ndarray) -> np.ndarray:
-        """Which boxes lie under one of the present ones, (n,) bool each."""
+        """Which boxes have one of the present ones on or over them, (n,) bool each."""
         lower, upper = self.covers
         return np.bincount(lower[present[upper]], minlength=len(self)) > 0
 
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:
-        """All pairs of a box and one that rests on it, as two arrays."""
-        starts, links = self.contacts
-        lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
-        return lower, links[starts[ABOVE, 0] : starts[ABOVE, -1]]
+        """All pairs of a box and one above it, (k,) int each, whether it rests there or hangs."""
+        return self._pairs(2, self.positions[:, 2])
 
     @cached_property
     def fronts(self) -> tuple[np.ndarray, np.ndarray]:
-        """All pairs of a box and one in front of it, as two arrays."""
+        """All pairs of a box and one in front of it, (k,) int each."""
+        return self._pairs(0, self.positions[:, 0] - self.sizes[:, 0] / 2)
+
+    def _pairs(self, axis: int, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a box and one that is larger in ``beyond`` and overlaps it on both other axes.
+
+        Along z the centres say which is the upper one, because boxes that overlap on the other two
+        do not overlap there.
+        """
         low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
-        fronts = []
+        found = []
         for box in range(len(self)):
             shared = np.minimum(high[box], high) - np.maximum(low[box], low)
-            across = (shared[:, 1:] > OVERLAP).all(axis=1)
-            fronts.append(np.flatnonzero(across & (low[:, 0] > low[box, 0])))
-        return np.repeat(np.arange(len(self)), [*map(len, fronts)]), np.concatenate(fronts)
+            across = (np.delete(shared, axis, axis=1) > OVERLAP).all(axis=1)
+            found.append(np.flatnonzero(across & (beyond > beyond[box])))
+        return np.repeat(np.arange(len(self)), [*map(len, found)]), np.concatenate(found)
 
     def __len__(self) -> int:
         return len(self.positions)
