@@ -17,7 +17,6 @@ from unload.support.compiled import compiled
 
 # Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
 _SMALLEST_EDGE = 0.002
-_LIGHTEST = 0.001  # kg, because a situation counts whole grams
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 LARGEST_TOLERANCE = 0.1  # m
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
@@ -74,9 +73,6 @@ class Load:
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
-        masses: (n,) float64, kg, at least 0.001; 1 kg each if not given, as in the task.
-        ceiling: m, to which a pick may lift a box; infinite if not given, because the paper's
-            physics has none. Those of packing lists have their container's.
         contact_tolerance: m, up to 0.1; boxes this close above one another touch. What bridges two
             boxes of measured heights touches both, though it stands on the higher one.
         contacts: which boxes touch, computed from positions and sizes.
@@ -84,8 +80,8 @@ class Load:
     Raises:
         TypeError: a field's dtype is not numeric.
         ValueError: a field's shape or a value is wrong.
-        BoxError: a ValueError, too: an edge is too short, a box too light, or sticks out of the
-            container, two boxes overlap by more than 1 µm, or have the same id.
+        BoxError: a ValueError, too: an edge is too short, a box sticks out of the container, two
+            boxes overlap by more than 1 µm, or have the same id.
     """
 
     positions: np.ndarray
@@ -95,8 +91,6 @@ class Load:
     ids: np.ndarray | None = None
     container: np.ndarray = None
     extras: Mapping[str, np.ndarray] = None
-    masses: np.ndarray = None
-    ceiling: float = None
     contact_tolerance: float = CONTACT_TOLERANCE
     contacts: Contacts = field(init=False)
 
@@ -113,10 +107,6 @@ class Load:
             "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
         )
 
-        ceiling = np.inf if self.ceiling is None else self.ceiling
-        if not np.array_equal(ceiling, np.inf):  # which ``replace`` hands over again
-            ceiling = checks.real("ceiling", ceiling, 0)
-
         # Labels serve views and lists; what moves does not depend on them.
         labels = {"packages": self.packages, "walls": self.walls}
         if labels["packages"] is None:
@@ -128,10 +118,6 @@ class Load:
             labels[name] = checks.integer_array(name, label, (count,))
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
-        masses = np.full(count, task.MASS) if self.masses is None else self.masses
-        masses = checks.finite_array("masses", masses, (count,))
-        if (light := np.flatnonzero(masses < _LIGHTEST)).size:
-            raise BoxError(light, f"a mass of {masses[light[0]]} kg; expected >= {_LIGHTEST} kg")
         checks.entries("extras", given := {} if self.extras is None else self.extras, ())
         extras = {name: np.array(values) for name, values in given.items()}
         for name, values in extras.items():
@@ -156,12 +142,10 @@ class Load:
         touching = _find_contacts(low, high, tolerance)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
-        fields = {"positions": positions, "sizes": sizes, "container": container, "masses": masses}
-        fields |= labels
+        fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
         for array in (*fields.values(), *extras.values(), *touching):
             array.setflags(write=False)
-        rest = {"extras": extras, "ceiling": ceiling, "contact_tolerance": tolerance}
-        rest["contacts"] = touching
+        rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": touching}
         for name, value in {**fields, **rest}.items():
             object.__setattr__(self, name, value)
 
@@ -227,6 +211,34 @@ def check_stacked(load: Load, name: str = "load") -> None:
         wanted = f"expected it, within {load.contact_tolerance} m, on the floor or on another box"
         place = f"floats in {name}, its lower face at {bottom[aloft[0]]:.6g} m"
         raise BoxError(aloft, f"{place}; {wanted}")
+
+
+def check_rests(load: Load) -> None:
+    """Raise BoxError where a box hangs over another one on which it does not rest, directly or not.
+
+    A lift that follows contacts alone would pull the lower one through the upper one.
+    """
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    upper, lower = load.contacts.pairs(BELOW)
+    shared = np.minimum(high[upper], high[lower]) - np.maximum(low[upper], low[lower])
+    held = np.bincount(upper, shared[:, 0] * shared[:, 1], len(load))
+
+    # What lies on others with its whole face hangs over nothing, as all boxes of the paper's loads.
+    aloft = low[:, 2] > CONTACT_TOLERANCE
+    for box in np.flatnonzero(aloft & (held < load.sizes[:, 0] * load.sizes[:, 1] - OVERLAP)):
+        rests, below = np.zeros(len(load), bool), [box]
+        while below:
+            others = load.contacts.of(BELOW, below.pop())
+            below += others[~rests[others]].tolist()
+            rests[others] = True
+        shared = np.minimum(high[box], high) - np.maximum(low[box], low)
+        under = (shared[:, :2] > OVERLAP).all(axis=1) & (
+            load.positions[:, 2] < load.positions[box, 2]
+        )
+        if (free := np.flatnonzero(under & ~rests)).size:
+            names = [other if load.ids is None else load.ids[other] for other in (box, free[0])]
+            wanted = "expected it to rest there, or physics='full', which simulates all boxes"
+            raise BoxError([box], f"{names[0]} hangs over {names[1]}; {wanted}")
 
 
 def check_stack(stack: object) -> None:

@@ -14,11 +14,9 @@ from threading import Lock
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load
-from unload.physics.base import Force
 from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import PULL, Situation, digest_of
+from unload.physics.situation import Situation, digest_of
 from unload.support import files
 from unload.support.compiled import compiled
 
@@ -28,24 +26,14 @@ LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
 
 
-def free_lift(force: float = task.PICK_FORCE, mass: float = task.MASS) -> float:
-    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes.
-
-    That is 0 where a force in N is less than the weight of a mass in kg.
-    """
+def free_lift() -> float:
+    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes."""
     velocity = distance = 0.0
     for _ in range(round(task.LIFT_TIME / TIME_STEP)):
         velocity *= (1 - DAMPING) ** TIME_STEP
-        velocity += (force / mass - task.GRAVITY) * TIME_STEP
+        velocity += (task.PICK_FORCE / task.MASS - task.GRAVITY) * TIME_STEP
         distance += velocity * TIME_STEP
-    return max(0.0, round(distance, 6))
-
-
-def too_heavy(load: Load, force: float) -> np.ndarray:
-    """(n,) bool, True for boxes that a force of so many N at most does not lift, though free."""
-    pulls = np.minimum(PULL * load.masses, force)
-    lifts = [free_lift(*each) for each in zip(pulls.tolist(), load.masses.tolist())]
-    return np.array(lifts) < task.LIFT_THRESHOLD
+    return round(distance, 6)
 
 
 # How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
@@ -172,20 +160,18 @@ class TablePhysics(LocalPhysics):
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
             their experience; one of its own if None.
-        force: see ``Physics``.
     """
 
-    def __init__(self, table: LiftTable | None = None, force: Force = task.PICK_FORCE) -> None:
+    def __init__(self, table: LiftTable | None = None) -> None:
         self.table = LiftTable() if table is None else table
-        super().__init__(self.table.engine, force)
+        super().__init__(self.table.engine)
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
         self._check_open()
-        free = free_lift(situation.force, situation.masses[0]) if situation.pull else FREE_LIFT
-        if situation.on_top == 0 or free == 0:
-            return free
-        if situation.on_top >= HELD_DOWN and not situation.pull:
+        if situation.on_top == 0:
+            return FREE_LIFT
+        if situation.on_top >= HELD_DOWN:
             return 0.0
         distance = self.table.find(situation)
         if distance is None:
