@@ -51,7 +51,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
-        change: is called with this, once it is complete, see ``train``; nothing if None.
+        change: is called with the finished ``Training``, see ``train``; nothing if None.
 
     Attributes:
         settings: what the run is, as JSON can hold it.
@@ -177,7 +177,7 @@ def train(
         config: what to train.
         run_dir: folder of the run alone: its checkpoint, and what it leaves.
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
-        stack: makes the loads, as in ``ContainerEnv``, of boxes of 1 kg; the paper's if None.
+        stack: makes the loads, as in ``ContainerEnv``; the paper's if None.
         lifts: ``.npz`` file of lifts that were simulated, for runs, also side by side, to share.
         callback: is called with each new point of the curve, a dict by the columns of
             ``TrainResult.curve``. If it returns False, the run ends there, and is finished.
