@@ -16,6 +16,7 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
+from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult, settings_of_run
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.curve import Curve, Point
@@ -76,7 +77,8 @@ class Training:
         generator = torch.Generator().manual_seed(weights_seed)
         network = make_network(config.network, config.n_features, generator)
         self.agent = DQN(network, config.learning_rate, config.gamma, config.beta)
-        self.replay = ReplayBuffer.of(config)
+        size = min(config.replay_size, config.picks)
+        self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
         self.curve = Curve()
         self.rollout = Rollout(config, stack)
         self.kept: dict[str, np.ndarray] = {}

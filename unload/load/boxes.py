@@ -225,7 +225,8 @@ def check_rests(load: Load) -> None:
 
     # What lies on others with its whole face hangs over nothing, as all boxes of the paper's loads.
     aloft = low[:, 2] > CONTACT_TOLERANCE
-    for box in np.flatnonzero(aloft & (held < load.sizes[:, 0] * load.sizes[:, 1] - OVERLAP)):
+    wide = load.sizes[:, 0] * load.sizes[:, 1] - held > OVERLAP  # m²
+    for box in np.flatnonzero(aloft & wide).tolist():
         rests, below = np.zeros(len(load), bool), [box]
         while below:
             others = load.contacts.of(BELOW, below.pop())
