@@ -16,10 +16,10 @@ class FusedLearner:
     """``PlainLearner`` for a network to which ``fused.applies``, with the same interface.
 
     Its update reads the rows where they are, which saves copying them, and goes on in other
-    threads while the caller does something else. It takes tanh in double precision, where its
-    slope does not become 0 so soon, and the choice compares what stands before it, which never
-    ties. ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights
-    of the paper's network; its rule is one compiled pass here.
+    threads while the caller does something else. tanh is computed in double precision, where its
+    slope vanishes later; actions are compared by the value before tanh, which has no ties.
+    ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights of the
+    paper's network; its rule is one compiled pass here.
     """
 
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
