@@ -14,15 +14,15 @@ from unload.agent.training import Training
 SETTINGS = [
     {"equalize": False},
     {"replay_size": 100, "max_picks": 50},
-    {"mask": True, "gamma": 0.5},
+    {"mask": True, "gamma": 0.5, "max_picks": 50},
 ]
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=str)
 def test_the_package_trains_as_the_page_does(settings):
-    """By bits, with loads of one wall, which are emptied, and a target that is renewed once."""
+    """By bits, with loads of one wall, episodes that end, and a target that is renewed once."""
     size = {"num_envs": 4, "picks": 800, "batch_size": 16, "n_features": 4}
-    config = TrainConfig(**size, target_update_interval=600, log_interval=1, **settings)
+    config = TrainConfig(**size, target_update_interval=599, log_interval=1, **settings)
     stack = partial(stack_load, walls=1)
 
     *seeds, weights_seed = config.seeds()
