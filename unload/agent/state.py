@@ -95,10 +95,10 @@ def _is_json(value: Any) -> bool:
 
 def _kind(value: Any) -> Any:
     """Return the same for all that can be put back in each other's place; None for all else."""
-    if isinstance(value, np.ndarray) and (value.dtype == object or not value.flags.writeable):
-        return None
-    if isinstance(value, (np.ndarray, torch.Tensor)):
-        return type(value), value.shape, value.dtype
+    if type(value) is np.ndarray and value.dtype != object and value.flags.writeable:
+        return value.shape, value.dtype
+    if isinstance(value, torch.Tensor):
+        return value.shape, value.dtype
     if isinstance(value, np.random.Generator):  # of others the state is no JSON
         return np.random.PCG64 if isinstance(value.bit_generator, np.random.PCG64) else None
     if _has_methods(value) or isinstance(value, (Containers, list)):
@@ -107,6 +107,8 @@ def _kind(value: Any) -> Any:
         return NUMBERS
     if value is None or isinstance(value, World):  # which is started when it is first needed
         return World
+    if isinstance(value, gymnasium.Space):  # once it is asked, it draws from its own generator
+        return value, str(value._np_random and value._np_random.bit_generator.state)
 
     # What never changes where it stands has to be the same one as when the run began.
     room = type(value).__module__.partition(".")[0]

@@ -38,7 +38,7 @@ def test_the_order_of_equals_is_followed_among_untouched_boxes():
     assert found.loc[(1, "y"), "spearman"] == pytest.approx(-1)
     assert found.loc[(2, "y"), "spearman"] == pytest.approx(1) and found.loc[(2, "z"), "rms"] == 0
     assert found.loc[(1, "x"), "rms"] == pytest.approx(0)
-    assert found.loc[(1, "y"), "rms"] == pytest.approx(2, rel=0.1), "mm, twice their spread"
+    assert 1 < found.loc[(1, "y"), "rms"] < 2, "mm, twice the spread within a group"
     assert found.loc[(1, "x"), "boxes"] == count
     touched[:] = 0
     assert not creep.rows(world, {"offsets": offsets, "touched": touched})
