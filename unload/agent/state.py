@@ -161,8 +161,10 @@ def gather(run: Any, fresh: dict[str, tuple]) -> dict[str, np.ndarray]:
         if isinstance(value, Containers) or _has_methods(value):
             parts = value._asdict() if isinstance(value, Containers) else value.state()
             arrays |= {f"{name}.{part}": np.asarray(array) for part, array in parts.items()}
-        elif isinstance(value, (np.ndarray, np.generic)):
+        elif isinstance(value, np.ndarray):
             arrays[name] = value[: len(run.replay)] if name.startswith(REPLAY) else value
+        elif isinstance(value, np.generic):
+            arrays[name] = np.asarray(value)
         elif isinstance(value, torch.Tensor):
             arrays[name] = value.detach().numpy()
         elif isinstance(value, np.random.Generator):
@@ -203,10 +205,10 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
                 value.bit_generator.state = new
             elif isinstance(value, torch.Tensor):
                 value.copy_(torch.from_numpy(new))
-            elif name.startswith(REPLAY):
-                value[: len(new)] = new
+            elif isinstance(value, list):
+                value[:] = new
             else:
-                value[... if isinstance(value, np.ndarray) else slice(None)] = new
+                (value[: len(new)] if name.startswith(REPLAY) else value)[...] = new
     if stored:
         raise ValueError(f"it holds {', '.join(sorted(stored)[:5])}; expected nothing of the kind")
     run.curve.points = [Point(*each) for each in run.curve.points]
