@@ -9,8 +9,8 @@ import torch
 
 from notebooks import checks
 from notebooks.checks import Exercise, check, judged
-from notebooks.solutions import masked_dqn
 from tests.test_notebooks import CHAPTERS, cells
+from unload import plain
 
 
 def said(path, word):
@@ -65,15 +65,15 @@ def test_what_is_wrong_is_said_and_stops_a_solution(capsys):
 
 
 def test_small_mistakes_in_the_algorithm_are_noticed():
-    """Each differs from the solution in one thing."""
+    """Each differs from the page ``unload/plain.py`` in one thing."""
     torch.set_num_threads(1)
 
     def ignores_the_mask(network, observations, allowed, epsilon, rng):
-        return masked_dqn.choose(network, observations, np.ones_like(allowed), epsilon, rng)
+        return plain.choose(network, observations, np.ones_like(allowed), epsilon, rng)
 
     def forgets_the_end(network, target, optimizer, picks, gamma):
         picks = [(*pick[:5], np.False_) for pick in picks]
-        return masked_dqn.update(network, target, optimizer, picks, gamma)
+        return plain.update(network, target, optimizer, picks, gamma)
 
     for number, wrong, line in (
         ("1", ignores_the_mask, "an item that the mask excludes"),

@@ -20,7 +20,7 @@ PACKAGES = ("unload", "studies")
 LIBRARIES = {
     "PIL": ("load/",),
     "filelock": ("support/files.py",),
-    "gymnasium": ("__init__.py", "env/", "agent/"),
+    "gymnasium": ("__init__.py", "env/", "plain.py", "agent/"),
     "llvmlite": ("fast/kernel.py",),
     "matplotlib": ("load/",),
     "mujoco": ("physics/mujoco.py",),
@@ -30,7 +30,7 @@ LIBRARIES = {
     "plotly": ("load/view.py",),
     "pybullet": ("physics/bullet.py",),
     "safetensors": ("network/weights.py",),
-    "torch": ("network/", "fast/", "agent/"),
+    "torch": ("network/", "fast/", "plain.py", "agent/"),
     "tqdm": ("agent/training.py",),
 }
 

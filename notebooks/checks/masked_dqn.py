@@ -12,7 +12,7 @@ from IPython.display import HTML, display
 
 import unload
 from notebooks.checks import Exercise, call, function, number
-from notebooks.solutions import masked_dqn as solution
+from unload import plain
 from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training
 
@@ -28,8 +28,8 @@ SETTINGS = {  # of trainings: what differs from the paper's, and what the enviro
 
 
 def skipped(name: str) -> Callable:
-    """A function of the solutions, which is shown folded."""
-    chosen = getattr(solution, name)
+    """A function of ``unload/plain.py``, which is shown folded."""
+    chosen = getattr(plain, name)
     code = html.escape(inspect.getsource(chosen))
     display(HTML(f"<details><summary>{name}</summary><pre>{code}</pre></details>"))
     return chosen

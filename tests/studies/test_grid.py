@@ -68,10 +68,10 @@ def test_a_grid_is_read_as_it_was_trained(trained):
 def test_published_runs_are_not_replaced_by_fewer(trained, monkeypatch):
     names = ("some/small.csv", "some/small.safetensors")
     before = [(trained / name).read_bytes() for name in names]
-    message = "would hold 2 finished runs; expected at least as many as the 4"
+    message = "would hold 3 finished runs; expected at least as many as the 4"
     with monkeypatch.context() as patch, pytest.raises(ValueError, match=message):
         patch.setattr(paths, "RUNS", trained / "other")
-        grid.train_grid(SMALL, ["plain"], n_jobs=1)
+        grid.train_grid(SMALL, ["plain", "shuffled"], n_jobs=1)
     assert not (trained / "other").exists()  # refused before hours of training
     grid.train_grid(SMALL, n_jobs=1)  # as many
     assert [(trained / name).read_bytes() for name in names] == before

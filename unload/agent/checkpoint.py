@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -13,12 +13,12 @@ import pandas as pd
 from unload import task
 from unload.agent.config import ENVS, TrainConfig, plain
 from unload.agent.greedy import Greedy, load_policy, save_policy
-from unload.agent.state import gather, put_back
+from unload.agent.state import gather, kinds, put_back
 from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 11  # of the checkpoints
+FORMAT = 12  # of the checkpoints
 OTHER = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 
@@ -64,6 +64,7 @@ class RunFolder:
         self.path = path.absolute()
         self._paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
         self._checkpoint_file, self.policy, self._curve_file, self._config_file = self._paths
+        self._fresh: dict[str, Any] = {}  # what a run of it holds before its first step
 
     def check_foreign(self, name: str, value: object) -> Path:
         """Return the absolute path of a file that is an argument; raise if it is one of these."""
@@ -90,7 +91,7 @@ class RunFolder:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": FORMAT, "version": task.VERSION, "settings": json.dumps(run.settings)}
         arrays = {name: np.array(mark) for name, mark in marks.items()}
-        files.write_arrays(self._checkpoint_file, gather(run) | arrays)
+        files.write_arrays(self._checkpoint_file, gather(run, self._fresh) | arrays)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -98,7 +99,8 @@ class RunFolder:
         files.write_text(self._curve_file, table.to_csv(index=False, lineterminator="\n"))
 
     def restore(self, run) -> None:
-        """Let a ``Training`` go on from the checkpoint, if there is one."""
+        """Let a fresh ``Training`` go on from the checkpoint, if there is one."""
+        self._fresh = kinds(run)
         if not self._checkpoint_file.exists():
             return
         try:

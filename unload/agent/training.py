@@ -156,7 +156,10 @@ def train(
 
     A run that was stopped or killed and resumed gives the same weights and curve, bit for bit, as
     an uninterrupted one. A finished run is not repeated. The book's page "Training runs" says
-    what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do.
+    what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do. State of
+    an environment, network or change of yours that a checkpoint could not put back is refused at
+    the first one, by name: keep it in arrays of ``run.kept``, or give its owner methods ``state()``
+    and ``load_state(arrays)``.
 
     Lifts by a physics of your own are a task of your own: a run knows it by the id under which it
     is registered, and another version of it needs another id::
@@ -193,7 +196,7 @@ def train(
 
     Raises:
         TypeError, ValueError: an argument is not as described; ``run_dir`` holds another run, or
-            a damaged file.
+            a damaged file; a checkpoint cannot hold the run's state.
         OSError: a file cannot be read or written.
         RuntimeError: another process is training in ``run_dir``.
         FloatingPointError: the loss or a weight is no longer finite.

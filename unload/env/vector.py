@@ -82,16 +82,21 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = load
-            if chosen is None:
-                chosen = self.stack(rng)
+            chosen = self.stack(rng) if load is None else load
+            # The paper's loads stand and have no overhangs, as they are made.
+            if load is None and self.stack is not stack_load:
                 check_stacked(chosen, "what stack returned")
+            if chosen is load or self.stack is not stack_load:
+                self._check_lifts(chosen)
             self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
+
+    def _check_lifts(self, load: Load) -> None:
+        """Refuse a load that the physics cannot lift."""
+        if isinstance(self.physics, LocalPhysics):
+            check_rests(load)
 
     def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:
         """Fill one container."""
-        if isinstance(self.physics, LocalPhysics):
-            check_rests(load)
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)

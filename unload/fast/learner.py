@@ -25,7 +25,6 @@ class FusedLearner:
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
         self.weights, self.beta = fused.weights_of(network), beta
         self.learning_rate, self.steps = learning_rate, 0
-        self._flat = tuple(array.reshape(-1) for array in self.weights)  # the same memory
         # Running means of the gradients and of their squares.
         self.moments = np.zeros((2, sum(array.size for array in self.weights)))
 
@@ -51,7 +50,8 @@ class FusedLearner:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - decay**self.steps for decay in _DECAYS]
-        _step(self._flat, gradients, self.moments, self.learning_rate, *corrections)
+        flat = tuple(array.reshape(-1) for array in self.weights)  # the same memory
+        _step(flat, gradients, self.moments, self.learning_rate, *corrections)
 
 
 @compiled
