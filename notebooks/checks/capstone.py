@@ -82,7 +82,9 @@ def answers(rows):
             return f"{row['setting']!r} has {row['runs']} runs; expected {FEWEST} or more"
         if row["verdict"] not in VERDICTS:
             known = ", ".join(map(repr, VERDICTS))
-            return f"the verdict on {row['setting']!r} is {row['verdict']!r}; expected one of {known}"
+            return (
+                f"the verdict on {row['setting']!r} is {row['verdict']!r}; expected one of {known}"
+            )
     return True
 
 
