@@ -31,8 +31,10 @@ README = HERE.parent / "README.md"
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
-# What a student takes: minutes for a figure or a cell of more lines to read, and for an exercise.
-WORDS_A_MINUTE, FIGURE, EXERCISE, LONG_CELL = 180, 0.5, 2.0, 5
+# What a student takes to read: minutes for a figure, and for a cell of more lines.
+WORDS_A_MINUTE, FIGURE, LONG_CELL = 180, 0.5, 5
+EXERCISE = r"^(?:\*\*Exercise \d.*?\*\*|\d\.) "  # how one begins; its minutes follow in brackets
+MINUTES = r"\((\d+) minutes?(, may be skipped)?\)"
 UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
@@ -82,7 +84,11 @@ def sentences(text: str) -> list[str]:
 
 
 def measured(notebook: Path) -> dict[str, float]:
-    """Count ``words``, ``figures``, ``long cells``, ``exercises`` and the ``minutes`` they take."""
+    """Count ``words``, ``figures`` and ``long cells``, the ``minutes`` to read them, ``exercises``.
+
+    Those have minutes of their own, as the notebook says them: all that are not ``skipped`` take
+    ``to solve``.
+    """
     cells, text = nbformat.read(notebook, as_version=4).cells, prose(notebook)
     code = [cell for cell in cells if cell.cell_type == "code"]
     counts = {
@@ -93,11 +99,15 @@ def measured(notebook: Path) -> dict[str, float]:
             for cell in code
             if not UNREAD & set(cell.metadata.get("tags", [])) and "check(" not in cell.source
         ),
-        "exercises": len(re.findall(r"\*\*Exercise \d", text))
-        + len(re.findall(r"^\d+\. ", text.partition("\n## Exercises\n")[2], re.M)),
     }
-    minutes = counts["words"] / WORDS_A_MINUTE + EXERCISE * counts["exercises"]
-    return counts | {"minutes": minutes + FIGURE * (counts["figures"] + counts["long cells"])}
+    solved = re.findall(EXERCISE + MINUTES, text.partition("\n## ")[2], re.M)
+    own = {
+        "exercises": len(solved),
+        "to solve": sum(int(minutes) for minutes, skipped in solved if not skipped),
+        "skipped": sum(int(minutes) for minutes, skipped in solved if skipped),
+    }
+    minutes = counts["words"] / WORDS_A_MINUTE + FIGURE * (counts["figures"] + counts["long cells"])
+    return counts | {"minutes": minutes} | own
 
 
 def measures(chosen: list[Path], readme: Path | None) -> str:

@@ -2,13 +2,16 @@
 
 import importlib
 import re
+from unittest.mock import patch
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 
 from notebooks import checks
 from notebooks.checks import Exercise, check, judged
+from notebooks.checks.solutions import solution, stand_in
 from tests.test_notebooks import CHAPTERS, cells
 from unload import plain
 
@@ -80,3 +83,57 @@ def test_small_mistakes_in_the_algorithm_are_noticed():
         ("2", forgets_the_end, "the loss of update 1 with γ = 0.5"),
     ):
         assert line in judged(checks.exercise(f"04/{number}"), wrong)
+
+
+def test_a_plan_runs_and_an_answer_are_judged_by_their_form():
+    """Each change makes of what is in form what is not, and the sentence says where."""
+    seeds = range(20_000, 20_010)
+    good = {
+        "30/1": {"setting": ["as it is", "slow"], "prediction": "-", "refuted if": "below 0.5"},
+        "30/2": {"setting": ["a"] * 10 + ["b"] * 10, "seed": [*seeds, *seeds], "msr": 0.5},
+        "30/3": {
+            "setting": ["a", "b"], "runs": 10, "value": 0.5, "low": 0.4, "high": 0.6,
+            "verdict": "open",
+        },
+    }  # fmt: skip
+    for name, columns in good.items():
+        assert judged(checks.exercise(name), pd.DataFrame(columns)) == "right"
+        assert judged(checks.exercise(name), columns).endswith(
+            "is not a table, a DataFrame of pandas"
+        )
+        for column in columns:
+            short = pd.DataFrame(columns).drop(columns=column)
+            assert f"no column '{column}'" in judged(checks.exercise(name), short)
+        assert "has no row" in judged(checks.exercise(name), pd.DataFrame(columns).head(0))
+    for name, changed, said in (
+        (
+            "30/1",
+            {"refuted if": "it does worse"},
+            "'as it is' has no number in it: 'it does worse'",
+        ),
+        ("30/1", {"setting": ["slow", "slow"]}, "one setting; expected a control"),
+        ("30/2", {"setting": ["a"] * 20}, "the same seed twice"),
+        ("30/2", {"seed": range(20_000, 20_020)}, "'b' has other seeds than 'a'"),
+        ("30/2", {"seed": [*range(10)] * 2}, "the seed 0 has been seen before"),
+        ("30/2", {"msr": 95.0}, "an MSR is 95.0; expected a share"),
+        ("30/2", {"msr": np.nan}, "the column 'msr' has an empty cell"),
+        ("30/3", {"low": 0.55}, "of 'a' the value 0.5 is not within 0.55 to 0.6"),
+        ("30/3", {"low": 0.5, "high": 0.5}, "has no width"),
+        ("30/3", {"runs": 3}, "'a' has 3 runs; expected 10 or more"),
+        ("30/3", {"verdict": "yes"}, "is 'yes'; expected one of 'holds', 'refuted', 'open'"),
+    ):
+        assert said in judged(checks.exercise(name), pd.DataFrame(good[name] | changed))
+    few = pd.DataFrame(good["30/2"]).query("seed < 20_005")
+    assert "5 seeds of a setting; expected 10" in judged(checks.exercise("30/2"), few)
+    alone = pd.DataFrame(good["30/2"]).query("setting == 'a'")
+    assert "one setting; expected a control" in judged(checks.exercise("30/2"), alone)
+
+
+def test_a_solution_is_shown_to_whoever_asks_and_stands_in_unseen(capsys):
+    assert stand_in("04/2") is plain.update
+    assert capsys.readouterr().out == "from here on: the solution's `update`\n"
+    with patch("notebooks.checks.solutions.display") as display:
+        assert solution("04/2") is None
+    assert "def update(network, target" in display.call_args.args[0].data
+    with pytest.raises(ValueError, match="no function for '04/4'; expected '04/1', '04/2'"):
+        solution("04/4")

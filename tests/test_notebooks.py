@@ -29,14 +29,14 @@ def name(path):
 
 
 def test_every_chapter_has_solutions_and_a_number_that_tells_its_track():
-    """Core from 00, reproduction from 10, beyond from 20, each without a gap."""
+    """Core from 00, reproduction from 10, beyond from 20, each without a gap; 30 is the last."""
     solutions = {path.stem for path in NOTEBOOKS if path.parent.name == "solutions"}
     assert {path.stem for path in CHAPTERS} == solutions
     numbers = [int(path.stem[:2]) for path in CHAPTERS]
-    for track in range(3):
+    for track in range(4):
         own = [number for number in numbers if number // 10 == track]
         assert own == list(range(10 * track, 10 * track + len(own)))
-    assert len(numbers) == len(set(numbers)) and max(numbers) < 30
+    assert len(numbers) == len(set(numbers)) and max(numbers) == 30
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
@@ -61,11 +61,17 @@ def test_chapter_tells_what_one_learns_in_how_long_and_closes_with_checked_exerc
         assert part in ending
     assert any("\ncheck(" in "\n" + text(cell) for cell in cells(path, "code"))
 
-    # The minutes are those of its words, figures and exercises.
-    stated = int(re.search(r"\*\*Time\*\*: (\d+) minutes to read", prose[0])[1])
-    assert abs(stated - run.measured(path)["minutes"]) <= 1
-    readme = (run.HERE.parent / "README.md").read_text(encoding="utf-8")
-    assert re.search(rf"notebooks/{path.name}\) \((\d+)", readme)[1] == str(stated)
+
+@pytest.mark.parametrize("path", CHAPTERS, ids=name)
+def test_chapter_says_how_long_it_takes_to_read_and_to_solve(path):
+    """The first by its words and figures, the second by the minutes that stand at its exercises."""
+    prose, counts = run.prose(path), run.measured(path)
+    stated = re.search(r"\*\*Time\*\*: (\d+) minutes to read, (\d+) for the exercises, ", prose)
+    assert abs(int(stated[1]) - counts["minutes"]) <= 1
+    assert int(stated[2]) == counts["to solve"]
+    within, _, closing = prose.partition("\n## Exercises\n")
+    asked = re.findall(r"^\*\*Exercise \d", within, re.M) + re.findall(r"^\d\. ", closing, re.M)
+    assert counts["exercises"] == len(asked) > 0
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)

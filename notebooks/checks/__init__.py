@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-TRACKS = {"0": "core", "1": "reproduction", "2": "beyond"}  # by the first digit of a notebook
+# By the first digit of a notebook.
+TRACKS = {"0": "core", "1": "reproduction", "2": "beyond", "3": "capstone"}
 REDUCED = "UNLOAD_REDUCED"  # set where a notebook runs at reduced counts
 
 

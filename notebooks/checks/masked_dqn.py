@@ -1,18 +1,13 @@
 """The exercises of notebook 04: the algorithm against the package, bit by bit."""
 
-import html
-import inspect
-from collections.abc import Callable
 from functools import partial
 
 import gymnasium
 import numpy as np
 import torch
-from IPython.display import HTML, display
 
 import unload
 from notebooks.checks import Exercise, call, function, number
-from unload import plain
 from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training
 
@@ -25,14 +20,6 @@ SETTINGS = {  # of trainings: what differs from the paper's, and what the enviro
         {"stack": partial(unload.stack_load, walls=2)},
     ),
 }
-
-
-def skipped(name: str) -> Callable:
-    """A function of ``unload/plain.py``, which is shown folded."""
-    chosen = getattr(plain, name)
-    code = html.escape(inspect.getsource(chosen))
-    display(HTML(f"<details><summary>{name}</summary><pre>{code}</pre></details>"))
-    return chosen
 
 
 def small(steps, **changes):
@@ -147,7 +134,7 @@ EXERCISES = {
     "04/3": Exercise(function, trains, ""),
     "04/4": Exercise(
         number,
-        lambda q: abs(0.9 * (1 - q) - 0.1) < 0.01,
+        lambda p: abs(p * (1 - 0.5) - (1 - p)) < 0.01,
         "beyond β the loss of the failures has the slope 1, whatever the value",
     ),
     "04/5": Exercise(number, lambda most: most == 1, "what would have to change to end one?"),
