@@ -17,7 +17,8 @@ VENV = ROOT / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 PROMPT = "unload"  # of an activated environment; says, too, that it was made here
 PIP = ("-m", "pip", "install", "--quiet", "--disable-pip-version-check")
-PYTEST = ("-m", "pytest", "-n", "2", "--dist", "loadfile")
+# A process a core, eight at most, because each takes 1 GB.
+PYTEST = ("-m", "pytest", "-n", "logical", "--maxprocesses", "8", "--dist", "loadfile")
 # Left out: tests marked slow; those that compile anew, kill runs or simulate every box, by name;
 # studies and notebooks.
 QUICK = ("-m", "not slow", "-k", "not (compiled or killed or full)")
