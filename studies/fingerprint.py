@@ -14,7 +14,6 @@ from studies.changes import height_reward
 from studies.networks import NETWORKS
 from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.identity import unchanged
 from unload.agent.training import Training, train
 
 
@@ -39,7 +38,7 @@ def name_of(network: str | Callable) -> str:
     return next((name for name, kind in NETWORKS.items() if kind is network), str(network))
 
 
-def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None]]]:
+def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None] | None]]:
     """The runs of a network, and what is changed in each (see ``train``).
 
     The paper's network has its configurations and the factors of the studies.
@@ -47,14 +46,14 @@ def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], Non
     if network != "peq":
         size = {"picks": 40 * task.NUM_ENVS, "batch_size": 64, "n_features": 16}
         config = TrainConfig(network=NETWORKS.get(network, network), log_interval=10, **size)
-        return [(config, unchanged)]
+        return [(config, None)]
     paper = {"picks": 200 * task.NUM_ENVS, "log_interval": 40}
     small = paper | {"batch_size": 256}
     return [
-        (TrainConfig(**paper), unchanged),
-        (TrainConfig(**small, equalize=False, mask=True, epsilon_final=0.05), unchanged),
+        (TrainConfig(**paper), None),
+        (TrainConfig(**small, equalize=False, mask=True, epsilon_final=0.05), None),
         (TrainConfig(**small, ties="average", gradient_steps=2), partial(height_reward, share=0.5)),
-        (TrainConfig(**small, env="unload/HighestItem-v0"), unchanged),
+        (TrainConfig(**small, env="unload/HighestItem-v0"), None),
     ]
 
 

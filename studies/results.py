@@ -14,15 +14,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
+from inspect import getsourcefile, isclass, isfunction
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import joblib
 import pandas as pd
+import torch
 from joblib import Memory, Parallel, delayed
 from tqdm import tqdm
 
 from studies import paths
-from unload.agent.identity import identity
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
@@ -62,6 +64,31 @@ def _answer(question: dict, compute: Callable[[], Any]) -> Result:
     return measured(compute)
 
 
+def code_of(value: Any) -> str:
+    """Digest of a value, in which a function or class counts by its name and its module's file.
+
+    Files that this module imports do not count: the training fingerprint stands for them.
+    """
+    return joblib.hash(_written(value))
+
+
+def _written(value: Any) -> Any:
+    """Replace what pickle would write by name or by address, at any depth."""
+    if isinstance(value, partial):
+        return [_written(value.func), _written(value.args), _written(value.keywords)]
+    if isinstance(value, (list, tuple)):
+        return [_written(entry) for entry in value]
+    if isinstance(value, dict):
+        return {name: _written(entry) for name, entry in value.items()}
+    if isinstance(value, torch.nn.Module):
+        return [_written(type(value)), _written(dict(value.state_dict()))]
+    if isinstance(value, torch.Tensor):
+        return value.detach().cpu().numpy()
+    if isfunction(value) or isclass(value):
+        return [value.__module__, value.__qualname__, files.digest(getsourcefile(value))]
+    return value
+
+
 def keep_all(
     place: str, compute: Callable, asked: Sequence[tuple[dict, tuple]], n_jobs: int
 ) -> list[Result]:
@@ -69,11 +96,11 @@ def keep_all(
 
     Args:
         place: the folder in ``runs/``.
-        compute: gives an answer; its ``identity`` is a part of each question.
+        compute: gives an answer; its code is a part of each question, see ``code_of``.
         asked: the rest of each question, and the arguments of ``compute``.
         n_jobs: processes.
     """
-    folder, code = paths.RUNS / place, {"code": identity(compute)}
+    folder, code = paths.RUNS / place, {"code": code_of(compute)}
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question | code, partial(compute, *arguments))
         for question, arguments in asked

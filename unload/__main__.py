@@ -157,6 +157,8 @@ def train_by(arguments: list[str]) -> None:
     parser.add_argument("--run-dir", required=True, help="folder of the run")
     parser.add_argument("--stack", type=_named, help="module:function that makes the loads")
     parser.add_argument("--lifts", help="file of lifts that have been computed")
+    text = "resume a run of functions of one's own, which are the same as when it was begun"
+    parser.add_argument("--same-code", action="store_true", help=text)
     explained = _explained(TrainConfig)
     for field in fields(TrainConfig):
         kind: dict = {"type": type(field.default)}
@@ -168,12 +170,13 @@ def train_by(arguments: list[str]) -> None:
         option = "--" + field.name.replace("_", "-")
         parser.add_argument(option, default=field.default, help=text, **kind)
     given = vars(parser.parse_args(arguments))
-    run_dir, stack, lifts = (given.pop(name) for name in ("run_dir", "stack", "lifts"))
+    run_dir = given.pop("run_dir")
+    others = {name: given.pop(name) for name in ("stack", "lifts", "same_code")}
 
     from unload import train  # not before, because it takes a second more
 
     try:
-        train(TrainConfig(**given), run_dir, stack=stack, lifts=lifts)
+        train(TrainConfig(**given), run_dir, **others)
     except (ImportError, OSError, TypeError, ValueError, RuntimeError, ArithmeticError) as error:
         parser.exit(1, f"{error}\n")
     except KeyboardInterrupt as stopped:

@@ -16,8 +16,7 @@ from studies.heap.generate import BOXES, settled_heap, stored_heaps, write_heaps
 from studies.heap.learning import STEPS, Learned, Picks, fit, joined, save_networks
 from studies.heap.network import FateNetwork
 from studies.heap.policies import RULES, best, linear, play
-from studies.results import COMMAND, Result, keep_all, publish
-from unload.agent.identity import identity
+from studies.results import COMMAND, Result, code_of, keep_all, publish
 
 NAME = "heap"
 HEAPS = {"train": 70, "test": 30}
@@ -59,9 +58,9 @@ def make_networks(n_jobs: int = 1) -> None:
     answers: list[Result] = []
     for round_number in range(ROUNDS):
         # Each episode explores around one of the networks that were learned in the round before.
-        question, asked = {"round": round_number, "explorers": identity(learned)}, []
+        question, asked = {"round": round_number, "explorers": code_of(learned)}, []
         for number in range(episodes):
-            one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
+            one = question | {"number": number, "heap": code_of(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
             asked.append((one, (round_number, number, explorer)))
         found = keep_all(f"{NAME}/picks", _record, asked, n_jobs)
@@ -69,7 +68,7 @@ def make_networks(n_jobs: int = 1) -> None:
         recorded += [answer.value for answer in found]
 
         # All networks learn from the picks of all rounds so far.
-        question = {"picks": identity(recorded), "steps": STEPS}
+        question = {"picks": code_of(recorded), "steps": STEPS}
         asked = [(question | {"seed": seed}, (recorded, seed)) for seed in range(NETWORKS)]
         found = keep_all(f"{NAME}/networks", _learn, asked, n_jobs)
         answers += found

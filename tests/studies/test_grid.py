@@ -5,6 +5,7 @@ import itertools
 import os
 import weakref
 from dataclasses import replace
+from functools import partial
 from unittest.mock import Mock
 
 import numpy as np
@@ -13,12 +14,11 @@ import torch
 from joblib import parallel_config
 
 from studies import grid, paths, sweep
-from studies.changes import shuffled
+from studies.changes import height_reward, shuffled
 from studies.paper import tuning
 from studies.results import read_provenance, read_table
 from tests.agent.runs import assert_same
 from unload.agent.config import TrainConfig
-from unload.agent.identity import unchanged
 from unload.agent.training import train
 from unload.support import files
 
@@ -118,6 +118,17 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     assert [path.stat().st_mtime_ns for path in written] == before
 
 
+def test_a_run_of_other_code_is_reported(configs, tmp_path, monkeypatch):
+    """The arguments of a change count, and the file that it stands in."""
+    one, other = (dict.fromkeys(configs, partial(height_reward, share=s)) for s in (0.5, 0.25))
+    for _ in range(2):
+        assert (sweep.run_sweep(configs, tmp_path, 1, one)["error"] == "").all()
+    message = "holds a run that was begun with other code"
+    assert sweep.run_sweep(configs, tmp_path, 1, other)["error"].str.contains(message).all()
+    monkeypatch.setattr("studies.results.getsourcefile", lambda function: __file__)
+    assert sweep.run_sweep(configs, tmp_path, 1, one)["error"].str.contains(message).all()
+
+
 def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):
     """Also where a change ties the run in a circle, which reference counts never free."""
     alive = weakref.WeakSet()
@@ -144,7 +155,7 @@ def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path,
     parents = itertools.chain([1], itertools.repeat(0))  # the sweep, and nobody once it is gone
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt, match="was killed"):
         patch.setattr(os, "getppid", lambda: next(parents))
-        sweep._run("run", config, tmp_path / "run", unchanged, sweep=1)
+        sweep._run("run", config, tmp_path / "run", None, sweep=1)
     assert (tmp_path / "run" / "checkpoint.npz").exists()
     sweep.run_sweep({"run": config}, tmp_path, n_jobs=1)
     assert (tmp_path / "run" / "policy.safetensors").exists()

@@ -1,10 +1,8 @@
 """The folder of a training run: checkpoint, policy, curve and configuration."""
 
-import errno
 import json
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -13,9 +11,8 @@ import numpy as np
 import pandas as pd
 
 from unload import task
-from unload.agent.config import ENVS, TrainConfig
+from unload.agent.config import ENVS, TrainConfig, plain
 from unload.agent.greedy import Greedy, load_policy, save_policy
-from unload.agent.identity import identity, unchanged
 from unload.agent.state import gather, put_back
 from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
@@ -39,14 +36,13 @@ class TrainResult(NamedTuple):
 
 
 def settings_of_run(
-    config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
+    config: TrainConfig, stack: Callable | None = None, change: Callable | None = None
 ) -> dict:
-    """What a run is: its configuration, and the identity of its change and stack, None without.
+    """What a run is: its configuration, and the names of its change and stack, None without.
 
     Also the engine, where lifts are decided by another one than PyBullet.
     """
-    change = None if change is unchanged else identity(change)
-    own = {"change": change, "stack": None if stack is None else identity(stack)}
+    own = plain({"change": change, "stack": stack})
     other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}
     return config.plain() | own | other
 
@@ -76,34 +72,19 @@ class RunFolder:
             raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
         return file
 
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Lock the folder, and remove what a killed process has left half written of its files."""
-        with files.locked(self.path):
-            for name in FILES:
-                files.remove_partial(self.path / name)
-            yield
-
     @property
     def finished(self) -> bool:
         """Whether the run has ended, and its policy is whole."""
         return self._config_file.exists()
 
-    def check_room(self, run) -> None:
-        """Raise OSError unless the disk has room for the checkpoints of a fresh ``Training``.
-
-        There are two versions of them while one replaces the other, with a full replay memory.
-        """
-        arrays = [*gather(run).values(), *run.replay.arrays.values()]
-        needed = 2 * sum(array.nbytes for array in arrays)
-        there = self._checkpoint_file.stat().st_size if self._checkpoint_file.exists() else 0
-        room = shutil.disk_usage(self.path).free + there
-        if room < needed:
-            reason = (
-                f"the disk has {room / 1e9:.2f} GB for checkpoints; expected {needed / 1e9:.2f} GB,"
-                " for one and the next one that replaces it"
+    def check_code(self, **functions: object) -> None:
+        """Refuse to go on with a run of the caller's functions, of which only names are kept."""
+        own = [name for name, value in functions.items() if callable(value)]
+        if own and (self.finished or self._checkpoint_file.exists()):
+            raise ValueError(
+                f"run_dir {str(self.path)!r} holds a run with its own {' and '.join(own)}, whose "
+                "code is not kept; expected same_code=True if it is the same, or another folder"
             )
-            raise OSError(errno.ENOSPC, reason, str(self.path))
 
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
@@ -150,8 +131,10 @@ class RunFolder:
         self._check_same(stored, settings)
         for path in (self.policy, self._curve_file):
             files.check_digest(path, marks.get(path.name))
-        with suppress(OSError):  # it is gone already, or the folder is read-only
-            self._checkpoint_file.unlink()
+        # A finished run needs neither its checkpoint nor what a killed process wrote of one.
+        for path in (self._checkpoint_file, files.partial_of(self._checkpoint_file)):
+            with suppress(OSError):  # it is gone already, or the folder is read-only
+                path.unlink()
         network = make_network(config.network, config.n_features)
         return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve_file))
 

@@ -21,13 +21,12 @@ from unload.agent.config import ENVS, TrainConfig
 from unload.agent.curve import Curve, Point
 from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy
-from unload.agent.identity import unchanged
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
 from unload.physics.table import shared_table
-from unload.support import checks
+from unload.support import checks, files
 
 CHECKPOINT_INTERVAL = 600.0  # seconds between two of them
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
@@ -52,7 +51,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
-        change: is called with this, once it is complete, see ``train``.
+        change: is called with this, once it is complete, see ``train``; nothing if None.
 
     Attributes:
         settings: what the run is, as JSON can hold it.
@@ -68,7 +67,7 @@ class Training:
         self,
         config: TrainConfig,
         stack: Callable | None = None,
-        change: Callable[["Training"], None] = unchanged,
+        change: Callable[["Training"], None] | None = None,
     ) -> None:
         self.config, self.settings = config, settings_of_run(config, stack, change)
         warn_of_other_bits(torch.backends.cpu.get_cpu_capability())
@@ -81,7 +80,8 @@ class Training:
         self.curve = Curve()
         self.rollout = Rollout(config, stack)
         self.kept: dict[str, np.ndarray] = {}
-        change(self)
+        if change is not None:
+            change(self)
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before."""
@@ -147,7 +147,8 @@ def train(
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
     callback: Callable[[dict[str, float]], bool | None] | None = None,
-    change: Callable[[Training], None] = unchanged,
+    change: Callable[[Training], None] | None = None,
+    same_code: bool = False,
 ) -> TrainResult:
     """Train an agent; resume where ``run_dir`` holds a checkpoint of the same run.
 
@@ -181,6 +182,9 @@ def train(
         callback: is called with each new point of the curve, a dict by the columns of
             ``TrainResult.curve``. If it returns False, the run ends there, and is finished.
         change: is called with the ``Training`` before its first pick, and replaces methods.
+        same_code: say that ``stack``, ``change`` and ``network`` are the functions that the run in
+            ``run_dir`` was begun with. Only their names are kept, so that without it such a run is
+            neither resumed nor read back.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
@@ -188,7 +192,7 @@ def train(
     Raises:
         TypeError, ValueError: an argument is not as described; ``run_dir`` holds another run, or
             a damaged file.
-        OSError: a file cannot be read or written, or there is no room for checkpoints.
+        OSError: a file cannot be read or written.
         RuntimeError: another process is training in ``run_dir``.
         FloatingPointError: the loss or a weight is no longer finite.
         KeyboardInterrupt: after Ctrl-C or SIGTERM, and a checkpoint; a second one stops at once.
@@ -198,7 +202,7 @@ def train(
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
     if callback is not None and not callable(callback):
         raise TypeError(f"callback is {callback!r}; expected a function of a dict")
-    if not callable(change):
+    if change is not None and not callable(change):
         raise TypeError(f"change is {change!r}; expected a function of a Training")
     for name, value in (("stack", stack), ("lifts", lifts)):
         if value is not None and config.env == ENVS[1]:
@@ -206,6 +210,8 @@ def train(
     if stack is not None:
         check_stack(stack)
     folder = RunFolder(run_dir)
+    if not checks.boolean("same_code", same_code):
+        folder.check_code(stack=stack, change=change, network=config.network)
     table = None if lifts is None else folder.check_foreign("lifts", lifts)
 
     def keep_lifts() -> None:
@@ -218,12 +224,11 @@ def train(
     if folder.finished:  # to be read only, perhaps where nothing can be written
         return folder.result(config, settings_of_run(config, stack, change))
     keep_lifts()
-    with folder.locked(), deferred_signals() as signals:
+    with files.locked(folder.path), deferred_signals() as signals:
         if folder.finished:  # by another process meanwhile
             return folder.result(config, settings_of_run(config, stack, change))
         run = Training(config, stack, change)
         try:
-            folder.check_room(run)
             folder.restore(run)
             with closing(_points(run, folder, keep_lifts, progress, signals)) as points:
                 for point in points:

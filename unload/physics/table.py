@@ -6,9 +6,7 @@ refused. Two rules answer without it: a box with nothing on top is free, one wit
 others on top is held down.
 """
 
-import errno
 import json
-import logging
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -24,12 +22,10 @@ from unload.physics.situation import PULL, Situation, digest_of
 from unload.support import files
 from unload.support.compiled import compiled
 
-_LOGGER = logging.getLogger(__name__)
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
-_FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
 
 
 def free_lift(force: float = task.PICK_FORCE, mass: float = task.MASS) -> float:
@@ -145,8 +141,7 @@ class LiftTable:
         """Take in the lifts of a file, and write those that it lacks; it may be missing.
 
         Any number of processes may share one file: each waits for its turn, which it takes by
-        the folder ``<path>.lock``. A link is followed. A full disk is logged, because lifts can be
-        simulated again.
+        the folder ``<path>.lock``. A link is followed.
 
         Raises:
             ValueError: ``path`` does not end in ``.npz``; as ``load``. Nothing is changed then.
@@ -155,22 +150,16 @@ class LiftTable:
         path = Path(path).resolve()
         if path.suffix != ".npz":
             raise ValueError(f"{path} is no name of a lift table; expected one that ends in .npz")
-        try:
-            with files.locked(f"{path}.lock", wait=True):
-                files.remove_partial(path)
-                stored = LiftTable(self.engine)
-                if path.exists():
-                    stored = LiftTable.load(path, self.engine)
-                count = len(stored)
-                with self._adding:
-                    stored._take_in(self.own())
-                    self._take_in(stored.entries)
-                if len(stored) > count:
-                    stored.save(path)
-        except OSError as error:
-            if error.errno not in _FULL:
-                raise
-            _LOGGER.warning("lifts are kept in memory only: %s", error)
+        with files.locked(f"{path}.lock", wait=True):
+            stored = LiftTable(self.engine)
+            if path.exists():
+                stored = LiftTable.load(path, self.engine)
+            count = len(stored)
+            with self._adding:
+                stored._take_in(self.own())
+                self._take_in(stored.entries)
+            if len(stored) > count:
+                stored.save(path)
 
 
 class TablePhysics(LocalPhysics):
