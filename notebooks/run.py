@@ -7,7 +7,7 @@
 
 The reduced counts stand in reduced.toml. Notebooks run side by side; with --in-place one after the
 other, because some measure how fast something is. --jobs says how many run at a time. If a cell
-fails, those that have begun are finished, and the run ends with a non-zero exit status.
+fails, those in hand are finished, and the run ends with a non-zero exit status.
 """
 
 import argparse
