@@ -9,7 +9,6 @@ import torch
 
 from notebooks import checks
 from notebooks.checks import Exercise, check, judged
-from notebooks.checks.masked_dqn import by_hand, compare, small
 from notebooks.solutions import masked_dqn
 from tests.test_notebooks import CHAPTERS, cells
 
@@ -28,6 +27,7 @@ def test_each_exercise_awaits_an_answer_and_has_a_solution_that_passes(path):
     assert names == said(path, "not yet") == said(path.parent / "solutions" / path.name, "right")
 
 
+by_checks = importlib.import_module("notebooks.checks.masked_dqn")
 NINE = {
     checks.number: (lambda answer: answer == 9, [9, 9.0, np.int64(9), np.array([9.0]), "9"]),
     checks.pair: (lambda answer: answer == (9, 1), [(9, 1), [9, 1], np.array([9, 1])]),
@@ -100,7 +100,7 @@ def test_an_empty_loop_is_said_to_be_empty_where_it_is_used():
     ): ...
 
     with pytest.raises(checks.Missing, match="masked_dqn returns nothing: its body is still to be"):
-        by_hand(masked_dqn, small(2))
+        by_checks.by_hand(masked_dqn, by_checks.small(2))
     assert judged(checks.exercise("04/3"), masked_dqn) == "not yet"
 
 
@@ -112,19 +112,13 @@ def test_runs_that_differ_are_compared_in_a_sentence():
         ((losses + [0, 1, 0], weights), "the losses differ from update 2 on"),
         ((losses, {"weight": torch.ones(2)}), "the losses agree, the weights at the end do not"),
     ):
-        assert compare(*changed, losses, weights) == line
+        assert by_checks.compare(*changed, losses, weights) == line
 
 
-def test_small_mistakes_in_the_algorithm_are_noticed():
-    """Each differs from the solution in one thing."""
+def test_mistakes_that_show_later_are_noticed():
+    """In an emptied container, in the losses' type, and where the replay memory is full."""
     torch.set_num_threads(1)
-
-    def ignores_the_mask(network, observations, allowed, epsilon, rng):
-        return masked_dqn.choose(network, observations, np.ones_like(allowed), epsilon, rng)
-
-    def forgets_the_end(network, target, optimizer, picks, gamma):
-        picks = [(*pick[:5], np.False_) for pick in picks]
-        return masked_dqn.update(network, target, optimizer, picks, gamma)
+    solved = importlib.import_module("notebooks.solutions.masked_dqn")
 
     def as_in_textbooks(network, target, optimizer, picks, gamma):
         """Multiplies by 1 - ended, where nothing is allowed and the best value is -inf."""
@@ -138,10 +132,29 @@ def test_small_mistakes_in_the_algorithm_are_noticed():
         return torch.nn.functional.smooth_l1_loss(values, goal).item()
 
     def returns_a_tensor(*given):
-        return torch.tensor(masked_dqn.update(*given))
+        return torch.tensor(solved.update(*given))
 
     def remembers_all(*given, size, **options):
-        return masked_dqn.masked_dqn(*given, **options)
+        return solved.masked_dqn(*given, **options)
+
+    for number, wrong, line in (
+        ("2", as_in_textbooks, "of update 1 with γ = 0.0 is nan where the episode has ended"),
+        ("2", returns_a_tensor, "it returns a Tensor; expected the loss as a float"),
+        ("3", remembers_all, f"positions, size = {by_checks.SMALL}: the losses differ from update"),
+    ):
+        assert line in judged(checks.exercise(f"04/{number}"), wrong)
+
+
+def test_small_mistakes_in_the_algorithm_are_noticed():
+    """Each differs from the solution in one thing."""
+    torch.set_num_threads(1)
+
+    def ignores_the_mask(network, observations, allowed, epsilon, rng):
+        return masked_dqn.choose(network, observations, np.ones_like(allowed), epsilon, rng)
+
+    def forgets_the_end(network, target, optimizer, picks, gamma):
+        picks = [(*pick[:5], np.False_) for pick in picks]
+        return masked_dqn.update(network, target, optimizer, picks, gamma)
 
     for number, wrong, line in (
         ("1", ignores_the_mask, "an item that the mask excludes"),
@@ -150,8 +163,5 @@ def test_small_mistakes_in_the_algorithm_are_noticed():
             forgets_the_end,
             "the loss of update 1 with γ = 0.0 is nan where the episode has ended",
         ),
-        ("2", as_in_textbooks, "of update 1 with γ = 0.0 is nan where the episode has ended"),
-        ("2", returns_a_tensor, "it returns a Tensor; expected the loss as a float"),
-        ("3", remembers_all, "positions, size = 500: the losses differ from update 8 on"),
     ):
         assert line in judged(checks.exercise(f"04/{number}"), wrong)

@@ -16,6 +16,7 @@ from notebooks.solutions import masked_dqn as solution
 from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training
 
+SMALL = 500  # picks that a short run remembers, no multiple of its 64 a step
 SETTINGS = {  # of trainings: what differs from the paper's, and what the environment is given
     "positions": ({"equalize": False}, {}),
     "ranks": ({}, {}),
@@ -33,9 +34,6 @@ def skipped(name: str) -> Callable:
     code = html.escape(inspect.getsource(chosen))
     display(HTML(f"<details><summary>{name}</summary><pre>{code}</pre></details>"))
     return chosen
-
-
-SMALL = 500  # picks that a short run remembers, no multiple of its 64 a step
 
 
 def small(steps, **changes):
