@@ -193,7 +193,8 @@ def run_chosen(chosen: list[Path], in_place: bool, jobs: int) -> bool:
             if error := done.result():
                 well = False
                 bar.write(f"{runs[done]} failed\n{error}", file=sys.stderr)
-                pool.shutdown(wait=False, cancel_futures=True)
+                for other in runs:
+                    other.cancel()
             bar.set_postfix_str(runs[done], refresh=False)
             bar.update()
     return well
