@@ -9,7 +9,7 @@ help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
 
 figures:  ## run every notebook at reduced counts and write figures/ (sets all up first)
-test:  ## run all tests, in two processes
+test:  ## run all tests, on all cores
 quick:  ## run most tests of the package in a minute or so (make.py says what it leaves out)
 lint:  ## check style and format, notebooks included, and the package's types
 lab:  ## open the notebooks in JupyterLab

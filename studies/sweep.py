@@ -1,6 +1,7 @@
 """Many training runs side by side, on the cores of one machine or of a cluster."""
 
 import gc
+import multiprocessing
 import os
 import sys
 import time
@@ -20,6 +21,8 @@ from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
 from unload.agent.training import Training, train
 from unload.support import files
+
+WINDOWS = os.name == "nt"
 
 
 def run_sweep(
@@ -85,7 +88,7 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
 
     def stop_if_alone(point: dict[str, float]) -> None:
         # Nobody waits for a run whose sweep was killed, and the next sweep needs its folder.
-        if child and os.getppid() != sweep:
+        if child and _orphaned(sweep):
             raise KeyboardInterrupt("the sweep of this run was killed")
 
     try:
@@ -105,6 +108,13 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
         return name, f"{type(error).__name__}: {error}"
     finally:
         gc.collect()  # of a run that a change has tied in a circle, 1.6 GB of replay memory
+
+
+def _orphaned(parent: int) -> bool:
+    """Whether the process that has started this one is gone."""
+    if WINDOWS:  # where ``getppid`` goes on naming it; joblib holds a handle of it there
+        return not multiprocessing.parent_process().is_alive()
+    return os.getppid() != parent
 
 
 def _check_code(path: Path, functions: list) -> None:

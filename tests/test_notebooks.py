@@ -3,9 +3,14 @@
 import json
 import re
 import sys
+import threading
+import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import nbformat
+import papermill
 import pytest
 
 from notebooks import run
@@ -109,6 +114,51 @@ def test_unknown_names_are_refused(tmp_path, monkeypatch, capsys):
         run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
 
 
+def test_a_notebook_of_solutions_may_be_named_as_windows_writes_it(monkeypatch):
+    chosen = []
+    monkeypatch.setattr(run, "run_chosen", lambda paths, *_: chosen.extend(paths) or True)
+    monkeypatch.setattr(sys, "argv", ["run.py", "solutions\\03"])
+    assert run.main() == 0
+    assert [run.key(path) for path in chosen] == ["solutions/03_network"]
+
+
+def test_notebooks_run_side_by_side_and_one_that_fails_is_named(set_in, capfd):
+    """The first two are begun before either ends; after the error most are not begun."""
+    first, begun, both = ["00_playground", "01_task"], {}, threading.Barrier(2)
+
+    def execute(notebook, output, parameters):
+        begun[run.key(notebook)] = parameters
+        if run.key(notebook) not in first:
+            return time.sleep(0.1)
+        both.wait(timeout=60)
+        if run.key(notebook) == "00_playground":
+            said = "ZeroDivisionError", "division by zero"
+            raise papermill.PapermillExecutionError(0, 1, "1 / 0", *said, [])
+
+    environ = {run.REDUCED: "left over"}
+    set_in(run, run=execute, ProcessPoolExecutor=ThreadPoolExecutor)
+    set_in(run.os, environ=environ)
+    set_in(run.joblib, cpu_count=lambda: 6)
+    assert not run.run_chosen(NOTEBOOKS, False, 2)
+    out, err = capfd.readouterr()
+    assert [*begun][:2] == first and len(begun) < 10
+    assert begun["00_playground"] == {"PICKS": 120}, "reduced"
+    assert environ["OMP_NUM_THREADS"] == environ["LOKY_MAX_CPU_COUNT"] == "3"
+    assert "00_playground failed" in err and "division by zero" in err
+    assert f"/{len(NOTEBOOKS)}" in out
+
+
+def test_as_many_notebooks_run_as_cores_and_memory_allow(set_in):
+    page = {"SC_PAGE_SIZE": 4096}
+    set_in(run.joblib, cpu_count=lambda: 8)
+    for memory, jobs in ((64, 8), (7, 3), (1, 1)):
+        pages = {"SC_PHYS_PAGES": memory * 2**30 // 4096}
+        set_in(run, os=SimpleNamespace(sysconf=(page | pages).get))
+        assert run.side_by_side() == jobs
+    set_in(run, os=SimpleNamespace())  # Windows
+    assert run.side_by_side() == 8
+
+
 def test_views_are_preferred_to_pictures_and_animations_wait_for_their_button():
     """Several that start at once can block a browser that draws without a graphics card."""
     line, new = [{"type": "scatter", "y": [1, 2]}], nbformat.v4
@@ -127,13 +177,15 @@ def test_links_that_lead_nowhere_are_found(tmp_path):
     for name, text in {
         "a": '<a href="b.html#top">1</a><a href="#here">2</a><p id="here">'
         '<a href="https://example.org">3</a><img src="data:image/png;base64,AA==">',
-        "b": '<h1 id="top">b</h1>',
-        "c": '<a href="d.html">1</a><a href="b.html#end">2</a><script src="https://e.org/x.js">',
+        "b": '<h1 id="top">b</h1><link rel="canonical" href="https://example.org/b.html">',
+        "c": '<a href="d.html">1</a><a href="b.html#end">2</a>'
+        '<link rel="stylesheet" href="https://e.org/x.css"><script src="https://e.org/x.js">',
     }.items():
         (tmp_path / f"{name}.html").write_text(text, encoding="utf-8")
     assert links.problems(tmp_path) == [
         "c.html: no b.html#end",
         "c.html: no d.html",
+        "c.html: loads https://e.org/x.css",
         "c.html: loads https://e.org/x.js",
     ]
     with pytest.raises(FileNotFoundError, match="holds no page"):

@@ -6,6 +6,7 @@ import os
 import weakref
 from dataclasses import replace
 from functools import partial
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -158,6 +159,15 @@ def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path,
     assert (tmp_path / "run" / "checkpoint.npz").exists()
     sweep.run_sweep({"run": config}, tmp_path, n_jobs=1)
     assert (tmp_path / "run" / "policy.safetensors").exists()
+
+
+def test_a_killed_sweep_is_noticed_on_windows_where_its_number_stays(monkeypatch):
+    monkeypatch.setattr(sweep, "WINDOWS", True)
+    parent = Mock()
+    monkeypatch.setattr(sweep.multiprocessing, "parent_process", lambda: parent)
+    for alive in (True, False):
+        parent.is_alive.return_value = alive
+        assert sweep._orphaned(os.getppid()) is not alive
 
 
 def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp_path):

@@ -70,7 +70,7 @@ def test_the_edge_is_at_the_front_but_does_not_give_way_beyond_the_door(cubes):
 @pytest.fixture(scope="module")
 def real_heap() -> Heap:
     """A new heap; in the last round of settling boxes were still leaving."""
-    return recording._new_heap(recording.SEEDS["train"], 60)
+    return Heap(**recording._new_heap(recording.SEEDS["train"], 60))
 
 
 def test_the_shipped_heaps_are_what_the_generator_makes(real_heap):
