@@ -121,7 +121,7 @@ def test_runs_that_differ_are_compared_in_a_sentence():
 def test_mistakes_that_show_later_are_noticed():
     """In an emptied container, in the losses' type, and where the replay memory is full."""
     torch.set_num_threads(1)
-    solved = importlib.import_module("notebooks.solutions.masked_dqn")
+    solved = importlib.import_module("unload.plain")
 
     def as_in_textbooks(network, target, optimizer, picks, gamma):
         """Multiplies by 1 - ended, where nothing is allowed and the best value is -inf."""

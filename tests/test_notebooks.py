@@ -133,7 +133,7 @@ def test_notebooks_run_side_by_side_and_one_that_fails_is_named(set_in, capfd):
         both.wait(timeout=60)
         if run.key(notebook) == "00_playground":
             said = "ZeroDivisionError", "division by zero"
-            raise papermill.PapermillExecutionError(0, 1, "1 / 0", *said, [])
+            raise papermill.PapermillExecutionError(0, 1, "1 / 0", *said, [": ".join(said)])
 
     environ = {run.REDUCED: "left over"}
     set_in(run, run=execute, ProcessPoolExecutor=ThreadPoolExecutor)
