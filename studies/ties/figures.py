@@ -1,4 +1,4 @@
-"""Where runs end, by how ties are broken, and the README's answer in one figure."""
+"""Where runs end, by how ties are broken and how long an order of equals lasts; single runs."""
 
 from collections.abc import Callable
 
@@ -11,9 +11,8 @@ from matplotlib.ticker import EngFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
-from studies.paper.training import PAPER, SMOOTH
+from studies.paper.training import PAPER
 from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
-from studies.results import read_table
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.criterion import WORDS, likeness, open_course
 from studies.ties.earlier import EARLIER
@@ -167,75 +166,3 @@ def draw_duration(runs: pd.DataFrame, long: pd.DataFrame) -> Figure:
     axes.set(xlabel="ρ: correlation of the noise from one pick to the next", ylim=(0, 103))
     axes.set_ylabel("MSR over the last tenth (%)")
     return figure
-
-
-# The agents of the figure: cells, what they are called, and their colour; dark is the larger batch.
-WITHOUT, WITH = {"paper_no_mask": "0.7", "paper_b2048_no_mask": "0.25"}, {
-    "paper_mask": "#f2b48f", "paper_b2048_mask": "#b5401f",
-}  # fmt: skip
-ASKED = {  # how they are asked afterwards: mask, place; marker, whether it is filled, label
-    (False, True): ("o", False, "without the mask"),
-    (True, True): ("o", True, "with the mask"),
-    (True, False): ("^", True, "with it, height alone"),
-}
-
-
-@styled
-def draw_answer() -> Figure:
-    """Learning curves of the paper's configuration and of positions, and its agents afterwards.
-
-    Running means over half a million picks; strong lines are means over the runs of a cell.
-    """
-    curves, choices = read_grid(PAPER), read_table("ties/choice").query("noise == 'frozen'")
-    figure, panels = plt.subplots(1, 4, figsize=(14.4, 3.7), sharey=True)
-    trained = {
-        "1  Trained as in the paper,\nwithout the mask": WITHOUT,
-        "2  Trained with the mask:\nup, then down": WITH,
-        "3  Positions instead of ranks,\nwith the mask and without": {
-            "positions_mask": COLOURS["positions"], "positions_no_mask": COLOURS["positions"],
-        },
-    }  # fmt: skip
-    for axes, (title, cells) in zip(panels, trained.items()):
-        for line, (cell, colour) in enumerate(reversed(cells.items())):
-            count = _draw_runs(axes, curves, cell, colour)
-            batch = PAPER.cells[cell].config.batch_size
-            label = f"batch {batch}: {count} agents" if cells in (WITHOUT, WITH) else ""
-            axes.text(19.5, 10 - 7 * line, label, color=colour, ha="right", fontsize=9)
-        axes.set_title(title, loc="left")
-        axes.set(xlim=(0, 20), xticks=range(0, 21, 5), xlabel="million picks")
-    panels[2].text(19.5, 3, "batch 256: 10 agents", c=COLOURS["positions"], ha="right", fontsize=9)
-    ends = [100 * PAPER_START, 100 * PAPER_MSR]
-    panels[0].plot([0, 20], ends, "k*", ms=12, clip_on=False, zorder=5)
-    panels[0].text(0.7, ends[0] - 5, "the paper", fontsize=9)
-    panels[0].set(ylim=(0, 102), ylabel="successful picks (%)")
-
-    right, agents = panels[3], [*reversed(WITHOUT.items()), *reversed(WITH.items())]
-    for (mask, place), (marker, filled, label) in ASKED.items():
-        look = {"marker": marker, "ms": 4, "ls": "none"}
-        right.plot([], [], c="0.25", mfc="0.25" if filled else "white", label=label, **look)
-        for column, (cell, colour) in enumerate(agents):
-            rows = choices.query("cell == @cell and mask == @mask and place == @place")
-            places = column + 0.27 * (mask - place) + np.linspace(-0.09, 0.09, len(rows))
-            face = colour if filled else "white"
-            right.plot(places, 100 * rows["msr"], c=colour, mfc=face, clip_on=False, **look)
-    right.legend(loc="lower left", fontsize=8, handlelength=0.8, borderaxespad=0.2, labelspacing=0.2)
-    names = [f"batch\n{PAPER.cells[cell].config.batch_size}" for cell, _ in agents]
-    right.set_xticks(range(len(agents)), names, fontsize=9)
-    right.set(xlim=(-0.5, 3.5))
-    right.grid(axis="x", visible=False)
-    right.set_title("4  The agents of 1 and 2\nin 100 new containers each", loc="left")
-    return figure
-
-
-def _draw_runs(axes: Axes, curves: pd.DataFrame, cell: str, colour: str) -> int:
-    """Draw all runs of a cell, pale below their mean, and return how many they are."""
-    runs = curves[curves["cell"] == cell].groupby("seed")
-    smooth = [
-        pd.Series(100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean().to_numpy(),
-                  run["picks"] / 1e6)
-        for _, run in runs
-    ]  # fmt: skip
-    for run in smooth:
-        axes.plot(run, color=colour, linewidth=0.8, alpha=0.45)
-    axes.plot(pd.concat(smooth, axis=1).mean(axis=1), color=colour, linewidth=2.5)
-    return len(runs)
