@@ -35,18 +35,15 @@ PUBLISHED = {
     "06_why_runs_fall": "why-runs-fall-4 06-why-runs-fal-c8 why-runs-fall-10 why-runs-fall-14",
     "10_lifting": "code-31 second-engine engines-figure engines-msr lifting-jams",
     "11_hyperparameters": "cell-17 d7126e58 tuning-explore cell-19 cell-24 cell-28",
-    "12_training": "cell-13 cell-19 cell-23 training-likeness training-ends training-ties "
+    "12_training": "training-method cell-13 cell-19 cell-23 training-likeness training-ends "
     "training-answer",
     "13_how_sure_are_you": "cell-04 sure-intervals",
     "20_a_policy_without_a_miss": "698c4502",
     "21_when_is_learning_worth_it": "cell-06 cell-09 cell-17 cell-23 cell-25 cell-27 cell-28",
     "22_how_it_became_fast": "592fcdbf",
     "report/01_paper_and_here": "",
-    "report/02_verdicts": "",
-    "report/03_outlook": "",
-    "report/04_evidence": "",
-    "report/05_seamless_walls": "",
-    "report/06_ties": "",
+    "report/02_evidence": "",
+    "report/03_plans_and_verdicts": "",
 }
 WITH_PYBULLET = {"21_when_is_learning_worth_it", "report/01_paper_and_here"}  # some cells need it
 # How Jupyter shows a table.
