@@ -3,13 +3,13 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 BIN := .venv/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help figures test quick lint lab notebooks paper bench ready dist book browser mutants clean
+.PHONY: help figures test quick lint lab notebooks paper bench ready dist book browser clean
 
 help:  ## this list
 	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  make \1	\2/p' Makefile | expand -t 20
 
 figures:  ## run every notebook at reduced counts and write figures/ (sets all up first)
-test:  ## run all tests, in two processes
+test:  ## run all tests, on all cores
 quick:  ## run most tests of the package in a minute or so (make.py says what it leaves out)
 lint:  ## check style and format, notebooks included, and the package's types
 lab:  ## open the notebooks in JupyterLab
@@ -35,9 +35,6 @@ book:  ## make a site of README, notebooks and solutions: build/book/index.html
 browser:  ## use notebooks in JupyterLab and the page that trains in a browser without a window
 	@$(PYTHON) make.py ready browser
 	$(BIN)/python -m tests.browser.look
-
-mutants: ready  ## change the code in small ways and count what the tests notice (an hour)
-	nice -n 10 $(BIN)/python -m studies.speed.mutants
 
 clean:  ## remove the virtual environment and all intermediate results
 	rm -rf .venv build runs

@@ -5,8 +5,9 @@
     python notebooks/run.py 03 solutions/08    only those whose names start so
     python notebooks/run.py --measure          words, minutes, words per sentence; runs nothing
 
-The reduced counts stand in reduced.toml. A cell that fails ends the run with its error and
-a non-zero exit status.
+The reduced counts stand in reduced.toml. Notebooks run side by side; with --in-place one after the
+other, because some measure how fast something is. --jobs says how many run at a time. If a cell
+fails, those in hand are finished, and the run ends with a non-zero exit status.
 """
 
 import argparse
@@ -15,13 +16,16 @@ import os
 import re
 import shutil
 import sys
-import time
 import tomllib
+import traceback
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
+import joblib
 import nbformat
 import pandas as pd
 import papermill
+from tqdm import tqdm
 
 from notebooks.checks import REDUCED
 from unload.support import files
@@ -30,9 +34,14 @@ HERE = Path(__file__).resolve().parent
 README = HERE.parent / "README.md"
 BUILD = HERE.parent / "build" / "notebooks"
 RUNS = HERE.parent / "runs"
+MEMORY = 2 * 2**30  # bytes for a notebook at reduced counts and what it starts
+# What libraries read who would otherwise take all cores for each notebook.
+THREADS = ("OMP_NUM_THREADS", "LOKY_MAX_CPU_COUNT")
 ASIDE = ("solutions", "report")  # folders of notebooks that are not of the course itself
-# What a student takes: minutes for a figure or a cell of more lines to read, and for an exercise.
-WORDS_A_MINUTE, FIGURE, EXERCISE, LONG_CELL = 180, 0.5, 2.0, 5
+# What a student takes to read: minutes for a figure, and for a cell of more lines.
+WORDS_A_MINUTE, FIGURE, LONG_CELL = 180, 0.5, 5
+EXERCISE = r"^(?:\*\*Exercise \d.*?\*\*|\d\.) "  # how one begins; its minutes follow in brackets
+MINUTES = r"\((\d+) minutes?(, may be skipped)?\)"
 UNREAD = {"parameters", "hide-input"}  # tags of cells that are not counted as code to read
 WIDGET_MIMETYPE = "application/vnd.jupyter.widget-view+json"
 
@@ -82,7 +91,11 @@ def sentences(text: str) -> list[str]:
 
 
 def measured(notebook: Path) -> dict[str, float]:
-    """Count ``words``, ``figures``, ``long cells``, ``exercises`` and the ``minutes`` they take."""
+    """Count ``words``, ``figures`` and ``long cells``, the ``minutes`` to read them, ``exercises``.
+
+    Those have minutes of their own, as the notebook says them: all that are not ``skipped`` take
+    ``to solve``.
+    """
     cells, text = nbformat.read(notebook, as_version=4).cells, prose(notebook)
     code = [cell for cell in cells if cell.cell_type == "code"]
     counts = {
@@ -93,11 +106,15 @@ def measured(notebook: Path) -> dict[str, float]:
             for cell in code
             if not UNREAD & set(cell.metadata.get("tags", [])) and "check(" not in cell.source
         ),
-        "exercises": len(re.findall(r"\*\*Exercise \d", text))
-        + len(re.findall(r"^\d+\. ", text.partition("\n## Exercises\n")[2], re.M)),
     }
-    minutes = counts["words"] / WORDS_A_MINUTE + EXERCISE * counts["exercises"]
-    return counts | {"minutes": minutes + FIGURE * (counts["figures"] + counts["long cells"])}
+    solved = re.findall(EXERCISE + MINUTES, text.partition("\n## ")[2], re.M)
+    own = {
+        "exercises": len(solved),
+        "to solve": sum(int(minutes) for minutes, skipped in solved if not skipped),
+        "skipped": sum(int(minutes) for minutes, skipped in solved if skipped),
+    }
+    minutes = counts["words"] / WORDS_A_MINUTE + FIGURE * (counts["figures"] + counts["long cells"])
+    return counts | {"minutes": minutes} | own
 
 
 def measures(chosen: list[Path], readme: Path | None) -> str:
@@ -134,7 +151,6 @@ def run(notebook: Path, output: Path, parameters: dict) -> None:
         if name not in known:
             raise ValueError(f"{notebook.name} has no parameter {name}; it has {sorted(known)}")
     output.parent.mkdir(parents=True, exist_ok=True)
-    shutil.rmtree(RUNS / notebook.stem, ignore_errors=True)  # of an earlier state of the code
     papermill.execute_notebook(
         str(notebook),
         str(output),
@@ -165,13 +181,65 @@ def tidy(notebook: Path) -> None:
     nbformat.write(content, notebook)
 
 
+def side_by_side() -> int:
+    """How many notebooks run at a time: a core each, and ``MEMORY`` where the system tells its."""
+    jobs = joblib.cpu_count()
+    if hasattr(os, "sysconf"):  # not on Windows
+        jobs = min(jobs, os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // MEMORY)
+    return max(1, jobs)
+
+
+def run_chosen(chosen: list[Path], in_place: bool, jobs: int) -> bool:
+    """Run notebooks side by side, and return whether all did well; errors are printed."""
+    for notebook in chosen:  # of an earlier state of the code
+        shutil.rmtree(RUNS / notebook.stem, ignore_errors=True)
+    well, threads = True, max(1, joblib.cpu_count() // jobs)
+    bar = tqdm(total=len(chosen), unit="notebook", ncols=100, file=sys.stdout)
+    with bar, ProcessPoolExecutor(jobs) as pool:
+        runs = {pool.submit(_run_one, path, in_place, threads): key(path) for path in chosen}
+        for done in as_completed(runs):
+            if done.cancelled():
+                continue
+            if error := done.result():
+                well = False
+                bar.write(f"{runs[done]} failed\n{error}", file=sys.stderr)
+                for other in runs:
+                    other.cancel()
+            bar.set_postfix_str(runs[done], refresh=False)
+            bar.update()
+    return well
+
+
+def _run_one(notebook: Path, in_place: bool, threads: int) -> str:
+    """Run a notebook in a process of its own; return the error, empty if there is none."""
+    parameters = {} if in_place else reduced_parameters(notebook)
+    os.environ |= dict.fromkeys(THREADS, str(threads))
+    os.environ.pop(REDUCED, None)
+    if parameters:
+        os.environ[REDUCED] = "1"
+    logging.getLogger("papermill").setLevel(logging.ERROR)
+    output = BUILD / notebook.relative_to(HERE)
+    try:
+        run(notebook, output, parameters)
+        if in_place:  # only now, so that a run that is stopped leaves it as it was
+            files.write_text(notebook, output.read_text(encoding="utf-8"))
+    except papermill.PapermillExecutionError as error:
+        return str(error)
+    except Exception:
+        return traceback.format_exc()
+    return ""
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", help="beginnings of notebook names; all if none")
     parser.add_argument("--in-place", action="store_true", help="keep the results in the notebooks")
     parser.add_argument("--measure", action="store_true", help="say how long each takes to read")
+    parser.add_argument("--jobs", type=int, help="how many notebooks run at a time")
     options = parser.parse_args()
-    logging.getLogger("papermill").setLevel(logging.ERROR)
+    options.names = [name.replace("\\", "/") for name in options.names]  # as Windows writes them
+    if options.jobs is not None and options.jobs < 1:
+        parser.error(f"--jobs is {options.jobs}; expected 1 or more")
     for name in options.names:
         if not name or not any(key(path).startswith(name) for path in notebooks()):
             parser.error(f"no notebook starts with {name!r}; expected 00, say")
@@ -180,24 +248,8 @@ def main() -> int:
     if options.measure:
         print(measures(chosen, README if not options.names else None))
         return 0
-    for number, path in enumerate(chosen, start=1):
-        label = path.relative_to(HERE)
-        print(f"[{number}/{len(chosen)}] {label} …", end=" ", flush=True)
-        start = time.monotonic()
-        parameters = {} if options.in_place else reduced_parameters(path)
-        os.environ.pop(REDUCED, None)
-        if parameters:
-            os.environ[REDUCED] = "1"
-        try:
-            run(path, BUILD / label, parameters)
-        except papermill.PapermillExecutionError as error:
-            print("failed")
-            print(error, file=sys.stderr)
-            return 1
-        if options.in_place:  # only now, so that a run that is stopped leaves it as it was
-            files.write_text(path, (BUILD / label).read_text(encoding="utf-8"))
-        print(f"{time.monotonic() - start:.0f} s", flush=True)
-    return 0
+    jobs = options.jobs or (1 if options.in_place else side_by_side())
+    return 0 if run_chosen(chosen, options.in_place, min(jobs, len(chosen))) else 1
 
 
 if __name__ == "__main__":

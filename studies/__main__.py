@@ -6,7 +6,7 @@ from functools import partial
 
 from studies.falls import laboratory, long
 from studies.grid import train_grid
-from studies.heap import table
+from studies.heap import greed, table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
@@ -79,6 +79,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     ),
     "earlier": ("runs of the first plan, from this repository's history", earlier.earlier_data, {}),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
+    "greed": ("heaps pick by pick", greed.greed_data, JOBS),
 }  # fmt: skip
 
 

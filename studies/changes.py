@@ -15,7 +15,6 @@ import numpy as np
 
 from unload import task
 from unload.agent.evaluation import Policy
-from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
@@ -171,17 +170,16 @@ def dug(run: Training, preference: float) -> None:
     run.rollout.envs.unwrapped.stack = lambda rng: loads[rng.integers(len(loads))]
 
 
-def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None:
+def tandem(run: Training, change: Callable[[Training], None] | None, seed: int) -> None:
     """Let another network choose, which learns from the same picks with a change of its own.
 
     Args:
         run: whose network only watches.
-        change: of the network that chooses.
+        change: of the network that chooses; none if None.
         seed: is added to the run's for the first weights and batches of that network.
     """
-    active = Training(replace(run.config, seed=run.config.seed + seed))
+    active = Training(replace(run.config, seed=run.config.seed + seed), change=change)
     active.rollout.close()
-    change(active)
     run.agent.choose, add = active.agent.choose, run.replay.add
 
     def add_to_both(**picks: np.ndarray) -> None:
@@ -193,7 +191,7 @@ def tandem(run: Training, change: Callable[[Training], None], seed: int) -> None
     run.replay.add = add_to_both
 
 
-def perfect_start(run: Training, change: Callable[[Training], None] = unchanged) -> None:
+def perfect_start(run: Training, change: Callable[[Training], None] | None = None) -> None:
     """Start from the weights of a run with shuffled places; then ``change``."""
     teacher = Training(replace(run.config, epsilon_init=1.0))
     shuffled(teacher)
@@ -201,13 +199,14 @@ def perfect_start(run: Training, change: Callable[[Training], None] = unchanged)
         teacher.step()
     teacher.rollout.close()
     run.agent.network.load_state_dict(teacher.agent.network.state_dict())
-    change(run)
+    several(run, (change,))
 
 
-def several(run: Training, makes: Iterable[Callable[[Training], None]]) -> None:
-    """Make some changes, one after the other."""
+def several(run: Training, makes: Iterable[Callable[[Training], None] | None]) -> None:
+    """Make some changes, one after the other; None is no change."""
     for make in makes:
-        make(run)
+        if make is not None:
+            make(run)
 
 
 mirrored = partial(store, change=mirror)

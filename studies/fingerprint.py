@@ -1,8 +1,9 @@
-"""A fingerprint of how the code trains, published with each result that rests on training.
+"""Fingerprints of how the code trains and lifts, for results that rest on it.
 
-It is a digest of what short runs yield. As long as it stays the same, the code still trains
-as it did when a result was made; a result of another fingerprint would come out otherwise
-today.
+One is a digest of what short runs or some lifts yield. As long as it stays the same, the code still
+trains or lifts as it did when a result was made; a result of another fingerprint would come out
+otherwise today. That of training is published, that of lifts is a part of what kept answers are
+known by, see ``results.keep_all``.
 """
 
 from collections.abc import Callable, Iterable
@@ -10,12 +11,18 @@ from functools import cache, partial
 from hashlib import blake2b
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from studies.changes import height_reward
 from studies.networks import NETWORKS
 from unload import task
 from unload.agent.config import TrainConfig
-from unload.agent.identity import unchanged
 from unload.agent.training import Training, train
+from unload.load.substacks import stack_load
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
+
+LIFTED = 12  # of the boxes of a wall from above, every twelfth
 
 
 def training_fingerprint(networks: Iterable[str | Callable] = ("peq",)) -> str:
@@ -39,7 +46,7 @@ def name_of(network: str | Callable) -> str:
     return next((name for name, kind in NETWORKS.items() if kind is network), str(network))
 
 
-def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None]]]:
+def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], None] | None]]:
     """The runs of a network, and what is changed in each (see ``train``).
 
     The paper's network has its configurations and the factors of the studies.
@@ -47,14 +54,14 @@ def short_runs(network: str) -> list[tuple[TrainConfig, Callable[[Training], Non
     if network != "peq":
         size = {"picks": 40 * task.NUM_ENVS, "batch_size": 64, "n_features": 16}
         config = TrainConfig(network=NETWORKS.get(network, network), log_interval=10, **size)
-        return [(config, unchanged)]
+        return [(config, None)]
     paper = {"picks": 200 * task.NUM_ENVS, "log_interval": 40}
     small = paper | {"batch_size": 256}
     return [
-        (TrainConfig(**paper), unchanged),
-        (TrainConfig(**small, equalize=False, mask=True, epsilon_final=0.05), unchanged),
+        (TrainConfig(**paper), None),
+        (TrainConfig(**small, equalize=False, mask=True, epsilon_final=0.05), None),
         (TrainConfig(**small, ties="average", gradient_steps=2), partial(height_reward, share=0.5)),
-        (TrainConfig(**small, env="unload/HighestItem-v0"), unchanged),
+        (TrainConfig(**small, env="unload/HighestItem-v0"), None),
     ]
 
 
@@ -68,3 +75,21 @@ def _curves(network: str) -> str:
         columns = ["picks", "success_rate", "deadlocked", "loss"]
         text += curve[columns].to_csv(index=False, float_format="%.3g", lineterminator="\n")
     return text
+
+
+@cache
+def physics_fingerprint() -> str:
+    """Digest of lifts in a container of one wall, 16 hexadecimal digits.
+
+    It covers the load, the engine that decides here, and the physics ``local``, which tables are
+    filled by, and ``full``. How far a box moved is rounded to three digits.
+    """
+    digest = blake2b(digest_size=8)
+    load = stack_load(np.random.default_rng(0), walls=1)
+    for kind in (LocalPhysics, FullPhysics):
+        physics = kind()
+        physics.reset(load)
+        for item in np.argsort(-load.positions[:, 2], kind="stable")[::LIFTED]:
+            digest.update(f"{physics.lift(int(item)):.3g} ".encode())
+        physics.close()
+    return digest.hexdigest()

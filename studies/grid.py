@@ -23,7 +23,6 @@ from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
-from unload.agent.identity import unchanged
 from unload.agent.training import Training
 from unload.network.weights import read_weights, write_weights
 from unload.support import checks, files
@@ -43,7 +42,7 @@ class Cell(NamedTuple):
 
     config: TrainConfig
     seeds: Sequence[int]
-    change: Callable[[Training], None] = unchanged
+    change: Callable[[Training], None] | None = None
 
 
 class Grid(NamedTuple):

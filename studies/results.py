@@ -5,6 +5,7 @@ one is a table in ``data/``, with its provenance in the ``provenance.json`` of i
 settings, code, versions, machine and time.
 """
 
+import json
 import os
 import platform
 import subprocess
@@ -14,20 +15,25 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
+from inspect import getsourcefile, isclass, isfunction
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import joblib
+import numpy as np
 import pandas as pd
-from joblib import Memory, Parallel, delayed
+import torch
+from joblib import Parallel, delayed
 from tqdm import tqdm
 
 from studies import paths
-from unload.agent.identity import identity
+from studies.fingerprint import physics_fingerprint
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import files
 
 PACKAGES = ("gymnasium", "joblib", "mujoco-core", "numba", "numpy", "pandas", "pybullet", "torch")
 COMMAND = "python -m studies"
+ARRAY = "array of this file"  # stands for an array in the JSON of a kept answer
 
 
 class Result(NamedTuple):
@@ -45,21 +51,83 @@ def measured(compute: Callable[[], Any]) -> Result:
 
 
 def kept(folder: str | Path, question: dict, compute: Callable[[], Any]) -> Result:
-    """The answer to a question, computed once and kept in ``folder`` by joblib.
+    """The answer to a question, computed once and kept in a file of ``folder``.
+
+    Each has a digest, and one that is damaged is computed again. Nothing is pickled, so that
+    reading a file that somebody else has made runs no code.
 
     Args:
         question: all that the answer depends on: an answer to another question is not taken.
-        compute: gives the answer, a value that can be pickled.
+        compute: gives the answer, of NumPy's arrays and what JSON can hold: lists, dictionaries by
+            text, text, numbers, None.
 
     Returns:
-        The answer and its record, the same whether it was kept or has just been computed.
+        The answer and its record, as they are read back; tuples have become lists.
+
+    Raises:
+        TypeError: the answer has something else.
     """
-    return Memory(folder, verbose=0).cache(_answer, ignore=["compute"])(question, compute)
+    path = Path(folder) / f"{joblib.hash(question)}.npz"
+    if path.exists():
+        try:
+            return _read_answer(path)
+        except ValueError as error:
+            print(f"{error}. It is computed again", file=sys.stderr)
+    _write_answer(path, measured(compute))
+    return _read_answer(path)
 
 
-def _answer(question: dict, compute: Callable[[], Any]) -> Result:
-    """What joblib keeps under the question; a function of the module, because it goes by name."""
-    return measured(compute)
+def _write_answer(path: Path, answer: Result) -> None:
+    arrays: dict[str, np.ndarray] = {}
+
+    def aside(value: Any) -> Any:
+        """What JSON holds of what it cannot hold itself: of an array its name."""
+        if isinstance(value, np.generic):
+            return value.item()
+        if not isinstance(value, np.ndarray):
+            kind = type(value).__name__
+            raise TypeError(f"an answer holds a {kind}; expected arrays and what JSON can hold")
+        name = f"array {len(arrays)}"
+        arrays[name] = value
+        return {ARRAY: name}
+
+    text = json.dumps(answer._asdict(), default=aside)
+    with files.locked(path.parent, wait=True):  # another command may ask the same
+        files.write_arrays(path, arrays | {"json": np.frombuffer(text.encode(), np.uint8)})
+
+
+def _read_answer(path: Path) -> Result:
+    arrays = files.read_arrays(path, checked=True)
+
+    def resolve(value: dict) -> Any:
+        return arrays[value[ARRAY]] if ARRAY in value else value
+
+    return Result(**json.loads(arrays["json"].tobytes(), object_hook=resolve))
+
+
+def code_of(value: Any) -> str:
+    """Digest of a value, in which a function or class counts by its name and its module's file.
+
+    Files that this module imports do not count: the training fingerprint stands for them.
+    """
+    return joblib.hash(_written(value))
+
+
+def _written(value: Any) -> Any:
+    """Replace what pickle would write by name or by address, at any depth."""
+    if isinstance(value, partial):
+        return [_written(value.func), _written(value.args), _written(value.keywords)]
+    if isinstance(value, (list, tuple)):
+        return [_written(entry) for entry in value]
+    if isinstance(value, dict):
+        return {name: _written(entry) for name, entry in value.items()}
+    if isinstance(value, torch.nn.Module):
+        return [_written(type(value)), _written(dict(value.state_dict()))]
+    if isinstance(value, torch.Tensor):
+        return value.detach().cpu().numpy()
+    if isfunction(value) or isclass(value):
+        return [value.__module__, value.__qualname__, files.digest(getsourcefile(value))]
+    return value
 
 
 def keep_all(
@@ -69,11 +137,13 @@ def keep_all(
 
     Args:
         place: the folder in ``runs/``.
-        compute: gives an answer; its ``identity`` is a part of each question.
+        compute: gives an answer; its code is a part of each question, see ``code_of``, and so is
+            the physics.
         asked: the rest of each question, and the arguments of ``compute``.
         n_jobs: processes.
     """
-    folder, code = paths.RUNS / place, {"code": identity(compute)}
+    folder = paths.RUNS / place
+    code = {"code": code_of(compute), "fingerprint of physics": physics_fingerprint()}
     answers = Parallel(n_jobs, return_as="generator")(
         delayed(kept)(folder, question | code, partial(compute, *arguments))
         for question, arguments in asked

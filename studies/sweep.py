@@ -1,6 +1,7 @@
 """Many training runs side by side, on the cores of one machine or of a cluster."""
 
 import gc
+import multiprocessing
 import os
 import sys
 import time
@@ -15,19 +16,20 @@ import torch
 from joblib import Parallel, delayed
 from tqdm import tqdm
 
-from studies.results import run_record
+from studies.results import code_of, run_record
 from unload.agent.checkpoint import RunFolder
 from unload.agent.config import TrainConfig
-from unload.agent.identity import unchanged
 from unload.agent.training import Training, train
 from unload.support import files
+
+WINDOWS = os.name == "nt"
 
 
 def run_sweep(
     configs: Mapping[str, TrainConfig],
     folder: str | Path,
     n_jobs: int = -1,
-    changes: Mapping[str, Callable[[Training], None]] | None = None,
+    changes: Mapping[str, Callable[[Training], None] | None] | None = None,
 ) -> pd.DataFrame:
     """Train many configurations side by side; finished ones are kept, broken ones resumed.
 
@@ -36,7 +38,9 @@ def run_sweep(
     have made before. A run that fails is reported and does not stop the others. Each uses one
     thread, and leaves in its folder ``log.txt``, its progress and the traceback of an error, and
     ``record.json``: the entries of ``studies.results.run_record`` (of its last part, if it had
-    been stopped), and ``process``. If this process is killed, those that it has started stop with
+    been stopped), and ``process``. Of a run with a change or a network of its own, ``code.json``
+    holds the digest of their files, see ``studies.results.code_of``: with other code it does not
+    go on. If this process is killed, those that it has started stop with
     a checkpoint at the next point of their curves.
 
     A run at work needs 0.5 GB of memory and its replay memory, 1.6 GB with the paper's
@@ -63,7 +67,7 @@ def run_sweep(
     # Absolute, because a cluster's processes may stand elsewhere.
     folder = Path(folder).absolute()
     runs = Parallel(n_jobs, return_as="generator_unordered", pre_dispatch="n_jobs", batch_size=1)
-    changes = dict.fromkeys(configs, unchanged) | dict(changes or {})
+    changes = dict.fromkeys(configs) | dict(changes or {})
     jobs = ((name, configs[name], folder / name, changes[name]) for name in configs)
     errors = {}
     with tqdm(total=len(configs), unit="run", ncols=100, file=sys.stdout) as bar:
@@ -84,15 +88,16 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
 
     def stop_if_alone(point: dict[str, float]) -> None:
         # Nobody waits for a run whose sweep was killed, and the next sweep needs its folder.
-        if child and os.getppid() != sweep:
+        if child and _orphaned(sweep):
             raise KeyboardInterrupt("the sweep of this run was killed")
 
     try:
         # A finished run is only read, perhaps where nothing can be written.
         log_path = os.devnull if RunFolder(folder).finished else folder / "log.txt"
         folder.mkdir(parents=True, exist_ok=True)
+        _check_code(folder / "code.json", [change, config.network])
         with open(log_path, "a", encoding="utf-8") as log, one_thread():
-            train(config, folder, log, callback=stop_if_alone, change=change)
+            train(config, folder, log, callback=stop_if_alone, change=change, same_code=True)
         if not (folder / "record.json").exists():
             record = run_record(time.monotonic() - start) | {"process": os.getpid()}
             files.write_json(folder / "record.json", record, checked=True)
@@ -103,6 +108,28 @@ def _run(name: str, config: TrainConfig, folder: Path, change, sweep: int):
         return name, f"{type(error).__name__}: {error}"
     finally:
         gc.collect()  # of a run that a change has tied in a circle, 1.6 GB of replay memory
+
+
+def _orphaned(parent: int) -> bool:
+    """Whether the process that has started this one is gone."""
+    if WINDOWS:  # where ``getppid`` goes on naming it; joblib holds a handle of it there
+        return not multiprocessing.parent_process().is_alive()
+    return os.getppid() != parent
+
+
+def _check_code(path: Path, functions: list) -> None:
+    """Keep a digest of a run's own functions; raise ValueError where the kept one is another."""
+    own = [function for function in functions if callable(function)]
+    if not own:
+        return
+    code = code_of(own)
+    if not path.exists():
+        files.write_json(path, {"code": code})
+    elif files.read_json(path)["code"] != code:
+        raise ValueError(
+            f"{path.parent} holds a run that was begun with other code; expected the same code, "
+            "or a folder without a run"
+        )
 
 
 @contextmanager

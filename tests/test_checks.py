@@ -2,15 +2,18 @@
 
 import importlib
 import re
+from unittest.mock import patch
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 
 from notebooks import checks
 from notebooks.checks import Exercise, check, judged
-from notebooks.solutions import masked_dqn
+from notebooks.checks.solutions import solution, stand_in
 from tests.test_notebooks import CHAPTERS, cells
+from unload import plain
 
 
 def said(path, word):
@@ -27,6 +30,7 @@ def test_each_exercise_awaits_an_answer_and_has_a_solution_that_passes(path):
     assert names == said(path, "not yet") == said(path.parent / "solutions" / path.name, "right")
 
 
+by_checks = importlib.import_module("notebooks.checks.masked_dqn")
 NINE = {
     checks.number: (lambda answer: answer == 9, [9, 9.0, np.int64(9), np.array([9.0]), "9"]),
     checks.pair: (lambda answer: answer == (9, 1), [(9, 1), [9, 1], np.array([9, 1])]),
@@ -64,19 +68,157 @@ def test_what_is_wrong_is_said_and_stops_a_solution(capsys):
             check(name, 1)
 
 
+def test_what_stops_is_shown_as_the_readers_own_line():
+    """And not as one of the check, or of what the function calls."""
+
+    def shaped(values):
+        return np.reshape(values, (5, 5))
+
+    wanted = Exercise(checks.function, lambda answer: checks.call(answer, np.arange(4)).any(), "")
+    said, line = judged(wanted, shaped), shaped.__code__.co_firstlineno + 1
+    start = f"not yet: it stops in line {line}, 'return np.reshape(values, (5, 5))', with Value"
+    assert said.startswith(start)
+    typed = {}
+    exec("def three(values): return 3", typed)
+    said = judged(wanted, typed["three"])
+    assert "three gives what the check cannot use (AttributeError: 'int' object has no" in said
+    assert "gives what the check cannot use (AssertionError)" in judged(
+        Exercise(checks.number, lambda value: exec("assert value < 0", {"value": value}), ""), 1
+    )
+
+
+def test_answers_that_differ_in_little_are_judged_by_what_was_asked():
+    for name, right, wrong in (
+        ("10/1", [(2, 0.5), [2.0, 0.9]], [2, (2, 0.2), (3, 0.5), (2, 0.95)]),
+        ("12/1", ["equalize=False", "equalize = False", '"equalize=False"'], ["mask=True"]),
+        ("13/1", [11], [10, 12]),
+    ):
+        said = [judged(checks.exercise(name), answer) for answer in right + wrong]
+        assert [each == "right" for each in said] == [True] * len(right) + [False] * len(wrong)
+
+
+def test_an_empty_loop_is_said_to_be_empty_where_it_is_used():
+    def masked_dqn(
+        envs, network, steps, seeds, gamma=0.0, mask=True, batch_size=64, size=2**20
+    ): ...
+
+    with pytest.raises(checks.Missing, match="masked_dqn returns nothing: its body is still to be"):
+        by_checks.by_hand(masked_dqn, by_checks.small(2))
+    assert judged(checks.exercise("04/3"), masked_dqn) == "not yet"
+
+
+def test_runs_that_differ_are_compared_in_a_sentence():
+    weights, losses = {"weight": torch.zeros(2)}, np.arange(3.0)
+    for changed, line in (
+        ((losses, weights), "3 losses and all weights are the same, bit by bit"),
+        ((losses[:2], weights), "there are 2 losses; expected 3"),
+        ((losses + [0, 1, 0], weights), "the losses differ from update 2 on"),
+        ((losses, {"weight": torch.ones(2)}), "the losses agree, the weights at the end do not"),
+    ):
+        assert by_checks.compare(*changed, losses, weights) == line
+
+
+def test_mistakes_that_show_later_are_noticed():
+    """In an emptied container, in the losses' type, and where the replay memory is full."""
+    torch.set_num_threads(1)
+    solved = importlib.import_module("notebooks.solutions.masked_dqn")
+
+    def as_in_textbooks(network, target, optimizer, picks, gamma):
+        """Multiplies by 1 - ended, where nothing is allowed and the best value is -inf."""
+        picks = [(*pick[:5], np.float32(pick[5])) for pick in picks]
+        columns = (torch.from_numpy(np.array(column)) for column in zip(*picks))
+        before, chosen, reward, after, free, ended = columns
+        with torch.no_grad():
+            best = target(after).masked_fill(~free, -torch.inf).amax(dim=1)
+        goal = reward + gamma * best * (1 - ended)
+        values = network(before).gather(1, chosen[:, None])[:, 0]
+        return torch.nn.functional.smooth_l1_loss(values, goal).item()
+
+    def returns_a_tensor(*given):
+        return torch.tensor(solved.update(*given))
+
+    def remembers_all(*given, size, **options):
+        return solved.masked_dqn(*given, **options)
+
+    for number, wrong, line in (
+        ("2", as_in_textbooks, "of update 1 with γ = 0.0 is nan where the episode has ended"),
+        ("2", returns_a_tensor, "it returns a Tensor; expected the loss as a float"),
+        ("3", remembers_all, f"positions, size = {by_checks.SMALL}: the losses differ from update"),
+    ):
+        assert line in judged(checks.exercise(f"04/{number}"), wrong)
+
+
 def test_small_mistakes_in_the_algorithm_are_noticed():
-    """Each differs from the solution in one thing."""
+    """Each differs from the page ``unload/plain.py`` in one thing."""
     torch.set_num_threads(1)
 
     def ignores_the_mask(network, observations, allowed, epsilon, rng):
-        return masked_dqn.choose(network, observations, np.ones_like(allowed), epsilon, rng)
+        return plain.choose(network, observations, np.ones_like(allowed), epsilon, rng)
 
     def forgets_the_end(network, target, optimizer, picks, gamma):
         picks = [(*pick[:5], np.False_) for pick in picks]
-        return masked_dqn.update(network, target, optimizer, picks, gamma)
+        return plain.update(network, target, optimizer, picks, gamma)
 
     for number, wrong, line in (
         ("1", ignores_the_mask, "an item that the mask excludes"),
-        ("2", forgets_the_end, "the loss of update 1 with γ = 0.5"),
+        (
+            "2",
+            forgets_the_end,
+            "the loss of update 1 with γ = 0.0 is nan where the episode has ended",
+        ),
     ):
         assert line in judged(checks.exercise(f"04/{number}"), wrong)
+
+
+def test_a_plan_runs_and_an_answer_are_judged_by_their_form():
+    """Each change makes of what is in form what is not, and the sentence says where."""
+    seeds = range(20_000, 20_010)
+    good = {
+        "30/1": {"setting": ["as it is", "slow"], "prediction": "-", "refuted if": "below 0.5"},
+        "30/2": {"setting": ["a"] * 10 + ["b"] * 10, "seed": [*seeds, *seeds], "msr": 0.5},
+        "30/3": {
+            "setting": ["a", "b"], "runs": 10, "value": 0.5, "low": 0.4, "high": 0.6,
+            "verdict": "open",
+        },
+    }  # fmt: skip
+    for name, columns in good.items():
+        assert judged(checks.exercise(name), pd.DataFrame(columns)) == "right"
+        assert judged(checks.exercise(name), columns).endswith(
+            "is not a table, a DataFrame of pandas"
+        )
+        for column in columns:
+            short = pd.DataFrame(columns).drop(columns=column)
+            assert f"no column '{column}'" in judged(checks.exercise(name), short)
+        assert "has no row" in judged(checks.exercise(name), pd.DataFrame(columns).head(0))
+    for name, changed, said in (
+        (
+            "30/1",
+            {"refuted if": "it does worse"},
+            "'as it is' has no number in it: 'it does worse'",
+        ),
+        ("30/1", {"setting": ["slow", "slow"]}, "one setting; expected a control"),
+        ("30/2", {"setting": ["a"] * 20}, "the same seed twice"),
+        ("30/2", {"seed": range(20_000, 20_020)}, "'b' has other seeds than 'a'"),
+        ("30/2", {"seed": [*range(10)] * 2}, "the seed 0 has been seen before"),
+        ("30/2", {"msr": 95.0}, "an MSR is 95.0; expected a share"),
+        ("30/2", {"msr": np.nan}, "the column 'msr' has an empty cell"),
+        ("30/3", {"low": 0.55}, "of 'a' the value 0.5 is not within 0.55 to 0.6"),
+        ("30/3", {"low": 0.5, "high": 0.5}, "has no width"),
+        ("30/3", {"runs": 3}, "'a' has 3 runs; expected 10 or more"),
+        ("30/3", {"verdict": "yes"}, "is 'yes'; expected one of 'holds', 'refuted', 'open'"),
+    ):
+        assert said in judged(checks.exercise(name), pd.DataFrame(good[name] | changed))
+    few = pd.DataFrame(good["30/2"]).query("seed < 20_005")
+    assert "5 seeds of a setting; expected 10" in judged(checks.exercise("30/2"), few)
+    alone = pd.DataFrame(good["30/2"]).query("setting == 'a'")
+    assert "one setting; expected a control" in judged(checks.exercise("30/2"), alone)
+
+
+def test_a_solution_is_shown_to_whoever_asks_and_stands_in_unseen(capsys):
+    assert stand_in("04/2") is plain.update
+    assert capsys.readouterr().out == "from here on: the solution's `update`\n"
+    with patch("notebooks.checks.solutions.display") as display:
+        assert solution("04/2") is None
+    assert "def update(network, target" in display.call_args.args[0].data
+    with pytest.raises(ValueError, match="no function for '04/4'; expected '04/1', '04/2'"):
+        solution("04/4")

@@ -29,7 +29,7 @@ RUN_ONLY = {
     "ipykernel": "runs the notebooks",
     "jupyterlab": "make lab",
     "mypy": "make lint",
-    "pytest-xdist": "make test, in two processes",
+    "pytest-xdist": "make test, on all cores",
     "ruff": "make lint",
     "setuptools": "make dist",
 }

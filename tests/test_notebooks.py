@@ -3,9 +3,14 @@
 import json
 import re
 import sys
+import threading
+import time
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
 
 import nbformat
+import papermill
 import pytest
 
 from notebooks import run
@@ -29,14 +34,14 @@ def name(path):
 
 
 def test_every_chapter_has_solutions_and_a_number_that_tells_its_track():
-    """Core from 00, reproduction from 10, beyond from 20, each without a gap."""
+    """Core from 00, reproduction from 10, beyond from 20, each without a gap; 30 is the last."""
     solutions = {path.stem for path in NOTEBOOKS if path.parent.name == "solutions"}
     assert {path.stem for path in CHAPTERS} == solutions
     numbers = [int(path.stem[:2]) for path in CHAPTERS]
-    for track in range(3):
+    for track in range(4):
         own = [number for number in numbers if number // 10 == track]
         assert own == list(range(10 * track, 10 * track + len(own)))
-    assert len(numbers) == len(set(numbers)) and max(numbers) < 30
+    assert len(numbers) == len(set(numbers)) and max(numbers) == 30
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
@@ -61,11 +66,17 @@ def test_chapter_tells_what_one_learns_in_how_long_and_closes_with_checked_exerc
         assert part in ending
     assert any("\ncheck(" in "\n" + text(cell) for cell in cells(path, "code"))
 
-    # The minutes are those of its words, figures and exercises.
-    stated = int(re.search(r"\*\*Time\*\*: (\d+) minutes to read", prose[0])[1])
-    assert abs(stated - run.measured(path)["minutes"]) <= 1
-    readme = (run.HERE.parent / "README.md").read_text(encoding="utf-8")
-    assert re.search(rf"notebooks/{path.name}\) \((\d+)", readme)[1] == str(stated)
+
+@pytest.mark.parametrize("path", CHAPTERS, ids=name)
+def test_chapter_says_how_long_it_takes_to_read_and_to_solve(path):
+    """The first by its words and figures, the second by the minutes that stand at its exercises."""
+    prose, counts = run.prose(path), run.measured(path)
+    stated = re.search(r"\*\*Time\*\*: (\d+) minutes to read, (\d+) for the exercises, ", prose)
+    assert abs(int(stated[1]) - counts["minutes"]) <= 1
+    assert int(stated[2]) == counts["to solve"]
+    within, _, closing = prose.partition("\n## Exercises\n")
+    asked = re.findall(r"^\*\*Exercise \d", within, re.M) + re.findall(r"^\d\. ", closing, re.M)
+    assert counts["exercises"] == len(asked) > 0
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=name)
@@ -103,6 +114,51 @@ def test_unknown_names_are_refused(tmp_path, monkeypatch, capsys):
         run.run(CHAPTERS[0], tmp_path / "out.ipynb", {"NONSENSE": 1})
 
 
+def test_a_notebook_of_solutions_may_be_named_as_windows_writes_it(monkeypatch):
+    chosen = []
+    monkeypatch.setattr(run, "run_chosen", lambda paths, *_: chosen.extend(paths) or True)
+    monkeypatch.setattr(sys, "argv", ["run.py", "solutions\\03"])
+    assert run.main() == 0
+    assert [run.key(path) for path in chosen] == ["solutions/03_network"]
+
+
+def test_notebooks_run_side_by_side_and_one_that_fails_is_named(set_in, capfd):
+    """The first two are begun before either ends; after the error most are not begun."""
+    first, begun, both = ["00_playground", "01_task"], {}, threading.Barrier(2)
+
+    def execute(notebook, output, parameters):
+        begun[run.key(notebook)] = parameters
+        if run.key(notebook) not in first:
+            return time.sleep(0.1)
+        both.wait(timeout=60)
+        if run.key(notebook) == "00_playground":
+            said = "ZeroDivisionError", "division by zero"
+            raise papermill.PapermillExecutionError(0, 1, "1 / 0", *said, [])
+
+    environ = {run.REDUCED: "left over"}
+    set_in(run, run=execute, ProcessPoolExecutor=ThreadPoolExecutor)
+    set_in(run.os, environ=environ)
+    set_in(run.joblib, cpu_count=lambda: 6)
+    assert not run.run_chosen(NOTEBOOKS, False, 2)
+    out, err = capfd.readouterr()
+    assert [*begun][:2] == first and len(begun) < 10
+    assert begun["00_playground"] == {"PICKS": 120}, "reduced"
+    assert environ["OMP_NUM_THREADS"] == environ["LOKY_MAX_CPU_COUNT"] == "3"
+    assert "00_playground failed" in err and "division by zero" in err
+    assert f"/{len(NOTEBOOKS)}" in out
+
+
+def test_as_many_notebooks_run_as_cores_and_memory_allow(set_in):
+    page = {"SC_PAGE_SIZE": 4096}
+    set_in(run.joblib, cpu_count=lambda: 8)
+    for memory, jobs in ((64, 8), (7, 3), (1, 1)):
+        pages = {"SC_PHYS_PAGES": memory * 2**30 // 4096}
+        set_in(run, os=SimpleNamespace(sysconf=(page | pages).get))
+        assert run.side_by_side() == jobs
+    set_in(run, os=SimpleNamespace())  # Windows
+    assert run.side_by_side() == 8
+
+
 def test_views_are_preferred_to_pictures_and_animations_wait_for_their_button():
     """Several that start at once can block a browser that draws without a graphics card."""
     line, new = [{"type": "scatter", "y": [1, 2]}], nbformat.v4
@@ -121,13 +177,15 @@ def test_links_that_lead_nowhere_are_found(tmp_path):
     for name, text in {
         "a": '<a href="b.html#top">1</a><a href="#here">2</a><p id="here">'
         '<a href="https://example.org">3</a><img src="data:image/png;base64,AA==">',
-        "b": '<h1 id="top">b</h1>',
-        "c": '<a href="d.html">1</a><a href="b.html#end">2</a><script src="https://e.org/x.js">',
+        "b": '<h1 id="top">b</h1><link rel="canonical" href="https://example.org/b.html">',
+        "c": '<a href="d.html">1</a><a href="b.html#end">2</a>'
+        '<link rel="stylesheet" href="https://e.org/x.css"><script src="https://e.org/x.js">',
     }.items():
         (tmp_path / f"{name}.html").write_text(text, encoding="utf-8")
     assert links.problems(tmp_path) == [
         "c.html: no b.html#end",
         "c.html: no d.html",
+        "c.html: loads https://e.org/x.css",
         "c.html: loads https://e.org/x.js",
     ]
     with pytest.raises(FileNotFoundError, match="holds no page"):

@@ -4,7 +4,6 @@ Every name is imported when it is first used, because PyTorch alone takes second
 picks needs none of the libraries that training does.
 """
 
-import sys
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -21,17 +20,17 @@ if TYPE_CHECKING:  # what ``_PLACES`` says, for type checkers
     from unload.agent.greedy import Greedy as Greedy
     from unload.agent.greedy import load_policy as load_policy
     from unload.agent.greedy import save_policy as save_policy
-    from unload.agent.order import picking_order as picking_order
     from unload.agent.training import train as train
     from unload.env.container import ContainerEnv as ContainerEnv
     from unload.env.equalization import equalize as equalize
     from unload.env.highest_item import HighestItemEnv as HighestItemEnv
     from unload.load.boxes import Load as Load
-    from unload.load.packing_list import read_load as read_load
     from unload.load.substacks import build_load as build_load
     from unload.load.substacks import stack_load as stack_load
     from unload.load.view import view as view
     from unload.network.peq import PEQNetwork as PEQNetwork
+    from unload.orders.order import picking_order as picking_order
+    from unload.orders.packing_list import read_load as read_load
 
 # Where each public name is defined; a module has itself.
 _PLACES = {
@@ -46,9 +45,9 @@ _PLACES = {
     "equalize": "env.equalization",
     "evaluate": "agent.evaluation",
     "load_policy": "agent.greedy",
-    "picking_order": "agent.order",
+    "picking_order": "orders.order",
     "policies": "agent.policies",
-    "read_load": "load.packing_list",
+    "read_load": "orders.packing_list",
     "save_policy": "agent.greedy",
     "stack_load": "load.substacks",
     "success_rate": "agent.evaluation",
@@ -78,6 +77,9 @@ def __dir__() -> list[str]:
 
 
 def _register() -> None:
+    """Register the environments, where Gymnasium is installed: an order does without it."""
+    if find_spec("gymnasium") is None:
+        return
     import gymnasium
 
     for name, single, arrays in (
@@ -88,21 +90,4 @@ def _register() -> None:
         gymnasium.register(f"unload/{name}", entry, vector_entry_point=vector_entry)
 
 
-class _WithGymnasium:
-    """Registers the environments when Gymnasium is imported, which an order does without."""
-
-    @staticmethod
-    def find_spec(name, path=None, target=None):
-        if name == "gymnasium":
-            sys.meta_path.remove(_WithGymnasium)
-            spec = find_spec(name)
-            if spec is not None:
-                execute = spec.loader.exec_module
-                spec.loader.exec_module = lambda module: (execute(module), _register())
-            return spec
-
-
-if "gymnasium" in sys.modules:
-    _register()
-else:
-    sys.meta_path.insert(0, _WithGymnasium)
+_register()

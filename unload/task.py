@@ -6,7 +6,7 @@ x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).
 
 import numpy as np
 
-VERSION = "0.2.0"  # of unload, as in pyproject.toml
+VERSION = "0.3.0"  # of unload, as in pyproject.toml
 
 # Sec. III-A, scaling of the observation: inner size of the container.
 CONTAINER = np.array([7.0, 2.5, 2.5])

@@ -20,12 +20,13 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        canonical = ("rel", "canonical") in attrs  # which says where the page stands
         for name, value in attrs:
             if name == "id" or (tag == "a" and name == "name"):
                 self.ids.add(value)
             elif name == "href" and tag == "a":
                 self.links.add(value)
-            elif name == "src" or (name == "href" and tag == "link"):
+            elif name == "src" or (name == "href" and tag == "link" and not canonical):
                 self.loaded.add(value)
 
 

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-TRACKS = {"0": "core", "1": "reproduction", "2": "beyond"}  # by the first digit of a notebook
+# By the first digit of a notebook.
+TRACKS = {"0": "core", "1": "reproduction", "2": "beyond", "3": "capstone"}
 REDUCED = "UNLOAD_REDUCED"  # set where a notebook runs at reduced counts
 
 
@@ -28,7 +29,7 @@ class Exercise(NamedTuple):
 
 
 class Missing(Exception):
-    """A function that is to be written has an empty body still."""
+    """A function that is to be written has an empty body still; it says which."""
 
 
 def check(name: str, answer: object, *, strict: bool = False) -> None:
@@ -73,12 +74,20 @@ def judged(wanted: Exercise, answer: object) -> str:
     except Missing:
         return "not yet"
     except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        stopped = f"it stops in line {place.lineno} of {place.name}"
-        return f"not yet: {stopped} with {type(error).__name__}: {error}"
+        return f"not yet: {_stopped(answer, error)}"
     if isinstance(right, str):
         return f"not yet: {right}"
     return "right" if right else f"not yet: {_called(answer)} is not right; {wanted.hint}"
+
+
+def _stopped(answer: object, error: Exception) -> str:
+    """Where a reader's function stops, as a line of its own, and why."""
+    said = f"{type(error).__name__}: {error}".rstrip(": ")
+    file = answer.__code__.co_filename if hasattr(answer, "__code__") else None
+    own = [line for line in traceback.extract_tb(error.__traceback__) if line.filename == file]
+    if not own:
+        return f"{_called(answer)} gives what the check cannot use ({said})"
+    return f"it stops in line {own[-1].lineno}, {own[-1].line!r}, with {said}"
 
 
 def _called(answer: object) -> str:
@@ -95,7 +104,7 @@ def call(function: Callable, *args: object, **kwargs: object) -> Any:
     """
     returned = function(*args, **kwargs)
     if returned is None:
-        raise Missing
+        raise Missing(f"{_called(function)} returns nothing: its body is still to be written")
     return returned
 
 

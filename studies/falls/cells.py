@@ -14,7 +14,6 @@ from studies import changes
 from studies.falls import measures
 from studies.grid import Cell
 from unload.agent.config import TrainConfig
-from unload.agent.identity import unchanged
 from unload.agent.training import Training
 
 # The mask is on by default.
@@ -44,23 +43,21 @@ PREFERENCES = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.2)
 SHORT = {"max_picks": 25}  # episodes in which a load hardly changes
 # Who watches such a policy, and how it learns.
 PUPILS = {
-    "taught": (unchanged, {}),
+    "taught": (None, {}),
     "shuffled_taught": (changes.shuffled, {}),
-    "averaged_taught": (unchanged, AVERAGED),
+    "averaged_taught": (None, AVERAGED),
     "level_taught": (partial(changes.dug, preference=0.0), SHORT),
 }
 DUG = 0.4  # the preference that has dug the loads to one side
 
-Change = Callable[[Training], None]
+Change = Callable[[Training], None] | None
 
 
-def _cell(
-    change: Change = unchanged, seeds: int = SEEDS, first: int = FIRST_SEED, **fields
-) -> Cell:
+def _cell(change: Change = None, seeds: int = SEEDS, first: int = FIRST_SEED, **fields) -> Cell:
     return Cell(replace(CONFIG, **fields), range(first, first + seeds), change)
 
 
-def _both(name: str, change: Change = unchanged, seeds: int = SEEDS, **fields) -> dict[str, Cell]:
+def _both(name: str, change: Change = None, seeds: int = SEEDS, **fields) -> dict[str, Cell]:
     """A cell with the mask and one without it."""
     return {
         name: _cell(change, seeds, **fields),
@@ -81,7 +78,7 @@ def _taught(change: Change, preference: float, epsilon: float = 0.2, **fields) -
     return _cell(change, FEW_SEEDS, picks=128_000, **exploring, **fields)
 
 
-def _perfect(change: Change = unchanged) -> Cell:
+def _perfect(change: Change = None) -> Cell:
     return _cell(partial(changes.perfect_start, change=change), FEW_SEEDS, epsilon_init=0.0)
 
 
@@ -103,9 +100,9 @@ CELLS: dict[str, Cell] = {
     },
     **{f"episodes_{picks}": _cell(max_picks=picks) for picks in (25, 100, 250)},
     **_both("watching_shuffled", _watching(changes.shuffled)),
-    "watching_ranks": _cell(_watching(unchanged)),
+    "watching_ranks": _cell(_watching(None)),
     "shuffled_watching_ranks": _cell(
-        partial(changes.several, makes=(changes.shuffled, _watching(unchanged)))
+        partial(changes.several, makes=(changes.shuffled, _watching(None)))
     ),
     "perfect": _perfect(),
     "perfect_shuffled": _perfect(changes.shuffled),
@@ -161,7 +158,7 @@ def held(run: Training, start: int, axes: tuple[int, ...] = (2,)) -> None:
 
 
 _fresh = partial(_cell, first=FRESH_SEED)
-_fresh_taught = partial(_taught, unchanged, first=FRESH_SEED)
+_fresh_taught = partial(_taught, None, first=FRESH_SEED)
 HELD = partial(held, start=HELD_FROM)
 FRESH: dict[str, Cell] = {
     "ranks": _fresh(),

@@ -16,11 +16,10 @@ from studies.falls import measures
 from studies.falls.cells import CELLS, CONFIG, FRESH, SEEN, Change
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell
-from studies.results import COMMAND, Result, keep_all, publish
+from studies.results import COMMAND, Result, code_of, keep_all, publish
 from studies.statistics import end_msr
 from studies.sweep import one_thread
 from unload.agent.config import TrainConfig
-from unload.agent.identity import identity, unchanged
 from unload.agent.training import Training
 
 TRACED = ("ranks", "ranks_no_mask", "shuffled", "averaged", "positions")
@@ -38,7 +37,7 @@ ERRS = 0.95  # MSR in fresh containers below which a network errs
 
 def train_in_laboratory(
     config: TrainConfig = CONFIG,
-    change: Change = unchanged,
+    change: Change = None,
     watch: Callable[[Training], None] | None = None,
     every: int = EVERY,
 ) -> Training:
@@ -103,7 +102,7 @@ def keep_cells(place: str, cells: Mapping[str, Cell], n_jobs: int) -> list[Resul
     """What ``run_cell`` returns of each seed of some cells, see ``results.kept``."""
     asked, fingerprint = [], training_fingerprint()
     for name, cell in cells.items():
-        question = {"cell": name, "change": identity(cell.change), "fingerprint": fingerprint}
+        question = {"cell": name, "change": code_of(cell.change), "fingerprint": fingerprint}
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
             asked.append((question | config, (name, cell, seed)))

@@ -19,9 +19,8 @@ from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
-from studies.results import COMMAND, keep_all, publish
+from studies.results import COMMAND, code_of, keep_all, publish
 from unload.agent.config import TrainConfig
-from unload.agent.identity import identity
 from unload.network.peq import PEQNetwork
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
@@ -104,7 +103,7 @@ def published_data(n_jobs: int = -1) -> None:
     # The weights are part of the question: a policy that was trained again is judged again.
     asked = []
     for name, (config, network) in judged.items():
-        question = {"name": name, "weights": identity(network), **config.plain(), **LOADS}
+        question = {"name": name, "weights": code_of(network), **config.plain(), **LOADS}
         question["fingerprint"] = fingerprint
         asked.append((question, (name, config, network)))
     results = keep_all("published", _judge, asked, n_jobs)

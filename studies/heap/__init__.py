@@ -1,8 +1,9 @@
 """Heaps: an unordered load, of which a rake picks several boxes at once.
 
 Read ``boxes``, ``rake``, ``generate``, ``observation``, ``env``, ``policies``, ``network`` and
-``learning``, in this order; ``picture`` draws a heap, and ``recording`` and ``table`` compare the
-policies. Importing this registers ``unload/Heap-v0``.
+``learning``, in this order; ``picture`` draws a heap, ``recording`` and ``table`` compare the
+policies, and ``greed`` plays them pick by pick, which ``figures`` draws. Importing this registers
+``unload/Heap-v0``.
 """
 
 import gymnasium

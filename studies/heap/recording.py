@@ -13,11 +13,10 @@ from studies import paths
 from studies.heap.boxes import Heap
 from studies.heap.env import MAX_PICKS, HeapEnv
 from studies.heap.generate import BOXES, settled_heap, stored_heaps, write_heaps
-from studies.heap.learning import STEPS, Learned, Picks, fit, joined, save_networks
-from studies.heap.network import FateNetwork
+from studies.heap.learning import STEPS, Learned, Picks, fit, joined, network_of, save_networks
+from studies.heap.network import FEATURES, FateNetwork
 from studies.heap.policies import RULES, best, linear, play
-from studies.results import COMMAND, Result, keep_all, publish
-from unload.agent.identity import identity
+from studies.results import COMMAND, Result, code_of, keep_all, publish
 
 NAME = "heap"
 HEAPS = {"train": 70, "test": 30}
@@ -40,14 +39,14 @@ def make_heaps(n_jobs: int = 1) -> None:
     answers = keep_all(f"{NAME}/heaps", _new_heap, asked, n_jobs)
     heaps: dict[str, list[Heap]] = {split: [] for split in HEAPS}
     for (split, _), answer in zip(names, answers):
-        heaps[split].append(answer.value)
+        heaps[split].append(Heap(**answer.value))
     write_heaps(paths.DATA / NAME / "heaps.npz", heaps)
     settings = {"heaps": HEAPS, "seeds": SEEDS, "boxes dropped": BOXES}
     publish(f"{NAME}/heaps", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
-def _new_heap(seed: int, number: int) -> Heap:
-    return settled_heap(np.random.default_rng([seed, number]))
+def _new_heap(seed: int, number: int) -> dict[str, np.ndarray]:
+    return vars(settled_heap(np.random.default_rng([seed, number])))
 
 
 def make_networks(n_jobs: int = 1) -> None:
@@ -59,21 +58,21 @@ def make_networks(n_jobs: int = 1) -> None:
     answers: list[Result] = []
     for round_number in range(ROUNDS):
         # Each episode explores around one of the networks that were learned in the round before.
-        question, asked = {"round": round_number, "explorers": identity(learned)}, []
+        question, asked = {"round": round_number, "explorers": code_of(learned)}, []
         for number in range(episodes):
-            one = question | {"number": number, "heap": identity(heaps[number % len(heaps)])}
+            one = question | {"number": number, "heap": code_of(heaps[number % len(heaps)])}
             explorer = learned[number % len(learned)] if learned else None
             asked.append((one, (round_number, number, explorer)))
         found = keep_all(f"{NAME}/picks", _record, asked, n_jobs)
         answers += found
-        recorded += [answer.value for answer in found]
+        recorded += [Picks(**answer.value) for answer in found]
 
         # All networks learn from the picks of all rounds so far.
-        question = {"picks": identity(recorded), "steps": STEPS}
+        question = {"picks": code_of(recorded), "steps": STEPS}
         asked = [(question | {"seed": seed}, (recorded, seed)) for seed in range(NETWORKS)]
         found = keep_all(f"{NAME}/networks", _learn, asked, n_jobs)
         answers += found
-        learned = [answer.value for answer in found]
+        learned = [_network(answer.value) for answer in found]
     save_networks(learned, paths.DATA / NAME / "networks.safetensors")
     settings = {
         "picks": PICKS, "physics": PHYSICS, "rounds": ROUNDS, "networks": NETWORKS, "steps": STEPS,
@@ -81,7 +80,7 @@ def make_networks(n_jobs: int = 1) -> None:
     publish(f"{NAME}/networks", {}, f"{COMMAND} {NAME}", settings, answers)
 
 
-def _record(round_number: int, number: int, explorer: FateNetwork | None) -> Picks:
+def _record(round_number: int, number: int, explorer: FateNetwork | None) -> dict[str, np.ndarray]:
     """The picks of one exploring episode; its number chooses the training heap.
 
     Half of the picks are random, because every box must be tried. The others are those of a
@@ -101,10 +100,15 @@ def _record(round_number: int, number: int, explorer: FateNetwork | None) -> Pic
     env = HeapEnv("train", physics=PHYSICS, max_picks=MAX_PICKS)
     heap = env.heaps[number % len(env.heaps)]
     episode = play(env, policy, heap, int(rng.integers(2**32)))
-    return joined([episode])
+    return vars(joined([episode]))
 
 
-def _learn(recorded: Sequence[Picks], seed: int) -> FateNetwork:
-    """A network that has learned from recorded picks."""
+def _learn(recorded: Sequence[Picks], seed: int) -> dict[str, np.ndarray]:
+    """The weights of a network that has learned from recorded picks."""
     torch.set_num_threads(1)
-    return fit(joined(recorded), seed, STEPS)
+    weights = fit(joined(recorded), seed, STEPS).state_dict()
+    return {name: weight.numpy() for name, weight in weights.items()}
+
+
+def _network(weights: dict[str, np.ndarray]) -> FateNetwork:
+    return network_of({name: torch.from_numpy(each) for name, each in weights.items()}, FEATURES)

@@ -23,10 +23,9 @@ from studies.heap.generate import stored_heaps
 from studies.heap.learning import Learned, load_networks
 from studies.heap.policies import RULES, Oracle, best, linear, play
 from studies.heap.recording import HEAPS, NAME, WEIGHTS, make_heaps, make_networks
-from studies.results import COMMAND, Result, keep_all, publish, read_table
+from studies.results import COMMAND, Result, code_of, keep_all, publish, read_table
 from studies.statistics import mean_interval, ratio_interval
 from studies.style import COLOURS, styled
-from unload.agent.identity import identity
 from unload.support import files
 
 # A box near the front takes many along if others lie before it and on it; how much each of these
@@ -113,7 +112,7 @@ def _played(
         if "networks" in player:
             known["networks"] = files.digest(player["networks"])
         for number, heap in enumerate(stored_heaps(split)[:heaps]):
-            question = {"player": known, "heap": identity(heap), "number": number}
+            question = {"player": known, "heap": code_of(heap), "number": number}
             question |= {"physics": physics, "picks": MAX_PICKS}
             asked.append((question, (player, split, number, physics)))
     answers = iter(keep_all(f"{NAME}/episodes", _play, asked, n_jobs))

@@ -13,6 +13,7 @@ from unittest import mock
 import pandas as pd
 
 from studies import paths
+from studies.fingerprint import physics_fingerprint
 from studies.lifts.agreement import FIRST_SEED, LIFT_COUNT, collect_lifts
 from studies.paper.training import default_policies
 from studies.policies.comparison import CONDITIONS, LOADS, PLAYERS, SEED, find_policy
@@ -27,7 +28,6 @@ from unload.physics.situation import Situation, Surroundings
 from unload.physics.table import LiftTable
 
 NAME, MSR_NAME = "engines", "engines_msr"
-LIFTS = paths.RUNS / "lifts" / "mujoco.npz"  # computed so far
 # Notebook 12 applies its ten policies to these containers.
 APPLIED = {"episodes": 50, "seed": 1000}
 
@@ -119,13 +119,14 @@ def played() -> Iterator[tuple[dict, tuple[Policy, dict]]]:
 def both_rates(policy: Policy, arguments: dict) -> dict[str, float]:
     """The mean MSR by engine, the number of ``containers``, and in how many it ``differ``s.
 
-    MuJoCo gives all its answers itself, which ``LIFTS`` keeps.
+    MuJoCo gives all its answers itself; those computed so far are kept.
     """
+    lifts = paths.RUNS / "lifts" / f"mujoco_{physics_fingerprint()}.npz"
     first = evaluate(policy, **arguments)["success_rate"]
     table = LiftTable(ENGINES[1])
-    table.exchange(LIFTS)
+    table.exchange(lifts)
     with mock.patch.object(vector, "shared_table", lambda: table):
         second = evaluate(policy, **arguments)["success_rate"]
-    table.exchange(LIFTS)
+    table.exchange(lifts)
     means = dict(zip(ENGINES, (float(first.mean()), float(second.mean()))))
     return means | {"containers": len(first), "differ": int((first != second).sum())}

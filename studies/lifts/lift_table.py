@@ -11,13 +11,11 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
-from studies import paths
-from studies.results import COMMAND, kept, publish
+from studies.results import COMMAND, keep_all, publish
 from unload import task
 from unload.agent import policies
 from unload.env.vector import ContainerVectorEnv
@@ -35,18 +33,17 @@ def lift_data() -> None:
         "of random picks": RANDOM_SHARE * EPISODES,
         "seed": SEED,
     }
-    folder = paths.RUNS / "lifts"
-    path = folder / f"{EPISODES}_episodes_seed_{SEED}.npz"
     question = settings | {"physics": SETTINGS}
-    filled = kept(folder, question, partial(_fill, path))
-    table = LiftTable.load(path, ENGINES[0])
+    (filled,) = keep_all("lifts", _fill, [(question, ())], 1)
+    table = LiftTable(ENGINES[0])
+    table.entries = filled.value["digests"], filled.value["micrometres"]
     table.save(LIFTS_FILE)
     settings["lifts"] = len(table)
     publish(LIFTS_FILE.with_suffix(""), {}, f"{COMMAND} lifts", settings, [filled])
 
 
-def _fill(path: Path) -> None:
-    """Fill an empty table by playing, and save it."""
+def _fill() -> dict[str, np.ndarray]:
+    """The entries of an empty table that was filled by playing."""
     rng = np.random.default_rng(SEED)
     table = LiftTable(ENGINES[0])  # the reference, wherever this runs
     envs = ContainerVectorEnv(task.NUM_ENVS, TablePhysics(table))
@@ -56,7 +53,7 @@ def _fill(path: Path) -> None:
         for _ in range(task.MAX_PICKS):
             actions = policy(observations, infos["action_mask"], rng)
             observations, _, _, _, infos = envs.step(actions)
-    table.save(path)
+    return dict(zip(("digests", "micrometres"), table.entries))
 
 
 def _filling_policies(rng: np.random.Generator) -> list[Callable]:

@@ -1,7 +1,10 @@
-"""Diagrams: the task as a Markov decision process (Fig. 1), substacks (3), the network (7).
+"""The paper's figures that no data are drawn in.
 
-Notebooks 01 and 03 draw and save them.
+The task as a Markov decision process (Fig. 1), containers side by side (2), substacks (3), and the
+network (7). Notebooks 01, 03 and 10 draw and save them.
 """
+
+from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,7 +15,7 @@ from matplotlib.patches import FancyBboxPatch, Rectangle
 
 from studies.style import styled
 from unload import task
-from unload.load.picture import package_colour
+from unload.load.picture import package_colour, snapshot
 from unload.load.substacks import (
     CELL,
     CELLS_HIGH,
@@ -23,6 +26,7 @@ from unload.load.substacks import (
     PACKAGES,
     RIGHT,
 )
+from unload.physics.base import Physics
 
 INK = "#333333"
 PANELS = {"Agent": (19, "#eaf2f8"), "Environment": (1, "#f6f1e7")}  # lower edge, colour
@@ -83,6 +87,30 @@ def fig01_mdp() -> Figure:
     axes.text(57, 14, r"reward $r_{k+1} = \pm 1$", va="center", ha="right")
     _path(axes, [(66, lower + HEIGHT), (66, upper)])
     axes.text(67, 14, "mask of failed items", va="center")
+    return figure
+
+
+@styled
+def fig02_containers(containers: Sequence[Physics]) -> Figure:
+    """Containers as they are, one of them large; below each how many boxes have left it."""
+    images = np.stack([snapshot(each.load, each.present, each.positions()) for each in containers])
+    drawn = (images < 255).any(axis=(0, 3))  # beyond, all are white
+    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    images = images[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+    large = len(images) // 2
+    small = [number for number in range(len(images)) if number != large]
+    figure = plt.figure(figsize=(9.6, 5.2))
+    left, right = figure.subfigures(1, 2, width_ratios=(1, 1.1))
+    across = max(2, round(0.9 * len(small) ** 0.5))
+    grid = right.subplots(-(-len(small) // across), across, squeeze=False)
+    places = {left.subplots(): large} | dict(zip(grid.flat, small))
+    for axes, number in places.items():
+        axes.imshow(images[number], interpolation="antialiased")
+        gone = (~containers[number].present).sum()
+        axes.set_xlabel(gone, fontsize=12 if number == large else 8, labelpad=0)
+    for axes in (*places, *grid.flat):
+        axes.set(xticks=[], yticks=[], frame_on=False)
     return figure
 
 

@@ -80,9 +80,12 @@ def agent_view(
     figure, axes = plt.subplots(figsize=(8, 4.6))
     draw(axes, low[order], high[order], colours[order])
     figure.colorbar(ScalarMappable(Normalize(0, len(ranks) - 1), RANKS), ax=axes, label="rank")
+    heights = len(np.unique(load.positions[moment.visible, HEIGHT].round(3)))
     axes.set_title(
-        f"{len(np.unique(ranks))} different ranks in height; the greedy choice, item {item} of "
-        f"rank {ranks[greedy]:.1f}, {'can' if liftable[greedy] else 'cannot'} be lifted\n"
+        f"{len(np.unique(ranks))} different ranks of boxes at {heights} heights"
+        f"{', by the order in which they are listed' if noise == 0 and ties == 'noise' else ''}\n"
+        f"the favourite, item {item} of rank {ranks[greedy]:.1f}, "
+        f"{'can' if liftable[greedy] else 'cannot'} be lifted\n"
         f"the next pick succeeds with probability {chance:.2f}, "
         f"on average over {DRAWS} draws of the noise with {others:.2f}"
     )

@@ -156,12 +156,16 @@ def comparison_data(n_jobs: int = -1) -> None:
         (case | {"physics": SETTINGS, "weights": weights.get(case["policy"])}, (*case.values(),))
         for case in cases
     ]
-    results = keep_all("comparison", compare, asked, n_jobs)
-    tables = {"policies": pd.concat([result.value for result in results])}
+    results = keep_all("comparison", _compared, asked, n_jobs)
+    tables = {"policies": pd.concat([pd.DataFrame(result.value) for result in results])}
     full = {name: FULL[name] for name in ("episodes", "seed", "max_picks")}
     settings = {"policies": weights, "loads": LOADS, "seed": SEED}
     settings["full"] = full | {"front walls": FRONT_WALLS}
     publish("policies", tables, f"{COMMAND} policies", settings, results)
+
+
+def _compared(*case) -> dict[str, list]:
+    return compare(*case).to_dict("list")
 
 
 def compare(name: str, mask: bool, condition: str) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from unload.network.peq import PEQNetwork
 
 def steps_of(load: Load) -> np.ndarray:
     """Steps from a box to one that lies on it: to the side (y) and up (z), (pairs, 2) in m."""
-    below, above = load.covers
+    below, above = load.contacts.pairs(ABOVE)
     return (load.positions[above] - load.positions[below])[:, 1:]
 
 

@@ -135,4 +135,4 @@ def weigh(run: Training, z: float) -> None:
         containers.show_nearest(envs._containers, env, *envs._how_observed)
 
     envs._put_load = put_in_order
-    run.rollout._see(*envs.reset(seed=run.config.seeds()[0]))
+    run.rollout._observe(*envs.reset(seed=run.config.seeds()[0]))

@@ -1,5 +1,5 @@
-"""How fast the parts are, and how much the tests notice.
+"""How fast the parts are.
 
 ``run`` measures whole trainings, ours and Stable-Baselines3's, and prints all speeds with those of
-``parts``. ``mutants`` changes the code in small ways and counts what the tests notice.
+``parts``; ``figures`` draws them.
 """

@@ -25,14 +25,13 @@ from studies.falls.long import LONG, UNTRAINED
 from studies.fingerprint import training_fingerprint
 from studies.grid import Cell, cell_of, read_policies
 from studies.paper.training import PAPER
-from studies.results import COMMAND, keep_all, publish
+from studies.results import COMMAND, code_of, keep_all, publish
 from studies.statistics import end_msr
 from studies.ties.noise import SPREAD, DriftingTies, drifting
 from studies.ties.training import TIES
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, greedy_actions
-from unload.agent.identity import identity
 from unload.agent.policies import choosable
 from unload.agent.training import Training
 from unload.env.equalization import equalize
@@ -197,7 +196,7 @@ def filled_at_deadlocks(run: Training) -> None:
             elapsed = envs._picks.copy()  # episodes go on together
             observations, _ = envs.reset(options={"reset_mask": deadlocked})
             envs._picks[:] = elapsed
-            rollout._see(observations, envs._infos())
+            rollout._observe(observations, envs._infos())
         return picked
 
     rollout.pick = pick_and_fill
@@ -239,7 +238,7 @@ def choice_data(n_jobs: int = -1) -> None:
     """Write ``ties/choice.csv``: a row per network and way to ask it, see ``evaluate_choice``."""
     fingerprint, questions = training_fingerprint(), []
     for name, policy in published_networks().items():
-        question = {"name": name, "weights": identity(policy.network), "fingerprint": fingerprint}
+        question = {"name": name, "weights": code_of(policy.network), "fingerprint": fingerprint}
         questions.append((question | LOADS, (name, policy)))
     results = keep_all("ties/choice", ask_network, questions, n_jobs)
     rows = pd.DataFrame([row for result in results for row in result.value])
@@ -258,7 +257,7 @@ def choice_laboratory_data(n_jobs: int = -1) -> None:
     for name, cells in {"choice_laboratory": CHOICE_CELLS, "mask_laboratory": MASK_CELLS}.items():
         questions = []
         for cell_name, cell in cells.items():
-            question = {"cell": cell_name, "change": identity(cell.change)}
+            question = {"cell": cell_name, "change": code_of(cell.change)}
             for seed in cell.seeds:
                 config = replace(cell.config, seed=seed)
                 arguments = cell_name, config, cell.change

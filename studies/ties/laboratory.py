@@ -39,7 +39,7 @@ def mirrored_load(rng: np.random.Generator) -> Load:
 def mirror_loads(run: Training) -> None:
     """Fill the containers with loads whose left and right are exchanged."""
     run.rollout.envs.unwrapped.stack = mirrored_load
-    run.rollout._see(*run.rollout.envs.reset(seed=run.config.seeds()[0]))
+    run.rollout._observe(*run.rollout.envs.reset(seed=run.config.seeds()[0]))
 
 
 def _ties(change: Callable[[Training], None], mask: bool) -> Cell:

@@ -16,6 +16,7 @@ from studies.seamless.training import SEAMLESS
 from unload.agent.evaluation import evaluate
 from unload.env.equalization import equalize
 from unload.env.observation import POSITION_NOISE, drift, nearest, scale
+from unload.load.boxes import ABOVE
 from unload.load.substacks import stack_load
 
 NOISE = {"order": 0.0, "noise": POSITION_NOISE}  # m, by how ties are broken
@@ -45,7 +46,7 @@ def told_by_rank(load_seed: int, ties: str) -> dict:
     ]
     along_x = np.full(len(load), np.nan)
     along_x[seen] = ranks[:, 0]
-    below, above = (along_x[each] for each in load.covers)
+    below, above = (along_x[each] for each in load.contacts.pairs(ABOVE))
     return {
         "load": load_seed, "ties": ties, "spearman": float(np.mean(found)),
         "pairs": int(np.isfinite(below + above).sum()), "upper": int((above < below).sum()),

@@ -86,7 +86,7 @@ def kill_run(config: TrainConfig, folder: Path, picks: int) -> None:
     def run():
         torch.set_num_threads(1)  # OpenMP's threads do not live in a fork
         training.CHECKPOINT_INTERVAL = 0
-        train(config, folder, progress=False, stack=few_walls, callback=kill)
+        train(config, folder, progress=False, stack=few_walls, callback=kill, same_code=True)
 
     process = multiprocessing.get_context("fork").Process(target=run, daemon=True)
     process.start()

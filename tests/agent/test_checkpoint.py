@@ -4,7 +4,6 @@ import errno
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -24,7 +23,7 @@ def test_a_killed_run_goes_on_with_the_same_bits(tmp_path):
     for picks in (60, 160):  # before the memory is full, and after that
         kill_run(config, tmp_path / "killed", picks)
         assert (tmp_path / "killed" / "checkpoint.npz").exists()
-    train(config, tmp_path / "killed", progress=False, stack=few_walls)
+    train(config, tmp_path / "killed", progress=False, stack=few_walls, same_code=True)
     assert_same(tmp_path / "straight", tmp_path / "killed")
     assert not (tmp_path / "killed" / "checkpoint.npz").exists()
 
@@ -52,10 +51,10 @@ def test_a_run_of_another_configuration_stack_or_change_is_refused(tmp_path, fin
     for other, given, message in (
         ({"seed": 5, "batch_size": 8}, {}, r"seed \(0, not 5\), batch_size \(16, not 8\);"),
         ({}, {"stack": stack_load}, r"stack \(None, not 'unload.load.substacks.stack_load'\)"),
-        ({}, {"change": metres}, r"change \(None, not 'tests.agent.runs.metres \w+'\)"),
+        ({}, {"change": metres}, r"change \(None, not 'tests.agent.runs.metres'\)"),
     ):
         with pytest.raises(ValueError, match=f"another configuration: {message}"):
-            train(replace(config, **other), tmp_path, progress=False, **given)
+            train(replace(config, **other), tmp_path, progress=False, same_code=True, **given)
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.*")} == before
 
 
@@ -69,7 +68,7 @@ def checkpoint(tmp_path) -> Path:
 def test_a_checkpoint_of_another_version_is_refused(checkpoint):
     config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
     for change, message in (
-        ({"format": np.array(9)}, "is not of format 11; if another version of unload"),
+        ({"format": np.array(9)}, "is not of format 12; if another version of unload"),
         ({"version": np.array("0.1.0")}, "is of unload 0.1.0; if another version of unl"),
         ({"settings": np.array("{")}, "JSONDecodeError"),
     ):
@@ -105,14 +104,35 @@ def test_a_damaged_file_of_a_finished_run_is_refused_by_name(tmp_path):
         (tmp_path / name).write_bytes(whole)
 
 
-def test_what_a_killed_process_left_half_written_is_removed(tmp_path):
-    """Of the run's own files; what others write beside them stays."""
-    tail = f"{'0123456789abcdef' * 2}.partial"
-    own = ("policy.safetensors", "curve.csv", "config.json", "checkpoint.npz", "owner")
-    for name in ("notes", *own):
-        (tmp_path / f"{name}.{tail}").write_bytes(b"half")
+def test_a_finished_run_leaves_no_checkpoint_whole_or_half_written(tmp_path):
+    interrupt_run(TrainConfig(**CONTAINER), tmp_path, 3)
+    (tmp_path / "checkpoint.npz.partial").write_bytes(b"half")
     train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-    assert [*tmp_path.glob("*.partial")] == [tmp_path / f"notes.{tail}"]
+    assert not [*tmp_path.glob("checkpoint*")]
+
+
+def test_a_full_disk_leaves_the_last_checkpoint_from_which_the_run_goes_on(tmp_path, monkeypatch):
+    config = TrainConfig(**CONTAINER)
+    train(config, tmp_path / "straight", progress=False)
+    interrupt_run(config, tmp_path / "full", 3)
+    whole = (tmp_path / "full/checkpoint.npz").read_bytes()
+
+    def fill(file, **arrays):
+        file.write(b"half of the n")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as full:
+        full.setattr("numpy.savez", fill)
+        with pytest.raises(OSError, match="cannot write this file: No space left .*checkpoint.n"):
+            train(config, tmp_path / "full", progress=False, callback=stop)
+    assert (tmp_path / "full/checkpoint.npz").read_bytes() == whole
+    assert not [*tmp_path.glob("full/*.partial")]
+    train(config, tmp_path / "full", progress=False)
+    assert_same(tmp_path / "straight", tmp_path / "full")
+
+
+def stop(point):
+    raise RuntimeError("a callback has failed")
 
 
 def named(run, by: float) -> None:
@@ -125,19 +145,20 @@ def test_numbers_that_python_holds_equal_are_told_apart(tmp_path, by, other):
     config = TrainConfig(**CONTAINER)
     train(config, tmp_path, progress=False, change=partial(named, by=by))
     with pytest.raises(ValueError, match="holds a run of another configuration: change"):
-        train(config, tmp_path, progress=False, change=partial(named, by=other))
-    train(config, tmp_path, progress=False, change=partial(named, by=by))
+        train(config, tmp_path, progress=False, same_code=True, change=partial(named, by=other))
+    train(config, tmp_path, progress=False, same_code=True, change=partial(named, by=by))
 
 
-def test_a_disk_without_room_is_refused_before_training(tmp_path, monkeypatch):
-    """Two versions of the checkpoint must fit, one of which may be there already."""
-    config, wider = (TrainConfig(**CONTAINER | {"replay_size": size}) for size in (100, 200))
-    interrupt_run(config, tmp_path, 40)  # the memory is full
-    there = (tmp_path / "checkpoint.npz").stat().st_size
-    for free, run, folder in ((there // 2, config, tmp_path), (2 * there, wider, tmp_path / "2")):
-        monkeypatch.setattr("shutil.disk_usage", lambda path, free=free: Mock(free=free))
-        with pytest.raises(OSError, match="GB for checkpoints; expected .* that repl") as full:
-            train(run, folder, progress=False)
-        assert full.value.errno == errno.ENOSPC
-    monkeypatch.setattr("shutil.disk_usage", lambda path: Mock(free=there))
-    train(config, tmp_path, progress=False)
+@pytest.mark.parametrize("finished", [True, False])
+def test_a_run_of_own_functions_goes_on_only_where_the_caller_says_that_they_are_the_same(
+    tmp_path, finished
+):
+    config, own = TrainConfig(**CONTAINER), {"change": metres, "stack": few_walls}
+    if finished:
+        train(config, tmp_path, progress=False, **own)
+    else:
+        interrupt_run(config, tmp_path, 3, **own)
+    with pytest.raises(ValueError, match="its own stack and change, whose code is not kept"):
+        train(config, tmp_path, progress=False, **own)
+    train(config, tmp_path, progress=False, same_code=True, **own)
+    assert (tmp_path / "policy.safetensors").exists()

@@ -14,7 +14,6 @@ from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, train
 from unload.agent.checkpoint import RunFolder
 from unload.agent.curve import Curve, Point
-from unload.agent.identity import identity
 from unload.agent.training import Training, warn_of_other_bits
 from unload.env.vector import ContainerVectorEnv
 from unload.physics.table import LiftTable
@@ -27,7 +26,7 @@ def own_network(n_features, generator):
 
 
 HIGHEST = TrainConfig(**RUNS["highest item"])
-LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock", "owner"}
+LEFT = {"policy.safetensors", "curve.csv", "config.json", "lock"}
 
 
 @pytest.mark.parametrize("fields", RUNS.values(), ids=RUNS)
@@ -84,7 +83,7 @@ def test_every_run_is_gone_on_with(tmp_path, fields):
     try:
         runs.interrupt_run(config, tmp_path / "broken", 23, signal.SIGTERM)
         with at_step(28, lambda: pytest.fail("it has begun anew")):
-            train(config, tmp_path / "broken", progress=False)
+            train(config, tmp_path / "broken", progress=False, same_code=True)
         network = None if config.network == "peq" else own_network(4, None)
         loaded = load_policy(tmp_path / "broken" / "policy.safetensors", network)
         pd.testing.assert_frame_equal(evaluate(loaded, 1, max_picks=20), table)
@@ -103,8 +102,8 @@ def test_a_reward_of_ones_own_gets_the_distance():
     for _ in range(20):
         run.step()
     card = run.policy().card
-    assert card["configuration"]["network"] == identity(own_network)
-    assert card["change"] == identity(metres)
+    assert card["configuration"]["network"] == f"{__name__}.own_network"
+    assert card["change"] == "tests.agent.runs.metres"
     learned = run.replay.arrays["rewards"][:80].reshape(4, 20)  # of the four points so far
     assert (learned >= 0).all() and len(np.unique(learned)) > 1
     successes = run.curve.table()["success_rate"].tolist()
@@ -129,7 +128,7 @@ def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     given = {
         "config": TrainConfig(**CONTAINER | {"picks": 40}), "progress": False, "lifts": lifts,
         "stack": lambda rng: own_load(rng, "continuous sizes"),
-        "callback": lambda point: kept.append(len(LiftTable.load(lifts))),
+        "callback": lambda point: kept.append(len(LiftTable.load(lifts))), "same_code": True,
     }  # fmt: skip
     for name in ("first", "second"):
         table = LiftTable()
@@ -168,7 +167,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
     message = r"^after (16|20|24) picks: .* (not finite|finite value); expected"
     with pytest.raises(FloatingPointError, match=message):
         train(config, tmp_path, progress=False)
-    left = {"checkpoint.npz", "curve.csv", "lock", "owner"}
+    left = {"checkpoint.npz", "curve.csv", "lock"}
     assert {path.name for path in tmp_path.iterdir()} <= left
     stored = files.read_arrays(tmp_path / "checkpoint.npz")
     assert all(np.isfinite(array).all() for name, array in stored.items() if "network" in name)
@@ -179,7 +178,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
     [
         ({"config": {}}, TypeError, "config is {}; expected an unload.TrainConfig"),
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
-        ({"change": None}, TypeError, "change is None; expected a function of a Training"),
+        ({"change": 3}, TypeError, "change is 3; expected a function of a Training"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
         ({"lifts": "run/checkpoint.npz"}, ValueError, "lifts is 'run/checkpoint.npz', a file of"),
         ({"lifts": "run/../run/config.json"}, ValueError, "lifts is .*, a file of the run; expec"),
@@ -215,7 +214,7 @@ def test_a_pipe_or_a_link_to_a_file_of_the_run_is_refused(tmp_path):
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
-    message = f"in use by process {os.getpid()}"
+    message = "in use by another process"
     with files.locked(tmp_path), pytest.raises(RuntimeError, match=message):
         train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
@@ -327,7 +326,7 @@ def test_weights_that_a_callback_spoils_are_not_kept(tmp_path, stop):
 
     with pytest.raises(FloatingPointError, match="scorer.bias is not finite"):
         train(TrainConfig(**CONTAINER), tmp_path, False, callback=callback, change=started.append)
-    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock", "owner"}
+    assert {path.name for path in tmp_path.iterdir()} <= {"curve.csv", "lock"}
     assert started[0].rollout.envs.closed
 
 

@@ -6,8 +6,7 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from tests.env.plain import PlainContainer, PlainHighestItem
-from unload import Load, stack_load
+from unload import Load, plain, stack_load
 from unload.env import observation
 
 CONTAINER, HIGHEST = "unload/Container-v0", "unload/HighestItem-v0"
@@ -28,9 +27,9 @@ def make_env(env_id: str = CONTAINER, **kwargs) -> gymnasium.Env:
 
 def make_pair(env_id: str, num_envs: int, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs):
     """The array environment, and plain ones side by side in Gymnasium's loop."""
-    plain = partial(PlainContainer if env_id == CONTAINER else PlainHighestItem, **kwargs)
+    single = partial(plain.Container if env_id == CONTAINER else plain.HighestItem, **kwargs)
     array = gymnasium.make_vec(env_id, num_envs, autoreset_mode=autoreset_mode, **kwargs)
-    return array, SyncVectorEnv([plain] * num_envs, autoreset_mode=autoreset_mode)
+    return array, SyncVectorEnv([single] * num_envs, autoreset_mode=autoreset_mode)
 
 
 def assert_same(one, other) -> None:

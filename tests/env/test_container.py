@@ -7,8 +7,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from tests.env.comparing import CONTAINER, HIGHEST, assert_same, few_items, make_env
-from tests.env.plain import PlainContainer, PlainHighestItem
-from unload import ContainerEnv
+from unload import ContainerEnv, plain
 from unload.env import observation
 from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
@@ -35,25 +34,25 @@ def test_a_single_environment_is_the_plain_one(env_id, rng):
     container = env_id == CONTAINER
     own = {"stack": lambda rng: few_items(rng, 140)} if container else {}
     env = make_env(env_id, max_picks=150, **own).unwrapped
-    plain = (PlainContainer if container else PlainHighestItem)(max_picks=150, **own)
+    page = (plain.Container if container else plain.HighestItem)(max_picks=150, **own)
     result = env.reset(seed=3)
-    assert_same(result, plain.reset(seed=3))
+    assert_same(result, page.reset(seed=3))
     ended = False
     while not ended:
         rows = (result[0][:, 2].argmax(), rng.integers(128))
         row = rows[rng.random() < 0.2]  # as an array, as Stable-Baselines3's predict gives it
         result = env.step(np.array(row))
-        assert_same(result, plain.step(row))
+        assert_same(result, page.step(row))
         assert (env.action_masks() == result[-1]["action_mask"]).all()
         if container:
-            assert_same(env.visible, plain.visible)
-            assert_same(env.observed_positions(), plain.positions)
-            assert_same(env.physics.present, plain.present)
+            assert_same(env.visible, page.visible)
+            assert_same(env.observed_positions(), page.positions)
+            assert_same(env.physics.present, page.present)
         ended = result[2] or result[3]
     with pytest.raises(ResetNeeded, match="the episode is finished; call reset first"):
         env.step(0)
-    assert_same(env.reset(), plain.reset())
-    assert env.np_random.random() == plain.np_random.random()
+    assert_same(env.reset(), page.reset())
+    assert env.np_random.random() == page.np_random.random()
 
 
 def test_positions_are_blurred_and_sunk(full_load):

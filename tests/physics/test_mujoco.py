@@ -42,6 +42,21 @@ def test_floor_and_side_walls_hold_what_they_touch():
         assert abs(mujoco.simulate(Situation(box, 1, floor, sides)) - free) > 0.002
 
 
+def test_a_lift_that_it_cannot_simulate_is_an_error(monkeypatch, tmp_path):
+    """Boxes that fly off, which it says by a warning and a file in the working directory."""
+    engine = pytest.importorskip("mujoco")
+    step = engine.mj_step
+
+    def diverge(model, data, nstep):
+        data.qvel[:] = np.inf
+        step(model, data, nstep=nstep)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(engine, "mj_step", diverge)
+    with pytest.raises(FloatingPointError, match="MuJoCo cannot simulate a lift"):
+        mujoco.simulate(Situation(np.array([[0, 0, 0, 400_000, 400_000, 400_000]]), 1, None, ()))
+
+
 @pytest.mark.pybullet
 def test_it_decides_as_pybullet_does(situations):
     light = [each for each in situations if each.on_top < HELD_DOWN]

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from tests.env.plain import on_top, situation
 from tests.load.walls import KINDS, own_load
 from unload import stack_load
 from unload.load.boxes import Load
 from unload.physics.situation import Surroundings
+from unload.plain import on_top, situation
 
 
 def surroundings(load: Load) -> Surroundings:

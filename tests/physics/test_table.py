@@ -1,11 +1,8 @@
 """Tables of lifts, and what they say without one."""
 
-import errno
-import os
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -146,23 +143,3 @@ def test_a_link_to_a_shared_file_stays_one(tmp_path):
     table_of([2]).exchange(shared)
     table_of([3]).exchange(link)
     assert link.is_symlink() and len(LiftTable.load(shared)) == 3
-
-
-def test_a_full_disk_is_logged_and_the_lifts_stay_in_memory(tmp_path, monkeypatch, caplog):
-    table, path = table_of([1]), tmp_path / "lifts.npz"
-    table_of([2]).exchange(path)
-    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-    monkeypatch.setattr(files, "write_arrays", Mock(side_effect=full))
-    table.exchange(path)
-    assert len(table) == 2 and len(LiftTable.load(path)) == 1
-    assert "lifts are kept in memory only" in caplog.text and str(path) in caplog.text
-    monkeypatch.undo()
-    table.exchange(path)
-    assert len(LiftTable.load(path)) == 2
-
-
-def test_what_a_killed_process_left_of_a_file_is_removed_by_the_next_exchange(tmp_path):
-    left = tmp_path / f"lifts.npz.{'0' * 32}.partial"
-    left.write_bytes(b"half")
-    table_of([1]).exchange(tmp_path / "lifts.npz")
-    assert not left.exists()

@@ -10,7 +10,6 @@ from studies import changes
 from studies.falls.laboratory import CONFIG
 from studies.seamless.jamming import jam, weigh
 from tests.agent.runs import assert_same, at_step, interrupt
-from unload.agent.identity import unchanged
 from unload.agent.training import Training, train
 
 SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
@@ -18,8 +17,7 @@ SMALL = replace(CONFIG, picks=6400, replay_size=2**13, log_interval=10, seed=3)
 
 def run_of(change, steps=3, config=SMALL):
     """A run with a change, and the observations that it has seen, as stored rows."""
-    run = Training(config)
-    change(run)
+    run = Training(config, change=change)
     seen = []
     for _ in range(steps):
         seen.append(run.rollout.observations.copy())
@@ -45,7 +43,7 @@ def remembered(run):
 
 
 def test_height_reward_shapes_what_is_learned_and_not_what_is_seen():
-    plain, seen = run_of(unchanged, steps=1)
+    plain, seen = run_of(None, steps=1)
     shaped, _ = run_of(partial(changes.height_reward, share=0.4), steps=1)
     rewards, learned = (run.replay.arrays["rewards"][:64] for run in (plain, shaped))
     heights = seen[np.arange(64), plain.replay.arrays["actions"][:64], 2]
@@ -57,7 +55,7 @@ def test_height_reward_shapes_what_is_learned_and_not_what_is_seen():
 
 def test_only_what_is_stored_is_changed():
     run, seen = run_of(changes.shuffled)
-    plain, same = run_of(unchanged)
+    plain, same = run_of(None)
     stored = remembered(run)
     assert (seen == same).all()  # exploring alone: the choices do not depend on the weights
     assert (stored[..., 2] == seen[..., 2]).all()
@@ -129,5 +127,5 @@ def test_a_changed_run_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, makes
     train(config, tmp_path / "whole", progress=False, change=change)
     with at_step(60, interrupt), pytest.raises(KeyboardInterrupt):
         train(config, tmp_path / "stopped", progress=False, change=change)
-    train(config, tmp_path / "stopped", progress=False, change=change)
+    train(config, tmp_path / "stopped", progress=False, change=change, same_code=True)
     assert_same(tmp_path / "whole", tmp_path / "stopped")

@@ -4,9 +4,11 @@ import pytest
 import torch
 
 from studies import fingerprint, paths
-from studies.fingerprint import short_runs, training_fingerprint
+from studies.fingerprint import physics_fingerprint, short_runs, training_fingerprint
 from studies.policies.variants import GRIDS
 from unload import PEQNetwork
+from unload.physics.full import FullPhysics
+from unload.physics.local import LocalPhysics
 from unload.support import files
 
 # Folders and files of data/ that rest on no training of the container's agent.
@@ -33,6 +35,17 @@ def test_data_is_of_todays_training():
     differing = {name for name, same in of_today.items() if not same}
     assert of_today
     assert not differing, "made by code that trained otherwise: make it again"
+
+
+def test_other_lifts_are_of_other_physics(monkeypatch):
+    found = {physics_fingerprint()}
+    assert found == {physics_fingerprint.__wrapped__()}
+    for kind in (LocalPhysics, FullPhysics):
+        with monkeypatch.context() as patch:
+            lift = kind.lift
+            patch.setattr(kind, "lift", lambda self, item, lift=lift: 2 * lift(self, item))
+            found.add(physics_fingerprint.__wrapped__())
+    assert len(found) == 3
 
 
 @pytest.mark.slow

@@ -5,6 +5,8 @@ import itertools
 import os
 import weakref
 from dataclasses import replace
+from functools import partial
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -12,12 +14,11 @@ import torch
 from joblib import parallel_config
 
 from studies import grid, paths, sweep
-from studies.changes import shuffled
+from studies.changes import height_reward, shuffled
 from studies.paper import tuning
 from studies.results import read_provenance, read_table
 from tests.agent.runs import assert_same
 from unload.agent.config import TrainConfig
-from unload.agent.identity import unchanged
 from unload.agent.training import train
 from unload.support import files
 
@@ -68,10 +69,10 @@ def test_a_grid_is_read_as_it_was_trained(trained):
 def test_published_runs_are_not_replaced_by_fewer(trained, monkeypatch):
     names = ("some/small.csv", "some/small.safetensors")
     before = [(trained / name).read_bytes() for name in names]
-    message = "would hold 2 finished runs; expected at least as many as the 4"
+    message = "would hold 3 finished runs; expected at least as many as the 4"
     with monkeypatch.context() as patch, pytest.raises(ValueError, match=message):
         patch.setattr(paths, "RUNS", trained / "other")
-        grid.train_grid(SMALL, ["plain"], n_jobs=1)
+        grid.train_grid(SMALL, ["plain", "shuffled"], n_jobs=1)
     assert not (trained / "other").exists()  # refused before hours of training
     grid.train_grid(SMALL, n_jobs=1)  # as many
     assert [(trained / name).read_bytes() for name in names] == before
@@ -117,6 +118,17 @@ def test_runs_equal_single_ones_and_are_kept(configs, tmp_path, capfd):
     assert [path.stat().st_mtime_ns for path in written] == before
 
 
+def test_a_run_of_other_code_is_reported(configs, tmp_path, monkeypatch):
+    """The arguments of a change count, and the file that it stands in."""
+    one, other = (dict.fromkeys(configs, partial(height_reward, share=s)) for s in (0.5, 0.25))
+    for _ in range(2):
+        assert (sweep.run_sweep(configs, tmp_path, 1, one)["error"] == "").all()
+    message = "holds a run that was begun with other code"
+    assert sweep.run_sweep(configs, tmp_path, 1, other)["error"].str.contains(message).all()
+    monkeypatch.setattr("studies.results.getsourcefile", lambda function: __file__)
+    assert sweep.run_sweep(configs, tmp_path, 1, one)["error"].str.contains(message).all()
+
+
 def test_the_memory_of_a_run_is_free_before_the_next_one(configs, tmp_path):
     """Also where a change ties the run in a circle, which reference counts never free."""
     alive = weakref.WeakSet()
@@ -143,10 +155,19 @@ def test_a_run_whose_sweep_was_killed_stops_with_a_checkpoint(configs, tmp_path,
     parents = itertools.chain([1], itertools.repeat(0))  # the sweep, and nobody once it is gone
     with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt, match="was killed"):
         patch.setattr(os, "getppid", lambda: next(parents))
-        sweep._run("run", config, tmp_path / "run", unchanged, sweep=1)
+        sweep._run("run", config, tmp_path / "run", None, sweep=1)
     assert (tmp_path / "run" / "checkpoint.npz").exists()
     sweep.run_sweep({"run": config}, tmp_path, n_jobs=1)
     assert (tmp_path / "run" / "policy.safetensors").exists()
+
+
+def test_a_killed_sweep_is_noticed_on_windows_where_its_number_stays(monkeypatch):
+    monkeypatch.setattr(sweep, "WINDOWS", True)
+    parent = Mock()
+    monkeypatch.setattr(sweep.multiprocessing, "parent_process", lambda: parent)
+    for alive in (True, False):
+        parent.is_alive.return_value = alive
+        assert sweep._orphaned(os.getppid()) is not alive
 
 
 def test_a_run_that_fails_is_reported_and_traced_and_stops_no_other(configs, tmp_path):

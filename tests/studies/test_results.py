@@ -3,6 +3,7 @@
 import subprocess
 from dataclasses import replace
 from functools import partial
+from importlib.util import module_from_spec, spec_from_file_location
 from unittest.mock import Mock
 
 import numpy as np
@@ -33,12 +34,16 @@ def asked() -> Mock:
 
 
 def test_a_result_is_computed_once_per_question(tmp_path, asked):
-    question, value = {"seed": 1, "sizes": (2, 3)}, {"msr": 0.1 + 0.2, "counts": (1, 2)}
+    question = {"seed": 1, "sizes": (2, 3)}
+    value = {"msr": 0.1 + 0.2, "rows": [{"item": np.int64(3), "free": np.True_, "fell": np.nan}]}
+    value |= {"picks": [np.arange(3, dtype=np.int8), np.zeros((2, 0), np.float32)], "none": None}
     first = kept(tmp_path, question, partial(asked, value))
-    assert first.value == value
+    assert str(first.value) == str(value | {"rows": [{"item": 3, "free": True, "fell": np.nan}]})
+    assert [each.dtype for each in first.value["picks"]] == [np.int8, np.float32]
+    assert first.value["picks"][1].shape == (2, 0)
     assert first.record["revision"] == revision() and 0 <= first.record["wall_time_s"] < 60
     same = kept(tmp_path, {"sizes": (2, 3), "seed": 1}, partial(asked, "not computed"))
-    assert same == first and asked.call_count == 1
+    assert str(same) == str(first) and asked.call_count == 1
 
 
 def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
@@ -47,12 +52,70 @@ def test_an_answer_to_another_question_is_not_taken(tmp_path, asked):
     assert asked.call_count == 2  # neither replaces the other
 
 
-def test_a_damaged_answer_is_computed_again(tmp_path, asked):
+def test_an_answer_that_could_not_be_read_back_is_refused(tmp_path):
+    for value in (pd.DataFrame({"a": [1]}), {1, 2}):
+        with pytest.raises(TypeError, match=f"an answer holds a {type(value).__name__}; expected"):
+            kept(tmp_path, {}, lambda value=value: [value])
+    assert not [*tmp_path.glob("*.npz")]
+
+
+def test_no_flipped_bit_of_an_answer_changes_it(tmp_path, asked, capfd):
+    value = {"msr": 0.125, "picks": np.arange(20)}
+    right = kept(tmp_path, {"seed": 1}, partial(asked, value)).value
+    (path,) = tmp_path.glob("*.npz")
+    whole, rng = path.read_bytes(), np.random.default_rng(0)
+    for place in rng.integers(8 * len(whole), size=100):
+        damaged = bytearray(whole)
+        damaged[place // 8] ^= 1 << place % 8
+        path.write_bytes(damaged)
+        assert str(kept(tmp_path, {"seed": 1}, partial(asked, value)).value) == str(right)
+    assert asked.call_count > 50 and "It is computed again" in capfd.readouterr().err
+    path.write_bytes(whole[:-9])
+    assert str(kept(tmp_path, {"seed": 1}, partial(asked, value)).value) == str(right)
+
+
+class Trap:
+    """Makes a file when it is unpickled."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return open, (self.path, "w")
+
+
+def test_a_forged_answer_runs_no_code(tmp_path, asked):
     kept(tmp_path, {"seed": 1}, partial(asked, 1))
-    (path,) = tmp_path.rglob("output.pkl")
-    path.write_bytes(path.read_bytes()[:-9])
+    (path,) = tmp_path.glob("*.npz")
+    np.savez(path, json=np.array([Trap(str(tmp_path / "sprung"))], object))
     assert kept(tmp_path, {"seed": 1}, partial(asked, 1)).value == 1
-    assert asked.call_count == 2
+    assert asked.call_count == 2 and not (tmp_path / "sprung").exists()
+
+
+def test_an_edit_of_what_keeps_answers_deletes_none(tmp_path, asked):
+    for seed in (1, 2):
+        kept(tmp_path / "runs", {"seed": seed}, partial(asked, seed))
+    text, edited = (paths.ROOT / "studies/results.py").read_text("utf-8"), tmp_path / "results.py"
+    text = text.replace('    """The answer to', '    """Edited: the answer to')
+    edited.write_text(text, encoding="utf-8")
+    spec = spec_from_file_location("studies.results", edited)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for seed in (3, 1, 2):
+        assert module.kept(tmp_path / "runs", {"seed": seed}, partial(asked, seed)).value == seed
+    assert asked.call_count == 3
+
+
+def test_an_answer_of_other_physics_is_not_taken(own_data, set_in):
+    def answer():
+        return next(answers)
+
+    answers = iter("ab")
+    set_in(results, physics_fingerprint=lambda: "this", code_of=str)
+    for _ in range(2):
+        assert results.keep_all("some", answer, [({}, ())], 1)[0].value == "a"
+    set_in(results, physics_fingerprint=lambda: "another")
+    assert results.keep_all("some", answer, [({}, ())], 1)[0].value == "b"
 
 
 def test_answers_are_kept_for_the_code_that_gives_them(own_data, capsys):
@@ -67,7 +130,7 @@ def test_answers_are_kept_for_the_code_that_gives_them(own_data, capsys):
         answers = results.keep_all("some", compute, asked, 1)
         assert [each.value.tolist() for each in answers] == ramps
     assert "2/2" in capsys.readouterr().out
-    assert len([*(own_data / "runs/some").rglob("output.pkl")]) == 4
+    assert len([*(own_data / "runs/some").glob("*.npz")]) == 4
 
 
 def test_what_is_published_says_where_it_comes_from(own_data):

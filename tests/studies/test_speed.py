@@ -1,6 +1,5 @@
 """The benchmarks: what they measure is what they say."""
 
-from queue import SimpleQueue
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +10,7 @@ import torch
 import unload
 from studies.policies.sb3 import containers, dqn
 from studies.results import read_provenance, read_table
-from studies.speed import mutants, parts, run
+from studies.speed import parts, run
 from studies.speed.parts import lift_rates, pick_rates, update_times
 from unload.agent import learner
 from unload.fast import fused
@@ -102,36 +101,6 @@ def test_the_first_steps_of_stable_baselines_do_not_count(set_in):
     set_in(run, containers=lambda config: None, time=SimpleNamespace(perf_counter=clock.__next__))
     set_in(run, dqn=lambda config, envs: SimpleNamespace(learn=learn))
     assert run._their_rate(10 * config.num_envs, 1) == pytest.approx(100)
-
-
-CODE = """
-def total(a, b):
-    return a + b
-
-def refuse(a: list[1]):
-    "1 < 2"
-    raise ValueError(1 + 2)
-
-UNUSED = 1 * 2
-"""
-
-
-def test_mutants_that_no_test_notices_are_counted(tmp_path, set_in):
-    """Annotations, texts and raised errors are not changed; one that subtracts is noticed."""
-    room, path = "unload/sums", tmp_path / "unload/sums/sums.py"
-    path.parent.mkdir(parents=True)
-    path.write_text(CODE, encoding="utf-8")
-
-    def killed_by(trees, room, path, code, limit) -> str:
-        return "test_total" if code and b"a - b" in code else ""
-
-    set_in(mutants, ROOT=tmp_path, MODULES=[path], killed_by=killed_by)
-    assert mutants.measure(room, 9, 0, SimpleQueue()).to_numpy().tolist() == [
-        [room, "sums", 3, "a + b -> a - b", "test_total"],
-        [room, "sums", 9, "1 * 2 -> 1 / 2", ""],
-        [room, "sums", 9, "1 -> 3", ""],
-        [room, "sums", 9, "2 -> 5", ""],
-    ]
 
 
 def test_speeds_are_printed_and_published_with_ratios(own_data, set_in, capsys):

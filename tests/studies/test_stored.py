@@ -83,4 +83,4 @@ def test_a_notebook_with_marked_cells_says_so_in_its_first():
         first, *others = sources(path)
         marked = any(source.startswith(stored.MARK) for source in others)
         assert marked == ("\nstored.show_where_missing()" in first), path
-    assert len(MARKED["10_lifting"]) == 9
+    assert len(MARKED["10_lifting"]) == 7

@@ -4,10 +4,9 @@ import os
 import re
 import subprocess
 import sys
-from contextlib import nullcontext
+import time
 from io import BytesIO
 from pathlib import Path
-from unittest.mock import DEFAULT, Mock
 
 import numpy as np
 import pytest
@@ -28,8 +27,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
 
     def write(file):
         file.write(b"half of the n")
-        (partial,) = {*tmp_path.iterdir()} - {path}
-        assert re.fullmatch(r"file\.[0-9a-f]{32}\.partial", partial.name)
+        assert {*tmp_path.iterdir()} == {path, tmp_path / "file.partial"}
         assert path.read_text(encoding="utf-8") == "old"
         raise OSError(errno.ENOSPC, "disk full")
 
@@ -38,20 +36,11 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     assert path.read_text(encoding="utf-8") == "old" and [path] == [*tmp_path.iterdir()]
 
 
-def test_what_a_killed_writer_left_is_removed_when_it_is_old(tmp_path):
-    """At once by ``remove_partial``; a young one may be another writer's, and the rest is not."""
-    path = tmp_path / "file[1].npz"
-    old, young = (tmp_path / f"{path.name}.{digit * 32}.partial" for digit in "01")
-    others = {tmp_path / f"x{old.name}", tmp_path / f"{path.name}.0123.partial"}
-    for each in (old, young, *others):
-        each.touch()
-        os.utime(each, (1, 1))
-    young.touch()
-    files.write_text(path, "whole")
-    assert {*tmp_path.iterdir()} == {path, young, *others}
-    os.utime(young, (2**33, 2**33))  # of when the clock was ahead
-    files.remove_partial(path)
-    assert {*tmp_path.iterdir()} == {path, *others}
+def test_what_a_killed_writer_left_is_overwritten(tmp_path):
+    (tmp_path / "file.partial").write_bytes(b"half of something longer")
+    files.write_text(tmp_path / "file", "whole")
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "whole"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
@@ -130,8 +119,7 @@ def test_digest_is_that_of_the_content(tmp_path):
         files.check_digest(path, digest)
 
 
-def test_a_second_process_is_told_whose_the_folder_is_or_waits(tmp_path, monkeypatch, caplog):
-    """After a while it says for whom, and goes on when the folder is free."""
+def test_a_second_process_is_refused_or_waits(tmp_path):
     script = """if True:
         import sys, time
         import files
@@ -149,25 +137,24 @@ def test_a_second_process_is_told_whose_the_folder_is_or_waits(tmp_path, monkeyp
     with process as owner:
         assert owner.stdout.readline() == "locked\n"
         for _ in range(2):  # the lock survives the first refusal
-            message = f"{folder} is in use by process {owner.pid} on .+ since 20.*; wait, or take"
+            message = f"{folder} is in use by another process; wait, or take another folder"
             with pytest.raises(RuntimeError, match=message), files.locked(folder):
                 pytest.fail("two processes hold one lock")
+        start = time.monotonic()
         owner.stdin.write("\n")
         owner.stdin.flush()
-        monkeypatch.setattr(files, "PATIENCE", 0.1)
         with files.locked(folder, wait=True):
-            assert caplog.messages[0].startswith(f"waiting for process {owner.pid} on ")
+            assert time.monotonic() - start > 0.9
 
 
 @pytest.mark.needs("fork")
 def test_the_package_can_be_imported_where_windows_lacks_something(run_python):
     script = """if True:
-        import errno, importlib, json, os, pathlib, pkgutil, signal, sys
+        import importlib, json, os, pathlib, pkgutil, signal, sys
 
         for name in ("fcntl", "grp", "pwd", "resource", "termios"):
             sys.modules[name] = None  # an ImportError
         for module, names in (
-            (errno, ["EDQUOT"]),
             (os, ["O_NOFOLLOW", "fork", "sched_getaffinity"]),
             (signal, ["SIGALRM", "SIGKILL", "SIGPIPE"]),
         ):
@@ -190,19 +177,3 @@ def test_the_package_can_be_imported_where_windows_lacks_something(run_python):
     locale = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     printed, _ = run_python(script, ROOT, **locale, MPLBACKEND="Agg")
     assert printed.endswith("True\n")
-
-
-@pytest.mark.parametrize(("system", "written"), [("win32", "new"), ("linux", "old")])
-def test_a_file_that_a_reader_holds_is_replaced_when_it_is_let_go(
-    tmp_path, monkeypatch, system, written
-):
-    """Windows refuses while a spreadsheet holds it open, which is awaited for a second."""
-    path, held = tmp_path / "curve.csv", PermissionError(errno.EACCES, "held by a reader")
-    files.write_text(path, "old")
-    replace = Mock(side_effect=[held, held, DEFAULT], wraps=os.replace)
-    monkeypatch.setattr(files.sys, "platform", system)
-    monkeypatch.setattr(files.os, "replace", replace)
-    refused = pytest.raises(OSError, match="held by a reader")
-    with nullcontext() if written == "new" else refused:
-        files.write_text(path, "new")
-    assert path.read_text(encoding="utf-8") == written and [*tmp_path.iterdir()] == [path]

@@ -1,8 +1,8 @@
 """The masked DQN agent and its training (Sec. II-B, III-G and IV-B).
 
 Read ``policies``, ``learner`` (the update in plain PyTorch), ``dqn`` and ``greedy``; then
-``config``, ``replay``, ``rollout``, ``curve`` and ``training``; what keeps a run: ``state``,
-``checkpoint`` (its folder) and ``identity``; then ``evaluation`` and ``order``. ``unload.fast``
+``config``, ``replay``, ``rollout``, ``curve`` and ``training``; what keeps a run: ``state`` and
+``checkpoint`` (its folder); then ``evaluation``. ``unload.fast``
 holds the compiled twin of the learner.
 
 An argument that is not as described is a TypeError or ValueError that names it; values or weights

@@ -1,27 +1,24 @@
 """The folder of a training run: checkpoint, policy, curve and configuration."""
 
-import errno
 import json
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from unload import task
-from unload.agent.config import ENVS, TrainConfig
+from unload.agent.config import ENVS, TrainConfig, plain
 from unload.agent.greedy import Greedy, load_policy, save_policy
-from unload.agent.identity import identity, unchanged
-from unload.agent.state import gather, put_back
+from unload.agent.state import gather, kinds, put_back
 from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 11  # of the checkpoints
+FORMAT = 12  # of the checkpoints
 OTHER = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 
@@ -39,14 +36,13 @@ class TrainResult(NamedTuple):
 
 
 def settings_of_run(
-    config: TrainConfig, stack: Callable | None = None, change: Callable = unchanged
+    config: TrainConfig, stack: Callable | None = None, change: Callable | None = None
 ) -> dict:
-    """What a run is: its configuration, and the identity of its change and stack, None without.
+    """What a run is: its configuration, and the names of its change and stack, None without.
 
     Also the engine, where lifts are decided by another one than PyBullet.
     """
-    change = None if change is unchanged else identity(change)
-    own = {"change": change, "stack": None if stack is None else identity(stack)}
+    own = plain({"change": change, "stack": stack})
     other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}
     return config.plain() | own | other
 
@@ -68,6 +64,7 @@ class RunFolder:
         self.path = path.absolute()
         self._paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
         self._checkpoint_file, self.policy, self._curve_file, self._config_file = self._paths
+        self._fresh: dict[str, Any] = {}  # what a run of it holds before its first step
 
     def check_foreign(self, name: str, value: object) -> Path:
         """Return the absolute path of a file that is an argument; raise if it is one of these."""
@@ -76,40 +73,25 @@ class RunFolder:
             raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
         return file
 
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Lock the folder, and remove what a killed process has left half written of its files."""
-        with files.locked(self.path):
-            for name in FILES:
-                files.remove_partial(self.path / name)
-            yield
-
     @property
     def finished(self) -> bool:
         """Whether the run has ended, and its policy is whole."""
         return self._config_file.exists()
 
-    def check_room(self, run) -> None:
-        """Raise OSError unless the disk has room for the checkpoints of a fresh ``Training``.
-
-        There are two versions of them while one replaces the other, with a full replay memory.
-        """
-        arrays = [*gather(run).values(), *run.replay.arrays.values()]
-        needed = 2 * sum(array.nbytes for array in arrays)
-        there = self._checkpoint_file.stat().st_size if self._checkpoint_file.exists() else 0
-        room = shutil.disk_usage(self.path).free + there
-        if room < needed:
-            reason = (
-                f"the disk has {room / 1e9:.2f} GB for checkpoints; expected {needed / 1e9:.2f} GB,"
-                " for one and the next one that replaces it"
+    def check_code(self, **functions: object) -> None:
+        """Refuse to go on with a run of the caller's functions, of which only names are kept."""
+        own = [name for name, value in functions.items() if callable(value)]
+        if own and (self.finished or self._checkpoint_file.exists()):
+            raise ValueError(
+                f"run_dir {str(self.path)!r} holds a run with its own {' and '.join(own)}, whose "
+                "code is not kept; expected same_code=True if it is the same, or another folder"
             )
-            raise OSError(errno.ENOSPC, reason, str(self.path))
 
     def save(self, run) -> None:
         """Write a checkpoint of a ``Training``."""
         marks = {"format": FORMAT, "version": task.VERSION, "settings": json.dumps(run.settings)}
         arrays = {name: np.array(mark) for name, mark in marks.items()}
-        files.write_arrays(self._checkpoint_file, gather(run) | arrays)
+        files.write_arrays(self._checkpoint_file, gather(run, self._fresh) | arrays)
 
     def save_curve(self, run) -> None:
         """Write the learning curve of a ``Training`` so far."""
@@ -117,7 +99,8 @@ class RunFolder:
         files.write_text(self._curve_file, table.to_csv(index=False, lineterminator="\n"))
 
     def restore(self, run) -> None:
-        """Let a ``Training`` go on from the checkpoint, if there is one."""
+        """Let a fresh ``Training`` go on from the checkpoint, if there is one."""
+        self._fresh = kinds(run)
         if not self._checkpoint_file.exists():
             return
         try:
@@ -150,8 +133,10 @@ class RunFolder:
         self._check_same(stored, settings)
         for path in (self.policy, self._curve_file):
             files.check_digest(path, marks.get(path.name))
-        with suppress(OSError):  # it is gone already, or the folder is read-only
-            self._checkpoint_file.unlink()
+        # A finished run needs neither its checkpoint nor what a killed process wrote of one.
+        for path in (self._checkpoint_file, files.partial_of(self._checkpoint_file)):
+            with suppress(OSError):  # it is gone already, or the folder is read-only
+                path.unlink()
         network = make_network(config.network, config.n_features)
         return TrainResult(load_policy(self.policy, network), pd.read_csv(self._curve_file))
 

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any
 
 import gymnasium
 import numpy as np
 
-from unload.agent.identity import identity
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.factory import NETWORKS
@@ -22,6 +23,29 @@ HIGHEST = {
     "learning_rate": 1e37,  # Adam's steps have to fit into float32
 }  # fmt: skip
 EPSILON_FALLS = 0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON can hold it: a function by its qualified name.
+
+    A ``partial`` is its function and its arguments; anything else that JSON cannot hold is the name
+    of its type.
+    """
+    if isinstance(value, partial):
+        parts = {"function": value.func, "arguments": value.args, "keywords": value.keywords}
+        return plain(parts)
+    if isinstance(value, dict):
+        return {str(name): plain(entry) for name, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, float) and not np.isfinite(value):
+        return str(value)  # which strict JSON has no number for
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    named = value if hasattr(value, "__qualname__") else type(value)
+    return f"{named.__module__}.{named.__qualname__}"
 
 
 def _registered(env: object) -> str:
@@ -124,8 +148,8 @@ class TrainConfig:
                 raise ValueError(f"{name} is {getattr(self, name)}; expected {wanted}")
 
     def plain(self) -> dict:
-        """Return the fields by name as JSON can hold them, of a function its identity."""
-        return {field.name: identity(getattr(self, field.name)) for field in fields(self)}
+        """Return the fields as JSON can hold them, a function by its qualified name."""
+        return plain({field.name: getattr(self, field.name) for field in fields(self)})
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""

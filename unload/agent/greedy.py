@@ -127,7 +127,7 @@ def load_policy(path: str | Path, network: torch.nn.Module | None = None) -> Gre
 
 
 def settings_of(policy: Greedy) -> dict:
-    """What ``policy_of`` needs of a policy besides its weights, as JSON can hold it."""
+    """Settings from which ``policy_of`` makes a policy again, besides its weights, for JSON."""
     return {
         "network": _kind(policy.network),
         "n_features": getattr(policy.network, "n_features", None),

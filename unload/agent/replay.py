@@ -2,15 +2,12 @@
 
 import numpy as np
 
-from unload import task
-from unload.agent.config import TrainConfig
-
 
 class ReplayBuffer:
     """The last ``size`` picks, in arrays.
 
     What follows a pick is kept only if it is needed: with gamma = 0 the target is the
-    reward alone (Sec. III-E).
+    reward alone (Sec. III-E). The machine gives the arrays room as they are filled.
 
     Args:
         size: number of picks kept; older ones are overwritten.
@@ -39,11 +36,6 @@ class ReplayBuffer:
                 "next_masks": np.empty((size, items), bool),
                 "terminations": np.empty(size, bool),
             }
-
-    @classmethod
-    def of(cls, config: TrainConfig) -> "ReplayBuffer":
-        """The memory of a run, still empty; the machine gives it room as it is filled."""
-        return cls(min(config.replay_size, config.picks), task.N_VISIBLE, config.gamma > 0)
 
     def __len__(self) -> int:
         return min(self.total, self.size)

@@ -53,9 +53,9 @@ class Rollout:
         ):
             if space != wanted:
                 raise ValueError(f"env={config.env!r} has {space}; expected {wanted}")
-        self._see(*self.envs.reset(seed=config.seeds()[0]))
+        self._observe(*self.envs.reset(seed=config.seeds()[0]))
 
-    def _see(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
+    def _observe(self, observations: np.ndarray, infos: dict[str, np.ndarray]) -> None:
         self.observations, self.masks = observations, infos["action_mask"]
         self._present = infos["item_mask"].astype(bool)
         masks = self.masks.astype(bool)
@@ -105,7 +105,7 @@ class Rollout:
                 "terminations": terminations,
             }
         self.steps += 1
-        self._see(following, infos)
+        self._observe(following, infos)
         return picks, distances
 
     def close(self) -> None:

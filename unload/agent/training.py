@@ -16,18 +16,18 @@ import numpy as np
 import torch
 from tqdm import tqdm
 
+from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult, settings_of_run
 from unload.agent.config import ENVS, TrainConfig
 from unload.agent.curve import Curve, Point
 from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy
-from unload.agent.identity import unchanged
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
 from unload.physics.table import shared_table
-from unload.support import checks
+from unload.support import checks, files
 
 CHECKPOINT_INTERVAL = 600.0  # seconds between two of them
 CURVE_INTERVAL = 1.0  # seconds between two versions of it on disk
@@ -52,7 +52,7 @@ class Training:
     Args:
         config: of the run.
         stack: makes the loads, see ``unload.train``.
-        change: is called with this, once it is complete, see ``train``.
+        change: is called with the finished ``Training``, see ``train``; nothing if None.
 
     Attributes:
         settings: what the run is, as JSON can hold it.
@@ -68,7 +68,7 @@ class Training:
         self,
         config: TrainConfig,
         stack: Callable | None = None,
-        change: Callable[["Training"], None] = unchanged,
+        change: Callable[["Training"], None] | None = None,
     ) -> None:
         self.config, self.settings = config, settings_of_run(config, stack, change)
         warn_of_other_bits(torch.backends.cpu.get_cpu_capability())
@@ -77,11 +77,13 @@ class Training:
         generator = torch.Generator().manual_seed(weights_seed)
         network = make_network(config.network, config.n_features, generator)
         self.agent = DQN(network, config.learning_rate, config.gamma, config.beta)
-        self.replay = ReplayBuffer.of(config)
+        size = min(config.replay_size, config.picks)
+        self.replay = ReplayBuffer(size, task.N_VISIBLE, next_state=config.gamma > 0)
         self.curve = Curve()
         self.rollout = Rollout(config, stack)
         self.kept: dict[str, np.ndarray] = {}
-        change(self)
+        if change is not None:
+            change(self)
 
     def step(self) -> None:
         """Pick once in every environment, and learn from the picks before."""
@@ -147,13 +149,17 @@ def train(
     stack: Callable[[np.random.Generator], Load] | None = None,
     lifts: str | Path | None = None,
     callback: Callable[[dict[str, float]], bool | None] | None = None,
-    change: Callable[[Training], None] = unchanged,
+    change: Callable[[Training], None] | None = None,
+    same_code: bool = False,
 ) -> TrainResult:
     """Train an agent; resume where ``run_dir`` holds a checkpoint of the same run.
 
     A run that was stopped or killed and resumed gives the same weights and curve, bit for bit, as
     an uninterrupted one. A finished run is not repeated. The book's page "Training runs" says
-    what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do.
+    what stands in ``run_dir``, on which machines bits agree, and what ``change`` may do. State of
+    an environment, network or change of yours that a checkpoint could not put back is refused at
+    the first one, by name: keep it in arrays of ``run.kept``, or give its owner methods ``state()``
+    and ``load_state(arrays)``.
 
     Lifts by a physics of your own are a task of your own: a run knows it by the id under which it
     is registered, and another version of it needs another id::
@@ -176,19 +182,22 @@ def train(
         config: what to train.
         run_dir: folder of the run alone: its checkpoint, and what it leaves.
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
-        stack: makes the loads, as in ``ContainerEnv``, of boxes of 1 kg; the paper's if None.
+        stack: makes the loads, as in ``ContainerEnv``; the paper's if None.
         lifts: ``.npz`` file of lifts that were simulated, for runs, also side by side, to share.
         callback: is called with each new point of the curve, a dict by the columns of
             ``TrainResult.curve``. If it returns False, the run ends there, and is finished.
         change: is called with the ``Training`` before its first pick, and replaces methods.
+        same_code: say that ``stack``, ``change`` and ``network`` are the functions that the run in
+            ``run_dir`` was begun with. Only their names are kept, so that without it such a run is
+            neither resumed nor read back.
 
     Returns:
         Policy and curve, read back from ``run_dir``.
 
     Raises:
         TypeError, ValueError: an argument is not as described; ``run_dir`` holds another run, or
-            a damaged file.
-        OSError: a file cannot be read or written, or there is no room for checkpoints.
+            a damaged file; a checkpoint cannot hold the run's state.
+        OSError: a file cannot be read or written.
         RuntimeError: another process is training in ``run_dir``.
         FloatingPointError: the loss or a weight is no longer finite.
         KeyboardInterrupt: after Ctrl-C or SIGTERM, and a checkpoint; a second one stops at once.
@@ -198,7 +207,7 @@ def train(
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
     if callback is not None and not callable(callback):
         raise TypeError(f"callback is {callback!r}; expected a function of a dict")
-    if not callable(change):
+    if change is not None and not callable(change):
         raise TypeError(f"change is {change!r}; expected a function of a Training")
     for name, value in (("stack", stack), ("lifts", lifts)):
         if value is not None and config.env == ENVS[1]:
@@ -206,6 +215,8 @@ def train(
     if stack is not None:
         check_stack(stack)
     folder = RunFolder(run_dir)
+    if not checks.boolean("same_code", same_code):
+        folder.check_code(stack=stack, change=change, network=config.network)
     table = None if lifts is None else folder.check_foreign("lifts", lifts)
 
     def keep_lifts() -> None:
@@ -218,12 +229,11 @@ def train(
     if folder.finished:  # to be read only, perhaps where nothing can be written
         return folder.result(config, settings_of_run(config, stack, change))
     keep_lifts()
-    with folder.locked(), deferred_signals() as signals:
+    with files.locked(folder.path), deferred_signals() as signals:
         if folder.finished:  # by another process meanwhile
             return folder.result(config, settings_of_run(config, stack, change))
         run = Training(config, stack, change)
         try:
-            folder.check_room(run)
             folder.restore(run)
             with closing(_points(run, folder, keep_lifts, progress, signals)) as points:
                 for point in points:

@@ -44,7 +44,7 @@ def check_options(options: dict | None, known: tuple[str, ...]) -> dict[str, Loa
 
 
 class InOrder:
-    """What refuses calls out of order.
+    """Raises an error if methods are called out of order.
 
     Subclasses set ``_state`` to ``"not started"``, ``"running"``, ``"finished"``, ``"closed"``, and
     while they change an episode to ``"broken off"``, which it stays if that raises an error.

@@ -51,8 +51,8 @@ class ContainerEnv(PickingEnv):
     +1 if the item was unloaded, -1 if not.
 
     ## Starting state
-    A new random load from ``stack``, each position blurred once by the drift that a full
-    simulation shows (0.5 mm, and 1 mm down).
+    A new random load from ``stack``, each position with noise, drawn once, as large as the
+    drift of a full simulation (0.5 mm, and 1 mm down).
 
     ## Episode end
     Termination when the last box has been unloaded; nothing is left to pick then, and every
@@ -84,13 +84,14 @@ class ContainerEnv(PickingEnv):
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
-        position_noise: standard deviation of the blur in m, at most 10; 0 also switches off
+        position_noise: standard deviation of that noise in m, at most 10; 0 also switches off
             the 1 mm down. It applies where the boxes stay where they were put; ``"full"``
             physics that is not restored drifts by itself, and its boxes are seen where
             they are.
         stack: makes a ``Load``, of any number of items and in a container of any size, from a
             ``numpy.random.Generator``. Each box stands on the floor or, within the load's
             ``contact_tolerance``, on another one: across a wider gap it would not hold it down.
+            Boxes that hang over others on which they do not rest need ``"full"`` physics.
         render_mode: ``"rgb_array"`` for pictures, or None.
 
     Attributes:
@@ -167,16 +168,16 @@ class _OneContainer(ContainerVectorEnv):
     def __init__(self, physics: Name | Physics, after_pick: str, settings: dict[str, Any]) -> None:
         super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)
         self.physics = make_physics(physics, after_pick)
-        self._lent = self.physics is physics
+        self._keep_open = self.physics is physics
 
     def observed_positions(self) -> np.ndarray:
-        return self.physics.positions() + self._blur
+        return self.physics.positions() + self._noise
 
-    def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
+    def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:
         self.physics.reset(load)
         self._failed = np.zeros(len(load), bool)
-        self._blur = blur if self.physics.exact else np.zeros_like(blur)
-        self._put_boxes(env, load, self._blur)
+        self._noise = noise if self.physics.exact else np.zeros_like(noise)
+        super()._put_load(env, load, self._noise)
 
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray

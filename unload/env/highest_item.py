@@ -28,13 +28,13 @@ class HighestItemVectorEnv(PickingVectorEnv):
     def _fill(self, envs: np.ndarray, rngs: list[np.random.Generator]) -> None:
         # Each environment draws from a generator of its own.
         shape = len(rngs), task.N_VISIBLE
-        places, offsets = np.empty((*shape, 3)), np.empty((*shape, 3))
+        places, noise = np.empty((*shape, 3)), np.empty((*shape, 3))
         for number, rng in enumerate(rngs):
             places[number] = GRID[rng.integers(len(GRID), size=task.N_VISIBLE)]
-            offsets[number] = drift(task.N_VISIBLE, self.position_noise, rng)
+            noise[number] = drift(task.N_VISIBLE, self.position_noise, rng)
 
         # The rest is done for all environments at once.
-        positions = (places + offsets).reshape(-1, 3)
+        positions = (places + noise).reshape(-1, 3)
         order = observation.distance(positions).reshape(shape).argsort(axis=1, kind="stable")
         rows = order[:, :, np.newaxis]
         seen = np.take_along_axis(scale(positions).reshape(*shape, 3), rows, axis=1)
@@ -66,7 +66,7 @@ class HighestItemEnv(PickingEnv):
     """Choose the item with the highest z among random ones on the grid of a load.
 
     ## Description
-    At each step 128 items are put at random places that a load's items can take, blurred
+    At each step 128 items are put at random places that a load's items can take, with noise
     as in ``unload/Container-v0``. There is no physics: the environment finds
     hyperparameters quickly, for one picking rule that is optimal in the container, too.
 
@@ -80,7 +80,7 @@ class HighestItemEnv(PickingEnv):
     ## Rewards
     +1 if no item's place is higher than that of the chosen one, -1 else. On the grid
     several items, 12 on average, share the greatest height, and each of them counts: the
-    blur is not a matter of the task.
+    noise is not a matter of the task.
 
     ## Starting state
     Random items. Every step shows new ones, whatever was chosen before.

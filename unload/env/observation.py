@@ -59,11 +59,11 @@ def scale(positions: np.ndarray, container: np.ndarray = task.CONTAINER) -> np.n
 
 
 def drift(count: int, position_noise: float, rng: np.random.Generator) -> np.ndarray:
-    """Return random offsets of simulated boxes from their places, (count, 3) float64 in m."""
-    offsets = rng.normal(0, position_noise, (count, 3))
+    """Return position noise, as large as a full simulation's drift, (count, 3) float64 in m."""
+    noise = rng.normal(0, position_noise, (count, 3))
     if position_noise:
-        offsets[:, 2] -= SINK
-    return offsets
+        noise[:, 2] -= SINK
+    return noise
 
 
 def holds_item(observations: np.ndarray) -> np.ndarray:

@@ -1,7 +1,6 @@
 """Many containers in arrays (Sec. III-A, Fig. 2): what ``PickingVectorEnv.step`` asks of them."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +10,7 @@ from unload.env import observation
 from unload.env.base import PickingVectorEnv
 from unload.env.observation import drift, scale
 from unload.fast import containers
-from unload.load.boxes import Load, check_stack, check_stacked
+from unload.load.boxes import Load, check_rests, check_stack, check_stacked
 from unload.load.substacks import stack_load
 from unload.physics.local import LocalPhysics
 from unload.physics.situation import situation_in
@@ -26,8 +25,8 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     Args:
         physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Unless it is a
-            plain ``TablePhysics`` of full force, its ``simulate``, and no other method, is asked
-            about each pick whose outcome neither an earlier failure nor the ceiling decides.
+            plain ``TablePhysics``, its ``simulate``, and no other method, is asked about each pick
+            whose outcome no earlier failure decides.
             Single environments take any ``Physics``, each one of its own:
             ``SyncVectorEnv([lambda: ContainerEnv(Mine())] * num_envs)``.
 
@@ -50,7 +49,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         super().__init__(num_envs, **settings)
         check_stack(stack)
         self._how_observed = self.equalize, self.ties == "average"
-        self.stack, self._lent = stack, isinstance(physics, LocalPhysics)
+        self.stack, self._keep_open = stack, isinstance(physics, LocalPhysics)
         if isinstance(physics, str):
             checks.one_of("physics", physics, ("table",))
             physics = TablePhysics(shared_table())
@@ -58,12 +57,12 @@ class ContainerVectorEnv(PickingVectorEnv):
         self.physics: Any = checks.instance("physics", physics, LocalPhysics, wanted)
         # The lifts that are known; none of a physics without a table.
         self.table = physics.table if isinstance(physics, TablePhysics) else LiftTable()
-        # No compiled loop knows what another class or a weaker pull does.
-        self._always_simulate = type(physics) is not TablePhysics or physics.force < task.PICK_FORCE
+        # No compiled loop knows what another class does.
+        self._always_simulate = type(physics) is not TablePhysics
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
-        if not self._lent:  # whoever lent it closes it
+        if not self._keep_open:  # a physics of the caller is the caller's to close
             self.physics.close()
         super().close_extras(**kwargs)
 
@@ -83,20 +82,21 @@ class ContainerVectorEnv(PickingVectorEnv):
         self, envs: np.ndarray, rngs: list[np.random.Generator], load: Load | None = None
     ) -> None:
         for env, rng in zip(envs, rngs):
-            chosen = load
-            if chosen is None:
-                chosen = self.stack(rng)
+            chosen = self.stack(rng) if load is None else load
+            # The paper's loads stand and have no overhangs, as they are made.
+            if load is None and self.stack is not stack_load:
                 check_stacked(chosen, "what stack returned")
+            if chosen is load or self.stack is not stack_load:
+                self._check_lifts(chosen)
             self._put_load(env, chosen, drift(len(chosen), self.position_noise, rng))
 
-    def _put_load(self, env: int, load: Load, blur: np.ndarray) -> None:
-        """Fill one container."""
-        if (other := load.masses[load.masses != task.MASS]).size:
-            wanted = f"expected {task.MASS} kg each in arrays, as of read_load(ignore=['weight'])"
-            raise ValueError(f"a load holds a box of {other[0]} kg; {wanted}")
-        self._put_boxes(env, load, blur)
+    def _check_lifts(self, load: Load) -> None:
+        """Refuse a load that the physics cannot lift."""
+        if isinstance(self.physics, LocalPhysics):
+            check_rests(load)
 
-    def _put_boxes(self, env: int, load: Load, blur: np.ndarray) -> None:
+    def _put_load(self, env: int, load: Load, noise: np.ndarray) -> None:
+        """Fill one container."""
         starts, links = load.contacts
         self._make_room(len(load), len(links))
         state, count = self._containers, len(load)
@@ -109,8 +109,8 @@ class ContainerVectorEnv(PickingVectorEnv):
         state.present[env, :count] = True
         state.present[env, count:] = False
         state.left[env], state.unloaded[env] = count, 0
-        state.widths[env], state.ceilings[env] = load.container[1], load.ceiling
-        self._show_items(env, np.arange(count), load.positions + blur, load)
+        state.widths[env] = load.container[1]
+        self._show_items(env, np.arange(count), load.positions + noise, load)
 
     def _show_items(self, env: int, items: np.ndarray, positions: np.ndarray, load: Load) -> None:
         """Show the items that are left, (k,) int64, where all are seen to be, (n, 3) in m."""
@@ -155,9 +155,6 @@ class ContainerVectorEnv(PickingVectorEnv):
         if unknown.size:
             arrays = (state.starts, state.links, state.present, state.geometry, state.widths, items)
             situations = [situation_in(*(array[env] for array in arrays)) for env in unknown]
-            if self.physics.force < task.PICK_FORCE:
-                pull, mass = (round(1000 * each) for each in (self.physics.force, task.MASS))
-                situations = [replace(s, pull=(pull, *[mass] * s.dynamic)) for s in situations]
             distances[unknown] = [self.physics.simulate(each) for each in situations]
         return items, distances
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from unload import task
 from unload.fast.ranking import features, rank, remove, replace
-from unload.load.boxes import OVERLAP
 from unload.physics.situation import digest_of, find_movers, key_length, write_key
 from unload.physics.table import FREE_LIFT, HELD_DOWN, UNKNOWN, find_distance
 from unload.support.compiled import compiled
@@ -23,14 +22,14 @@ class Containers(NamedTuple):
     """The state of E containers with room for ``capacity`` items and ``links`` contacts each.
 
     Attributes:
-        widths, ceilings: (E,) float64, inner width and ``Load.ceiling`` of each container in m.
+        widths: (E,) float64, inner width of each container in m.
         geometry: (E, capacity, 6) float64, centre and edge lengths of each item in m.
         starts, links: (E, 3, capacity + 1) and (E, links) int32, see ``Contacts``.
         present: (E, capacity) bool, False for items that have been unloaded.
         left, unloaded: (E,) int64, how many items are there, and how many have been taken out.
         seen: (E, capacity, 3) float32, the scaled positions as observed.
-        by_distance: (E, capacity) int32, the items, nearest first. Shown anew, those that are left
-            stand after as many entries as there are unloaded.
+        by_distance: (E, capacity) int32, the items, nearest first. After a re-sort, the remaining
+            items start at index ``unloaded``.
         visible: (E, 128) int32, the item in each row of the observation, -1 in padded rows.
         values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows
             that hold an item.
@@ -41,7 +40,6 @@ class Containers(NamedTuple):
     """
 
     widths: np.ndarray
-    ceilings: np.ndarray
     geometry: np.ndarray
     starts: np.ndarray
     links: np.ndarray
@@ -62,7 +60,6 @@ def allocate(num_envs: int, capacity: int, links: int) -> Containers:
     """Empty containers."""
     return Containers(
         widths=np.zeros(num_envs),
-        ceilings=np.zeros(num_envs),
         geometry=np.zeros((num_envs, capacity, 6)),
         starts=np.zeros((num_envs, 3, capacity + 1), np.int32),
         links=np.zeros((num_envs, links), np.int32),
@@ -110,7 +107,7 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
     """Each chosen item, (E,) int64, and how far it moves in m, or ``UNKNOWN``, (E,) float64.
 
     Where the row is padded, the item is -1 and moves by 0. With ``always_simulate``, for a physics
-    that the table does not speak for, only what has failed and what the ceiling holds is known.
+    that the table does not speak for, only what has failed is known.
     """
     items, distances = np.empty(len(actions), np.int64), np.empty(len(actions))
     capacity = containers.present.shape[1]
@@ -127,12 +124,6 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             distances[env] = containers.failed[env, row]
             continue
 
-        # Under a low ceiling there is no pick, see Physics.lift.
-        geometry = containers.geometry[env]
-        top = geometry[items[env], 2] + geometry[items[env], 5] / 2
-        if containers.ceilings[env] - top < task.LIFT_THRESHOLD - OVERLAP:
-            distances[env] = 0
-            continue
         if always_simulate:
             distances[env] = UNKNOWN
             continue
@@ -146,7 +137,9 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
             distances[env] = FREE_LIFT if on_top == 0 else 0.0
             continue
 
-        words = write_key(starts, links, present, geometry, right, members, dynamic, key)
+        words = write_key(
+            starts, links, present, containers.geometry[env], right, members, dynamic, key
+        )
         found = find_distance(digests, micrometres, digest_of(key[:words]))
         distances[env] = UNKNOWN if found == UNKNOWN else found / 1e6
     return items, distances

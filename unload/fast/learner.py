@@ -16,16 +16,15 @@ class FusedLearner:
     """``PlainLearner`` for a network to which ``fused.applies``, with the same interface.
 
     Its update reads the rows where they are, which saves copying them, and goes on in other
-    threads while the caller does something else. It takes tanh in double precision, where its
-    slope does not become 0 so soon, and the choice compares what stands before it, which never
-    ties. ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights
-    of the paper's network; its rule is one compiled pass here.
+    threads while the caller does something else. tanh is computed in double precision, where its
+    slope vanishes later; actions are compared by the value before tanh, which has no ties.
+    ``torch.optim.Adam`` spends most of its time on everything but the few hundred weights of the
+    paper's network; its rule is one compiled pass here.
     """
 
     def __init__(self, network: PEQNetwork, learning_rate: float, beta: float) -> None:
         self.weights, self.beta = fused.weights_of(network), beta
         self.learning_rate, self.steps = learning_rate, 0
-        self._flat = tuple(array.reshape(-1) for array in self.weights)  # the same memory
         # Running means of the gradients and of their squares.
         self.moments = np.zeros((2, sum(array.size for array in self.weights)))
 
@@ -51,7 +50,8 @@ class FusedLearner:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
         corrections = [1 - decay**self.steps for decay in _DECAYS]
-        _step(self._flat, gradients, self.moments, self.learning_rate, *corrections)
+        flat = tuple(array.reshape(-1) for array in self.weights)  # the same memory
+        _step(flat, gradients, self.moments, self.learning_rate, *corrections)
 
 
 @compiled

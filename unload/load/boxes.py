@@ -17,7 +17,6 @@ from unload.support.compiled import compiled
 
 # Edges are at least this long (m), because physics makes boxes 1 mm narrower (``bullet.GAP``).
 _SMALLEST_EDGE = 0.002
-_LIGHTEST = 0.001  # kg, because a situation counts whole grams
 CONTACT_TOLERANCE = 1e-4  # m, faces this close touch
 LARGEST_TOLERANCE = 0.1  # m
 OVERLAP = 1e-6  # m, boxes that share more than this on each axis overlap
@@ -41,6 +40,12 @@ class Contacts(NamedTuple):
     def of(self, kind: int, box: int) -> np.ndarray:
         """The boxes that touch ``box``, (k,) int32."""
         return self.links[self.starts[kind, box] : self.starts[kind, box + 1]]
+
+    def pairs(self, kind: int) -> tuple[np.ndarray, np.ndarray]:
+        """All pairs of a box and one that touches it, (k,) int each."""
+        starts = self.starts[kind]
+        boxes = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        return boxes, self.links[starts[0] : starts[-1]]
 
 
 class BoxError(ValueError):
@@ -68,9 +73,6 @@ class Load:
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
-        masses: (n,) float64, kg, at least 0.001; 1 kg each if not given, as in the task.
-        ceiling: m, to which a pick may lift a box; infinite if not given, because the paper's
-            physics has none. Those of packing lists have their container's.
         contact_tolerance: m, up to 0.1; boxes this close above one another touch. What bridges two
             boxes of measured heights touches both, though it stands on the higher one.
         contacts: which boxes touch, computed from positions and sizes.
@@ -78,8 +80,8 @@ class Load:
     Raises:
         TypeError: a field's dtype is not numeric.
         ValueError: a field's shape or a value is wrong.
-        BoxError: a ValueError, too: an edge is too short, a box too light, or sticks out of the
-            container, two boxes overlap by more than 1 µm, or have the same id.
+        BoxError: a ValueError, too: an edge is too short, a box sticks out of the container, two
+            boxes overlap by more than 1 µm, or have the same id.
     """
 
     positions: np.ndarray
@@ -89,8 +91,6 @@ class Load:
     ids: np.ndarray | None = None
     container: np.ndarray = None
     extras: Mapping[str, np.ndarray] = None
-    masses: np.ndarray = None
-    ceiling: float = None
     contact_tolerance: float = CONTACT_TOLERANCE
     contacts: Contacts = field(init=False)
 
@@ -107,10 +107,6 @@ class Load:
             "contact_tolerance", self.contact_tolerance, CONTACT_TOLERANCE, LARGEST_TOLERANCE
         )
 
-        ceiling = np.inf if self.ceiling is None else self.ceiling
-        if not np.array_equal(ceiling, np.inf):  # which ``replace`` hands over again
-            ceiling = checks.real("ceiling", ceiling, 0)
-
         # Labels serve views and lists; what moves does not depend on them.
         labels = {"packages": self.packages, "walls": self.walls}
         if labels["packages"] is None:
@@ -122,10 +118,6 @@ class Load:
             labels[name] = checks.integer_array(name, label, (count,))
             if (labels[name] < 0).any():
                 raise ValueError(f"{name} holds {labels[name].min()}; expected numbers >= 0")
-        masses = np.full(count, task.MASS) if self.masses is None else self.masses
-        masses = checks.finite_array("masses", masses, (count,))
-        if (light := np.flatnonzero(masses < _LIGHTEST)).size:
-            raise BoxError(light, f"a mass of {masses[light[0]]} kg; expected >= {_LIGHTEST} kg")
         checks.entries("extras", given := {} if self.extras is None else self.extras, ())
         extras = {name: np.array(values) for name, values in given.items()}
         for name, values in extras.items():
@@ -150,12 +142,10 @@ class Load:
         touching = _find_contacts(low, high, tolerance)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
-        fields = {"positions": positions, "sizes": sizes, "container": container, "masses": masses}
-        fields |= labels
+        fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
         for array in (*fields.values(), *extras.values(), *touching):
             array.setflags(write=False)
-        rest = {"extras": extras, "ceiling": ceiling, "contact_tolerance": tolerance}
-        rest["contacts"] = touching
+        rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": touching}
         for name, value in {**fields, **rest}.items():
             object.__setattr__(self, name, value)
 
@@ -168,27 +158,33 @@ class Load:
         return np.bincount(box[present[front]], minlength=len(self)) > 0
 
     def covered(self, present: np.ndarray) -> np.ndarray:
-        """Which boxes lie under one of the present ones, (n,) bool each."""
+        """Which boxes have one of the present ones on or over them, (n,) bool each."""
         lower, upper = self.covers
         return np.bincount(lower[present[upper]], minlength=len(self)) > 0
 
     @cached_property
     def covers(self) -> tuple[np.ndarray, np.ndarray]:
-        """All pairs of a box and one that rests on it, as two arrays."""
-        starts, links = self.contacts
-        lower = np.repeat(np.arange(len(self)), np.diff(starts[ABOVE]))
-        return lower, links[starts[ABOVE, 0] : starts[ABOVE, -1]]
+        """All pairs of a box and one above it, (k,) int each, whether it rests there or hangs."""
+        return self._pairs(2, self.positions[:, 2])
 
     @cached_property
     def fronts(self) -> tuple[np.ndarray, np.ndarray]:
-        """All pairs of a box and one in front of it, as two arrays."""
+        """All pairs of a box and one in front of it, (k,) int each."""
+        return self._pairs(0, self.positions[:, 0] - self.sizes[:, 0] / 2)
+
+    def _pairs(self, axis: int, beyond: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a box and one that is larger in ``beyond`` and overlaps it on both other axes.
+
+        Along z the centres say which is the upper one, because boxes that overlap on the other two
+        do not overlap there.
+        """
         low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
-        fronts = []
+        found = []
         for box in range(len(self)):
             shared = np.minimum(high[box], high) - np.maximum(low[box], low)
-            across = (shared[:, 1:] > OVERLAP).all(axis=1)
-            fronts.append(np.flatnonzero(across & (low[:, 0] > low[box, 0])))
-        return np.repeat(np.arange(len(self)), [*map(len, fronts)]), np.concatenate(fronts)
+            across = (np.delete(shared, axis, axis=1) > OVERLAP).all(axis=1)
+            found.append(np.flatnonzero(across & (beyond > beyond[box])))
+        return np.repeat(np.arange(len(self)), [*map(len, found)]), np.concatenate(found)
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -215,6 +211,35 @@ def check_stacked(load: Load, name: str = "load") -> None:
         wanted = f"expected it, within {load.contact_tolerance} m, on the floor or on another box"
         place = f"floats in {name}, its lower face at {bottom[aloft[0]]:.6g} m"
         raise BoxError(aloft, f"{place}; {wanted}")
+
+
+def check_rests(load: Load) -> None:
+    """Raise BoxError where a box hangs over another one on which it does not rest, directly or not.
+
+    A lift that follows contacts alone would pull the lower one through the upper one.
+    """
+    low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
+    upper, lower = load.contacts.pairs(BELOW)
+    shared = np.minimum(high[upper], high[lower]) - np.maximum(low[upper], low[lower])
+    held = np.bincount(upper, shared[:, 0] * shared[:, 1], len(load))
+
+    # What lies on others with its whole face hangs over nothing, as all boxes of the paper's loads.
+    aloft = low[:, 2] > CONTACT_TOLERANCE
+    wide = load.sizes[:, 0] * load.sizes[:, 1] - held > OVERLAP  # m²
+    for box in np.flatnonzero(aloft & wide).tolist():
+        rests, below = np.zeros(len(load), bool), [box]
+        while below:
+            others = load.contacts.of(BELOW, below.pop())
+            below += others[~rests[others]].tolist()
+            rests[others] = True
+        shared = np.minimum(high[box], high) - np.maximum(low[box], low)
+        under = (shared[:, :2] > OVERLAP).all(axis=1) & (
+            load.positions[:, 2] < load.positions[box, 2]
+        )
+        if (free := np.flatnonzero(under & ~rests)).size:
+            names = [other if load.ids is None else load.ids[other] for other in (box, free[0])]
+            wanted = "expected it to rest there, or physics='full', which simulates all boxes"
+            raise BoxError([box], f"{names[0]} hangs over {names[1]}; {wanted}")
 
 
 def check_stack(stack: object) -> None:

@@ -6,30 +6,18 @@ All have ``reset(load)``, ``lift(item)``, ``remove(item)``, ``positions()`` and 
 """
 
 from abc import ABC, abstractmethod
-from typing import Literal
 
 import numpy as np
 
-from unload import task
-from unload.load.boxes import OVERLAP, Load, check_load
+from unload.load.boxes import Load, check_load
 from unload.physics.bullet import World
 from unload.support import checks
-
-Force = float | Literal["auto"]  # N, or as much as a box needs
-
-
-def low_ceiling(load: Load) -> np.ndarray:
-    """(n,) bool, True for boxes that the ceiling lets nobody lift by ``task.LIFT_THRESHOLD``."""
-    headroom = load.ceiling - (load.positions[:, 2] + load.sizes[:, 2] / 2)
-    return headroom < task.LIFT_THRESHOLD - OVERLAP
 
 
 class Physics(ABC):
     """A container whose items can be lifted.
 
     Attributes:
-        force: N, the strongest pull; a box is pulled with 20 N per kg of its mass up to that,
-            which is the paper's task for boxes of 1 kg.
         exact: True where a lift leaves all other boxes exactly where they were.
         load: the load, None before the first ``reset``.
         present: (n,) bool, False for items that have been removed.
@@ -42,8 +30,7 @@ class Physics(ABC):
 
     exact = True
 
-    def __init__(self, force: Force = task.PICK_FORCE) -> None:
-        self.force = np.inf if str(force) == "auto" else checks.real("force", force, 0)
+    def __init__(self) -> None:
         self.load: Load | None = None
         self.present = np.zeros(0, dtype=bool)
         self._closed = False
@@ -59,12 +46,8 @@ class Physics(ABC):
         self.load = load
 
     def lift(self, item: int) -> float:
-        """Try to lift an item; return how far it moved, in m (Sec. III-C, appendix).
-
-        Where the ceiling leaves less room than a pick needs there is none: 0 m.
-        """
-        item = self._check(item)
-        return 0.0 if low_ceiling(self.load)[item] else self._lift(item)
+        """Try to lift an item; return how far it moved, in m (Sec. III-C, appendix)."""
+        return self._lift(self._check(item))
 
     def remove(self, item: int) -> None:
         """Take an item out of the container."""

@@ -6,10 +6,10 @@ import numpy as np
 
 from unload import task
 from unload.load.boxes import Load
-from unload.physics.base import Force, Physics
+from unload.physics.base import Physics
 from unload.physics.bullet import TIME_STEP, UPRIGHT, World, slim
 from unload.physics.local import LocalPhysics
-from unload.physics.situation import PULL, RESOLUTION
+from unload.physics.situation import RESOLUTION
 from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
 
@@ -26,12 +26,11 @@ class FullPhysics(Physics):
             back, ``"keep"`` leaves whatever the simulation made of them: they drift.
             ``"keep"`` simulates them as plain rigid bodies, ``"restore"`` as multibodies,
             see ``bullet.World``.
-        force: see ``Physics``.
     """
 
-    def __init__(self, after_pick: str = "restore", force: Force = task.PICK_FORCE) -> None:
+    def __init__(self, after_pick: str = "restore") -> None:
         checks.one_of("after_pick", after_pick, ("restore", "keep"))
-        super().__init__(force)
+        super().__init__()
         self.after_pick = after_pick
         self.exact = after_pick == "restore"
 
@@ -55,8 +54,8 @@ class FullPhysics(Physics):
         ):
             world.add_box(position, size, 0)
         self._bodies = [
-            world.add_box(position, size, mass)
-            for position, size, mass in zip(load.positions, sizes, load.masses.tolist())
+            world.add_box(position, size, task.MASS)
+            for position, size in zip(load.positions, sizes)
         ]
         self._poses: list[tuple] = [(place, UPRIGHT) for place in load.positions.tolist()]
 
@@ -76,8 +75,7 @@ class FullPhysics(Physics):
     def _lift(self, item: int) -> float:
         restore = True  # also when interrupted: no box may stay halfway
         try:
-            force = min(PULL * self.load.masses[item], self.force)
-            distance = self._world.pull(self._bodies[item], force)
+            distance = self._world.pull(self._bodies[item])
             restore = self.after_pick == "restore"
             return distance
         finally:
@@ -105,25 +103,20 @@ class FullPhysics(Physics):
         return np.array([position for position, _ in self._poses])
 
 
-def make_physics(
-    physics: Name | Physics, after_pick: str = "restore", force: Force = task.PICK_FORCE
-) -> Physics:
+def make_physics(physics: Name | Physics, after_pick: str = "restore") -> Physics:
     """The physics of a name, or the one that is given, which is its caller's to close.
 
     Args:
         physics: ``"local"``, ``"full"`` or ``"table"``, or a ``Physics`` that is open.
         after_pick: of ``"full"``, see ``FullPhysics``.
-        force: of those that have a name, see ``Physics``.
     """
     if not isinstance(physics, Physics):
         checks.one_of("physics", physics, get_args(Name))
         if physics == "full":
-            return FullPhysics(after_pick, force)
-    elif force != task.PICK_FORCE:
-        raise ValueError(f"force is {force!r}; expected it to be given to the physics itself")
+            return FullPhysics(after_pick)
     if after_pick != "restore":
         wanted = f"expected 'restore' for physics={physics!r}"
         raise ValueError(f"after_pick is {after_pick!r}; {wanted}")
     if isinstance(physics, Physics):
         return physics
-    return LocalPhysics(force=force) if physics == "local" else TablePhysics(shared_table(), force)
+    return LocalPhysics() if physics == "local" else TablePhysics(shared_table())

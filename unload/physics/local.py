@@ -3,9 +3,9 @@
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load
+from unload.load.boxes import Load, check_rests
 from unload.physics import mujoco
-from unload.physics.base import Force, Physics
+from unload.physics.base import Physics
 from unload.physics.bullet import ENGINES, SETTINGS, World, engine_of, slim
 from unload.physics.situation import RESOLUTION, Situation, Surroundings
 
@@ -27,11 +27,10 @@ class LocalPhysics(Physics):
 
     Args:
         engine: ``"pybullet"`` or ``"mujoco"``; PyBullet where it is installed if None.
-        force: see ``Physics``.
     """
 
-    def __init__(self, engine: str | None = None, force: Force = task.PICK_FORCE) -> None:
-        super().__init__(force)
+    def __init__(self, engine: str | None = None) -> None:
+        super().__init__()
         self.engine = engine_of(engine)
 
     def simulate(self, situation: Situation) -> float:
@@ -50,9 +49,8 @@ class LocalPhysics(Physics):
         world = self._world
         bodies: list[int] = []
         try:
-            masses = situation.masses
             for row, box in enumerate(situation.boxes * RESOLUTION):
-                mass = masses[row] if row < situation.dynamic else 0.0
+                mass = task.MASS if row < situation.dynamic else 0.0
                 bodies.append(world.add_box(box[:3], slim(box[3:]), mass))
             if situation.floor is not None:
                 height = situation.floor * RESOLUTION
@@ -60,13 +58,14 @@ class LocalPhysics(Physics):
             for side in situation.sides:
                 outwards = np.sign(side) * 0.5
                 bodies.append(world.add_box((0, side * RESOLUTION + outwards, 0), (9, 1, 9), 0))
-            return round(world.pull(bodies[0], situation.force), 6)
+            return round(world.pull(bodies[0]), 6)
         finally:  # also when interrupted: what stays behind would be in the way of the next lift
             for body in reversed(bodies):
                 world.remove(body)
 
     def _reset(self, load: Load) -> None:
-        self.surroundings = Surroundings(load, self.present, self.force)
+        check_rests(load)
+        self.surroundings = Surroundings(load, self.present)
 
     def _lift(self, item: int) -> float:
         return self.simulate(self.surroundings.situation(item))

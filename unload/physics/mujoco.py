@@ -39,7 +39,7 @@ def simulate(situation: Situation) -> float:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     start = data.xpos[1].copy()  # body 0 is the world
-    data.xfrc_applied[1, 2] = situation.force
+    data.xfrc_applied[1, 2] = task.PICK_FORCE
     mujoco.mj_step(model, data, nstep=round(task.LIFT_TIME / STEP))
     mujoco.mj_kinematics(model, data)
     if any(warning.number for warning in data.warning):
@@ -49,11 +49,11 @@ def simulate(situation: Situation) -> float:
 
 def _described(situation: Situation) -> str:
     """A situation in MuJoCo's language, MJCF: bodies that move, and fixed geometry."""
-    parts, masses = [], situation.masses
+    parts = []
     for row, box in enumerate(situation.boxes * RESOLUTION):
         place, size = _text("pos", box[:3]), _text("size", slim(box[3:]) / 2)
         if row < situation.dynamic:
-            geometry = f'<geom type="box" {size} mass="{masses[row]}"/>'
+            geometry = f'<geom type="box" {size} mass="{task.MASS}"/>'
             parts.append(f"<body {place}><freejoint/>{geometry}</body>")
         else:
             parts.append(f'<geom type="box" {place} {size}/>')

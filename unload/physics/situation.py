@@ -5,17 +5,14 @@ neighbours in the same wall, and it can tip aside only what its surroundings let
 All else in the container is left out. The search is compiled, for ``unload.fast`` as well.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from unload import task
 from unload.load.boxes import ABOVE, BELOW, BESIDE, CONTACT_TOLERANCE, Load
 from unload.support.compiled import compiled
 
-PULL = task.PICK_FORCE / task.MASS  # N per kg
-_USUAL = round(task.MASS * 1000)  # g
 RESOLUTION = 1e-6  # m, to which a situation is rounded, so that equal ones are equal in bits
 
 
@@ -29,32 +26,19 @@ class Situation:
         dynamic: how many of the rows can move: the chosen box and all on top of it.
         floor: z of the floor if the chosen box stands on it, else None.
         sides: y of the container's side walls that a box which can move touches.
-        pull: what else decides: the force in mN, and the masses of the dynamic boxes in g; empty
-            for those of the task, 20 N and 1 kg each.
     """
 
     boxes: np.ndarray
     dynamic: int
     floor: int | None
     sides: tuple[int, ...]
-    pull: tuple[int, ...] = ()
 
     @cached_property
     def key(self) -> bytes:
-        """Equal for equal situations: the words that ``write_key`` writes, and ``pull``."""
+        """Equal for equal situations: the words that ``write_key`` writes."""
         floor = () if self.floor is None else (self.floor,)
         head = np.array([self.dynamic, len(floor), *floor, *self.sides], dtype=np.int32)
-        return head.tobytes() + self.boxes.tobytes() + np.array(self.pull, np.int32).tobytes()
-
-    @property
-    def force(self) -> float:
-        """N, with which the chosen box is pulled."""
-        return self.pull[0] / 1000 if self.pull else task.PICK_FORCE
-
-    @property
-    def masses(self) -> list[float]:
-        """Of the dynamic boxes in kg."""
-        return [gram / 1000 for gram in self.pull[1:]] or [task.MASS] * self.dynamic
+        return head.tobytes() + self.boxes.tobytes()
 
     @property
     def on_top(self) -> int:
@@ -66,13 +50,11 @@ class Surroundings:
     """The situations of all boxes of a load, while it is unloaded.
 
     The load knows which boxes touch; picks only take boxes away: ``present``, (n,) bool and owned
-    by the caller, is False for those. ``force`` is the strongest pull, see ``Physics``.
+    by the caller, is False for those.
     """
 
-    def __init__(self, load: Load, present: np.ndarray, force: float = task.PICK_FORCE) -> None:
+    def __init__(self, load: Load, present: np.ndarray) -> None:
         self.load, self.present = load, present
-        self._grams = np.rint(load.masses * 1000).astype(np.int64)
-        self._pulls = np.minimum(self._grams * PULL, force * 1000).astype(np.int64)  # mN
         self._geometry = np.hstack([load.positions, load.sizes])
         # Copies, which may be written: for arrays that may not be, numba would compile twice.
         self._starts, self._links = map(np.array, load.contacts)
@@ -86,13 +68,8 @@ class Surroundings:
 
     def situation(self, item: int) -> Situation:
         """Return the situation of ``item``: the boxes that decide its lift."""
-        right = self.load.container[1]
         contacts = self._starts, self._links, self.present
-        situation = situation_in(*contacts, self._geometry, right, item)
-        moving = [item, *self.on_top(item)]
-        pull = (int(self._pulls[item]), *self._grams[moving].tolist())
-        usual = (round(_USUAL * PULL), *[_USUAL] * len(moving))
-        return situation if pull == usual else replace(situation, pull=pull)
+        return situation_in(*contacts, self._geometry, self.load.container[1], item)
 
 
 @compiled(plain=True)

@@ -6,9 +6,7 @@ refused. Two rules answer without it: a box with nothing on top is free, one wit
 others on top is held down.
 """
 
-import errno
 import json
-import logging
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -16,40 +14,26 @@ from threading import Lock
 import numpy as np
 
 from unload import task
-from unload.load.boxes import Load
-from unload.physics.base import Force
 from unload.physics.bullet import DAMPING, ENGINES, TIME_STEP, engine_of
 from unload.physics.local import LocalPhysics, settings_of_lifts
-from unload.physics.situation import PULL, Situation, digest_of
+from unload.physics.situation import Situation, digest_of
 from unload.support import files
 from unload.support.compiled import compiled
 
-_LOGGER = logging.getLogger(__name__)
 UNKNOWN = -1  # in place of a distance that is not in the table
 HELD_DOWN = 3  # so many boxes on top hold a box down
 LIFTS_FILE = files.SHIPPED / "lifts.npz"
 _ARRAYS = {"digests", "micrometres", "settings"}  # of a file
-_FULL = (errno.ENOSPC, getattr(errno, "EDQUOT", None))  # a disk; Windows has no quotas
 
 
-def free_lift(force: float = task.PICK_FORCE, mass: float = task.MASS) -> float:
-    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes.
-
-    That is 0 where a force in N is less than the weight of a mass in kg.
-    """
+def free_lift() -> float:
+    """How far a box moves that nothing touches, in m, by the steps that PyBullet makes."""
     velocity = distance = 0.0
     for _ in range(round(task.LIFT_TIME / TIME_STEP)):
         velocity *= (1 - DAMPING) ** TIME_STEP
-        velocity += (force / mass - task.GRAVITY) * TIME_STEP
+        velocity += (task.PICK_FORCE / task.MASS - task.GRAVITY) * TIME_STEP
         distance += velocity * TIME_STEP
-    return max(0.0, round(distance, 6))
-
-
-def too_heavy(load: Load, force: float) -> np.ndarray:
-    """(n,) bool, True for boxes that a force of so many N at most does not lift, though free."""
-    pulls = np.minimum(PULL * load.masses, force)
-    lifts = [free_lift(*each) for each in zip(pulls.tolist(), load.masses.tolist())]
-    return np.array(lifts) < task.LIFT_THRESHOLD
+    return round(distance, 6)
 
 
 # How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
@@ -145,8 +129,7 @@ class LiftTable:
         """Take in the lifts of a file, and write those that it lacks; it may be missing.
 
         Any number of processes may share one file: each waits for its turn, which it takes by
-        the folder ``<path>.lock``. A link is followed. A full disk is logged, because lifts can be
-        simulated again.
+        the folder ``<path>.lock``. A link is followed.
 
         Raises:
             ValueError: ``path`` does not end in ``.npz``; as ``load``. Nothing is changed then.
@@ -155,22 +138,16 @@ class LiftTable:
         path = Path(path).resolve()
         if path.suffix != ".npz":
             raise ValueError(f"{path} is no name of a lift table; expected one that ends in .npz")
-        try:
-            with files.locked(f"{path}.lock", wait=True):
-                files.remove_partial(path)
-                stored = LiftTable(self.engine)
-                if path.exists():
-                    stored = LiftTable.load(path, self.engine)
-                count = len(stored)
-                with self._adding:
-                    stored._take_in(self.own())
-                    self._take_in(stored.entries)
-                if len(stored) > count:
-                    stored.save(path)
-        except OSError as error:
-            if error.errno not in _FULL:
-                raise
-            _LOGGER.warning("lifts are kept in memory only: %s", error)
+        with files.locked(f"{path}.lock", wait=True):
+            stored = LiftTable(self.engine)
+            if path.exists():
+                stored = LiftTable.load(path, self.engine)
+            count = len(stored)
+            with self._adding:
+                stored._take_in(self.own())
+                self._take_in(stored.entries)
+            if len(stored) > count:
+                stored.save(path)
 
 
 class TablePhysics(LocalPhysics):
@@ -183,20 +160,18 @@ class TablePhysics(LocalPhysics):
     Args:
         table: filled by its engine as situations are met. Share one among environments to share
             their experience; one of its own if None.
-        force: see ``Physics``.
     """
 
-    def __init__(self, table: LiftTable | None = None, force: Force = task.PICK_FORCE) -> None:
+    def __init__(self, table: LiftTable | None = None) -> None:
         self.table = LiftTable() if table is None else table
-        super().__init__(self.table.engine, force)
+        super().__init__(self.table.engine)
 
     def simulate(self, situation: Situation) -> float:
         """Look a lift up, or simulate and remember it; return the distance in m."""
         self._check_open()
-        free = free_lift(situation.force, situation.masses[0]) if situation.pull else FREE_LIFT
-        if situation.on_top == 0 or free == 0:
-            return free
-        if situation.on_top >= HELD_DOWN and not situation.pull:
+        if situation.on_top == 0:
+            return FREE_LIFT
+        if situation.on_top >= HELD_DOWN:
             return 0.0
         distance = self.table.find(situation)
         if distance is None:

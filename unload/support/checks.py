@@ -1,7 +1,7 @@
 """Errors for bad input: each names the argument, its value and what was expected.
 
-What is of another type is a TypeError, what has another value a ValueError; a library that is not
-installed is a ModuleNotFoundError that says how it is.
+A wrong type raises TypeError, a wrong value ValueError, and a library that is not installed a
+ModuleNotFoundError that says how to install it.
 """
 
 import re

@@ -56,7 +56,7 @@ class Compiled:
 
     @cached_property
     def dispatcher(self) -> Any:
-        """What numba has made of the function."""
+        """The function as numba has compiled it."""
         njit, config, place = _numba().njit, _numba().config, _folder()
         if place is None:
             return njit(**self._options)(self._function)
@@ -69,7 +69,7 @@ class Compiled:
 
     @property
     def _numba_type_(self) -> Any:
-        """What other compiled functions take it for."""
+        """The compiled function, for numba's type inference in other compiled functions."""
         return self.dispatcher._numba_type_
 
 

@@ -5,51 +5,35 @@ missing one a FileNotFoundError, one that cannot be written an OSError.
 """
 
 import json
-import logging
 import os
-import socket
-import sys
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from datetime import datetime
-from glob import escape
+from contextlib import contextmanager
 from hashlib import blake2b, file_digest
 from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
-from uuid import uuid4
 
 import numpy as np
 from filelock import FileLock, Timeout
 
-LOGGER = logging.getLogger(__name__)
-PATIENCE = 5.0  # s for which a lock may be held before it is said who holds it
-HELD = 1.0  # s for which a spreadsheet or a virus scanner may hold a file open
-ABANDONED = 3600.0  # s after which a half file that nothing was added to is nobody's
 SHIPPED = Path(str(resources.files("unload") / "data"))  # what the package needs wherever it is
 POLICIES = {file.stem: file for file in sorted(SHIPPED.glob("policies/*.safetensors"))}  # by name
 
 
 def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
-    """Let ``write`` fill a file that replaces ``path`` only once it is complete on disk.
+    """Let ``write`` fill ``<path>.partial``, which replaces ``path`` once it is complete on disk.
 
-    Until then it stands beside ``path`` as ``<name>.<random>.partial``, so that several
-    processes may write one file: the last to finish wins. A killed writer leaves its partial
-    file behind, which nothing reads and git ignores, and which a later writer removes.
+    A killed writer leaves the partial file, which nothing reads, git ignores, and the next writer
+    overwrites. Where several processes may write one file, each takes a lock first, see ``locked``.
     """
-    path = Path(path)
+    path, partial = Path(path), partial_of(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    remove_partial(path, ABANDONED)
-    partial = path.with_name(f"{path.name}.{uuid4().hex}.partial")
     try:
-        with open(partial, "xb") as file:
+        with open(partial, "wb") as file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
-        _replace(partial, path)
-        with suppress(OSError):  # some file systems refuse it; the file itself is on disk
-            _sync(path.parent)
+        os.replace(partial, path)
     except OSError as error:
         reason = f"cannot write this file: {error.strerror or error}"
         raise OSError(error.errno, reason, str(path)) from error
@@ -57,36 +41,9 @@ def write_atomically(path: str | Path, write: Callable[[BinaryIO], object]) -> N
         partial.unlink(missing_ok=True)  # of a write that failed
 
 
-def remove_partial(path: Path, age: float = 0.0) -> None:
-    """Remove what killed writers of a file have left beside it, last written ``age`` s ago.
-
-    Right away where a lock keeps living writers out.
-    """
-    for partial in path.parent.glob(f"{escape(path.name)}.{'[0-9a-f]' * 32}.partial"):
-        with suppress(OSError):
-            if not age or time.time() - partial.stat().st_mtime >= age:
-                partial.unlink()
-
-
-def _replace(partial: Path, path: Path) -> None:
-    """Rename a file; for a while again on Windows, which refuses where a reader holds the old."""
-    until = time.monotonic() + HELD
-    while True:
-        try:
-            return os.replace(partial, path)
-        except PermissionError:
-            if sys.platform != "win32" or time.monotonic() > until:
-                raise
-            time.sleep(0.02)
-
-
-def _sync(folder: Path) -> None:
-    """Let the new name of a file outlast a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def partial_of(path: str | Path) -> Path:
+    """Path of a file while it is being written."""
+    return Path(f"{path}.partial")
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -183,12 +140,12 @@ def _check_equal(path: str | Path, wanted: object, found: str) -> None:
 def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     """Keep all other processes that ask for it out of ``folder``, which is made if missing.
 
-    ``folder/owner`` names who holds ``folder/lock``, or the last one who did. The operating system
-    releases the lock of a process that dies, so that a killed process stops nobody.
+    The operating system releases the lock of a process that dies, so that a killed process stops
+    nobody.
 
     Args:
         folder: to be locked.
-        wait: until whoever holds the lock gives it back; after five seconds, say who does.
+        wait: until whoever holds the lock gives it back.
 
     Raises:
         RuntimeError: another process, or another block of this one, holds the lock; not if
@@ -197,21 +154,13 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    lock, owner = FileLock(folder / "lock", fallback_to_soft=False), folder / "owner"
+    lock = FileLock(folder / "lock", timeout=-1 if wait else 0, fallback_to_soft=False)
     try:
-        # Others hold such a lock for moments; who does so for longer may have been stopped.
-        lock.acquire(timeout=PATIENCE if wait else 0)
-    except Timeout:
-        holder = owner.read_text(encoding="utf-8").strip() if owner.exists() else "another process"
-        if not wait:
-            reason = f"{folder} is in use by {holder}; wait, or take another folder"
-            raise RuntimeError(reason) from None
-        LOGGER.warning("waiting for %s, which uses %s", holder, folder)
         lock.acquire()
+    except Timeout:
+        reason = f"{folder} is in use by another process; wait, or take another folder"
+        raise RuntimeError(reason) from None
     try:
-        remove_partial(owner)
-        started = datetime.now().astimezone().isoformat(timespec="seconds")
-        write_text(owner, f"process {os.getpid()} on {socket.gethostname()} since {started}\n")
         yield
     finally:
         lock.release()

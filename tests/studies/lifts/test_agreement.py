@@ -157,3 +157,19 @@ def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):
     assert engines.both_rates(policies.random, arguments) == row and len(asked) == count
     assert row["pybullet"] == evaluate(policies.random, **arguments)["success_rate"].mean()
     assert row["containers"] == row["differ"] == 2 and row["mujoco"] > row["pybullet"]
+
+
+def test_lifts_of_another_physics_are_computed_anew(monkeypatch):
+    """What is kept of a fill answers for the physics that it was filled by."""
+    asked = []
+
+    def ask(folder, question, compute):
+        asked.append(question)
+        raise InterruptedError
+
+    monkeypatch.setattr(lifts, "kept", ask)
+    for settings in (lifts.SETTINGS, lifts.SETTINGS | {"pybullet": "another"}):
+        monkeypatch.setattr(lifts, "SETTINGS", settings)
+        with pytest.raises(InterruptedError):
+            lifts.lift_data()
+    assert asked[0] != asked[1]

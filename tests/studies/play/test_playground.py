@@ -190,3 +190,4 @@ def test_the_settings_show_why_the_agent_is_stuck():
         assert ("item 637 of" in title) is not can
         ranks = int(title.split()[0])
         assert ranks < 30 if "ties" in changed else ranks == 128
+        assert ("by the order in which they are listed" in title) is ("noise" in changed)

@@ -30,12 +30,15 @@ def test_the_order_of_equals_is_followed_among_untouched_boxes():
     count = len(load_of(Case(0, 3)))
     offsets = np.tile(np.random.default_rng(0).normal(size=(count, 3)), (3, 1, 1)) * 1000
     offsets[1, :, 1] *= -1
+    offsets[1, :, 0] += 5000  # of all boxes alike, which is not counted
     touched = np.full(count, -1)
     rows = pd.DataFrame(creep.rows(world, {"offsets": offsets, "touched": touched}))
     found = rows.set_index(["lag", "axis"])
     assert found.loc[(1, "x"), "spearman"] == pytest.approx(1)
     assert found.loc[(1, "y"), "spearman"] == pytest.approx(-1)
     assert found.loc[(2, "y"), "spearman"] == pytest.approx(1) and found.loc[(2, "z"), "rms"] == 0
+    assert found.loc[(1, "x"), "rms"] == pytest.approx(0)
+    assert 1 < found.loc[(1, "y"), "rms"] < 2, "mm, twice the spread within a group"
     assert found.loc[(1, "x"), "boxes"] == count
     touched[:] = 0
     assert not creep.rows(world, {"offsets": offsets, "touched": touched})

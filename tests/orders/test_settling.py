@@ -6,8 +6,8 @@ import pytest
 from tests.load.walls import of_corners, own_load
 from unload import stack_load, task
 from unload.load.boxes import BoxError, check_stacked
-from unload.load.settling import settle as moves
-from unload.load.settling import uncarried
+from unload.orders.settling import settle as moves
+from unload.orders.settling import uncarried
 
 
 def settle(low, sizes, tolerance=0.005):

@@ -1,0 +1,165 @@
+"""The command ``unload``."""
+
+import io
+import logging
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from unload import picking_order, read_load
+from unload.orders import command
+from unload.physics.bullet import engine_of
+from unload.task import VERSION
+
+ROOT = Path(__file__).resolve().parents[2]
+STACK = "id,x_min,y_min,z_min,size_x,size_y,size_z\na,6,0.1,0,0.5,0.4,0.3\n"
+
+
+def refused(capsys, *arguments: str) -> str:
+    """The sentence with which the command ends, with status 1."""
+    with pytest.raises(SystemExit, match="1"):
+        command.main([*map(str, arguments)])
+    return capsys.readouterr().err
+
+
+def test_it_writes_the_order_of_the_example(capsys, tmp_path):
+    command.main(["--output", str(tmp_path / "order.csv")])
+    assert capsys.readouterr() == ("", "136 picks, 0 under and 0 behind others\n")
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "order.csv"), picking_order(read_load()))
+
+
+def test_it_reads_what_read_load_reads(tmp_path, capsys, monkeypatch):
+    """Each option; what is said of boxes that were moved stands on stderr.
+
+    No cell becomes a formula in a spreadsheet.
+    """
+    (tmp_path / "boxes.csv").write_text(
+        "nr;x;y;z;length;width;height;weight;stop;=note\n"
+        "=a;50;50;50;100;100;100;5;2.1234567;=1\n"
+        "b;50;50;159;100;100;100;7;1;x\n",
+        encoding="utf-8",
+    )
+    options = "--units cm --container 12 2 2.4 --x-from door --tolerance 0.1"
+    with monkeypatch.context() as usual:
+        usual.setattr(logging.root, "handlers", [])  # pytest's; a program has none
+        command.main([f"{tmp_path}/boxes.csv", "--column", "nr=id", *options.split()])
+    printed, said = capsys.readouterr()
+    order = pd.read_csv(io.StringIO(printed))
+    assert order["id"].tolist() == ["b", "'=a"] and order["weight"].tolist() == [7, 5]
+    assert order["stop"].tolist() == [1, 2.1234567] and order["'=note"].tolist() == ["x", "'=1"]
+    assert said.splitlines() == [
+        "1 of 2 boxes moved by up to 90.0 mm",
+        "2 picks, 0 under and 0 behind others",
+    ]
+
+
+def test_what_is_refused_names_the_option_that_may_help(capsys, tmp_path):
+    """And not the argument of ``read_load``."""
+    (tmp_path / "boxes.csv").write_text(STACK, encoding="utf-8")
+    file = tmp_path / "boxes.csv"
+    said = refused(capsys, file, "--container", "3", "2", "2")
+    assert said.endswith("expected it inside the container, [0 0 0] to [3. 2. 2.] m; "
+                         "see the option --container\n")  # fmt: skip
+    file.write_text(STACK.replace("size_x", "Länge"), encoding="utf-8")
+    assert refused(capsys, file).endswith("size_x; see the option --column NAME=MEANING\n")
+    file.write_text(STACK.replace("0.3\n", "wide\n"), encoding="utf-8")
+    assert refused(capsys, file) == "row 1 (id 'a'): size_z is 'wide'; expected a number\n"
+    file.write_text(STACK.replace("size_z", "stop"), encoding="utf-8")
+    assert "stop" in refused(capsys, file, "--by", "town")
+
+
+def test_it_orders_by_stops_and_draws(tmp_path, capsys):
+    list_ = tmp_path / "boxes.csv"
+    list_.write_text(
+        "id,x_min,y_min,z_min,size_x,size_y,size_z,stop,town,weight\n"
+        "a,0,0,0,1,1,1,1,,30\nb,1,0,0,1,1,1,2,B,2\nc,0,1,0,1,1,1,2,C,3\n",
+        encoding="utf-8",
+    )
+    out, picture = tmp_path / "order.json", tmp_path / "order.png"
+    files = f"--output {out} --format json --picture {picture}".split()
+    command.main([str(list_), "--by", "stop", *files])
+    order = pd.read_json(out)
+    assert order["id"].tolist() == ["b", "a", "c"] and order["weight"].tolist() == [2, 30, 3]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert capsys.readouterr().err.splitlines()[-3:] == [
+        "3 picks, 0 under and 0 behind others",
+        "stop 1: 1 boxes, 1 of later ones come out first",
+        "stop 2: 2 boxes, 0 of later ones come out first",
+    ]
+    assert refused(capsys, list_, "--by", "town").endswith("1 boxes have no 'town', the first a; "
+                                                          "expected one for each\n")  # fmt: skip
+
+
+def test_an_order_is_written_before_a_picture_that_lacks_its_library(tmp_path, capsys, monkeypatch):
+    """It was lost once."""
+    monkeypatch.setitem(sys.modules, "matplotlib", None)  # as if it were not installed
+    for module in [name for name in sys.modules if name.startswith("unload.load.picture")]:
+        monkeypatch.delitem(sys.modules, module)
+    said = refused(capsys, "--output", tmp_path / "order.csv", "--picture", tmp_path / "order.png")
+    assert "--picture needs more than an order; expected matplotlib" in said
+    assert len(pd.read_csv(tmp_path / "order.csv")) == 136
+
+
+def test_names_of_any_language_are_written_to_any_console(tmp_path):
+    """As UTF-8, where the console's encoding knows them or not; once a header was all."""
+    (tmp_path / "boxes.csv").write_text(STACK.replace("a,", "Łódź 箱,"), encoding="utf-8")
+    environment = os.environ | {"PYTHONIOENCODING": "cp1252", "PYTHONPATH": str(ROOT)}
+    program = [sys.executable, "-m", "unload", "boxes.csv"]
+    done = subprocess.run(program, cwd=tmp_path, env=environment, capture_output=True, check=True)
+    assert done.stdout.decode("utf-8").splitlines()[1] == "1,Łódź 箱,0,False,False"
+
+
+@pytest.mark.parametrize("missing", [(), ("pybullet", "mujoco")])
+def test_its_version_names_the_engine_or_none(capsys, monkeypatch, missing):
+    for name in missing:
+        monkeypatch.setitem(sys.modules, name, None)
+    known = command.find_spec
+    monkeypatch.setattr(command, "find_spec", lambda name: name not in missing and known(name))
+    with pytest.raises(SystemExit, match="0"):
+        command.main(["--version"])
+    engine = "none" if missing else engine_of()
+    assert capsys.readouterr().out == f"unload {VERSION}, lifts by {engine}\n"
+
+
+@pytest.mark.needs("SIGPIPE")
+def test_nothing_is_imported_before_it_is_needed(tmp_path, run_python):
+    """An order takes pandas, but compiles nothing; help takes neither.
+
+    A script entry point calls ``command``. A pipe that is closed, as by ``head``, ends the program
+    without an error.
+    """
+    entry = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "scripts"
+    ]
+    module, _, name = entry["unload"].partition(":")
+    (tmp_path / "bad.csv").write_bytes(b"\xff")
+    program = f"""if True:
+        import signal, sys
+        from {module} import {name}
+
+        for arguments in ("--version", "--help", "bad.csv", ""):
+            sys.argv[1:], code = arguments.split(), None
+            try:
+                {name}()
+            except SystemExit as end:
+                code = end.code
+            slow = {{"numba", "torch", "pandas", "matplotlib", "plotly", "pybullet"}}
+            slow &= {{each for each in sys.modules if sys.modules[each]}}
+            print(code, signal.getsignal(signal.SIGPIPE).name, *sorted(slow), file=sys.stderr)
+    """
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    compiled = str(tmp_path / "compiled")
+    printed, said = run_python(program, tmp_path, PYTHONPATH=path, NUMBA_CACHE_DIR=compiled)
+    *before, refused, after, summary, ordered = said.splitlines()
+    assert before == ["0 SIG_DFL", "0 SIG_DFL"] and after == "1 SIG_DFL pandas"
+    assert refused.startswith("bad.csv is not a readable list: ")
+    assert summary == "136 picks, 0 under and 0 behind others"
+    assert ordered == "None SIG_DFL pandas"
+    assert not (tmp_path / "compiled").exists()
+    for text in ("x_min", "size_z", "in m", "--units", "rear wall", "entrance"):
+        assert text in printed

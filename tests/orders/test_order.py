@@ -1,0 +1,150 @@
+"""The order of picks of one load."""
+
+import inspect
+import textwrap
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.load.walls import KINDS, of_corners, own_load
+from unload import Load, picking_order, read_load, stack_load
+from unload.orders.order import reachable, stops_of
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "the paper's"])
+def test_the_default_can_be_carried_out_from_the_entrance(kind, rng, full_load):
+    load = full_load if kind == "the paper's" else own_load(rng, kind)
+    order = picking_order(load)
+    assert order.columns.tolist() == ["pick", "id", "item", "covered", "behind"]
+    assert order["pick"].tolist() == list(range(1, len(load) + 1))
+    assert sorted(order["item"]) == list(range(len(load)))
+    assert not order[["covered", "behind"]].any(axis=None)
+    assert order["id"].tolist() == order["item"].tolist()  # these loads have no ids
+    pd.testing.assert_frame_equal(order, picking_order(load, rule=reachable))
+    # Of boxes that are free alike the foremost is picked, and of those the highest.
+    present, front = np.ones(len(load), bool), (load.positions + load.sizes / 2)[:, 0]
+    for item in order["item"]:
+        free = present & ~load.behind(present) & ~load.covered(present)
+        assert free[item] and front[item] >= front[free].max() - 1e-6
+        foremost = free & (front >= front[item] - 1e-6)
+        assert (
+            load.positions[item, 2] + load.sizes[item, 2] / 2
+            >= (load.positions[foremost, 2] + load.sizes[foremost, 2] / 2).max() - 2e-6
+        )
+        present[item] = False
+
+
+def test_a_rule_knows_the_load_and_what_is_present(boxes):
+    load, seen = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2), (1.8, 0.2)), []
+    extras = {"stop": [2, 1, 2, 1], "item": list("wxyz")}
+    load = Load(load.positions, load.sizes, ids=list("abcd"), extras=extras)
+
+    def by_stop(load, present):
+        seen.append(present.sum())
+        present[:] = False  # a copy
+        return -load.extras["stop"], load.ids == "c"
+
+    order = picking_order(load, rule=by_stop)
+    assert order["id"].tolist() == ["b", "d", "c", "a"], "equal ones in the order of the list"
+    assert order["stop"].tolist() == [1, 1, 2, 2] and order["item"].tolist() == [1, 3, 2, 0]
+    assert order["item in the list"].tolist() == ["x", "z", "y", "w"]
+    assert seen == [4, 3, 2, 1]
+
+
+def test_an_order_says_what_lay_on_a_box_or_stood_in_front_of_it():
+    """Of a rule that prefers the lowest boxes: a stack of two, and one before it."""
+    load = of_corners([(0, 0, 0), (0, 0, 0.4), (1, 0, 0)], np.full((3, 3), 0.4))
+    order = picking_order(load, rule=lambda load, present: [-load.positions[:, 2]])
+    assert order["item"].tolist() == [0, 2, 1]
+    assert order["covered"].tolist() == [True, False, False]
+    assert order["behind"].tolist() == [True, False, False]
+
+
+def test_a_box_that_hangs_over_another_one_comes_out_first():
+    """A plank of three metres bridges two posts, and stays clear of a low box between them."""
+    corners = [(0, 0, 0), (2.5, 0, 0), (1.5, 0, 0), (0, 0, 0.5)]
+    sizes = [(0.5, 1, 0.5), (0.5, 1, 0.5), (0.5, 1, 0.4), (3, 1, 0.2)]
+    load = of_corners(corners, sizes)
+    assert load.covered(np.ones(4, bool)).tolist() == [True, True, True, False]
+    order = picking_order(load)
+    assert order["item"].tolist() == [3, 1, 2, 0] and not order["covered"].any()
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"rule": reachable, "by": "stop"}, TypeError, "expected a function, and no by beside it"),
+        ({"rule": 3}, TypeError, "rule is 3; expected a function"),
+        ({"by": "stop"}, ValueError, "by is 'stop'; expected one of the list's other columns"),
+        ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),
+        ({"rule": lambda load, _: [np.ones(3)]}, ValueError, "rule returned has shape"),
+        ({"rule": lambda load, _: 3}, TypeError, "what rule returned is 3; expected arrays"),
+        ({"load": Load([[3.5, 1, 0.9]], [[0.4, 0.4, 0.4]])}, ValueError, "floats in load"),
+    ],
+)
+def test_what_is_no_order_is_refused(given, error, message):
+    with pytest.raises(error, match=message):
+        picking_order(**{"load": read_load()} | given)
+
+
+@pytest.mark.parametrize(
+    ("by", "first_to_last"),
+    [("-stop", [3, 2, 1]), ("town", ["stop 2", "stop 9", "stop 10"])],
+)
+def test_an_order_by_stops_can_be_carried_out_and_takes_out_early_what_it_must(
+    rng, by, first_to_last
+):
+    load = stack_load(rng, walls=3)
+    stops = rng.integers(1, 4, len(load))
+    towns = np.array(["stop 9", "stop 10", "stop 2"])[rng.integers(3, size=len(load))]
+    load = Load(load.positions, load.sizes, extras={"stop": stops, "town": towns})
+    order = picking_order(load, by=by)
+    assert not order[["covered", "behind"]].any(axis=None) and len(order) == len(load)
+    summary = stops_of(load, order, by)
+    assert summary["stop"].tolist() == first_to_last
+    stops = load.extras[by.strip("-")].tolist()
+    turn = np.array([first_to_last.index(stop) for stop in stops])
+    # For each box those that are behind it or under it.
+    alone = np.eye(len(load), dtype=bool)
+    waiting = np.array([load.behind(each) | load.covered(each) for each in alone])
+    for number, row in enumerate(summary.itertuples()):
+        # What has to be out before the last box of this stop is: all that one box leads to.
+        out = turn <= number
+        for _ in out:
+            out = out | waiting[:, out].any(axis=1)
+        assert row.boxes == (turn == number).sum()
+        assert row.others_first == (turn[out] > number).sum()
+    assert summary["others_first"].iloc[0] > 20 and summary["others_first"].iloc[-1] == 0
+
+
+def test_the_rule_in_the_docstring_works(small_load):
+    text = inspect.cleandoc(picking_order.__doc__)
+    _, _, example = text.partition("the heaviest first::\n\n")
+    code = textwrap.dedent(example.partition("\n\n")[0])
+    exec(code, space := {"reachable": reachable})
+    masses = 1 + np.arange(len(small_load)) % 7
+    load = Load(small_load.positions, small_load.sizes, extras={"weight": masses})
+    order = picking_order(load, rule=space["heaviest"])
+    present = np.ones(len(load), bool)
+    for item in order["item"]:
+        free = present & ~load.covered(present) & ~load.behind(present)
+        assert masses[item] == masses[free].max()
+        present[item] = False
+
+
+def test_where_boxes_block_each_other_in_a_circle_none_is_lifted_with_another_on_it():
+    """A high box behind a tall one lies on a plank, which lies on what stands before the tall."""
+    tall, foot, plank, high, far = range(5)
+    corners = [(2, 0, 0), (3, 0, 0), (1, 1, 0.5), (1, 0.5, 0.8), (1, 1, 0)]
+    sizes = [(1, 1, 1.5), (1, 2, 0.5), (2.5, 1, 0.3), (1, 1.1, 0.5), (0.5, 1, 0.5)]
+    order = picking_order(of_corners(corners, sizes))
+    assert order["item"].tolist() == [tall, high, plank, foot, far]
+    assert order["behind"].tolist() == [True, False, False, False, False]
+
+
+def test_boxes_without_a_stop_are_counted_and_the_first_is_named(boxes):
+    load = boxes((0.3, 0.2), (0.8, 0.2), (1.3, 0.2))
+    load = Load(load.positions, load.sizes, ids=list("abc"), extras={"town": ["B", "", ""]})
+    with pytest.raises(ValueError, match="2 boxes have no 'town', the first b; expected one for"):
+        picking_order(load, by="town")

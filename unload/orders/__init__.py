@@ -1,0 +1,5 @@
+"""Packing lists and orders of picks: geometry alone, without a lift and without an agent.
+
+Skip this room unless you have a list. Read ``packing_list``, ``settling``, ``order`` and
+``command``, in this order.
+"""

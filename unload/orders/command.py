@@ -1,0 +1,103 @@
+"""The command ``unload``: an order of picks for a packing list."""
+
+import argparse
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from unload import task
+from unload.physics.bullet import ENGINES
+from unload.support import files
+from unload.support.checks import needed_for
+
+DESCRIPTION = """\
+Print an order in which the boxes of a packing list can be taken out: pick, id, item, covered
+(True if another box lay on it or hung over it), behind (True if another one stood in front of
+it), and the list's other columns.
+
+A line of the list is a box. Its columns, in any order, in capitals or not:
+  x_min, y_min, z_min      corner nearest to the origin (pos_x, ...), or x, y, z, the centre
+  size_x, size_y, size_z   edges along the axes (length, width, height)
+  id                       optional
+  rotation                 optional, in degrees: quarter turns
+
+Lengths are in m unless --units or a name says otherwise, as length_mm and "x (cm)" do. The
+axes are x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from the entrance)
+and z (height, 0 at the floor). unload.read_load and unload.picking_order say more.
+
+  unload list.csv --units cm --container 13.6 2.48 2.7 --by stop
+"""
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a formula in a spreadsheet begins with
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command with these arguments, those of the process if None."""
+    form = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser("unload", description=DESCRIPTION, formatter_class=form)
+    text = "CSV or Excel file; an example if missing"
+    parser.add_argument("list", nargs="?", help=text)
+    text = "a column of stops: what can be reached, 1 before 2, ... (--by=-stop: the last first)"
+    parser.add_argument("--by", metavar="COLUMN", help=text)
+    parser.add_argument("--output", help="file; the screen if missing")
+    parser.add_argument("--format", choices=("csv", "json"), default="csv", help="of the output")
+    text = "PNG file for a picture of the load, its first fifty picks numbered"
+    parser.add_argument("--picture", metavar="FILE", help=text)
+    parser.add_argument("--units", default="m", help="of lengths: m, cm, mm or in")
+    size: dict = {"type": float, "nargs": 3, "metavar": ("LENGTH", "WIDTH", "HEIGHT")}
+    text = "its inner size in m; the paper's is 7 2.5 2.5"
+    parser.add_argument("--container", default=task.CONTAINER, help=text, **size)
+    parser.add_argument("--x-from", default="rear", help="where x is 0: rear (the default) or door")
+    text = "in m: how far each box may be from where it belongs (%(default)s)"
+    parser.add_argument("--tolerance", type=float, default=0.005, help=text)
+    text = "what a column is, such as Länge=size_x; may be repeated"
+    parser.add_argument("--column", action="append", default=[], metavar="NAME=MEANING", help=text)
+    version = f"unload {task.VERSION}, lifts by {next(filter(find_spec, ENGINES), 'none')}"
+    parser.add_argument("--version", action="version", version=version)
+    options = vars(parser.parse_args(arguments))
+
+    from unload.orders.order import picking_order, stops_of  # not before: help takes no time
+    from unload.orders.packing_list import EXAMPLE, ListError, read_load
+
+    path, by, output, form, picture, columns = (
+        options.pop(name) for name in ("list", "by", "output", "format", "picture", "column")
+    )
+    options["columns"] = dict(entry.partition("=")[::2] for entry in columns)
+    try:
+        load = read_load(EXAMPLE if path is None else path, **options)
+        order = picking_order(load, by)
+        _write(_as_text(order, form), output)
+        if picture is not None:
+            with needed_for("--picture"):
+                from unload.load.picture import numbered
+            Path(picture).write_bytes(numbered(load, order["item"].to_numpy()))
+    except ListError as error:
+        option = {"columns": "column NAME=MEANING", None: ""}.get(error.argument, error.argument)
+        parser.exit(1, error.problem + (f"; see the option --{option}\n" if option else "\n"))
+    except (ImportError, OSError, TypeError, ValueError) as error:  # ImportError: of an extra
+        parser.exit(1, f"{error}\n")
+    covered, behind = order["covered"].sum(), order["behind"].sum()
+    print(f"{len(order)} picks, {covered} under and {behind} behind others", file=sys.stderr)
+    if by is not None:
+        for stop, boxes, others in stops_of(load, order, by).itertuples(index=False):
+            summary = f"{boxes} boxes, {others} of later ones come out first"
+            print(f"{by.lstrip('-')} {stop}: {summary}", file=sys.stderr)
+
+
+def _as_text(order, form: str) -> str:
+    if form == "json":
+        return order.to_json(orient="records", indent=1, force_ascii=False) + "\n"
+    return order.map(_guarded).rename(columns=_guarded).to_csv(index=False, lineterminator="\n")
+
+
+def _guarded(cell):
+    """A text that a spreadsheet would take for a formula, with an apostrophe before it."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
+
+
+def _write(text: str, output: str | None) -> None:
+    """Write text as UTF-8, whatever a console has, or as a whole file."""
+    if output is not None:
+        return files.write_text(output, text)
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(encoding="utf-8")
+    sys.stdout.write(text)

@@ -1,0 +1,135 @@
+"""An order of picks that can be carried out from the entrance, by the places of the boxes alone."""
+
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from unload.load.boxes import OVERLAP, Load, check_stacked
+from unload.support import checks
+
+Rule = Callable[[Load, np.ndarray], Sequence[np.ndarray]]
+
+
+def reachable(load: Load, present: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The rule of an order that can be carried out from the entrance.
+
+    First what no box lies on or hangs over, then what has none in front of it, then the foremost,
+    then the highest. What is in front of a box stands nearer to the entrance and overlaps it in y
+    and z.
+
+    Args:
+        load: its positions, sizes, contacts, ids and extras are what a rule may use.
+        present: (n,) bool, the boxes that are left.
+
+    Returns:
+        Keys, (n,) each, the most important one first: the box with the largest ones is picked.
+    """
+    front, top = (load.positions + load.sizes / 2)[:, [0, 2]].T
+    # Rounded, so that equal places are equal, however they were computed.
+    foremost, highest = np.rint(front / OVERLAP), np.rint(top / OVERLAP)
+    return ~load.covered(present), ~load.behind(present), foremost, highest
+
+
+def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -> pd.DataFrame:
+    """Order the boxes of a load so that each can be taken out when its turn comes.
+
+    No lift is simulated. What a learned policy picks is an episode of ``ContainerEnv(stack=...)``.
+
+    Args:
+        load: see ``unload.read_load``.
+        by: a name in ``load.extras``, such as ``"stop"``: what can be reached, the lowest value
+            first, or with ``"-stop"`` the highest. Boxes of later stops come out early only where
+            they stand in the way of what can come out.
+        rule: instead of ``reachable``, a function of the load and what is present that returns
+            keys. What can be reached, the heaviest first::
+
+                def heaviest(load, present):
+                    uncovered, in_front, *others = reachable(load, present)
+                    return uncovered, in_front, load.extras["weight"], *others
+
+    Returns:
+        A row for each pick: ``pick``, counted from 1; ``id`` of the box, the number of its item if
+        the load has no ids; ``item``, its row in the load; ``covered`` and ``behind``, True if a
+        box lay on it or hung over it, or stood in front of it, see ``Load``; and the load's
+        ``extras``.
+
+    Raises:
+        TypeError, ValueError: an argument is not as described, or ``rule`` returns other than
+            keys.
+    """
+    check_stacked(load)
+    if rule is None:
+        rule = reachable if by is None else _by_stop(load, by)
+    elif by is not None or not callable(rule):
+        raise TypeError(f"rule is {rule!r}; expected a function, and no by beside it")
+    present, rows = np.ones(len(load), bool), []
+    for pick in range(1, len(load) + 1):
+        returned = rule(load, present.copy())
+        checks.instance("what rule returned", returned, Sequence, "arrays of numbers")
+        keys = checks.finite_array("what rule returned", returned, (None, len(load)))
+        items = np.flatnonzero(present)
+        item = items[np.lexsort(-keys[::-1, items])[0]]
+        name = item if load.ids is None else load.ids[item]
+        rows.append((pick, name, item, load.covered(present)[item], load.behind(present)[item]))
+        present[item] = False
+    table = pd.DataFrame(rows, columns=["pick", "id", "item", "covered", "behind"])
+    for name, values in load.extras.items():
+        table[f"{name} in the list" if name in table else name] = values[table["item"]]
+    return table
+
+
+def _by_stop(load: Load, by: str) -> Rule:
+    """The rule of an order by stops that can be carried out.
+
+    A box is due at the first of the stops of all that it stands in front of or lies on, and of all
+    that these keep from coming out; so no box comes out before its stop that need not.
+    """
+    due = stop_numbers(load, by)[1]
+    blocked, blocking = np.hstack([load.fronts, load.covers])
+    for _ in range(len(load)):  # as long as the longest chain, at most
+        np.minimum.at(due, blocking, due[blocked])
+
+    def rule(load: Load, present: np.ndarray) -> Sequence[np.ndarray]:
+        uncovered, in_front, *others = reachable(load, present)
+        return uncovered, in_front, -due, *others
+
+    return rule
+
+
+def stop_numbers(load: Load, by: str) -> tuple[np.ndarray, np.ndarray]:
+    """The stops in order, (k,), and the index of each box's stop, (n,) int64; see ``by``."""
+    falling = str(by).startswith("-") and by not in load.extras
+    if (name := by[1:] if falling else by) not in load.extras:
+        raise ValueError(
+            f"by is {by!r}; expected one of the list's other columns: {', '.join(load.extras)}"
+        )
+    values = load.extras[name]
+    missing = np.flatnonzero(pd.isna(values) | (values == ""))
+    if missing.size:
+        first = missing[0] if load.ids is None else load.ids[missing[0]]
+        count = len(missing)
+        raise ValueError(f"{count} boxes have no {by!r}, the first {first}; expected one for each")
+    stops, numbers = np.unique(values, return_inverse=True)
+    if stops.dtype.kind not in "biuf":  # texts: "stop 2" comes before "stop 10"
+        order = sorted(range(len(stops)), key=lambda stop: _parts(str(stops[stop])))
+        stops, numbers = stops[order], np.argsort(order)[numbers]
+    return (stops[::-1], len(stops) - 1 - numbers) if falling else (stops, numbers)
+
+
+def _parts(text: str) -> list:
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", text)]
+
+
+def stops_of(load: Load, order: pd.DataFrame, by: str) -> pd.DataFrame:
+    """A row for each stop: ``stop``, ``boxes``, and ``others_first``.
+
+    The latter is how many boxes of later stops come out before its last one.
+    """
+    stops, numbers = stop_numbers(load, by)
+    turns, rows = numbers[order["item"]], []
+    for number, stop in enumerate(stops):
+        until = turns[: np.flatnonzero(turns == number)[-1] + 1]
+        rows.append((stop, (turns == number).sum(), (until > number).sum()))
+    return pd.DataFrame(rows, columns=["stop", "boxes", "others_first"])

@@ -1,0 +1,239 @@
+"""Packing lists: the boxes of a load in a CSV or Excel file, or in a table of pandas."""
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import NoReturn
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+import pandas as pd
+
+from unload import task
+from unload.load.boxes import CONTACT_TOLERANCE, LARGEST_TOLERANCE, BoxError, Load, check_stacked
+from unload.orders.settling import settle, uncarried
+from unload.support import checks, files
+
+LOGGER = logging.getLogger(__name__)
+EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
+MOST = {"rows": 3_000, "columns": 200, "bytes": 20_000_000}
+UNITS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": 1 / 0.0254}  # of a unit in a metre
+CENTRE, CORNER = ("x", "y", "z"), ("x_min", "y_min", "z_min")
+SIZES = ("size_x", "size_y", "size_z")
+TURNS = ("rotation", "yaw", "pitch", "roll")
+# What a column is, by its name in lower case.
+MEANINGS = {name: name for name in (*CENTRE, *CORNER, *SIZES, *TURNS, "id")}
+MEANINGS |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
+MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
+NUMBER = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
+
+
+class ListError(ValueError):
+    """A list that holds no load.
+
+    Attributes:
+        problem: what was found, and what was expected.
+        argument: name of the argument of ``read_load`` that may help, or None.
+    """
+
+    def __init__(self, problem: str, argument: str | None = None) -> None:
+        super().__init__(problem, argument)
+        self.problem, self.argument = problem, argument
+
+    def __str__(self) -> str:
+        return self.problem + (f"; see the argument {self.argument}" if self.argument else "")
+
+
+def read_load(
+    path: str | Path | pd.DataFrame = EXAMPLE,
+    units: str = "m",
+    columns: Mapping[str, str] | None = None,
+    tolerance: float = 0.005,
+    container: Sequence[float] | np.ndarray = tuple(task.CONTAINER),
+    x_from: str = "rear",
+) -> Load:
+    """Read a packing list: a line of names, and one line for each box.
+
+    The container's axes are x (depth, 0 at the rear wall), y (width, 0 at the left wall, seen from
+    the entrance) and z (height). Columns that are read, in capitals or not:
+
+    - ``x_min``, ``y_min``, ``z_min`` or ``pos_x``, ``pos_y``, ``pos_z``: the box's corner nearest
+      to the origin; or ``x``, ``y``, ``z``: its centre;
+    - ``size_x``, ``size_y``, ``size_z`` or ``length``, ``width``, ``height``: edges along the axes
+      as the box stands, at least 2 mm;
+    - ``id``: the number of the row if missing;
+    - ``rotation``, ``yaw``, ``pitch`` or ``roll``, in degrees: quarter turns only, because sizes
+      are those after the turns.
+
+    A length's name may end in its unit: ``length_mm``, ``x (cm)``. All other columns, such as a
+    stop or a weight, become ``Load.extras``. Each line is one box; quantities are ignored.
+
+    Args:
+        path: of a CSV file (UTF-8, or UTF-16 with its mark; separated by commas, or by semicolons
+            or tabs, where decimals may have a comma) or of an Excel file (``.xlsx``, first sheet);
+            or a ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000
+            rows, 200 columns and, unpacked, 20 MB.
+        units: of lengths whose names say none: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``.
+        columns: name in the list → name above, for other names: ``{"Länge": "size_x"}``.
+        tolerance: in m, up to 0.1, how far each box may be from where it belongs, see
+            ``unload.orders.settling.settle``. How many were moved and how far is logged. A box
+            touches whatever is so little below it.
+        container: (3,) its inner length, width and height in m; by default the paper's.
+        x_from: ``"rear"``, or ``"door"`` if x counts from there to the box's front or centre.
+
+    Returns:
+        The load in the order of the list, with its ``ids``.
+
+    Raises:
+        TypeError: an argument is of another type.
+        FileNotFoundError: there is no such file.
+        ModuleNotFoundError: the file needs an extra; the message names it.
+        ListError: a ValueError, too: the list cannot be read, is too long, lacks a column or has
+            two for the same; or a box is refused. The message names the first rows, counted from 1
+            without the line of names, and their ids.
+    """
+    checks.one_of("units", units, UNITS)
+    checks.one_of("x_from", x_from, ("rear", "door"))
+    tolerance = checks.real("tolerance", tolerance, 0, LARGEST_TOLERANCE)
+    container = checks.finite_array("container", container, (3,))
+    checks.entries("columns", {} if columns is None else columns, ())
+    table = read_table(path)
+    names = _by_meaning([*table], columns or {})
+    ids = table[names["id"]] if "id" in names else np.arange(1, len(table) + 1)
+    ids = np.array([*map(str, ids)])
+
+    def refuse(rows: np.ndarray, problem: str, argument: str | None = None) -> NoReturn:
+        shown = ", ".join(f"row {row + 1} (id {str(ids[row])!r})" for row in rows[:5])
+        more = f" and {len(rows) - 5} more" if len(rows) > 5 else ""
+        raise ListError(f"{shown}{more}: {problem}", argument)
+
+    def numbers(meaning: str) -> np.ndarray:
+        name = names[meaning]
+        found = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
+        if (wrong := np.flatnonzero(~np.isfinite(found))).size:
+            refuse(wrong, f"{name} is {str(table[name][wrong[0]])!r}; expected a number")
+        return found
+
+    # A box turned otherwise than by quarter turns is none along the axes.
+    for turn in {*TURNS} & {*names}:
+        if (turned := np.flatnonzero(np.abs((numbers(turn) + 45) % 90 - 45) > 1e-3)).size:
+            refuse(turned, f"a {names[turn]} that is no quarter turn; expected one")
+
+    # Lengths in m, and x from the rear.
+    place = CENTRE if {*CENTRE} <= {*names} else CORNER
+    read = (*place, *SIZES, "id")
+    lengths = [numbers(name) / UNITS[_plain(names[name])[1] or units] for name in read[:6]]
+    centres, sizes = np.hsplit(np.stack(lengths, axis=1), 2)
+    centres = centres if place is CENTRE else centres + sizes / 2
+    if x_from == "door":
+        centres[:, 0] = container[0] - centres[:, 0]
+
+    # What fits stays, to the bit, where and as large as the list says.
+    moves, smaller = settle(centres - sizes / 2, sizes, container, tolerance)
+    try:
+        load = Load(
+            centres + moves,
+            sizes - smaller,
+            ids=ids,
+            container=container,
+            extras={str(n): _extra(table[n]) for what, n in names.items() if what not in read},
+            contact_tolerance=max(tolerance, CONTACT_TOLERANCE),
+        )
+        check_stacked(load)
+    except BoxError as error:
+        outside = np.abs(centres - container / 2) + sizes / 2 - container / 2
+        argument = "container" if outside.max() > LARGEST_TOLERANCE else "tolerance"
+        if outside.max() > 2 * container.max():  # metres that are none
+            argument = "units"
+        said = error.problem.startswith(("reaches", "overlap", "floats"))
+        refuse(np.array(error.boxes), error.problem, argument if said else None)
+    if (tipping := uncarried(load)).size:
+        refuse(tipping, "tips, because nothing carries its centre of mass", "tolerance")
+    for changes, what in ((moves, "moved by"), (smaller, "taken for smaller, by")):
+        if changes.any():
+            count, most = changes.any(axis=1).sum(), 1000 * np.linalg.norm(changes, axis=1).max()
+            LOGGER.warning("%d of %d boxes %s up to %.1f mm", count, len(load), what, most)
+    return load
+
+
+def read_table(path: str | Path | pd.DataFrame) -> pd.DataFrame:
+    """Cells of a list below its line of names: as text, or as they are in a table."""
+    if isinstance(path, pd.DataFrame):
+        table = path.reset_index(drop=True)
+    else:
+        file = checks.path("path", path)
+        try:
+            cells = (_excel if file.suffix.lower() == ".xlsx" else _csv)(file)
+        except (BadZipFile, LookupError, UnicodeError, pd.errors.ParserError) as error:
+            wanted = "expected CSV in UTF-8, an .xlsx file, or a table that pandas has read"
+            raise ListError(f"{file} is not a readable list: {error}; {wanted}") from error
+        # Spreadsheets leave empty lines and columns around a table.
+        cells = cells.fillna("").map(str.strip)
+        cells = cells.loc[(cells != "").any(axis=1), (cells != "").any()]
+        table = cells.iloc[1:].reset_index(drop=True).set_axis([*cells.iloc[0]], axis=1)
+    _check("rows", len(table))
+    _check("columns", table.shape[1])
+    if not len(table):
+        raise ListError(f"the list has the columns {[*table]} and no row; expected boxes")
+    return table
+
+
+def _check(what: str, count: int) -> None:
+    if count > MOST[what]:
+        raise ListError(f"the list has {count:,} {what}; expected at most {MOST[what]:,}")
+
+
+def _csv(file: Path) -> pd.DataFrame:
+    _check("bytes", file.stat().st_size)
+    content = file.read_bytes()
+    text = content.decode("utf-16" if content[:2] in MARKS else "utf-8-sig")
+    separator = max(",;\t", key=text.lstrip().partition("\n")[0].count)
+    form = {"header": None, "dtype": str, "na_filter": False, "skipinitialspace": True}
+    cells = pd.read_csv(StringIO(text), sep=separator, **form)
+    # Where the comma does not separate cells it separates decimals.
+    return cells if separator == "," else cells.replace(r"^(-?\d+),(\d+)$", r"\1.\2", regex=True)
+
+
+def _excel(file: Path) -> pd.DataFrame:
+    with ZipFile(file) as parts:
+        _check("bytes", sum(part.file_size for part in parts.infolist()))
+    with checks.needed_for(f"{file}, an Excel file,"), pd.ExcelFile(file) as book:
+        sheet = book.book.worksheets[0]  # whose last row and column may be far from all others
+        _check("rows", sheet.max_row)
+        _check("columns", sheet.max_column)
+        return pd.read_excel(book, header=None, dtype=str, na_filter=False)
+
+
+def _by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
+    """Names of columns by what they are; a column without a meaning is what its name says."""
+    for name, meaning in columns.items():
+        checks.one_of("columns", name, names)
+        checks.one_of("columns", meaning, MEANINGS)
+    found: dict[str, str] = {}
+    for name in names:
+        meaning = MEANINGS.get(columns.get(name) or _plain(name)[0], name)
+        if meaning in found:
+            raise ListError(f"the list has the columns {names}; expected one {meaning!r}")
+        found[meaning] = name
+    missing = ", ".join(name for name in SIZES if name not in found)
+    if ({*CENTRE} <= {*found}) == ({*CORNER} <= {*found}):
+        missing = "either x, y, z or x_min, y_min, z_min"
+    if missing:
+        raise ListError(f"the list has the columns {names}; expected {missing}", "columns")
+    return found
+
+
+def _plain(name: object) -> tuple[str, str | None]:
+    """A column's name in lower case without its unit, and the unit, None if it states none."""
+    words = re.sub(r"[\W_]+", "_", str(name).lower()).strip("_")
+    head, _, unit = words.rpartition("_")
+    return (head, unit) if head and unit in UNITS else (words, None)
+
+
+def _extra(cells: pd.Series) -> np.ndarray:
+    """Cells of another column: numbers where all are written as such, else as they are."""
+    if all(isinstance(cell, str) and re.fullmatch(NUMBER, cell) for cell in cells):
+        return pd.to_numeric(cells).to_numpy()
+    return cells.to_numpy() if cells.dtype.kind in "biuf" else cells.to_numpy(object)
