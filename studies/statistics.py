@@ -27,8 +27,12 @@ def windows(curve: pd.DataFrame) -> pd.DataFrame:
     Args:
         curve: ``picks`` (increasing), ``success_rate`` and ``loss``.
     """
-    number = (curve["picks"] - 1) // WINDOW_PICKS
-    return curve.groupby(number)[["success_rate", "loss"]].mean()
+    return curve.groupby(window_numbers(curve))[["success_rate", "loss"]].mean()
+
+
+def window_numbers(curve: pd.DataFrame) -> pd.Series:
+    """Return the number of the window of half a million picks that each point belongs to."""
+    return (curve["picks"] - 1) // WINDOW_PICKS
 
 
 def end_msr(curve: pd.DataFrame) -> float:

@@ -6,7 +6,15 @@
 import numpy as np
 import pandas as pd
 
-from studies.statistics import END, WINDOW_PICKS, end_msr, fell, steady, windows
+from studies.statistics import (
+    END,
+    WINDOW_PICKS,
+    end_msr,
+    fell,
+    steady,
+    window_numbers,
+    windows,
+)
 
 STARTS = (0.125, 0.175)  # MSR over the first episode: the paper's mean reward of −0.7
 ENDS = (0.55, 0.65)  # MSR over the last tenth: "around 0.2"
@@ -22,6 +30,13 @@ WORDS = {
     "noisier": ("more noisy after it", "changes vary more from then on"),
     "ends": ("around 0.2", "55–65 % over the last tenth"),
     "fig11": ("decreases, increases, a lower slope", "it falls, rises, sinks at most half as fast"),
+}
+# Three readings of "noisier": what varies more after the peak of the loss than before it. The
+# criterion is the first one; a plan fixed it. See ``noisier_readings``.
+READINGS = {
+    "windows": "changes from window to window",
+    "scatter": "points around the trend of their window",
+    "steps": "changes from point to point",
 }
 
 
@@ -55,6 +70,35 @@ def likeness(curve: pd.DataFrame) -> dict:
     measures = {"start": start, "end": end, "best": float(means["success_rate"].max())}
     verdicts = {"fig12": fig12, "fig11": fig11, "both": fig12 and fig11}
     return measures | {"fell": fell(curve)} | parts | verdicts
+
+
+def noisier_readings(curve: pd.DataFrame) -> dict[str, bool]:
+    """Return whether the MSR is noisier after the loss's peak, by each of ``READINGS``.
+
+    Args:
+        curve: see ``likeness``.
+    """
+    late = window_numbers(curve) > windows(curve)["loss"].idxmax()
+    varies = {"scatter": scatter(curve), "steps": curve["success_rate"].diff()}
+    spreads = {name: (values[~late].std(), values[late].std()) for name, values in varies.items()}
+    # Without a point after the peak its spread is NaN, and larger than nothing.
+    noisier = {name: bool(after > before) for name, (before, after) in spreads.items()}
+    return {"windows": likeness(curve)["noisier"], **noisier}
+
+
+def scatter(curve: pd.DataFrame) -> pd.Series:
+    """Return by how much each point's MSR differs from the straight line through its window's.
+
+    Args:
+        curve: ``picks`` and ``success_rate``, with at least two points in each window.
+    """
+
+    def line(rates: pd.Series) -> np.ndarray:
+        places = np.arange(len(rates))
+        return np.polyval(np.polyfit(places, rates, 1), places)
+
+    rates = curve["success_rate"]
+    return rates - rates.groupby(window_numbers(curve)).transform(line)
 
 
 def open_course(share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

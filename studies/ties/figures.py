@@ -1,4 +1,4 @@
-"""Where runs end, by how ties are broken, and the README's answer in one figure."""
+"""Where runs end, by how ties are broken and how long an order of equals lasts; single runs."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ from matplotlib.ticker import EngFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
-from studies.paper.training import PAPER, SMOOTH
+from studies.paper.training import PAPER
 from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.criterion import WORDS, likeness, open_course
@@ -166,71 +166,3 @@ def draw_duration(runs: pd.DataFrame, long: pd.DataFrame) -> Figure:
     axes.set(xlabel="ρ: correlation of the noise from one pick to the next", ylim=(0, 103))
     axes.set_ylabel("MSR over the last tenth (%)")
     return figure
-
-
-@styled
-def draw_answer() -> Figure:
-    """Learning curves of the paper's configuration, of other ties, and of positions.
-
-    Running means over half a million picks; a label counts the runs whose colour it has. Thick
-    lines are means over runs.
-    """
-    paper, ties, earlier = map(read_grid, (PAPER, TIES, EARLIER))
-    figure, panels = plt.subplots(1, 3, figsize=(11.4, 3.7), sharex=True, sharey=True)
-    left, middle, right = panels
-    ranks, shared, positions = (COLOURS[name] for name in ("ranks", "averaged", "positions"))
-
-    count = _draw_runs(
-        left, paper, ["paper_no_mask", "paper_b2048_no_mask"], WITHOUT_MASK, mean=True
-    )
-    _label(left, (0.98, 0.04), f"without the mask ({count} runs)", WITHOUT_MASK)
-    count = _draw_runs(left, paper, ["paper_mask", "paper_b2048_mask"], ranks, mean=True)
-    _label(left, (0.02, 0.96), f"with the mask\n({count} runs)", ranks)
-    left.plot([0, 20], [100 * PAPER_START, 100 * PAPER_MSR], "k*", ms=12, clip_on=False, zorder=5)
-    _label(left, (0.04, 0.04), "the paper", "black")
-    left.set_title(
-        "The paper's configuration, ties broken\nby frozen noise: runs rise, and sink", loc="left"
-    )
-
-    drifting = _draw_runs(middle, ties, ["drifting_mask"], ranks)
-    anew = _draw_runs(middle, ties, ["anew_mask"], COLOURS["level"])
-    ordered = _draw_runs(middle, earlier, ["ties_by_order_mask"], shared)
-    count = _draw_runs(middle, paper, ["averaged_mask", "averaged_b2048_mask"], shared)
-    count += _draw_runs(middle, ties, ["averaged_mask"], shared)
-    _label(middle, (0.98, 0.36), f"by noise that drifts ({drifting})", ranks)
-    _label(middle, (0.98, 0.26), f"by noise drawn anew at each pick ({anew})", COLOURS["level"])
-    said = f"by the items' order ({ordered}), or averaged ({count})"
-    _label(middle, (0.98, 0.16), said, shared)
-    middle.set_title("Ranks, ties broken otherwise,\nwith the mask: most stay up", loc="left")
-
-    count = _draw_runs(right, paper, ["positions_mask", "positions_no_mask"], positions)
-    _label(right, (0.98, 0.36), f"with the mask and without ({count} runs)", positions)
-    right.set_title("Positions instead of ranks:\nnone falls", loc="left")
-    for axes in panels:
-        axes.set(xlim=(0, 20), xticks=range(0, 21, 5), ylim=(0, 102), xlabel="million picks")
-    left.set_ylabel("successful picks while training (%)")
-    return figure
-
-
-def _draw_runs(
-    axes: Axes, curves: pd.DataFrame, cells: list[str], colour: str, mean: bool = False
-) -> int:
-    """Draw all runs of some cells, pale below their mean if asked, and return how many they are."""
-    runs = curves[curves["cell"].isin(cells)].groupby(["cell", "seed"])
-    smooth = [
-        pd.Series(100 * run["success_rate"].rolling(SMOOTH, min_periods=1).mean().to_numpy(),
-                  run["picks"] / 1e6)
-        for _, run in runs
-    ]  # fmt: skip
-    for run in smooth:
-        axes.plot(run, color=colour, linewidth=0.9, alpha=0.3 if mean else 0.75)
-    if mean:
-        axes.plot(pd.concat(smooth, axis=1).mean(axis=1), color=colour, linewidth=2.5)
-    return len(runs)
-
-
-def _label(axes: Axes, place: tuple[float, float], text: str, colour: str) -> None:
-    """Write a label at a place in shares of the panel, on its nearer side."""
-    across, up = place
-    sides = {"ha": "left" if across < 0.5 else "right", "va": "bottom" if up < 0.5 else "top"}
-    axes.text(across, up, text, color=colour, fontsize=9, transform=axes.transAxes, **sides)

@@ -15,11 +15,18 @@ import pytest
 from PIL import Image
 
 from studies import paths, style
+from studies.falls.long import LONG
+from studies.grid import read_grid
 from studies.heap.table import compared
 from studies.paper import diagrams
+from studies.paper.training import PAPER, PAPER_CELLS
 from studies.play import animation
 from studies.policies.comparison import comparison_msr
 from studies.results import read_table
+from studies.seamless.training import SEAMLESS
+from studies.statistics import PAPER_MSR, by_cell, by_run
+from studies.ties.criterion import READINGS, likeness, noisier_readings
+from studies.ties.training import TIES
 from tests.test_notebooks import cells as cells_in
 from tests.test_notebooks import text as text_of
 from unload.load.view import _PLOTLY_MIMETYPE
@@ -35,18 +42,15 @@ PUBLISHED = {
     "06_why_runs_fall": "why-runs-fall-4 06-why-runs-fal-c8 why-runs-fall-10 why-runs-fall-14",
     "10_lifting": "lifting-jams",
     "11_hyperparameters": "cell-17 d7126e58 tuning-explore cell-19 cell-24 cell-28",
-    "12_training": "cell-13 cell-19 cell-23 training-likeness training-ends training-ties "
+    "12_training": "training-method cell-13 cell-19 cell-23 training-likeness training-ends "
     "training-answer",
     "13_how_sure_are_you": "cell-04 sure-intervals",
     "20_a_policy_without_a_miss": "698c4502",
     "21_when_is_learning_worth_it": "cell-06 cell-09 cell-17 cell-23 cell-25 cell-27 cell-28",
     "22_how_it_became_fast": "52be85f7 fast-lifts 592fcdbf c563d4e7",
     "report/01_paper_and_here": "",
-    "report/02_verdicts": "",
-    "report/03_outlook": "",
-    "report/04_evidence": "",
-    "report/05_seamless_walls": "",
-    "report/06_ties": "",
+    "report/02_evidence": "",
+    "report/03_plans_and_verdicts": "",
 }
 WITH_PYBULLET = {"21_when_is_learning_worth_it", "report/01_paper_and_here"}  # some cells need it
 # How Jupyter shows a table.
@@ -201,3 +205,172 @@ def test_the_moving_picture_is_the_one_that_its_notebook_makes(tmp_path, monkeyp
             assert found.info == published.info
             both = [np.asarray(frame.convert("RGB"), int) for frame in (found, published)]
             assert (np.abs(both[0] - both[1]) > 25).mean() < 1e-5
+
+
+def prose(notebook: str) -> str:
+    """The Markdown of a notebook, in one line."""
+    path = paths.ROOT / "notebooks" / f"{notebook}.ipynb"
+    return " ".join(" ".join(map(text_of, cells_in(path, "markdown"))).split())
+
+
+@pytest.fixture(scope="module")
+def runs() -> pd.DataFrame:
+    """All runs of 20 million picks by the criterion, with their ``grid``."""
+    return pd.concat(
+        by_run(read_grid(grid), lambda curve: likeness(curve) | noisier_readings(curve)).assign(
+            grid=grid.name
+        )
+        for grid in (PAPER, LONG, SEAMLESS, TIES)
+    ).reset_index(drop=True)
+
+
+@pytest.fixture(scope="module")
+def asked() -> pd.DataFrame:
+    """The MSR of published networks in new containers in %, a column per noise and mask."""
+    choice = read_table("ties/choice").query("place")
+    return 100 * choice.pivot_table("msr", ["cell", "seed"], ["noise", "mask"])
+
+
+def spread(values, digits=0) -> str:
+    """From the lowest to the highest of shares, in %."""
+    return "–".join(f"{100 * value:.{digits}f}" for value in (values.min(), values.max()))
+
+
+def test_the_training_is_what_notebook_12_says(runs, asked):
+    text = prose("12_training")
+    own = runs[runs["cell"].isin([*PAPER_CELLS])]
+    agents = asked.loc["paper_b2048_no_mask", ("frozen", True)]
+    said = f"succeed in {agents.mean():.0f} % of their picks**, the worst in {agents.min():.0f} %"
+    assert said in text
+    assert f"All {len(own)} runs of the paper's settings start at 26–27 %" in text
+    assert own["start"].round(3).between(0.255, 0.275).all() and not own["steady"].any()
+    masked = own[~own["cell"].str.contains("no_mask")]
+    assert f"{masked['fell'].sum()} of {len(masked)} rise to 95–100 % and fall" in text
+    near = own[own["ends"]]
+    assert (len(near), near["fell"].sum()) == (9, 7)
+    assert "Nine of the 36 end at 55–65 %. Seven of the nine had fallen" in text
+    without = dict(list(own.groupby("cell")["end"]))
+    large, small = without["paper_b2048_no_mask"], without["paper_no_mask"]
+    assert f"b = 2048 ends at {spread(large)} %, b = 256 at {spread(small)} %" in text
+    assert f"end up to {100 * (large.max() - large.min()):.0f} points apart" in text
+
+
+def test_the_readings_are_what_notebook_12_says(runs):
+    text = prose("12_training")
+    flat = runs[runs["cell"].str.startswith("weight_1")]
+    assert len(flat) == 9 and flat["best"].min() > 0.87
+    assert f"nine runs start at {spread(flat['start'], 1)} %, and all pass 87 % later" in text
+    anew = runs["cell"].str.match(
+        r"(no_)?mask_|b2048_(no_)?mask_order|shuffled_mask|positions_mask_"
+    )
+    anew = runs[anew & (runs["grid"] == SEAMLESS.name)]
+    assert f"{len(anew)} runs start at {spread(anew['start'], 1)} %" in text
+    said = f"{len(anew)} runs end at {spread(anew['end'])} %; {anew['ends'].sum()} of them"
+    assert said in text and anew["best"].max() < 0.602
+    ties = runs[(runs["grid"] == TIES.name) & ~runs["cell"].str.contains("jams")]
+    fresh = ties[ties["cell"].str.contains("anew")]
+    assert len(fresh) == 7 and not fresh["fell"].any()
+    assert 0.91 <= fresh["end"].min() < 0.92 and 0.997 < fresh["end"].max() < 0.9985
+    assert "seven runs stay up and end at 91–99.8 %" in text
+    drifting = ties[ties["cell"].str.contains("drifting")]
+    assert (len(drifting), drifting["fell"].sum()) == (6, 5) and "six runs; five fall" in text
+    ordered = read_table("ties/earlier").query("cell.str.startswith('ties_by_order')")
+    assert len(ordered) == 10 and ordered["end"].min() > 0.985 and not ordered["fell"].any()
+    assert "ten runs stay up and end at 99–100 %" in text
+
+
+def test_runs_that_do_not_fall_look_like_the_papers(runs):
+    started = runs[runs["starts"]]
+    rising = started[started["steady"]]
+    alike = rising[rising[["slower", "ends", "fig11"]].all(axis=1)]
+    assert (len(started), len(rising), len(alike)) == (59, 19, 17)
+    counts = [alike[name].sum() for name in READINGS]
+    assert counts == [1, 6, 7] and alike["both"].sum() == alike["windows"].sum()
+    for name, said in {
+        "12_training": "59 runs start near 15 %, and 19 of them rise steadily. Of these, 17 also "
+        "end near 60 %",
+        "report/02_evidence": "Of the 59 that do, 19 are steady, and 17 of the 19 meet every part",
+    }.items():
+        text = prose(name)
+        assert said in text
+        assert "With 40 % of attempts failing by chance, a run that does not fall".lower() in (
+            text.lower()
+        )
+    said = "by windows 1 of the 17 is, by the scatter of the points 6, from point to point 7"
+    assert said in prose("12_training")
+
+
+def test_the_first_report_says_what_the_data_say(runs, asked):
+    text = prose("report/01_paper_and_here")
+    applied = asked.loc["paper_b2048_no_mask"]["frozen"] / 100
+    said = f"{applied[True].mean():.0%} of their picks in new containers".replace("%", " %")
+    said += f" ({spread(applied[True])}; b = 2048, eight agents), without the mask in "
+    said += f"{100 * applied[False].mean():.0f} % ({spread(applied[False])})"
+    assert said in text
+    own = runs[runs["cell"].isin([*PAPER_CELLS])]
+    means = [100 * own.loc[own["cell"] == cell, "end"].mean() for cell in PAPER_CELLS]
+    assert "means of {:.0f}, {:.0f}, {:.0f} and {:.0f} %".format(*means) in text
+    assert f"{own['fig11'].sum()} of 36 runs | in part" in text
+    without = own[own["cell"].str.contains("no_mask")]["fig11"]
+    masked = own["fig11"].sum() - without.sum()
+    said = f"{without.sum()} of the 18 runs without the mask, and in {masked} of the 18 with it"
+    assert said in text
+
+
+def test_the_evidence_says_what_the_data_say(runs, asked):
+    text = prose("report/02_evidence")
+    four = asked.loc[[*PAPER_CELLS]].mean()
+    said = f"succeed in {four['frozen', False]:.0f} % of their picks with frozen noise and no mask."
+    said += f" The mask alone brings them to {four['frozen', True]:.0f} %, noise anew alone to "
+    assert said + f"{four['anew', False]:.0f} %, both to {four['anew', True]:.0f} %." in text
+    frozen, cells = asked["frozen"], asked["frozen"].groupby("cell").mean()
+    anew = frozen.loc[["anew_mask", "anew_no_mask"]].mean()
+    said = f"succeed in {anew[False]:.0f} % without the mask and in {anew[True]:.0f} % with it"
+    assert said in text
+    no_mask, mask = (cells.loc[f"paper_{name}"] for name in ("no_mask", "mask"))
+    said = f"({no_mask[False]:.0f} and {no_mask[True]:.0f} %, with the mask in training "
+    assert said + f"{mask[False]:.0f} and {mask[True]:.0f} %)" in text
+    assert f"reaches {cells.loc['b2048_anew_no_mask', True]:.0f} % with the mask" in text
+    short = cells.loc["episodes_25", True]
+    assert f"three long networks succeed in {short:.0f} % of the picks of whole" in text
+    walls = dict(list(runs[runs["grid"] == SEAMLESS.name].groupby("cell")))
+    noise = pd.concat([walls["mask_noise"], walls["no_mask_noise"]])
+    said = f"ten runs rise to {spread(noise['best'])} % and end at {spread(noise['end'])} %"
+    assert said in text
+    high, low = (
+        spread(
+            pd.concat([walls[f"measured_{each}_{mask}_order"] for mask in ("mask", "no_mask")])[
+                "start"
+            ]
+        )
+        for each in ("1.0", "0.64")
+    )
+    assert f"start at {high} % or {low} %" in text
+    lab = 100 * read_table("ties/laboratory").groupby("cell")["end"].mean()
+    said = f"with the mask ({lab['renewed']:.0f} and {lab['rho_0.0']:.0f} %), and half as high "
+    assert (
+        said + f"without it ({lab['renewed_no_mask']:.0f} and {lab['rho_0.0_no_mask']:.0f} %)"
+        in text
+    )
+
+
+def test_the_first_plans_verdict_is_in_part(runs):
+    text, own = prose("report/03_plans_and_verdicts"), runs[runs["cell"].isin([*PAPER_CELLS])]
+    cells = by_cell(own[["cell", "seed", "end"]])
+    holds = (cells["low"] <= PAPER_MSR) & (PAPER_MSR <= cells["high"])
+    assert holds.sum() == 3 and "**in part in three of four cells**" in text
+    widest = 100 * (cells["high"] - cells["low"]).max()
+    nearest = 100 * (PAPER_MSR - cells["low"])[holds].min()
+    assert f"one interval is {widest:.0f} points wide" in text and 0.05 < nearest < 0.15
+    assert f"{own['end'].between(0.5, 0.7).sum()} of the 36 runs end at 50–70 %" in text
+    fresh = own[own["cell"].str.contains("no_mask") & (own["seed"] > 3)].groupby("cell")["end"]
+    small, large = 100 * fresh.mean()[["paper_no_mask", "paper_b2048_no_mask"]]
+    assert (
+        f"the means are {small:.0f} % (b = 256, six runs) and {large:.0f} % (b = 2048, four)"
+        in text
+    )
+    long = TIES.configs(), read_grid(TIES).groupby(["cell", "seed"]).ngroups
+    assert f"{len(long[0]) - long[1]} of the {len(long[0])} runs of 20 million picks" in text
+    assert f"{long[1]} were made" in text
+    seen = read_table("ties/laboratory").query("5000 <= seed <= 5009")
+    assert f"{len(seen)} runs were seen before any prediction of them" in text

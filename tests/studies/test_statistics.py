@@ -76,5 +76,7 @@ def test_pairs_make_the_interval_of_a_ratio_narrow():
 
 def test_what_a_plan_predicts_is_read_from_its_tables():
     predicted = statistics.predictions("ties")
-    assert list(predicted.index) == [*(f"N{number}" for number in range(1, 10)), "P1", "P2"]
+    counts = {"N": 9, "P": 2, "Q": 8, "M": 5}
+    names = [f"{part}{number}" for part in counts for number in range(1, counts[part] + 1)]
+    assert list(predicted.index) == names
     assert predicted["N3"] == "drifting with the mask: at least 3 of 5 fall"

@@ -4,13 +4,14 @@ import re
 from fnmatch import fnmatch
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from studies import paths
 from studies.grid import read_grid
 from studies.results import read_provenance, read_table
 from studies.ties import earlier, leak, training
-from studies.ties.criterion import FIG11, FIG12, likeness
+from studies.ties.criterion import FIG11, FIG12, READINGS, likeness, noisier_readings, scatter
 from studies.ties.laboratory import CELLS, mirrored_load
 from tests.studies.test_statistics import course
 from unload import stack_load, task
@@ -41,6 +42,37 @@ def test_each_part_of_the_criterion_is_missed_by_a_run_of_its_own(part, rates, l
     assert [name for name in FIG12 + FIG11 if not found[name]] == ([part] if part else [])
     assert found["fig12"] == (part not in FIG12) and found["fig11"] == (part not in FIG11)
     assert found["both"] == (part is None)
+
+
+# What is added to the eight points of each window; neither changes the mean of a window.
+BENT = 0.01 * np.array([7, 1, -3, -5, -5, -3, 1, 7])  # far from a line, small steps
+ZIGZAG = 0.03 * np.array([1, -1, 1, -1, -1, 1, -1, 1])  # near one, large steps
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "noisier"),
+    [
+        (BENT, ZIGZAG, ["steps"]),
+        (ZIGZAG, BENT, ["scatter"]),
+        (0 * BENT, BENT, ["scatter", "steps"]),
+    ],
+)
+def test_noisier_has_three_readings(before, after, noisier):
+    """Of a run whose MSR rises evenly, with the peak of its loss at half time."""
+    rates = np.linspace(0.2, 0.6, 160) + np.r_[np.tile(before, 10), np.tile(after, 10)]
+    run = pd.DataFrame({"picks": 62_500 * np.arange(1, 161), "success_rate": rates, "loss": 0.3})
+    run.loc[72:79, "loss"] = 0.5
+    found = noisier_readings(run)
+    assert [*found] == [*READINGS] and found["windows"] is likeness(run)["noisier"]
+    assert [name for name in ("scatter", "steps") if found[name]] == noisier
+
+
+def test_scatter_leaves_out_what_a_window_rises():
+    rates = np.r_[0.1, 0.2, 0.3, 0.4, 0.9, 0.7, 0.5, 0.3, 0.5, 0.6, 0.5, 0.6]
+    run = pd.DataFrame({"picks": 125_000 * np.arange(1, 13), "success_rate": rates})
+    found = scatter(run).to_numpy()
+    assert found[:8] == pytest.approx(0, abs=1e-12)
+    assert found[8:] == pytest.approx([-0.02, 0.06, -0.06, 0.02])
 
 
 def test_the_cells_are_those_of_the_plan():
