@@ -32,7 +32,7 @@ from studies.play.page import PAGE
 
 BUILD = ROOT / "build" / "browser"
 PLAYGROUND = "00_playground"
-NOTEBOOKS = (PLAYGROUND, "01_task", "04_masked_dqn", "06_why_runs_fall")
+NOTEBOOKS = (PLAYGROUND, "01_task", "04_masked_dqn", "06_why_agents_go_wrong")
 NOTEBOOKS += ("21_when_is_learning_worth_it",)
 RUN_LIMIT = 400  # s, for all cells of a notebook
 DRAW_LIMIT = 60  # s, for a picture, without a graphics card
