@@ -19,8 +19,8 @@ from unload.support import files
 WIDTH, HEIGHT = 4.4, 4.4  # of one agent's part, in inches at 100 pixels each
 RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
 STUCK = task.N_VISIBLE  # failed picks in a row after which an agent counts as stuck
-SLOW, STEP = 10, 9  # frames of one pick each at the beginning, and picks per frame at last
-FIRST, EARLY, LATE, LAST = 1500, 240, 80, 5000  # ms that frames are shown
+SLOW, STEP = 4, 9  # frames of one pick each at the beginning, and picks per frame at last
+FIRST, EARLY, LATE, LAST = 600, 150, 80, 5000  # ms that frames are shown
 FAINT, RAIL = "#6f6f6f", "#e4e4e1"
 PALETTE = 127  # colours of all frames, besides white
 LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
@@ -141,6 +141,5 @@ def _boxes(run: Run, before: int, now: int) -> tuple[np.ndarray, np.ndarray, np.
     order = back_to_front(low, high)
     for corner in (low, high):
         corner[rising, 2] += RISE
-    # What fails is drawn last, so that it is seen through all others.
-    order = np.concatenate([order[present[order]], np.unique(failed[present[failed]])])
+    order = order[present[order]]
     return low[order], high[order], colours[order]
