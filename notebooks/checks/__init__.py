@@ -125,6 +125,11 @@ def pair(answer: Any) -> tuple[float, float]:
     return first, second
 
 
+def numbers(answer: Any) -> list[float]:
+    """a list of numbers"""
+    return np.asarray(list(answer), dtype=float).reshape(-1).tolist()
+
+
 def truth(answer: object) -> bool:
     """True or False"""
     if str(answer) not in ("True", "False"):

@@ -1,11 +1,14 @@
 """The exercises of the core, notebooks 00 to 06; those of 04 stand in ``masked_dqn``."""
 
+from itertools import pairwise
+
 import numpy as np
 import torch
 
 import unload
-from notebooks.checks import Exercise, call, function, masked_dqn, number, pair, truth
+from notebooks.checks import Exercise, call, function, masked_dqn, number, numbers, pair, truth
 from studies.falls import measures
+from studies.falls.laboratory import taught_preference
 from studies.play.episode import Run
 from unload import PEQNetwork, task
 from unload.physics.table import TablePhysics, shared_table
@@ -157,6 +160,24 @@ def msr(along_x, along_y, ties="noise"):
     return unload.evaluate(policy, 2)["success_rate"].mean()
 
 
+def errs_first(along_y):
+    """Whether a rule errs, but not the one of the other side, nor those of a tenth less."""
+    less = along_y - np.copysign(0.1, along_y)
+    return msr(0, along_y) < 0.95 <= min(msr(0, each) for each in (-along_y, less, -less))
+
+
+def teach_each_other(preferences):
+    if len(preferences) != PUPILS:
+        return f"these are {len(preferences)} preferences; expected {PUPILS}"
+    for teacher, pupil in pairwise([FIRST_TEACHER, *preferences]):
+        if abs(pupil - taught_preference(teacher)) > 1e-3:
+            return f"{pupil:.3g} is not what a pupil of the teacher {teacher:.3g} prefers"
+    return True
+
+
+FIRST_TEACHER, PUPILS = 0.1, 4
+
+
 EXERCISES = {
     "00/1": Exercise(number, successes, "load and run have the same seed, 0 to 19"),
     "00/2": Exercise(number, deadlocks, "did you give mask=False, and the seed of the load?"),
@@ -177,14 +198,6 @@ EXERCISES = {
     ),
     "05/2": Exercise(pair, both, "evaluate over 4 containers from seed 0 on"),
     "05/3": Exercise(function, digs_left, ""),
-    "06/1": Exercise(
-        number,
-        lambda least: msr(0, least) < 0.95 <= msr(0, least - 0.1),
-        "the title of the figure gives the MSR",
-    ),
-    "06/2": Exercise(
-        number,
-        lambda share: abs(share - msr(1.5, 0, "average")) < 0.01,
-        "all boxes of a wall share x, and now its rank, too",
-    ),
+    "06/1": Exercise(number, errs_first, "try both signs; the title of the figure gives the MSR"),
+    "06/2": Exercise(numbers, teach_each_other, ""),
 }

@@ -172,6 +172,6 @@ FRESH: dict[str, Cell] = {
         changes.shuffled, mask=False, **TAKEN_BACK["learning_rate"]
     ),
     **{f"epsilon_{each}": _fresh(epsilon_final=each) for each in EPSILONS},
-    **{f"taught_{rho}_epsilon_0.5": _fresh_taught(rho, 0.5) for rho in FRESH_PREFERENCES},
+    **{f"taught_{each}_epsilon_0.5": _fresh_taught(each, 0.5) for each in FRESH_PREFERENCES},
     "taught_0.4_epsilon_1.0": _fresh_taught(0.4, 1.0),
 }

@@ -1,21 +1,24 @@
-"""The figures of why runs fall."""
+"""The figures of why agents go wrong."""
 
 from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from studies.falls.cells import PREFERENCES, PUPILS
 from studies.falls.laboratory import ERRS, THRESHOLDS
 from studies.paper.training import PAPER_CELLS
-from studies.statistics import PAPER_MSR, end_msr, t_interval
-from studies.style import COLOURS, styled
+from studies.statistics import PAPER_MSR
+from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload import task
+from unload.agent.config import TrainConfig
 
 MOST_PREFERENCE = 1.5  # larger ones are drawn at the edge
+ALONG_X, ALONG_Y = "preference along x: rear – entrance", "along y: left – right"
+DARK_IS_HIGH = "viridis_r"
+SHADE = "#f6d5c9"
 NAMES = {  # of what ``PUPILS`` see and store, in their order
     "ranks": "ranks",
     "shuffled": "shuffled places",
@@ -23,67 +26,66 @@ NAMES = {  # of what ``PUPILS`` see and store, in their order
     "level": "level loads",
 }
 PAPER_KINDS = {  # what the paper's four cells are called
-    name: f"mask {'on' if cell.config.mask else 'off'}, b = {cell.config.batch_size}"
+    name: f"{'with' if cell.config.mask else 'without'} the mask, b = {cell.config.batch_size}"
     for name, cell in PAPER_CELLS.items()
 }
 
 
 @styled
-def four_cells(curves: pd.DataFrame) -> Figure:
-    """MSR while training of every run of the paper's four cells, and the end of each.
+def worth(runs: pd.DataFrame) -> Figure:
+    """What agents of the paper's four cells do in new containers, over what their curves end at.
 
     Args:
-        curves: see ``read_grid``; other cells are left out.
+        runs: ``cell``; ``end``, see ``end_msr``; and ``judged_as_is``, the MSR in new containers,
+            with the mask.
     """
-    figure, panels = plt.subplots(2, 2, figsize=(7, 4.6), sharex=True, sharey=True)
-    for axes, (name, kind) in zip(panels.flat, PAPER_KINDS.items()):
-        runs = [run for _, run in curves[curves["cell"] == name].groupby("seed")]
-        for run in runs:
-            axes.plot(run["picks"] / 1e6, 100 * run["success_rate"], "C1", lw=0.5, alpha=0.5)
-        ends = 100 * np.array([end_msr(run) for run in runs])
-        axes.plot(np.full(len(ends), 21), ends, "k.", ms=4)
-        low, high = t_interval(ends)
-        axes.errorbar(
-            22.3, ends.mean(), [[ends.mean() - low], [high - ends.mean()]],
-            fmt="k_", capsize=3,
+    figure, axes = plt.subplots(figsize=(5.6, 4))
+    axes.plot([0, 100], [0, 100], "0.6", ls="--", lw=1)
+    for name, kind in PAPER_KINDS.items():
+        config, rows = PAPER_CELLS[name].config, runs[runs["cell"] == name]
+        axes.plot(
+            100 * rows["end"], 100 * rows["judged_as_is"],
+            "o" if config.batch_size == TrainConfig().batch_size else "^",
+            color=COLOURS["ranks"] if config.mask else WITHOUT_MASK, alpha=0.8, ms=6,
+            label=f"{kind} ({len(rows)})", clip_on=False,
         )  # fmt: skip
-        axes.axhline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
-        axes.set(title=f"{kind}: {len(runs)} runs", xlim=(0, 23), ylim=(0, 102))
-    figure.supxlabel("million picks; dots: mean over the last tenth, with its 95 % t interval")
-    figure.supylabel("MSR while training (%)")
+    axes.axvline(100 * PAPER_MSR, color="0.4", ls=":", lw=1)
+    axes.set(xlim=(0, 100), ylim=(0, 100), xlabel="MSR while training, last tenth (%)")
+    axes.set_ylabel("MSR in new containers, with the mask (%)")
+    axes.legend(loc="lower left", fontsize=8)
     return figure
 
 
 @styled
 def dug(
-    surface: np.ndarray, preferences: tuple[float, float], ties: str, msr: float, rules: np.ndarray
+    surface: np.ndarray, preferences: tuple[float, float], msr: float, rules: np.ndarray
 ) -> Figure:
     """What a rule leaves of the loads, seen from above, and its place among all such rules.
 
     Args:
         surface: what ``measures.surface`` returns.
         preferences: of the rule, along x and y.
-        ties: see ``unload.equalize``.
         msr: of the rule, in [0, 1].
-        rules: that of the others, see ``measures.rules``.
+        rules: that of others, whose preferences go from -1.5 to 1.5 in even steps, along y in the
+            rows and along x in the columns.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.6, 3.6), width_ratios=(1.4, 1))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8.8, 3.9), width_ratios=(1.3, 1))
     length, width, height = task.CONTAINER
     place = {"origin": "lower", "extent": (0, length, 0, width)}
-    image = left.imshow(surface.T, "viridis", vmin=0, vmax=height, **place)
+    image = left.imshow(surface.T, DARK_IS_HIGH, vmin=0, vmax=height, **place)
     figure.colorbar(image, ax=left, location="bottom", label="mean height of the load (m)")
-    left.set(xlabel="x, depth (m); the entrance is at the right", ylabel="y, across (m)")
+    left.set(xlabel="x, depth (m): rear – entrance", ylabel="y, across (m)")
     left.set_title("what 300 picks leave, from above")
     left.grid(False)
-    along_x, along_y = (MOST_PREFERENCE if ties == "average" else THRESHOLDS[0]), THRESHOLDS[1]
-    right.set_facecolor("#f6d5c9")
-    right.add_patch(plt.Rectangle((-along_x, -along_y), 2 * along_x, 2 * along_y, color="white"))
     axis = np.linspace(-MOST_PREFERENCE, MOST_PREFERENCE, len(rules))
-    right.contour(axis, axis, rules, [ERRS], colors="black")
-    errs, colour = ("errs", "C1") if msr < ERRS else ("does not err", "C0")
-    right.plot(*preferences, "o", color=colour, ms=12, clip_on=False)
-    right.set(xlabel="preference along x (depth)", ylabel="along y (across)")
+    image = right.pcolormesh(axis, axis, 100 * rules, cmap=DARK_IS_HIGH, vmin=0, vmax=100)
+    figure.colorbar(image, ax=right, location="bottom", label="MSR of the rule there (%)")
+    right.contour(axis, axis, rules, [ERRS], colors="white")
+    errs, colour = ("errs", "C1") if msr < ERRS else ("does not err", "white")
+    right.plot(*preferences, "o", color=colour, mec="black", ms=11, clip_on=False)
+    right.set(xlabel=ALONG_X, ylabel=ALONG_Y)
     right.set_title(f"MSR {msr:.1%}: it {errs}")
+    right.grid(False)
     return figure
 
 
@@ -94,25 +96,21 @@ def loop(trace: pd.DataFrame, runs: pd.DataFrame) -> Figure:
     Args:
         trace, runs: the tables of ``laboratory.laboratory_data``.
     """
-    figure, (left, middle, right) = plt.subplots(1, 3, figsize=(9, 3.5))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(7.6, 3.5))
     for cell in ("ranks", "shuffled"):
         points = trace[trace["cell"] == cell]
         preference = points["slope_y"] / points["slope_z"].abs()
         left.plot(preference, points["tilt_y"], ".", color=COLOURS[cell], ms=3, label=NAMES[cell])
-    left.set(xlabel="preference: slope across / upward", ylabel="tilt of the load", xlim=(-2, 2))
-    middle.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
+    left.set(xlabel="preference along y", ylabel="tilt of the load", xlim=(-2, 2))
+    right.plot([0, max(PREFERENCES)], [0, max(PREFERENCES)], "0.6", ls="--", lw=1)
     for pupil, (kind, name) in zip(PUPILS, NAMES.items()):
         cells = [f"{pupil}_{preference}" for preference in PREFERENCES]
         groups = [runs[runs["cell"] == cell] for cell in cells]
         learned = [(group["slope_y"] / group["slope_z"].abs()).mean() for group in groups]
-        middle.plot(PREFERENCES, learned, "o-", ms=3, color=COLOURS[kind], label=name)
-        if pupil == "taught":
-            success = [100 * group["mean"].mean() for group in groups]
-            right.plot(PREFERENCES, success, "o-", ms=3, color=COLOURS[kind])
-    middle.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
-    # Its colours are those of the other panels, whose data leave no room for a legend.
-    figure.legend(*middle.get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    right.set(xlabel="preference of the teacher", ylabel="teacher's MSR (%)", ylim=(0, 102))
+        right.plot(PREFERENCES, learned, "o-", ms=3, color=COLOURS[kind], label=name)
+    right.set(xlabel="preference of the teacher", ylabel="preference of the pupil")
+    # Its colours are those of the other panel, whose data leave no room for a legend.
+    figure.legend(*right.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     return figure
 
 
@@ -165,28 +163,63 @@ def ends(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
     return figure
 
 
-def draw_phase(axes: Axes, rows: pd.DataFrame, averaged: bool) -> None:
+@styled
+def phase(networks: Mapping[str, pd.DataFrame]) -> Figure:
     """Networks by their preferences along x and y, coloured by whether they err.
 
     The shaded region is where the rule of ``laboratory.predicted`` says that a network errs.
 
     Args:
-        axes: where.
-        rows: with ``slope_x``, ``slope_y``, ``slope_z`` and ``judged_as_is``.
-        averaged: whether equal x share one rank.
+        networks: by how ties are broken, a title; each with ``slope_x``, ``slope_y``, ``slope_z``
+            and ``judged_as_is``. Equal x share a rank in the last of them.
     """
-    along_x, along_y = THRESHOLDS
-    axes.axhspan(along_y, MOST_PREFERENCE, color="#f6d5c9", zorder=0)
-    if not averaged:
-        axes.fill_between([along_x, MOST_PREFERENCE], 0, along_y, color="#f6d5c9", zorder=0)
-    preferences = rows[["slope_x", "slope_y"]].abs().div(rows["slope_z"].abs(), axis=0)
-    preferences = preferences.clip(upper=0.98 * MOST_PREFERENCE)
-    errs = rows["judged_as_is"] < ERRS
-    for name, chosen, colour in (("errs", errs, "C1"), ("does not", ~errs, "C0")):
-        places = preferences[chosen]
-        axes.plot(
-            places["slope_x"], places["slope_y"], "o", color=colour, markersize=4, alpha=0.7,
-            markeredgewidth=0, label=f"{name}: {len(places)}",
-        )  # fmt: skip
-    limits = 0, MOST_PREFERENCE
-    axes.set(xlabel="|preference| along x (depth)", xlim=limits, ylim=limits)
+    figure, panels = plt.subplots(1, len(networks), figsize=(8.4, 4), sharex=True, sharey=True)
+    edge = 0.98 * MOST_PREFERENCE
+    for axes, (title, rows) in zip(panels, networks.items()):
+        along_x, along_y = THRESHOLDS
+        if axes is panels[-1]:
+            along_x = MOST_PREFERENCE
+        axes.set_facecolor(SHADE)
+        corner, size = (-along_x, -along_y), (2 * along_x, 2 * along_y)
+        axes.add_patch(plt.Rectangle(corner, *size, color="white", zorder=0))
+        preferences = rows[["slope_x", "slope_y"]].div(rows["slope_z"].abs(), axis=0)
+        preferences = preferences.clip(-edge, edge)
+        errs = rows["judged_as_is"] < ERRS
+        for name, chosen, colour in (("errs", errs, "C1"), ("does not", ~errs, "C0")):
+            axes.plot(
+                preferences["slope_x"][chosen], preferences["slope_y"][chosen], "o",
+                color=colour, ms=5, alpha=0.8, mew=0, label=f"{name}: {chosen.sum()}",
+            )  # fmt: skip
+        limits = -MOST_PREFERENCE, MOST_PREFERENCE
+        axes.set(xlabel=ALONG_X, xlim=limits, ylim=limits, title=title)
+        axes.legend(loc="upper right", fontsize=8)
+    panels[0].set_ylabel(ALONG_Y)
+    return figure
+
+
+@styled
+def mask_cells(runs: pd.DataFrame, names: Mapping[str, str]) -> Figure:
+    """What the mask in training does: MSR in new containers, and the tilt while training.
+
+    Args:
+        runs: ``ties/mask_laboratory``; a dot per run, a bar at the mean.
+        names: cell → what it is called; drawn from top to bottom.
+    """
+    size = (8.4, 0.36 * len(names) + 1)
+    figure, panels = plt.subplots(1, 2, figsize=size, sharey=True, width_ratios=(1.5, 1))
+    rng = np.random.default_rng(0)  # dots of a line are spread a little, to be told apart
+    for line, cell in enumerate(names):
+        rows = runs[runs["cell"] == cell]
+        colour = WITHOUT_MASK if cell.endswith("_no_mask") else COLOURS["ranks"]
+        for axes, values in zip(panels, (100 * rows["frozen_mask"], rows["tilt"])):
+            heights = line + rng.uniform(-0.2, 0.2, len(rows))
+            axes.plot(values, heights, ".", color=colour, ms=5, alpha=0.6, clip_on=False)
+            axes.plot(values.mean(), line, "k|", ms=14, mew=2)
+    left, right = panels
+    left.set(xlim=(0, 100), ylim=(len(names) - 0.4, -0.6))
+    left.set_xlabel("MSR in new containers, with the mask (%)")
+    right.set_xlabel("tilt of the load while training")
+    left.set_yticks(range(len(names)), names.values())
+    for axes in panels:
+        axes.grid(axis="y", visible=False)
+    return figure

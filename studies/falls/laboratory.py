@@ -8,10 +8,12 @@ How its cells are trained and measured, and when a preference becomes a mistake.
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
 
+from studies import changes
 from studies.falls import measures
 from studies.falls.cells import CELLS, CONFIG, FRESH, SEEN, Change
 from studies.fingerprint import training_fingerprint
@@ -79,6 +81,28 @@ def point(run: Training, seen: measures.Seen | None = None) -> dict[str, float]:
         *measures.mistakes(network, observations, liftable),
     ]
     return dict(zip(POINT, map(float, values), strict=True))
+
+
+@cache
+def taught_preference(teacher: float, seed: int = 0) -> float:
+    """The preference along y that a pupil learns.
+
+    A teacher picks the highest z + ``teacher`` · y of ranks, and a fifth of the boxes at random; a
+    fresh network, its pupil, learns from these 128,000 picks and never chooses.
+
+    Args:
+        teacher: the preference of the teacher along y.
+        seed: of the run.
+    """
+    learned: list[np.ndarray] = []
+
+    def note(run: Training) -> None:
+        learned.append(measures.slopes(run.agent.network, run.rollout.observations))
+
+    config = replace(CELLS["taught_0.0"].config, seed=seed)
+    train_in_laboratory(config, partial(changes.taught, preference=teacher), note)
+    _, along_y, upward = learned[-1]
+    return float(along_y / abs(upward))
 
 
 def run_cell(name: str, cell: Cell, seed: int) -> dict:

@@ -1,6 +1,6 @@
 """Where runs end, by how ties are broken and how long an order of equals lasts; single runs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,10 +14,12 @@ from studies.grid import Grid, read_grid
 from studies.paper.training import PAPER
 from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, windows
 from studies.style import COLOURS, WITHOUT_MASK, styled
+from studies.ties.choice import COUNTS, WAYS, evaluate_choice
 from studies.ties.criterion import WORDS, likeness, open_course
 from studies.ties.earlier import EARLIER
 from studies.ties.laboratory import RHOS
 from studies.ties.training import SWEPT, TIES
+from unload.agent.greedy import Greedy
 
 PICKS = 20_000_000  # of a run
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
@@ -31,6 +33,9 @@ KINDS: dict[str, list[tuple[Grid, str]]] = {
     "settled walls,\nfrozen": [(EARLIER, "ties_by_drift")],
     "noise,\nfrozen": [(PAPER, "paper"), (LONG, "ranks"), (TIES, "frozen")],
 }
+
+# What becomes of a pick, from the left, and its colour.
+OUTCOMES = {"unloaded": "#4c9f70", "deadlocked": "0.25", "preference": "C1", "noise": "C0"}
 
 
 def read_by_ties() -> pd.DataFrame:
@@ -166,3 +171,61 @@ def draw_duration(runs: pd.DataFrame, long: pd.DataFrame) -> Figure:
     axes.set(xlabel="ρ: correlation of the noise from one pick to the next", ylim=(0, 103))
     axes.set_ylabel("MSR over the last tenth (%)")
     return figure
+
+
+def ask(policy: Greedy, episodes: int, seed: int) -> pd.DataFrame:
+    """Let a network choose in fresh containers in all four ways.
+
+    Args:
+        policy, episodes, seed: see ``evaluate_choice``.
+
+    Returns:
+        A row for each of ``WAYS``, as in ``ties/choice``.
+    """
+    rows = []
+    for noise, mask in WAYS:
+        counts = evaluate_choice(policy, noise, mask, episodes=episodes, seed=seed)
+        rows.append({"noise": noise, "mask": mask} | counts)
+    return pd.DataFrame(rows)
+
+
+@styled
+def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
+    """What becomes of the picks of some networks, in each of the four ways to ask them.
+
+    Args:
+        groups: by the title of a panel, rows as those of ``ask``, of one network or of several.
+    """
+    across = min(len(groups), 3)
+    down = -(-len(groups) // across)
+    size = (0.6 + 2.9 * across + 1.2 * (across == 1), 0.6 + 1.6 * down)
+    figure, panels = plt.subplots(down, across, figsize=size, sharex=True, sharey=True)
+    panels = np.atleast_1d(panels).ravel()
+    for axes, (title, rows) in zip(panels, groups.items()):
+        for place, (noise, mask) in enumerate(WAYS):
+            counts = rows[(rows["noise"] == noise) & (rows["mask"] == mask)][COUNTS].mean()
+            failures = 1 - counts["msr"]
+            deadlocked, preference = (
+                failures * counts[name] / max(counts["failures"], 1)
+                for name in ("deadlocked", "preference")
+            )
+            others = failures - deadlocked - preference
+            start = 0.0
+            shares = counts["msr"], deadlocked, preference, others
+            for (name, colour), share in zip(OUTCOMES.items(), shares):
+                axes.barh(place, 100 * share, left=100 * start, color=colour, label=name)
+                start += share
+            axes.text(2, place, f"{counts['msr']:.0%}", va="center", color="white", fontsize=9)
+        axes.set(title=title, xlim=(0, 100), ylim=(len(WAYS) - 0.5, -0.5))
+        axes.set_yticks(range(len(WAYS)), [_way(*way) for way in WAYS], fontsize=9)
+        axes.grid(axis="y", visible=False)
+    for axes in panels[len(groups) :]:
+        axes.set_axis_off()
+    figure.supxlabel("% of the picks", fontsize=10)
+    handles = panels[0].get_legend_handles_labels()[0][: len(OUTCOMES)]
+    figure.legend(handles, OUTCOMES, loc="outside lower center", ncols=4, fontsize=9)
+    return figure
+
+
+def _way(noise: str, mask: bool) -> str:
+    return f"{noise}, {'mask' if mask else 'no mask'}"

@@ -150,6 +150,8 @@ function showCurve(curves, end) {
   }
   const last = ([point]) => (point ? percent(point.success_rate) : "");
   element("rate").textContent = last(curves.success_rate.slice(-1));
+  const [latest] = curves.success_rate.slice(-1);
+  element("epsilon-rate").textContent = latest ? percent(latest.epsilon) : "";
   element("frozen-rate").textContent = last(curves.frozen.slice(-1));
   element("end").textContent = end.toLocaleString("en");
   element("ceiling").setAttribute("d", `M0 ${100 - 100 * ceiling(config)}H100`);

@@ -4,7 +4,9 @@
 import { limits, preferences } from "./policy.mjs";
 
 const ROSE = 0.8; // rate of an agent that has learned, although it errs
-const FELL = 0.2; // by how much a rate has sunk
+const HIGH = 0.95; // rates that a fall begins at, and ends at
+const LOW = 0.8;
+const WORSE = 0.2; // by how much a rate has sunk that was never so high
 const STUCK = 0.5; // share of picks that repeat one that has just failed
 const MISLED = 0.1; // by how much a rate rises if x and y are blank
 const SIDES = [["the rear", "the front"], ["the left side", "the right side"]];
@@ -23,7 +25,8 @@ export const SENTENCES = {
     "Now it sees, as in the paper, only ranks: " +
     "each box’s number in the order along x, y and z.",
   blank:
-    "Nothing is trained: the same weights choose in fresh containers, where they see height alone.",
+    "Nothing is trained: the same weights see height alone, in the container shown and in eight " +
+    "new ones, where their picks are counted.",
   shuffled:
     "It learns anew, with shuffled places: in each remembered pick the boxes exchange theirs, " +
     "so that no place can be learned.",
@@ -72,19 +75,22 @@ export function runVerdict({ points, frozen, picks, seconds, running }, config, 
   const limit = top < 1 ? ` With these jams nothing ends above ${percent(top)}.` : "";
   if (end >= task.errs * top) {
     const time = `after ${seconds.toFixed(1)} s`;
-    return `It learned: ${percent(end)} of its picks in fresh containers succeed, ${time}.${limit}`;
+    return `It learned: ${percent(end)} of its picks in new containers succeed, ${time}.${limit}`;
   }
   if (judged.repeated > STUCK) {
     return `It is stuck: ${percent(judged.repeated)} of its picks repeat one that has just failed.`;
   }
   const why = misled(latest.slopes, config, task);
-  if (best - end < FELL * top) {
+  const high = rates.findIndex((rate) => rate >= HIGH * top);
+  const fell = high >= 0 && rates.slice(high).some((rate) => rate <= LOW * top);
+  if (!fell && best - end < WORSE * top) {
     const what = end >= ROSE * top ? "It did not fall" : "It did not learn";
     return `${what}: ${percent(end)} at the end, ${percent(best)} at best; it ${why}.${limit}`;
   }
   const early = frozen[rates.indexOf(best)].picks.toLocaleString("en");
-  const fell = `It fell: best after ${early} picks, with ${percent(best)} in fresh containers`;
-  return `${fell}; ${percent(end)} at the end. It ${why}.${limit}`;
+  const what = `It ${fell ? "fell" : "got worse"}: best after ${early} picks`;
+  const both = `with ${percent(best)} in new containers; ${percent(end)} at the end`;
+  return `${what}, ${both}. It ${why}.${limit}`;
 }
 
 /** What a network prefers to height, by its slopes. */
