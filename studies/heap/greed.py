@@ -53,7 +53,8 @@ def greed_data(n_jobs: int = 1) -> None:
     asked, cells = [], []
     for after in AFTER:
         for number, answer in enumerate(by_rule):
-            heap, question = answer.value[1][after], {"networks": files.digest(NETWORKS)}
+            heap = Heap(**answer.value[1][after])
+            question = {"networks": files.digest(NETWORKS)}
             question |= {"heap": code_of(heap), "physics": PHYSICS, "picks": MAX_PICKS - after}
             asked.append((question, (heap, PHYSICS, MAX_PICKS - after)))
             cells.append((number, after))
@@ -76,11 +77,11 @@ def _rows(heap: int, rule_picks: int, counts: np.ndarray) -> pd.DataFrame:
     return frame.assign(heap=heap, rule_picks=rule_picks)[COLUMNS]
 
 
-def _by_rule(rule: str, heap: Heap, physics: str) -> tuple[np.ndarray, tuple[Heap, ...]]:
+def _by_rule(rule: str, heap: Heap, physics: str) -> list:
     """Boxes and falls of a rule's picks, (15, 2) int, and the heaps before and after each."""
     env = HeapEnv("test", physics=physics, max_picks=MAX_PICKS)
     episode = play(env, rules_by_name()[rule], heap, seed=0)
-    return _counts(episode), episode.heaps
+    return [_counts(episode), [dict(vars(left)) for left in episode.heaps]]
 
 
 def _by_networks(heap: Heap, physics: str, picks: int) -> np.ndarray:
