@@ -20,7 +20,7 @@ WIDTH, HEIGHT = 4.4, 4.4  # of one agent's part, in inches at 100 pixels each
 RISE = 0.45  # m, how far a box that is being unloaded is drawn above its place
 STUCK = task.N_VISIBLE  # failed picks in a row after which an agent counts as stuck
 SLOW, STEP = 4, 9  # frames of one pick each at the beginning, and picks per frame at last
-FIRST, EARLY, LATE, LAST = 600, 150, 80, 5000  # ms that frames are shown
+FIRST, EARLY, LATE, LAST = 600, 150, 80, 3000  # ms that frames are shown
 FAINT, RAIL = "#6f6f6f", "#e4e4e1"
 PALETTE = 127  # colours of all frames, besides white
 LEGEND = {"unseen": "unseen", "visible": "visible", "liftable": "unloaded", "failed": "failed"}
@@ -51,14 +51,15 @@ def save_unloading(episodes: Mapping[str, Run], path: str | Path) -> list[Image.
         path: of the GIF.
 
     Returns:
-        Its frames.
+        Its frames in the order of the picks; the file begins with the last one.
     """
     counts = picks_of_frames(max(len(run.picks) for run in episodes.values()))
     frames = [_frame(episodes, *span) for span in zip([0, *counts], counts)]
     palette = _palette(frames)
-    first, *others = (frame.quantize(palette=palette, dither=0) for frame in frames)
-    before = [FIRST, *[EARLY] * SLOW, *[LATE] * len(frames)]
-    durations = [*before[: len(frames) - 1], LAST]
+    # The end comes first, because a reader who sees one picture alone should see what happens.
+    shown = [frames[-1], *frames[:-1]]
+    first, *others = (frame.quantize(palette=palette, dither=0) for frame in shown)
+    durations = [LAST, FIRST, *[EARLY] * SLOW, *[LATE] * len(frames)][: len(frames)]
     files.write_atomically(
         path,
         lambda file: first.save(

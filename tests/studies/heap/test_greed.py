@@ -7,8 +7,10 @@ import torch
 
 from studies.heap import env as heap_env
 from studies.heap import greed
+from studies.heap.boxes import Heap
 from studies.heap.learning import save_networks
 from studies.heap.network import FateNetwork
+from studies.heap.recording import HEAPS
 from studies.results import read_provenance, read_table
 
 
@@ -29,6 +31,7 @@ def test_the_networks_go_on_where_the_rule_has_stopped(own_data, set_in, pile, t
     }  # fmt: skip
     for number, heap in enumerate(heaps):
         counts, left = greed._by_rule("lowest", heap, greed.PHYSICS)
+        left = [Heap(**arrays) for arrays in left]
         assert len(left[2]) == len(heap) - counts[:2, 0].sum()
         for rule_picks, expected in (
             (3, counts),
@@ -52,3 +55,13 @@ def test_nets_join_the_rules_picks_and_the_networks(set_in):
     found = greed.ratios(frame)
     assert found.loc[("first", 1), "ratio"] == 1
     assert found.loc[("all 15 picks", 1), "ratio"] == pytest.approx(43 / 18)
+
+
+def test_published_picks_are_those_of_all_test_heaps():
+    frame = read_table("heap/greed")
+    assert set(frame["heap"]) == set(range(HEAPS["test"]))
+    for rule_picks, picks in ((greed.MAX_PICKS, 15), (0, 15), (10, 5), (11, 4)):
+        rows = frame[frame["rule_picks"] == rule_picks]
+        assert (rows.groupby("heap").size() == picks).all() and rows["pick"].max() == 15
+    settings = read_provenance("heap/greed")["settings"]
+    assert settings["physics"] == greed.PHYSICS and settings["rule picks"] == list(greed.AFTER)

@@ -45,7 +45,7 @@ def test_all_policies_play_the_same_heaps_and_are_kept(own_data, set_in, pile):
 
 def test_data_of_heaps_are_those_that_are_read():
     names = {path.name.split(".")[0] for path in (paths.DATA / "heap").iterdir()}
-    assert names == {"heaps", "networks", "rules", "episodes", "table", "provenance"}
+    assert names == {"heaps", "networks", "rules", "greed", "episodes", "table", "provenance"}
     table = read_table("heap/table")
     assert (table["heaps"] == HEAPS["test"]).all() and len(table) == 19
     heaps, networks, rules = (
