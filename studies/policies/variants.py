@@ -11,11 +11,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import product
 
-import matplotlib.pyplot as plt
-import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
 from scipy import stats
 
 from studies.changes import height_reward
@@ -23,8 +19,6 @@ from studies.falls import measures
 from studies.grid import Cell, Grid, train_grid
 from studies.networks import NETWORKS as KINDS
 from studies.results import COMMAND, read_table
-from studies.statistics import t_interval
-from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, load_policy, save_policy
 from unload.support import files
@@ -35,10 +29,7 @@ SMALL = TrainConfig(picks=320_000, batch_size=64, n_features=32, log_interval=50
 LOADS = {"episodes": 200, "seed": 1000}  # fresh containers for each trained policy
 SHARES = (0.25, 0.5, 0.9)  # of the height in the reward
 RECOMMENDED = TrainConfig(picks=1_000_000, equalize=False, log_interval=500)
-APPLIED = {
-    "msr_mask": (COLOURS["ranks"], "o", "with the mask"),
-    "msr_no_mask": (WITHOUT_MASK, "s", "without the mask"),
-}
+APPLIED = {"msr_mask": "with the mask", "msr_no_mask": "without the mask"}
 
 
 def judged(policy: Greedy, config: TrainConfig) -> dict[str, float]:
@@ -97,26 +88,5 @@ def differences(part: str) -> pd.DataFrame:
     for (name, cell), column in product(cells.items(), APPLIED):
         test = stats.ttest_ind(cell[column], reference[column], equal_var=False)
         difference = cell[column].mean() - reference[column].mean()
-        rows[name, APPLIED[column][2]] = (difference, *test.confidence_interval())
+        rows[name, APPLIED[column]] = (difference, *test.confidence_interval())
     return 100 * pd.DataFrame(rows, index=["difference", "low", "high"]).T
-
-
-@styled
-def variants_msr(part: str) -> Figure:
-    """MSR of the policies of a part: each seed pale, their mean strong, with its 95 % interval."""
-    cells = dict(list(read_variants(part).groupby("cell", sort=False)))
-    figure, axes = plt.subplots(figsize=(6.4, 0.8 + 0.34 * len(cells)))
-    for row, cell in enumerate(cells.values()):
-        for place, (name, (colour, marker, label)) in enumerate(APPLIED.items()):
-            y = row + (0.15 if place else -0.15)
-            style = {"color": colour, "marker": marker, "linestyle": "none"}
-            axes.plot(cell[name], np.full(len(cell), y), **style, alpha=0.3, markersize=3)
-            axes.plot(t_interval(cell[name]), [y, y], color=colour, linewidth=1.2)
-            label = None if row else label
-            axes.plot(cell[name].mean(), y, **style, markersize=6, label=label)
-    axes.set_yticks(range(len(cells)), [name.replace("_", " ") for name in cells])
-    axes.set_ylim(len(cells) - 0.5, -0.5)
-    axes.set(xlabel="MSR of the trained policy on fresh loads", xlim=(0, 1.02))
-    axes.xaxis.set_major_formatter(PercentFormatter(1))
-    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
-    return figure

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from scipy import stats
 
 from studies import paths, style
 from studies.falls.long import LONG
@@ -376,3 +377,30 @@ def test_the_first_plans_verdict_is_in_part(runs):
     assert f"{long[1]} were made" in text
     seen = read_table("ties/laboratory").query("5000 <= seed <= 5009")
     assert f"{len(seen)} runs were seen before any prediction of them" in text
+
+
+def test_the_laboratories_are_what_the_evidence_says():
+    text = prose("report/02_evidence")
+    parted = read_table("ties/choice_laboratory")
+    of_choice = parted.groupby([parted["cell"].str.split("_").str[1], "cell"])["end"].mean()
+    anew, frozen = (spread(of_choice[noise]).replace("–", " to ") for noise in ("anew", "frozen"))
+    assert f"runs end at {anew} %, whatever stands in the memory, and with frozen noise at" in text
+    assert f"at {frozen} %. The preference" in text
+    best = parted.groupby("cell")["frozen_mask"].mean().nlargest(2)
+    assert {*best.index} == {f"choice_anew_memory_frozen{mask}" for mask in ("", "_no_mask")}
+    assert f"({spread(best).replace('–', ' and ')} %)" in text
+    cells = dict(list(read_table("ties/mask_laboratory").groupby("cell")))
+    judged = {cell: 100 * rows["frozen_mask"] for cell, rows in cells.items()}
+    base, masked = judged["episodes_500_no_mask"], judged["episodes_500"]
+    low, high = stats.ttest_ind(masked, base, equal_var=False).confidence_interval()
+    assert f"succeed in {masked.mean():.0f} % of their picks, those trained without it in" in text
+    said = f"in {base.mean():.0f} % (difference −{base.mean() - masked.mean():.0f} points, 95 %"
+    assert f"{said} interval −{-low:.0f} to {high:.0f})" in text
+    assert f"the networks do as well ({judged['no_deadlocks_stored_no_mask'].mean():.0f} %)" in text
+    tilt = {cell: rows["tilt"].mean() for cell, rows in cells.items()}
+    said = f"with the mask ({tilt['episodes_500']:.2f}) than without it "
+    assert f"{said}({tilt['episodes_500_no_mask']:.2f})" in text
+    filled = judged["filled_at_deadlocks_no_mask"]
+    low, high = stats.ttest_ind(filled, base, equal_var=False).confidence_interval()
+    said = f"{filled.mean() - base.mean():.0f} points better ({low:.0f} to {high:.0f}), but their "
+    assert f"{said}tilt is the same ({tilt['filled_at_deadlocks_no_mask']:.2f})" in text
