@@ -65,6 +65,10 @@ def draw_answer() -> Figure:
         axes.set(xlim=(0, 20), xticks=range(0, 21, 5), xlabel="million picks of training")
     panels[0].set(ylim=(0, 103), ylabel="successful picks (%)")
     _draw_choices(panels[3], choices)
+    look = {"ncols": 3, "fontsize": 8, "title_fontsize": 8, "handletextpad": 0.2}
+    title = "how the agents of panel 4 choose"
+    handles = panels[3].get_legend_handles_labels()
+    figure.legend(*handles, loc="outside lower right", title=title, **look)
     return figure
 
 
@@ -101,8 +105,6 @@ def _draw_choices(axes: Axes, choices: pd.DataFrame) -> None:
     axes.set(xlabel="how they were trained, and the batch", xlim=(-0.5, column - 0.5))
     axes.set_title("4  The same agents afterwards,\n    in new containers", loc="left")
     axes.grid(axis="x", visible=False)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.29), ncols=3, title="how they choose",
-                fontsize=8, title_fontsize=8, handletextpad=0.2, columnspacing=1)  # fmt: skip
 
 
 def _dark(name: str) -> str:
