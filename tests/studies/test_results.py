@@ -95,7 +95,10 @@ def test_a_forged_answer_runs_no_code(tmp_path, asked):
 def test_an_edit_of_what_keeps_answers_deletes_none(tmp_path, asked):
     for seed in (1, 2):
         kept(tmp_path / "runs", {"seed": seed}, partial(asked, seed))
-    text, edited = (paths.ROOT / "studies/results.py").read_text("utf-8"), tmp_path / "results.py"
+    text, edited = (
+        (paths.ROOT / "studies/results.py").read_text(encoding="utf-8"),
+        tmp_path / "results.py",
+    )
     text = text.replace('    """The answer to', '    """Edited: the answer to')
     edited.write_text(text, encoding="utf-8")
     spec = spec_from_file_location("studies.results", edited)
