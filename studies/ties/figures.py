@@ -221,7 +221,8 @@ def draw_ways(groups: Mapping[str, pd.DataFrame]) -> Figure:
         axes.grid(axis="y", visible=False)
     for axes in panels[len(groups) :]:
         axes.set_axis_off()
-    figure.supxlabel("% of the picks", fontsize=10)
+    for axes in panels[len(groups) - across : len(groups)]:
+        axes.set_xlabel("% of the picks")
     handles = panels[0].get_legend_handles_labels()[0][: len(OUTCOMES)]
     figure.legend(handles, OUTCOMES, loc="outside lower center", ncols=4, fontsize=9)
     return figure

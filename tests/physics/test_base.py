@@ -23,9 +23,9 @@ EACH = [pytest.param("full", marks=pytest.mark.pybullet), "local", "table", "muj
 ONE_BOX, TWO_BOXES = 0.46, 0.009  # m, for 20 N and 1 kg
 
 
-def make(kind: str, load: Load) -> Physics:
+def make(kind: str, load: Load, **options) -> Physics:
     """A physics that holds ``load``."""
-    physics = KINDS[kind]()
+    physics = KINDS[kind](**options)
     physics.reset(load)
     return physics
 

@@ -118,8 +118,8 @@ def test_committed_lifts_of_the_second_engine_can_be_computed_again(monkeypatch)
     assert np.allclose(table["pybullet"], known["local"], atol=1e-6)
     assert read_provenance(engines.NAME)["settings"]["mujoco"] == settings_of_lifts("mujoco")
     lifted = table[[*ENGINES]] >= task.LIFT_THRESHOLD
-    readme = (paths.ROOT / "README.md").read_text(encoding="utf-8")
-    assert f"decided none of {len(table):,} situations otherwise" in readme
+    lifting = (paths.ROOT / "notebooks/10_lifting.ipynb").read_text(encoding="utf-8")
+    assert f"{len(table):,} situations" in lifting
     assert (lifted["pybullet"] == lifted["mujoco"]).all()
     monkeypatch.setattr(engines, "LIFT_COUNT", 60)
     table, physics = table.set_index("situation"), LocalPhysics("mujoco")
@@ -142,7 +142,7 @@ def test_committed_rates_are_those_of_the_published_policies():
 
 def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):
     """PyBullet's answers, which ship, are never taken; MuJoCo's are kept for the next process."""
-    monkeypatch.setattr(engines, "LIFTS", own_data / "mujoco.npz")
+    monkeypatch.setattr(engines, "physics_fingerprint", lambda: "as_it_is")
     asked = []
 
     def simulate(physics: LocalPhysics, situation) -> float:
@@ -152,7 +152,7 @@ def test_the_second_engine_is_asked_for_all_lifts(own_data, monkeypatch):
     monkeypatch.setattr(LocalPhysics, "simulate", simulate)
     arguments = {"episodes": 2, "seed": 0, "mask": False, "max_picks": 60}
     row = engines.both_rates(policies.random, arguments)
-    kept, count = LiftTable.load(own_data / "mujoco.npz", "mujoco"), len(asked)
+    kept, count = LiftTable.load(paths.RUNS / "lifts/mujoco_as_it_is.npz", "mujoco"), len(asked)
     assert {*asked} == {"mujoco"} and 0 < len(kept) <= count
     assert engines.both_rates(policies.random, arguments) == row and len(asked) == count
     assert row["pybullet"] == evaluate(policies.random, **arguments)["success_rate"].mean()
@@ -163,11 +163,11 @@ def test_lifts_of_another_physics_are_computed_anew(monkeypatch):
     """What is kept of a fill answers for the physics that it was filled by."""
     asked = []
 
-    def ask(folder, question, compute):
-        asked.append(question)
+    def ask(place, compute, questions, n_jobs):
+        asked.append(questions[0][0])
         raise InterruptedError
 
-    monkeypatch.setattr(lifts, "kept", ask)
+    monkeypatch.setattr(lifts, "keep_all", ask)
     for settings in (lifts.SETTINGS, lifts.SETTINGS | {"pybullet": "another"}):
         monkeypatch.setattr(lifts, "SETTINGS", settings)
         with pytest.raises(InterruptedError):
