@@ -76,7 +76,7 @@ def test_what_came_out_is_what_the_data_say():
     alike = rising[other].all(axis=1).sum()
     assert not runs["starts"].any()
     said = f"Of {len(started)} trainings that start there, {len(rising)} rise steadily. "
-    assert said + f"Of these, {alike} look like the paper's" in text
+    assert said + f"Of these, {alike} look like the paper's but for the growing noise" in text
 
     positions = paper[paper["cell"].str.startswith("positions")]
     assert "ten of ten trainings end without a miss" in text
