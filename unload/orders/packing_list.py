@@ -26,7 +26,6 @@ TURNS = ("rotation", "yaw", "pitch", "roll")
 # What a column is, by its name in lower case.
 MEANINGS = {name: name for name in (*CENTRE, *CORNER, *SIZES, *TURNS, "id")}
 MEANINGS |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
-MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 NUMBER = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
 
 
@@ -71,10 +70,10 @@ def read_load(
     stop or a weight, become ``Load.extras``. Each line is one box; quantities are ignored.
 
     Args:
-        path: of a CSV file (UTF-8, or UTF-16 with its mark; separated by commas, or by semicolons
-            or tabs, where decimals may have a comma) or of an Excel file (``.xlsx``, first sheet);
-            or a ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000
-            rows, 200 columns and, unpacked, 20 MB.
+        path: of a CSV file (UTF-8; separated by commas, or by semicolons or tabs, where decimals
+            may have a comma) or of an Excel file (``.xlsx``, first sheet); or a
+            ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000 rows,
+            200 columns and, unpacked, 20 MB.
         units: of lengths whose names say none: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``.
         columns: name in the list → name above, for other names: ``{"Länge": "size_x"}``.
         tolerance: in m, up to 0.1, how far each box may be from where it belongs, see
@@ -187,8 +186,7 @@ def _check(what: str, count: int) -> None:
 
 def _csv(file: Path) -> pd.DataFrame:
     _check("bytes", file.stat().st_size)
-    content = file.read_bytes()
-    text = content.decode("utf-16" if content[:2] in MARKS else "utf-8-sig")
+    text = file.read_text(encoding="utf-8-sig")
     separator = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     form = {"header": None, "dtype": str, "na_filter": False, "skipinitialspace": True}
     cells = pd.read_csv(StringIO(text), sep=separator, **form)
