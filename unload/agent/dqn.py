@@ -50,11 +50,8 @@ class DQN:
                 "fused_update is True; expected a PEQNetwork in float32 on the CPU with it"
             )
         self.gamma = checks.real("gamma", gamma, 0, 1)
-        self._needed: tuple[str, ...] = (
-            "observations",
-            "actions",
-            "rewards",
-        )  # of the arrays of a batch
+        # Of the arrays of a batch.
+        self._needed: tuple[str, ...] = ("observations", "actions", "rewards")
         if self.gamma > 0:
             self._needed += "next_observations", "next_masks", "terminations"
         settings = checks.real("learning_rate", learning_rate, 0), checks.real("beta", beta, 0)
