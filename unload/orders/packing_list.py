@@ -110,10 +110,10 @@ def read_load(
 
     def numbers(meaning: str) -> np.ndarray:
         name = names[meaning]
-        found = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
-        if (wrong := np.flatnonzero(~np.isfinite(found))).size:
+        cells = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
+        if (wrong := np.flatnonzero(~np.isfinite(cells))).size:
             refuse(wrong, f"{name} is {str(table[name][wrong[0]])!r}; expected a number")
-        return found
+        return cells
 
     # A box turned otherwise than by quarter turns is none along the axes.
     for turn in {*TURNS} & {*names}:
@@ -209,18 +209,18 @@ def _by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
     for name, meaning in columns.items():
         checks.one_of("columns", name, names)
         checks.one_of("columns", meaning, MEANINGS)
-    found: dict[str, str] = {}
+    by_meaning: dict[str, str] = {}
     for name in names:
         meaning = MEANINGS.get(columns.get(name) or _plain(name)[0], name)
-        if meaning in found:
+        if meaning in by_meaning:
             raise ListError(f"the list has the columns {names}; expected one {meaning!r}")
-        found[meaning] = name
-    missing = ", ".join(name for name in SIZES if name not in found)
-    if ({*CENTRE} <= {*found}) == ({*CORNER} <= {*found}):
+        by_meaning[meaning] = name
+    missing = ", ".join(name for name in SIZES if name not in by_meaning)
+    if ({*CENTRE} <= {*by_meaning}) == ({*CORNER} <= {*by_meaning}):
         missing = "either x, y, z or x_min, y_min, z_min"
     if missing:
         raise ListError(f"the list has the columns {names}; expected {missing}", "columns")
-    return found
+    return by_meaning
 
 
 def _plain(name: object) -> tuple[str, str | None]:
