@@ -3,20 +3,10 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import HeightNetwork, make_batch, peq, weights, without_next
+from tests.agent.runs import make_batch, peq, weights, without_next
 from unload import DQN, Greedy
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.fast.learner import FusedLearner
-
-
-def test_epsilon_is_the_share_of_random_actions(rng):
-    """The others go for the best item that is allowed, which is not the best of all."""
-    observations = np.zeros((20_000, 4, 3), np.float32)
-    observations[:, 2:, 2] = 1, 2
-    masks = np.tile([True, True, True, False], (20_000, 1))
-    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
-    shares = np.bincount(actions, minlength=4) / 20_000
-    assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
 
 
 @pytest.mark.parametrize("beta", [1.0, 0.3])

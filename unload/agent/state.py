@@ -147,6 +147,8 @@ def gather(run: Any, fresh: dict[str, tuple]) -> dict[str, np.ndarray]:
     Raises:
         ValueError: it holds what could not be put back into a fresh run.
     """
+    # Only what stands in a fresh run under the same name, and is of the same kind, finds its place
+    # again.
     now = kinds(run)
     for name in fresh | now:
         if name not in fresh or fresh[name] != now.get(name) or fresh[name][0] is None:

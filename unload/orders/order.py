@@ -68,6 +68,8 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
         returned = rule(load, present.copy())
         checks.instance("what rule returned", returned, Sequence, "arrays of numbers")
         keys = checks.finite_array("what rule returned", returned, (None, len(load)))
+        # lexsort takes its last key first and the smallest first; equal boxes stay in the list's
+        # order.
         items = np.flatnonzero(present)
         item = items[np.lexsort(-keys[::-1, items])[0]]
         name = item if load.ids is None else load.ids[item]
