@@ -1,6 +1,7 @@
 """The page ``unload/plain.py``: it learns, and the package trains as it does."""
 
 import runpy
+import sys
 from functools import partial
 
 import numpy as np
@@ -45,6 +46,7 @@ def test_the_package_trains_as_the_page_does(settings):
 
 
 @pytest.mark.slow
-def test_it_learns_on_positions_to_unload_without_a_mistake(capsys):
-    runpy.run_path(plain.__file__, run_name="__main__")
+def test_it_learns_on_positions_to_unload_without_a_mistake(capsys, monkeypatch):
+    monkeypatch.delitem(sys.modules, "unload.plain")
+    runpy.run_module("unload.plain", run_name="__main__")
     assert capsys.readouterr().out == "MSR of the last 50 steps: 100.0%\n"
