@@ -3,20 +3,10 @@ import pytest
 import torch
 from torch.nn.functional import smooth_l1_loss
 
-from tests.agent.runs import HeightNetwork, make_batch, peq, weights, without_next
+from tests.agent.runs import make_batch, peq, weights, without_next
 from unload import DQN, Greedy
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.fast.learner import FusedLearner
-
-
-def test_epsilon_is_the_share_of_random_actions(rng):
-    """The others go for the best item that is allowed, which is not the best of all."""
-    observations = np.zeros((20_000, 4, 3), np.float32)
-    observations[:, 2:, 2] = 1, 2
-    masks = np.tile([True, True, True, False], (20_000, 1))
-    actions = DQN(HeightNetwork()).choose(observations, masks, 0.3, rng)
-    shares = np.bincount(actions, minlength=4) / 20_000
-    assert shares == pytest.approx([0.1, 0.1, 0.8, 0.0], abs=0.015)
 
 
 @pytest.mark.parametrize("beta", [1.0, 0.3])
@@ -85,6 +75,29 @@ def test_what_is_no_network_setting_or_batch_is_refused(rng):
             DQN(peq(), **{name: -0.5})
     with pytest.raises(ValueError, match="batch has no next_masks, next_observations"):
         DQN(peq(), gamma=0.9).update(without_next(make_batch(rng)))
+    observations = make_batch(rng)["observations"]
+    for given in ((observations[..., :2], np.ones((150, 20))), (observations, np.ones((150, 19)))):
+        with pytest.raises(ValueError, match="has shape"):
+            DQN(peq()).choose(*given, 0.0, rng)
+
+
+@pytest.mark.parametrize("fused", [False, True])
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("actions", np.full(150, 20), "actions holds 20 to 20; expected 0 to 19"),
+        ("actions", np.zeros(150, np.int32), "actions is .* dtype int32; expected int64"),
+        ("rewards", np.zeros(149, np.float32), "rewards has shape"),
+        ("observations", np.zeros((150, 20, 2), np.float32), "observations has shape"),
+        ("rows", np.array([0, 150]), "rows holds 0 to 150; expected 0 to 149"),
+        ("rows", np.zeros(0, int), "rows is empty"),
+    ],
+)
+def test_a_batch_that_does_not_fit_is_refused(rng, fused, name, value, message):
+    """Compiled code would read past its end."""
+    batch = without_next(make_batch(rng)) | {"rows": None, name: value}
+    with pytest.raises((TypeError, ValueError), match=message):
+        DQN(peq(), fused_update=fused).update(batch, batch.pop("rows"))
 
 
 def test_a_next_state_without_a_choice_is_refused(rng):

@@ -13,8 +13,6 @@ from tests.agent.runs import HeightNetwork
 from unload import PEQNetwork
 from unload.network.factory import make_network
 
-ITEMS = torch.zeros(2, 4, 3)
-
 
 @pytest.fixture
 def kind() -> type:
@@ -129,21 +127,6 @@ def test_values_and_gradients_are_finite_where_there_is_no_item(kind, items, tra
     values.square().sum().backward()
     for name, value in network.named_parameters():
         assert value.grad.isfinite().all() and value.grad.any(), name
-
-
-@pytest.mark.parametrize(
-    ("observations", "present", "error", "message"),
-    [
-        (torch.zeros(2, 4, 2), None, ValueError, r"observations has shape \(2, 4, 2\)"),
-        (torch.zeros(2, 0, 3), None, ValueError, "observations has no rows; expected at least one"),
-        (torch.zeros((1, 4, 3), dtype=int), None, TypeError, "dtype torch.int64; expected torch."),
-        (ITEMS, torch.ones(2, 4), TypeError, "present is a Tensor of dtype torch.float32; expec"),
-        (ITEMS, torch.ones(2, 5, dtype=bool), ValueError, r"shape \(2, 5\); expected \(2, 4\)"),
-    ],
-)
-def test_bad_arguments_are_refused(kind, observations, present, error, message):
-    with pytest.raises(error, match=message):
-        make(kind)(observations, present)
 
 
 def test_bad_numbers_of_features_are_refused(kind):

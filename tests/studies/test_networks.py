@@ -7,7 +7,6 @@ import torch
 from studies.networks import NETWORKS, EquivariantStack, TwoLayerScorer
 from tests.network.test_peq import (  # noqa: F401
     make,
-    test_bad_arguments_are_refused,
     test_bad_numbers_of_features_are_refused,
     test_permuting_the_items_permutes_the_values,
     test_the_generator_alone_decides_the_weights,

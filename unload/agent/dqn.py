@@ -50,6 +50,10 @@ class DQN:
                 "fused_update is True; expected a PEQNetwork in float32 on the CPU with it"
             )
         self.gamma = checks.real("gamma", gamma, 0, 1)
+        # Of the arrays of a batch.
+        self._needed: tuple[str, ...] = ("observations", "actions", "rewards")
+        if self.gamma > 0:
+            self._needed += "next_observations", "next_masks", "terminations"
         settings = checks.real("learning_rate", learning_rate, 0), checks.real("beta", beta, 0)
         kind: Any = FusedLearner if fused_update else PlainLearner
         self.learner: FusedLearner | PlainLearner = kind(network, *settings)
@@ -73,6 +77,8 @@ class DQN:
         Returns:
             (batch,) int64.
         """
+        checks.shaped("observations", observations, (None, None, 3))
+        checks.shaped("allowed", allowed, observations.shape[:2])
         explore = rng.random(len(observations)) < epsilon
         exploit = ~explore
         actions = np.empty(len(observations), np.int64)
@@ -93,29 +99,38 @@ class DQN:
             The loss before the step.
 
         Raises:
-            TypeError, ValueError: ``batch`` is no dict, an array is missing, or a next state
-                that is not terminal allows no action.
+            TypeError, ValueError: ``batch`` is no dict, an array is missing or not as described,
+                or a next state that is not terminal allows no action.
             FloatingPointError: the loss is not finite; the weights are left as they were.
         """
+        checks.entries("batch", batch, self._needed)
+        observations, actions = batch["observations"], batch["actions"]
+        checks.shaped("observations", observations, (None, None, 3), np.dtype(np.float32))
+        count, items = observations.shape[:2]
+        checks.shaped("actions", actions, (count,), np.dtype(np.int64))
+        checks.shaped("rewards", batch["rewards"], (count,), np.dtype(np.float32))
+        rows = np.arange(count) if rows is None else rows
+        rows = checks.integer_array("rows", rows, (None,), count - 1)
+        if not rows.size:
+            raise ValueError("rows is empty; expected at least one")
+        checks.integer_array("actions", actions[rows], (None,), items - 1)
         return self.start_update(batch, rows)()
 
     def start_update(
         self, batch: dict[str, np.ndarray], rows: np.ndarray | None = None
     ) -> Callable[[], float]:
-        """Begin ``update``; the fused one goes on in other threads while this one acts.
+        """Begin an ``update`` whose arrays need no check, as those of a ``ReplayBuffer``.
+
+        The fused one goes on in other threads while this one acts.
 
         Returns:
             A function that completes the update, returns the loss and may raise as ``update``
             does. The weights stay as they are until it is called, and so must the arrays.
         """
-        names = ["observations", "actions", "rewards"]
-        if self.gamma > 0:
-            names += ["next_observations", "next_masks", "terminations"]
-        checks.entries("batch", batch, names)
         if self.gamma == 0:
             return self.learner.start(batch, batch["rewards"], rows)
         if rows is not None:
-            batch = {name: batch[name].take(rows, axis=0) for name in names}
+            batch = {name: batch[name].take(rows, axis=0) for name in self._needed}
         return self.learner.start(batch, self._targets(batch))
 
     @torch.no_grad()

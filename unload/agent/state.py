@@ -126,12 +126,12 @@ def kinds(run: Any) -> dict[str, tuple]:
 
     Of what is put back in place, also the first name of the same object.
     """
-    found: dict[str, tuple] = {}
+    result: dict[str, tuple] = {}
     first: dict[int, str] = {}
     for name, _, _, value in _walk(run):
         shared = first.setdefault(id(value), name) if isinstance(value, IN_PLACE) else name
-        found[name] = _kind(value), shared
-    return found
+        result[name] = _kind(value), shared
+    return result
 
 
 def gather(run: Any, fresh: dict[str, tuple]) -> dict[str, np.ndarray]:
@@ -147,6 +147,8 @@ def gather(run: Any, fresh: dict[str, tuple]) -> dict[str, np.ndarray]:
     Raises:
         ValueError: it holds what could not be put back into a fresh run.
     """
+    # Only what stands in a fresh run under the same name, and is of the same kind, finds its place
+    # again.
     now = kinds(run)
     for name in fresh | now:
         if name not in fresh or fresh[name] != now.get(name) or fresh[name][0] is None:
@@ -186,8 +188,8 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
     torch.set_rng_state(torch.from_numpy(stored.pop("torch")))
     for name, owner, key, value in [*_walk(run)]:
         if isinstance(value, Containers) or _has_methods(value):
-            names = [each for each in stored if each.startswith(f"{name}.")]
-            parts = {each.removeprefix(f"{name}."): stored.pop(each) for each in names}
+            names = [part for part in stored if part.startswith(f"{name}.")]
+            parts = {part.removeprefix(f"{name}."): stored.pop(part) for part in names}
             if _has_methods(value):
                 value.load_state(parts)
             else:
@@ -211,4 +213,4 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
                 (value[: len(new)] if name.startswith(REPLAY) else value)[...] = new
     if stored:
         raise ValueError(f"it holds {', '.join(sorted(stored)[:5])}; expected nothing of the kind")
-    run.curve.points = [Point(*each) for each in run.curve.points]
+    run.curve.points = [Point(*point) for point in run.curve.points]

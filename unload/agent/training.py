@@ -323,11 +323,11 @@ def deferred_signals() -> Iterator[list[int]]:
     if threading.current_thread() is not threading.main_thread():
         yield received  # only the main thread receives signals
         return
-    previous = {each: signal.signal(each, receive) for each in (signal.SIGINT, signal.SIGTERM)}
+    previous = {kind: signal.signal(kind, receive) for kind in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield received
     finally:
-        for each, handler in previous.items():
-            signal.signal(each, handler)
+        for kind, handler in previous.items():
+            signal.signal(kind, handler)
     if received:
         raise KeyboardInterrupt

@@ -140,8 +140,8 @@ def look_up(containers, actions, always_simulate, digests, micrometres):
         words = write_key(
             starts, links, present, containers.geometry[env], right, members, dynamic, key
         )
-        found = find_distance(digests, micrometres, digest_of(key[:words]))
-        distances[env] = UNKNOWN if found == UNKNOWN else found / 1e6
+        micrometre_count = find_distance(digests, micrometres, digest_of(key[:words]))
+        distances[env] = UNKNOWN if micrometre_count == UNKNOWN else micrometre_count / 1e6
     return items, distances
 
 

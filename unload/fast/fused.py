@@ -29,7 +29,6 @@ import torch
 
 from unload.fast.kernel import CHUNK, add_chunks, best_items
 from unload.network.peq import PEQNetwork
-from unload.support import checks
 
 _CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
 
@@ -74,6 +73,9 @@ def start_gradients(
     Up to ``torch.get_num_threads()`` threads do it, all but this one at once, which may do
     something else meanwhile. The result does not depend on their number.
 
+    Compiled code reads and writes wherever it is told to: the arrays must be as described, which
+    ``DQN.update`` checks and a ``Training`` takes care of.
+
     Args:
         observations: (batch, items, 3) float32.
         actions: (batch,) int64, in 0 … items-1.
@@ -86,20 +88,8 @@ def start_gradients(
         A function that does what is left to do and returns (8n + 2,) float64: the gradients of
         ``weights``, one array after the other, and the loss. Until then, weights and arrays must
         stay as they are. It raises FloatingPointError unless all are finite.
-
-    Raises:
-        TypeError: an array's dtype is another.
-        ValueError: its shape is another, or an action or row is out of range.
     """
-    # Compiled code reads and writes wherever it is told to, therefore all is checked before.
-    count, items = _check(observations)
-    rows = np.arange(count) if rows is None else rows
-    rows = checks.integer_array("rows", rows, (None,), count - 1)
-    checks.shaped("actions", actions, (count,), np.dtype(np.int64))
-    checks.shaped("targets", targets, (count,), np.dtype(np.float32))
-    if not rows.size:
-        raise ValueError("rows is empty; expected at least one")
-    checks.integer_array("actions", actions[rows], (None,), items - 1)
+    rows = np.arange(len(actions)) if rows is None else rows
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
     partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
@@ -147,9 +137,7 @@ def best_actions(weights: _Weights, observations: np.ndarray, allowed: np.ndarra
     Raises:
         FloatingPointError: a row has no allowed action of a finite value.
     """
-    size, items = _check(observations)
-    checks.shaped("allowed", allowed, (size, items), np.dtype(bool))
-    actions = np.full(size, -1)
+    actions = np.full(len(observations), -1)
     best_items(observations, allowed, weights.weight, weights.bias, weights.score[0], actions)
     if (actions < 0).any():
         raise FloatingPointError(
@@ -157,14 +145,6 @@ def best_actions(weights: _Weights, observations: np.ndarray, allowed: np.ndarra
             "expected finite observations and weights"
         )
     return actions
-
-
-def _check(observations: np.ndarray) -> tuple[int, int]:
-    """Batch size and number of items of (batch, items, 3) float32 observations."""
-    checks.shaped("observations", observations, (None, None, 3), np.dtype(np.float32))
-    if not observations.size:
-        raise ValueError(f"observations is empty, {observations.shape}; expected at least one item")
-    return observations.shape[:2]
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.Tensor, ...]:

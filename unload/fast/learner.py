@@ -35,8 +35,7 @@ class FusedLearner:
         self, batch: dict[str, np.ndarray], targets: np.ndarray, rows: np.ndarray | None = None
     ) -> Callable[[], float]:
         """See ``PlainLearner``; weights and arrays must stay as they are until the call."""
-        seen, actions = batch["observations"], batch["actions"]
-        arrays = seen, actions, targets
+        arrays = batch["observations"], batch["actions"], targets
         finish_gradients = fused.start_gradients(self.weights, *arrays, self.beta, rows)
 
         def finish() -> float:

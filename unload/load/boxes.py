@@ -139,13 +139,13 @@ class Load:
             place = f"from {low[outside[0]]} to {high[outside[0]]} m"
             inside = f"inside the container, [0 0 0] to {container} m"
             raise BoxError(outside, f"reaches {place}; expected it {inside}")
-        touching = _find_contacts(low, high, tolerance)
+        contacts = _find_contacts(low, high, tolerance)
 
         # Nobody may change the arrays later, because contacts would no longer be theirs.
         fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
-        for array in (*fields.values(), *extras.values(), *touching):
+        for array in (*fields.values(), *extras.values(), *contacts):
             array.setflags(write=False)
-        rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": touching}
+        rest = {"extras": extras, "contact_tolerance": tolerance, "contacts": contacts}
         for name, value in {**fields, **rest}.items():
             object.__setattr__(self, name, value)
 
@@ -179,12 +179,12 @@ class Load:
         do not overlap there.
         """
         low, high = self.positions - self.sizes / 2, self.positions + self.sizes / 2
-        found = []
+        pairs = []
         for box in range(len(self)):
             shared = np.minimum(high[box], high) - np.maximum(low[box], low)
             across = (np.delete(shared, axis, axis=1) > OVERLAP).all(axis=1)
-            found.append(np.flatnonzero(across & (beyond > beyond[box])))
-        return np.repeat(np.arange(len(self)), [*map(len, found)]), np.concatenate(found)
+            pairs.append(np.flatnonzero(across & (beyond > beyond[box])))
+        return np.repeat(np.arange(len(self)), [*map(len, pairs)]), np.concatenate(pairs)
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -268,12 +268,12 @@ def _find_contacts(
     groups = slabs(low[:, 0] + OVERLAP, high[:, 0])
     left_to_right = np.lexsort((low[:, 1], groups))  # within each slab
     # One row per axis: what is read next is near what was read last.
-    rows = (np.ascontiguousarray(each[left_to_right].T) for each in (low, high))
-    found, *pair = _find(*rows, left_to_right, np.cumsum(np.bincount(groups)), tolerance)
+    corners = (np.ascontiguousarray(corner[left_to_right].T) for corner in (low, high))
+    rows, *pair = _find(*corners, left_to_right, np.cumsum(np.bincount(groups)), tolerance)
     if pair[0] != pair[1]:
         shared = (np.minimum(*high[pair]) - np.maximum(*low[pair])).min()
         raise BoxError(sorted(pair), f"overlap by {shared:.2g} m; expected none")
-    return Contacts(*_lists(found, len(low)))
+    return Contacts(*_lists(rows, len(low)))
 
 
 @compiled(plain=True)
@@ -284,14 +284,14 @@ def _find(low, high, order, ends, tolerance):
     so are the corners ``low`` and ``high``, (3, n).
     """
     count, start = 0, 0
-    found = np.empty((8 * len(order), 3), np.int32)
+    rows = np.empty((8 * len(order), 3), np.int32)
     (x0, y0, z0), (x1, y1, z1) = (low[0], low[1], low[2]), (high[0], high[1], high[2])
     # Boxes of different slabs share no depth. Within a slab, a sweep from left to right compares a
     # box with those only that begin before it ends.
     for end in ends:
         for i in range(start, end):
-            if count + 2 * (end - i) > len(found):
-                found = np.concatenate((found, np.empty_like(found)))
+            if count + 2 * (end - i) > len(rows):
+                rows = np.concatenate((rows, np.empty_like(rows)))
             limit = y1[i] + CONTACT_TOLERANCE
             for j in range(i + 1, end):
                 if y0[j] > limit:
@@ -303,7 +303,7 @@ def _find(low, high, order, ends, tolerance):
                 across = min(y1[i], y1[j]) - y0[j]
                 along = min(x1[i], x1[j]) - max(x0[i], x0[j])
                 if min(across, upwards, along) > OVERLAP:
-                    return found[:count], order[i], order[j]
+                    return rows[:count], order[i], order[j]
 
                 # They touch if they share depth, and besides either width or height.
                 if max(across, upwards) <= CONTACT_TOLERANCE or along <= CONTACT_TOLERANCE:
@@ -313,28 +313,28 @@ def _find(low, high, order, ends, tolerance):
                     one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
 
                 # Each pair is written down twice, because each box has a list of its own.
-                found[count, 0], found[count, 1], found[count, 2] = one, order[i], order[j]
+                rows[count, 0], rows[count, 1], rows[count, 2] = one, order[i], order[j]
                 count += 1
-                found[count, 0], found[count, 1], found[count, 2] = other, order[j], order[i]
+                rows[count, 0], rows[count, 1], rows[count, 2] = other, order[j], order[i]
                 count += 1
         start = end
-    return found[:count], 0, 0
+    return rows[:count], 0, 0
 
 
 @compiled(plain=True)
-def _lists(found, count):
+def _lists(rows, count):
     """``starts`` and ``links`` of ``Contacts``."""
     starts = np.zeros((3, count + 1), np.int32)
-    for row in range(len(found)):
-        starts[found[row, 0], found[row, 1]] += 1
+    for row in range(len(rows)):
+        starts[rows[row, 0], rows[row, 1]] += 1
     total = 0
     for kind in range(3):  # from the number of a box's contacts to the end of its list
         for box in range(count + 1):
             total += starts[kind, box]
             starts[kind, box] = total
     links = np.empty(total, np.int32)
-    for row in range(len(found)):  # fills each list from its end, which leaves its start
-        kind, box = found[row, 0], found[row, 1]
+    for row in range(len(rows)):  # fills each list from its end, which leaves its start
+        kind, box = rows[row, 0], rows[row, 1]
         starts[kind, box] -= 1
-        links[starts[kind, box]] = found[row, 2]
+        links[starts[kind, box]] = rows[row, 2]
     return starts, links

@@ -41,16 +41,8 @@ class ScoringNetwork(nn.Module):
         Returns:
             (batch, items), of the same dtype, in [-1, 1]. Where a row holds no item, the
             value is finite but means nothing.
-
-        Raises:
-            TypeError, ValueError: no tensor, another dtype or shape, or no rows.
         """
-        dtype = next(self.parameters()).dtype
-        checks.shaped("observations", observations, (None, None, 3), dtype)
-        if not observations.shape[1]:
-            raise ValueError("observations has no rows; expected at least one item")
         if present is not None:
-            checks.shaped("present", present, tuple(observations.shape[:2]), torch.bool)
             present = present | ~present.any(dim=1, keepdim=True)  # the maximum of none is infinite
         return torch.tanh(self.scorer(self.features(observations, present))).squeeze(2)
 

@@ -2,11 +2,9 @@
 
 import argparse
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 from unload import task
-from unload.physics.bullet import ENGINES
 from unload.support import files
 from unload.support.checks import needed_for
 
@@ -27,7 +25,6 @@ and z (height, 0 at the floor). unload.read_load and unload.picking_order say mo
 
   unload list.csv --units cm --container 13.6 2.48 2.7 --by stop
 """
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a formula in a spreadsheet begins with
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -36,10 +33,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser("unload", description=DESCRIPTION, formatter_class=form)
     text = "CSV or Excel file; an example if missing"
     parser.add_argument("list", nargs="?", help=text)
-    text = "a column of stops: what can be reached, 1 before 2, ... (--by=-stop: the last first)"
+    text = (
+        "a column of numbers of stops: what can be reached, 1 before 2 (--by=-stop: the last first)"
+    )
     parser.add_argument("--by", metavar="COLUMN", help=text)
-    parser.add_argument("--output", help="file; the screen if missing")
-    parser.add_argument("--format", choices=("csv", "json"), default="csv", help="of the output")
+    parser.add_argument("--output", help="CSV file; the screen if missing")
     text = "PNG file for a picture of the load, its first fifty picks numbered"
     parser.add_argument("--picture", metavar="FILE", help=text)
     parser.add_argument("--units", default="m", help="of lengths: m, cm, mm or in")
@@ -51,21 +49,20 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--tolerance", type=float, default=0.005, help=text)
     text = "what a column is, such as Länge=size_x; may be repeated"
     parser.add_argument("--column", action="append", default=[], metavar="NAME=MEANING", help=text)
-    version = f"unload {task.VERSION}, lifts by {next(filter(find_spec, ENGINES), 'none')}"
-    parser.add_argument("--version", action="version", version=version)
+    parser.add_argument("--version", action="version", version=f"unload {task.VERSION}")
     options = vars(parser.parse_args(arguments))
 
-    from unload.orders.order import picking_order, stops_of  # not before: help takes no time
+    from unload.orders.order import picking_order  # not before: help takes no time
     from unload.orders.packing_list import EXAMPLE, ListError, read_load
 
-    path, by, output, form, picture, columns = (
-        options.pop(name) for name in ("list", "by", "output", "format", "picture", "column")
+    path, by, output, picture, columns = (
+        options.pop(name) for name in ("list", "by", "output", "picture", "column")
     )
     options["columns"] = dict(entry.partition("=")[::2] for entry in columns)
     try:
         load = read_load(EXAMPLE if path is None else path, **options)
         order = picking_order(load, by)
-        _write(_as_text(order, form), output)
+        _write(order.to_csv(index=False, lineterminator="\n"), output)
         if picture is not None:
             with needed_for("--picture"):
                 from unload.load.picture import numbered
@@ -77,21 +74,6 @@ def main(arguments: list[str] | None = None) -> None:
         parser.exit(1, f"{error}\n")
     covered, behind = order["covered"].sum(), order["behind"].sum()
     print(f"{len(order)} picks, {covered} under and {behind} behind others", file=sys.stderr)
-    if by is not None:
-        for stop, boxes, others in stops_of(load, order, by).itertuples(index=False):
-            summary = f"{boxes} boxes, {others} of later ones come out first"
-            print(f"{by.lstrip('-')} {stop}: {summary}", file=sys.stderr)
-
-
-def _as_text(order, form: str) -> str:
-    if form == "json":
-        return order.to_json(orient="records", indent=1, force_ascii=False) + "\n"
-    return order.map(_guarded).rename(columns=_guarded).to_csv(index=False, lineterminator="\n")
-
-
-def _guarded(cell):
-    """A text that a spreadsheet would take for a formula, with an apostrophe before it."""
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
 
 
 def _write(text: str, output: str | None) -> None:

@@ -1,6 +1,5 @@
 """An order of picks that can be carried out from the entrance, by the places of the boxes alone."""
 
-import re
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -39,9 +38,9 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
 
     Args:
         load: see ``unload.read_load``.
-        by: a name in ``load.extras``, such as ``"stop"``: what can be reached, the lowest value
-            first, or with ``"-stop"`` the highest. Boxes of later stops come out early only where
-            they stand in the way of what can come out.
+        by: a name in ``load.extras`` of numbers, such as ``"stop"``: what can be reached, the
+            lowest first, or with ``"-stop"`` the highest. Boxes of later stops come out early only
+            where they stand in the way of what can come out.
         rule: instead of ``reachable``, a function of the load and what is present that returns
             keys. What can be reached, the heaviest first::
 
@@ -69,6 +68,8 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
         returned = rule(load, present.copy())
         checks.instance("what rule returned", returned, Sequence, "arrays of numbers")
         keys = checks.finite_array("what rule returned", returned, (None, len(load)))
+        # lexsort takes its last key first and the smallest first; equal boxes stay in the list's
+        # order.
         items = np.flatnonzero(present)
         item = items[np.lexsort(-keys[::-1, items])[0]]
         name = item if load.ids is None else load.ids[item]
@@ -86,7 +87,7 @@ def _by_stop(load: Load, by: str) -> Rule:
     A box is due at the first of the stops of all that it stands in front of or lies on, and of all
     that these keep from coming out; so no box comes out before its stop that need not.
     """
-    due = stop_numbers(load, by)[1]
+    due = _turns(load, by)
     blocked, blocking = np.hstack([load.fronts, load.covers])
     for _ in range(len(load)):  # as long as the longest chain, at most
         np.minimum.at(due, blocking, due[blocked])
@@ -98,38 +99,19 @@ def _by_stop(load: Load, by: str) -> Rule:
     return rule
 
 
-def stop_numbers(load: Load, by: str) -> tuple[np.ndarray, np.ndarray]:
-    """The stops in order, (k,), and the index of each box's stop, (n,) int64; see ``by``."""
+def _turns(load: Load, by: str) -> np.ndarray:
+    """The stop of each box, (n,) float64, so that the lowest is the first; see ``by``."""
     falling = str(by).startswith("-") and by not in load.extras
     if (name := by[1:] if falling else by) not in load.extras:
         raise ValueError(
             f"by is {by!r}; expected one of the list's other columns: {', '.join(load.extras)}"
         )
-    values = load.extras[name]
-    missing = np.flatnonzero(pd.isna(values) | (values == ""))
-    if missing.size:
-        first = missing[0] if load.ids is None else load.ids[missing[0]]
-        count = len(missing)
-        raise ValueError(f"{count} boxes have no {by!r}, the first {first}; expected one for each")
-    stops, numbers = np.unique(values, return_inverse=True)
-    if stops.dtype.kind not in "biuf":  # texts: "stop 2" comes before "stop 10"
-        order = sorted(range(len(stops)), key=lambda stop: _parts(str(stops[stop])))
-        stops, numbers = stops[order], np.argsort(order)[numbers]
-    return (stops[::-1], len(stops) - 1 - numbers) if falling else (stops, numbers)
-
-
-def _parts(text: str) -> list:
-    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", text)]
-
-
-def stops_of(load: Load, order: pd.DataFrame, by: str) -> pd.DataFrame:
-    """A row for each stop: ``stop``, ``boxes``, and ``others_first``.
-
-    The latter is how many boxes of later stops come out before its last one.
-    """
-    stops, numbers = stop_numbers(load, by)
-    turns, rows = numbers[order["item"]], []
-    for number, stop in enumerate(stops):
-        until = turns[: np.flatnonzero(turns == number)[-1] + 1]
-        rows.append((stop, (turns == number).sum(), (until > number).sum()))
-    return pd.DataFrame(rows, columns=["stop", "boxes", "others_first"])
+    stops = pd.to_numeric(pd.Series(load.extras[name]), errors="coerce").to_numpy(float)
+    wrong = np.flatnonzero(~np.isfinite(stops))
+    if wrong.size:
+        first = wrong[0] if load.ids is None else load.ids[wrong[0]]
+        raise ValueError(
+            f"{len(wrong)} boxes have no number in {name!r}, the first {first}; "
+            "expected the number of its stop for each"
+        )
+    return -stops if falling else stops

@@ -26,7 +26,6 @@ TURNS = ("rotation", "yaw", "pitch", "roll")
 # What a column is, by its name in lower case.
 MEANINGS = {name: name for name in (*CENTRE, *CORNER, *SIZES, *TURNS, "id")}
 MEANINGS |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
-MARKS = (b"\xff\xfe", b"\xfe\xff")  # of UTF-16
 NUMBER = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
 
 
@@ -71,10 +70,10 @@ def read_load(
     stop or a weight, become ``Load.extras``. Each line is one box; quantities are ignored.
 
     Args:
-        path: of a CSV file (UTF-8, or UTF-16 with its mark; separated by commas, or by semicolons
-            or tabs, where decimals may have a comma) or of an Excel file (``.xlsx``, first sheet);
-            or a ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000
-            rows, 200 columns and, unpacked, 20 MB.
+        path: of a CSV file (UTF-8; separated by commas, or by semicolons or tabs, where decimals
+            may have a comma) or of an Excel file (``.xlsx``, first sheet); or a
+            ``pandas.DataFrame``, for a list that has to be read otherwise. At most 3,000 rows,
+            200 columns and, unpacked, 20 MB.
         units: of lengths whose names say none: ``"m"``, ``"cm"``, ``"mm"`` or ``"in"``.
         columns: name in the list → name above, for other names: ``{"Länge": "size_x"}``.
         tolerance: in m, up to 0.1, how far each box may be from where it belongs, see
@@ -111,10 +110,10 @@ def read_load(
 
     def numbers(meaning: str) -> np.ndarray:
         name = names[meaning]
-        found = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
-        if (wrong := np.flatnonzero(~np.isfinite(found))).size:
+        cells = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
+        if (wrong := np.flatnonzero(~np.isfinite(cells))).size:
             refuse(wrong, f"{name} is {str(table[name][wrong[0]])!r}; expected a number")
-        return found
+        return cells
 
     # A box turned otherwise than by quarter turns is none along the axes.
     for turn in {*TURNS} & {*names}:
@@ -187,8 +186,7 @@ def _check(what: str, count: int) -> None:
 
 def _csv(file: Path) -> pd.DataFrame:
     _check("bytes", file.stat().st_size)
-    content = file.read_bytes()
-    text = content.decode("utf-16" if content[:2] in MARKS else "utf-8-sig")
+    text = file.read_text(encoding="utf-8-sig")
     separator = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     form = {"header": None, "dtype": str, "na_filter": False, "skipinitialspace": True}
     cells = pd.read_csv(StringIO(text), sep=separator, **form)
@@ -211,18 +209,18 @@ def _by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
     for name, meaning in columns.items():
         checks.one_of("columns", name, names)
         checks.one_of("columns", meaning, MEANINGS)
-    found: dict[str, str] = {}
+    by_meaning: dict[str, str] = {}
     for name in names:
         meaning = MEANINGS.get(columns.get(name) or _plain(name)[0], name)
-        if meaning in found:
+        if meaning in by_meaning:
             raise ListError(f"the list has the columns {names}; expected one {meaning!r}")
-        found[meaning] = name
-    missing = ", ".join(name for name in SIZES if name not in found)
-    if ({*CENTRE} <= {*found}) == ({*CORNER} <= {*found}):
+        by_meaning[meaning] = name
+    missing = ", ".join(name for name in SIZES if name not in by_meaning)
+    if ({*CENTRE} <= {*by_meaning}) == ({*CORNER} <= {*by_meaning}):
         missing = "either x, y, z or x_min, y_min, z_min"
     if missing:
         raise ListError(f"the list has the columns {names}; expected {missing}", "columns")
-    return found
+    return by_meaning
 
 
 def _plain(name: object) -> tuple[str, str | None]:

@@ -26,7 +26,7 @@ def settle(
         How far each centre moves, and by how much each edge becomes smaller, (n, 3) float64 in m
         each; 0 where a box fits.
     """
-    high, found, edges = low + sizes, low.copy(), sizes.copy()
+    high, moved, edges = low + sizes, low.copy(), sizes.copy()
     between = 2 * tolerance
 
     # From the floor upwards, each box sinks or rises onto the highest one below it.
@@ -38,13 +38,13 @@ def settle(
         under = order[:count][(share[:, :2].min(axis=1) > between) & (share[:, 2] <= between)]
         most = between if under.size else tolerance
         if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
-            found[box, 2] = top[under].max(initial=0)
-            top[box] = found[box, 2] + sizes[box, 2]
+            moved[box, 2] = top[under].max(initial=0)
+            top[box] = moved[box, 2] + sizes[box, 2]
 
     # Those that share height now are pushed apart, along x or y: away from the rear wall or the
     # left one, and back where the container ends.
     for axis in (0, 1):
-        end, end_x = container[axis], found[:, 0] + edges[:, 0]
+        end, end_x = container[axis], moved[:, 0] + edges[:, 0]
         order, before = np.argsort(low[:, axis] + high[:, axis], kind="stable"), []
         for count, box in enumerate(order):
             others = order[:count]
@@ -54,10 +54,10 @@ def settle(
                 beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -between)
             else:  # what is apart along x needs nothing along y
                 depth = np.minimum(end_x[box], end_x[others]) - np.maximum(
-                    found[box, 0], found[others, 0]
+                    moved[box, 0], moved[others, 0]
                 )
                 beside &= depth > OVERLAP
-            level = np.minimum(top[box], top[others]) - np.maximum(found[box, 2], found[others, 2])
+            level = np.minimum(top[box], top[others]) - np.maximum(moved[box, 2], moved[others, 2])
             before.append(others[beside & (level > OVERLAP)])
 
         # Where the longest row through a box is too long, all boxes in it become a little smaller.
@@ -76,10 +76,10 @@ def settle(
             first[box] = max(first[box], (first + wide)[others].max(initial=-np.inf))
         for box, others in zip(order[::-1], before[::-1]):
             last[others] = np.minimum(last[others], last[box] - wide[others])
-        found[:, axis] = np.minimum(first, last)
+        moved[:, axis] = np.minimum(first, last)
 
     smaller = np.where(sizes - edges > OVERLAP / 2, sizes - edges, 0.0)
-    moves = found - low - smaller / 2  # of the centres
+    moves = moved - low - smaller / 2  # of the centres
     return np.where(np.abs(moves) > OVERLAP / 2, moves, 0.0), smaller
 
 
@@ -90,7 +90,7 @@ def uncarried(load: Load) -> np.ndarray:
     faces that the box stands on, each made smaller by ``SLACK`` as in the physics.
     """
     low, high = load.positions - load.sizes / 2, load.positions + load.sizes / 2
-    found = []
+    tipping = []
     for box in np.flatnonzero(low[:, 2] > CONTACT_TOLERANCE).tolist():
         below, centre = load.contacts.of(BELOW, box), load.positions[box]
         start = np.maximum(low[below], low[box]) - centre + SLACK
@@ -99,5 +99,5 @@ def uncarried(load: Load) -> np.ndarray:
         # Corners all around the centre leave no half of the directions without one.
         angles = np.sort(np.arctan2(y[:, np.newaxis], x).ravel())
         if not below.size or np.diff(angles, append=angles[0] + 2 * np.pi).max() >= np.pi:
-            found.append(box)
-    return np.array(found, np.int64)
+            tipping.append(box)
+    return np.array(tipping, np.int64)

@@ -108,8 +108,8 @@ class Client:
         self.disconnect = weakref.finalize(self, _pybullet().disconnect, self.number)
 
     def __getattr__(self, name: str) -> Any:
-        found = getattr(_pybullet(), name)
-        return partial(found, physicsClientId=self.number) if callable(found) else found
+        attribute = getattr(_pybullet(), name)
+        return partial(attribute, physicsClientId=self.number) if callable(attribute) else attribute
 
 
 class World:

@@ -85,8 +85,8 @@ class LiftTable:
     def own(self) -> tuple[np.ndarray, np.ndarray]:
         """The entries without the foreign ones."""
         digests, micrometres = self.entries
-        kept = ~np.isin(digests, self.foreign)
-        return digests[kept], micrometres[kept]
+        own = ~np.isin(digests, self.foreign)
+        return digests[own], micrometres[own]
 
     def _take_in(self, new: tuple[np.ndarray, np.ndarray]) -> None:
         """Add entries in increasing order; a situation that is known keeps its own."""

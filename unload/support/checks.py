@@ -108,8 +108,8 @@ def entries(name: str, value: object, required: Iterable[str]) -> None:
 def shaped(name: str, value: Any, shape: _Shape, dtype: Any = None) -> None:
     """Check an array or tensor: raise TypeError for another dtype, ValueError for another shape."""
     if dtype is not None and getattr(value, "dtype", None) != dtype:
-        found = f"a {type(value).__name__} of dtype {getattr(value, 'dtype', None)}"
-        raise TypeError(f"{name} is {found}; expected {dtype}")
+        given = f"a {type(value).__name__} of dtype {getattr(value, 'dtype', None)}"
+        raise TypeError(f"{name} is {given}; expected {dtype}")
     has = tuple(np.shape(value))
     fits = shape is None or (
         len(has) == len(shape)

@@ -89,19 +89,19 @@ def _folder() -> Path | None:
     for place in (_numba().config.CACHE_DIR, _PACKAGE / "__pycache__", Path(user, "unload")):
         if not place:
             continue
-        kept = Path(place, f"compiled-{_digest(_PACKAGE)}")
+        folder = Path(place, f"compiled-{_digest(_PACKAGE)}")
         try:
-            fresh = not kept.exists()
-            kept.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=kept).close()
+            fresh = not folder.exists()
+            folder.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
         except OSError:
             continue
         if fresh:  # else whoever waits for the compiler does not know why
             _LOGGER.warning(
                 "compiling for this processor, for about ten seconds in all; kept for later in %s",
-                kept,
+                folder,
             )
-        return kept
+        return folder
     warnings.warn(
         "compiled code cannot be kept, and every process compiles for ten seconds; set "
         "NUMBA_CACHE_DIR to a folder that can be written",
