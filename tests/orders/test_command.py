@@ -33,10 +33,13 @@ def test_it_writes_the_order_of_the_example(capsys, tmp_path):
 
 
 def test_it_reads_what_read_load_reads(tmp_path, capsys, monkeypatch):
-    """Each option; what is said of boxes that were moved stands on stderr."""
+    """Each option; what is said of boxes that were moved stands on stderr.
+
+    No cell becomes a formula in a spreadsheet.
+    """
     (tmp_path / "boxes.csv").write_text(
-        "nr;x;y;z;length;width;height;weight;stop;note\n"
-        "-7;50;50;50;100;100;100;5;2.1234567;y\n"
+        "nr;x;y;z;length;width;height;weight;stop;=note\n"
+        "=a;50;50;50;100;100;100;5;2.1234567;=1\n"
         "b;50;50;159;100;100;100;7;1;x\n",
         encoding="utf-8",
     )
@@ -46,8 +49,8 @@ def test_it_reads_what_read_load_reads(tmp_path, capsys, monkeypatch):
         command.main([f"{tmp_path}/boxes.csv", "--column", "nr=id", *options.split()])
     printed, said = capsys.readouterr()
     order = pd.read_csv(io.StringIO(printed))
-    assert order["id"].tolist() == ["b", "-7"] and order["weight"].tolist() == [7, 5]
-    assert order["stop"].tolist() == [1, 2.1234567] and order["note"].tolist() == ["x", "y"]
+    assert order["id"].tolist() == ["b", "'=a"] and order["weight"].tolist() == [7, 5]
+    assert order["stop"].tolist() == [1, 2.1234567] and order["'=note"].tolist() == ["x", "'=1"]
     assert said.splitlines() == [
         "1 of 2 boxes moved by up to 90.0 mm",
         "2 picks, 0 under and 0 behind others",

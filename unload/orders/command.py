@@ -25,6 +25,7 @@ and z (height, 0 at the floor). unload.read_load and unload.picking_order say mo
 
   unload list.csv --units cm --container 13.6 2.48 2.7 --by stop
 """
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what a formula in a spreadsheet begins with
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -62,7 +63,8 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         load = read_load(EXAMPLE if path is None else path, **options)
         order = picking_order(load, by)
-        _write(order.to_csv(index=False, lineterminator="\n"), output)
+        text = order.map(_guarded).rename(columns=_guarded)
+        _write(text.to_csv(index=False, lineterminator="\n"), output)
         if picture is not None:
             with needed_for("--picture"):
                 from unload.load.picture import numbered
@@ -74,6 +76,11 @@ def main(arguments: list[str] | None = None) -> None:
         parser.exit(1, f"{error}\n")
     covered, behind = order["covered"].sum(), order["behind"].sum()
     print(f"{len(order)} picks, {covered} under and {behind} behind others", file=sys.stderr)
+
+
+def _guarded(cell):
+    """A text that a spreadsheet would take for a formula, with an apostrophe before it."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
 
 
 def _write(text: str, output: str | None) -> None:
