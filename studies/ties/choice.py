@@ -23,7 +23,7 @@ from studies.falls.cells import CONFIG
 from studies.falls.laboratory import SLOPES, TILTS, point, train_in_laboratory
 from studies.falls.long import LONG, UNTRAINED
 from studies.fingerprint import training_fingerprint
-from studies.grid import Cell, cell_of, read_policies
+from studies.grid import cell, cell_of, read_policies
 from studies.paper.training import PAPER
 from studies.results import COMMAND, code_of, keep_all, publish
 from studies.statistics import end_msr
@@ -204,20 +204,20 @@ def filled_at_deadlocks(run: Training) -> None:
 
 B256 = replace(CONFIG, batch_size=256)
 CHOICE_CELLS = {
-    f"choice_{choice}_memory_{memory}{'' if mask else '_no_mask'}": Cell(
-        replace(CONFIG, position_noise=0.0, mask=mask), CHOICE_SEEDS, choice_change(choice, memory)
+    f"choice_{choice}_memory_{memory}{'' if mask else '_no_mask'}": cell(
+        CONFIG, CHOICE_SEEDS, choice_change(choice, memory), position_noise=0.0, mask=mask
     )
     for choice, memory, mask in product(NOISE, NOISE, (False, True))
 }
 MASK_CELLS = {
     **{
-        f"episodes_{picks}{'' if mask else '_no_mask'}": Cell(
-            replace(B256, max_picks=picks, mask=mask), MASK_SEEDS
+        f"episodes_{picks}{'' if mask else '_no_mask'}": cell(
+            B256, MASK_SEEDS, max_picks=picks, mask=mask
         )
         for picks, mask in product((25, 500), (False, True))
     },
-    "no_deadlocks_stored_no_mask": Cell(replace(B256, mask=False), MASK_SEEDS, no_deadlocks_stored),
-    "filled_at_deadlocks_no_mask": Cell(replace(B256, mask=False), MASK_SEEDS, filled_at_deadlocks),
+    "no_deadlocks_stored_no_mask": cell(B256, MASK_SEEDS, no_deadlocks_stored, mask=False),
+    "filled_at_deadlocks_no_mask": cell(B256, MASK_SEEDS, filled_at_deadlocks, mask=False),
 }
 
 
@@ -256,11 +256,11 @@ def choice_laboratory_data(n_jobs: int = -1) -> None:
     fingerprint = training_fingerprint()
     for name, cells in {"choice_laboratory": CHOICE_CELLS, "mask_laboratory": MASK_CELLS}.items():
         questions = []
-        for cell_name, cell in cells.items():
-            question = {"cell": cell_name, "change": code_of(cell.change)}
-            for seed in cell.seeds:
-                config = replace(cell.config, seed=seed)
-                arguments = cell_name, config, cell.change
+        for cell_name, planned in cells.items():
+            question = {"cell": cell_name, "change": code_of(planned.change)}
+            for seed in planned.seeds:
+                config = replace(planned.config, seed=seed)
+                arguments = cell_name, config, planned.change
                 question |= {"fingerprint": fingerprint, **config.plain()}
                 questions.append((dict(question), arguments))
         results = keep_all(f"ties/{name}", run_laboratory, questions, n_jobs)
