@@ -135,7 +135,7 @@ def test_policies_and_networks_are_judged_alike(own_data, set_in):
     assert trained.judged_as_is == evaluate(policy, 1, 0, mask=True)["success_rate"].mean()
     policy.network.scorer.weight.data[0, 0] += 1  # another network of the same name
     long.published_data(n_jobs=1)
-    assert len([*(own_data / "runs/published").glob("*.npz")]) == 3
+    assert len([*(own_data / "runs/published").rglob("*.npz")]) == 3
 
 
 def test_the_published_table_holds_every_policy():
