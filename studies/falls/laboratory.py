@@ -26,7 +26,6 @@ from unload.agent.training import Training
 
 TRACED = ("ranks", "shuffled")
 EVERY = 16_000  # picks between the points of a trace: half an episode of all containers
-JUDGED = [f"judged_{name}" for name in measures.BLANKED]
 SLOPES, TILTS = ["slope_x", "slope_y", "slope_z"], ["tilt_x", "tilt_y"]
 POINT = [
     "picks", "success_rate", *SLOPES, *TILTS, "wrong", "wrong_without_place", "height_of_wrong",
@@ -123,15 +122,17 @@ def run_cell(name: str, cell: Cell, seed: int) -> dict:
     return {"row": row, "trace": trace if name in TRACED else []}
 
 
-def keep_cells(place: str, cells: Mapping[str, Cell], n_jobs: int) -> list[Result]:
-    """What ``run_cell`` returns of each seed of some cells, see ``results.kept``."""
+def keep_cells(
+    place: str, cells: Mapping[str, Cell], n_jobs: int, compute: Callable[..., dict] = run_cell
+) -> list[Result]:
+    """What ``compute`` returns of the name, the cell and each seed of some cells, see ``kept``."""
     asked, fingerprint = [], training_fingerprint()
     for name, cell in cells.items():
         question = {"cell": name, "change": code_of(cell.change), "fingerprint": fingerprint}
         for seed in cell.seeds:
             config = replace(cell.config, seed=seed).plain()
             asked.append((question | config, (name, cell, seed)))
-    return keep_all(place, run_cell, asked, n_jobs)
+    return keep_all(place, compute, asked, n_jobs)
 
 
 def laboratory_data(n_jobs: int = -1) -> None:

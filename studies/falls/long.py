@@ -15,7 +15,7 @@ import torch
 
 from studies import changes, paths
 from studies.falls import measures
-from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
+from studies.falls.laboratory import POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
 from studies.grid import Grid, cell, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
@@ -46,7 +46,7 @@ LONG = Grid(
 )
 LOADS = {"episodes": 100, "seed": 1000}  # that policies are judged in, 500 picks each
 UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
-COLUMNS = ["cell", "seed", *JUDGED]
+COLUMNS = ["cell", "seed", *(f"judged_{name}" for name in measures.BLANKED)]
 
 
 def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
