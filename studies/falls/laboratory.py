@@ -27,9 +27,8 @@ from unload.agent.training import Training
 TRACED = ("ranks", "shuffled")
 EVERY = 16_000  # picks between the points of a trace: half an episode of all containers
 SLOPES, TILTS = ["slope_x", "slope_y", "slope_z"], ["tilt_x", "tilt_y"]
-POINT = [
-    "picks", "success_rate", *SLOPES, *TILTS, "wrong", "wrong_without_place", "height_of_wrong",
-]  # fmt: skip
+TRACE = ["picks", "success_rate", *SLOPES, *TILTS]
+POINT = [*TRACE, "wrong", "wrong_without_place", "height_of_wrong"]
 COLUMNS = ["cell", "seed", "mean", "end", "judged_as_is", *SLOPES]
 FRESH_COLUMNS = ["cell", "seed", "end", "judged_as_is", "judged_averaged_x", *SLOPES]
 # Preferences along x and y above which a network errs, fitted on 290 networks, of which 190 are in
@@ -140,12 +139,12 @@ def laboratory_data(n_jobs: int = -1) -> None:
 
     The first has a row per run: ``cell``, ``seed``; ``mean`` and ``end``, the MSR while training
     over all picks and over the last tenth; ``judged_as_is``, the trained network's MSR in fresh
-    containers; and its slopes at the end (see ``measures``). The second has the points of the runs
-    in ``TRACED``, see ``point``.
+    containers; and its slopes at the end (see ``measures``). The second has of the points of the
+    runs in ``TRACED`` what is in ``TRACE``, see ``point``.
     """
     results = keep_cells("laboratory", CELLS, n_jobs)
     trace = pd.DataFrame([point for result in results for point in result.value["trace"]])
-    trace = trace[["cell", "seed", *POINT]].astype({"picks": int})
+    trace = trace[["cell", "seed", *TRACE]].astype({"picks": int})
     publish_cells("falls/laboratory", "laboratory", COLUMNS, results, trace=trace)
 
 
