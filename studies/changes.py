@@ -135,8 +135,11 @@ def best_actions(
     return np.where(allowed, score, -np.inf).argmax(axis=1)
 
 
-def taught(run: Training, preference: float) -> None:
-    """Let the policy of ``best_actions`` choose."""
+def taught(
+    run: Training, preference: float, change: Callable[[Training], None] | None = None
+) -> None:
+    """Make a change, and let the policy of ``best_actions`` choose."""
+    several(run, (change,))
     run.agent.learner.best_actions = partial(best_actions, preference=preference)
 
 
@@ -168,27 +171,6 @@ def dug(run: Training, preference: float) -> None:
     """From the second episode on, fill the containers with ``dug_loads``."""
     loads = dug_loads(preference)
     run.rollout.envs.unwrapped.stack = lambda rng: loads[rng.integers(len(loads))]
-
-
-def tandem(run: Training, change: Callable[[Training], None] | None, seed: int) -> None:
-    """Let another network choose, which learns from the same picks with a change of its own.
-
-    Args:
-        run: whose network only watches.
-        change: of the network that chooses; none if None.
-        seed: is added to the run's for the first weights and batches of that network.
-    """
-    active = Training(replace(run.config, seed=run.config.seed + seed), change=change)
-    active.rollout.close()
-    run.agent.choose, add = active.agent.choose, run.replay.add
-
-    def add_to_both(**picks: np.ndarray) -> None:
-        add(**picks)
-        active.replay.add(**picks)
-        if len(active.replay) >= run.config.batch_size:
-            active.start_update()()
-
-    run.replay.add = add_to_both
 
 
 def perfect_start(run: Training, change: Callable[[Training], None] | None = None) -> None:

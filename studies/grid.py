@@ -11,17 +11,18 @@ A run is called ``<cell>/seed_<seed>``.
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 import torch
 
 from studies import paths
 from studies.fingerprint import training_fingerprint
+from studies.networks import NETWORKS
 from studies.results import joined, read_provenance, read_table, write_provenance, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
-from unload.agent.config import TrainConfig
+from unload.agent.config import EPSILON_FALLS, TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
 from unload.agent.training import Training
 from unload.network.weights import read_weights, write_weights
@@ -29,6 +30,10 @@ from unload.support import checks, files
 
 # Of a curve, what is published, and its digits: a success rate of 64 picks needs six.
 COLUMNS = {"success_rate": "{:.6g}", "loss": "{:.5g}"}
+# Fields that a configuration once had, with the one value that they had in all published runs.
+FORMER_FIELDS = {
+    "epsilon_fraction": EPSILON_FALLS, "shuffle_places": False, "checkpoint_interval": 60.0,
+}  # fmt: skip
 
 
 class Cell(NamedTuple):
@@ -43,6 +48,16 @@ class Cell(NamedTuple):
     config: TrainConfig
     seeds: Sequence[int]
     change: Callable[[Training], None] | None = None
+
+
+def cell(
+    config: TrainConfig,
+    seeds: Sequence[int],
+    change: Callable[[Training], None] | None = None,
+    **fields: Any,
+) -> Cell:
+    """The cell of a configuration in which some ``fields`` have other values, see ``Cell``."""
+    return Cell(replace(config, **fields), seeds, change)
 
 
 class Grid(NamedTuple):
@@ -110,12 +125,17 @@ def _records(kept: Path, names: Iterable[str]) -> dict[str, Path]:
 
 def _check_count(name: str, kept: Path, runs: int) -> None:
     """Refuse to publish fewer runs than are published: they take hours, and none may be lost."""
-    there = read_provenance(name).get("runs", 0)
+    there = published_runs(read_provenance(name))
     if runs < there:
         raise ValueError(
             f"{kept} would hold {runs} finished runs; expected at least as many as the {there} "
             f"of {name}"
         )
+
+
+def published_runs(record: Mapping[str, Any]) -> int:
+    """How many runs are published, by the provenance: some may have been taken out since."""
+    return record.get("runs kept", record.get("runs", 0))
 
 
 def _publish(grid: Grid, configs: dict, kept: Path, fingerprint: str) -> None:
@@ -214,3 +234,27 @@ def read_policies(path: str | Path) -> dict[str, Greedy]:
         return {name: policy_of(each, of_run[name]) for name, each in settings.items()}
 
     return read_weights(path, "policies", policies)
+
+
+def recorded_config(settings: Mapping[str, Any]) -> TrainConfig:
+    """The configuration whose fields stand in a provenance, see ``TrainConfig.plain``.
+
+    Args:
+        settings: the fields by name; those of ``FORMER_FIELDS`` may be among them. A network of
+            ``studies.networks`` stands there by its qualified name, perhaps with a digest of its
+            file as it was then.
+
+    Raises:
+        ValueError: one of ``FORMER_FIELDS`` has another value than it had in all published runs.
+    """
+    fields = dict(settings)
+    for name, value in FORMER_FIELDS.items():
+        found = fields.pop(name, value)
+        if found != value:
+            raise ValueError(
+                f"{name} is {found!r}; expected {value!r}, because a configuration has no such "
+                "field any more"
+            )
+    own = {f"{kind.__module__}.{kind.__name__}": kind for kind in NETWORKS.values()}
+    network, *_ = fields["network"].split()
+    return TrainConfig(**fields | {"network": own.get(network, network)})

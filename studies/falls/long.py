@@ -15,16 +15,16 @@ import torch
 
 from studies import changes, paths
 from studies.falls import measures
-from studies.falls.laboratory import JUDGED, POINT, point, train_in_laboratory
+from studies.falls.laboratory import POINT, point, train_in_laboratory
 from studies.fingerprint import training_fingerprint
-from studies.grid import Cell, Grid, cell_of, read_policies, train_grid
+from studies.grid import Grid, cell, cell_of, read_policies, train_grid
 from studies.paper.training import PAPER
 from studies.results import COMMAND, code_of, keep_all, publish
 from unload.agent.config import TrainConfig
 from unload.network.peq import PEQNetwork
 
 CONFIG = TrainConfig(batch_size=256, mask=True)
-NO_MASK, B2048 = replace(CONFIG, mask=False), TrainConfig(mask=True)
+B2048 = TrainConfig(mask=True)
 SEEDS, FEW_SEEDS = range(20, 25), range(20, 23)
 EXPLORED = 10_000_000  # picks after which the agent no longer explores
 TRACED_SEEDS = (20, 21)
@@ -33,20 +33,20 @@ LONG = Grid(
     "falls/long",
     f"{COMMAND} falls",
     {
-        "shuffled": Cell(CONFIG, SEEDS, changes.shuffled),
-        "ranks": Cell(CONFIG, SEEDS),
-        "shuffled_no_mask": Cell(NO_MASK, SEEDS, changes.shuffled),
-        "successes": Cell(CONFIG, SEEDS, partial(changes.successes_only, start=EXPLORED)),
-        "ranks_no_mask": Cell(NO_MASK, SEEDS),
-        "episodes_25": Cell(replace(CONFIG, max_picks=25), FEW_SEEDS),
-        "mirrored": Cell(CONFIG, SEEDS, changes.mirrored),
-        "shuffled_b2048": Cell(B2048, FEW_SEEDS, changes.shuffled),
-        "shuffled_b2048_no_mask": Cell(replace(B2048, mask=False), FEW_SEEDS, changes.shuffled),
+        "shuffled": cell(CONFIG, SEEDS, changes.shuffled),
+        "ranks": cell(CONFIG, SEEDS),
+        "shuffled_no_mask": cell(CONFIG, SEEDS, changes.shuffled, mask=False),
+        "successes": cell(CONFIG, SEEDS, partial(changes.successes_only, start=EXPLORED)),
+        "ranks_no_mask": cell(CONFIG, SEEDS, mask=False),
+        "episodes_25": cell(CONFIG, FEW_SEEDS, max_picks=25),
+        "mirrored": cell(CONFIG, SEEDS, changes.mirrored),
+        "shuffled_b2048": cell(B2048, FEW_SEEDS, changes.shuffled),
+        "shuffled_b2048_no_mask": cell(B2048, FEW_SEEDS, changes.shuffled, mask=False),
     },
 )
 LOADS = {"episodes": 100, "seed": 1000}  # that policies are judged in, 500 picks each
 UNTRAINED = 36  # networks, as many as there are runs in the paper's four cells
-COLUMNS = ["cell", "seed", *JUDGED]
+COLUMNS = ["cell", "seed", *(f"judged_{name}" for name in measures.BLANKED)]
 
 
 def falls_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
@@ -112,6 +112,5 @@ def published_data(n_jobs: int = -1) -> None:
 
 
 def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
-    cell, _, seed = name.partition("/seed_")
-    row = {"cell": cell, "seed": int(seed)}
+    row = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
     return row | measures.judged_blanked(network, config, loads=LOADS)

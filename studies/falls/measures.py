@@ -99,12 +99,10 @@ def judged(
     return evaluate(policy, mask=config.mask, **loads, **env)["success_rate"].mean()
 
 
-def judged_blanked(
-    network: nn.Module, config: TrainConfig, seen: Seen | None = None, loads: dict = LOADS
-) -> dict[str, float]:
+def judged_blanked(network: nn.Module, config: TrainConfig, loads: dict) -> dict[str, float]:
     """``judged`` with the coordinates of each of ``BLANKED`` set to 0, by ``judged_<its name>``."""
     return {
-        f"judged_{name}": judged(network, config, blank, seen, loads)
+        f"judged_{name}": judged(network, config, blank, loads=loads)
         for name, blank in BLANKED.items()
     }
 

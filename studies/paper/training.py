@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from studies import paths
-from studies.grid import Cell, Grid, read_policies, train_grid
+from studies.grid import Grid, cell, read_policies, train_grid
 from studies.results import COMMAND
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from unload import task
@@ -26,29 +26,23 @@ from unload.support import files
 
 B2048 = TrainConfig()
 CONFIG = replace(B2048, batch_size=256)
-
-
-def _both(name: str, config: TrainConfig, seeds: int, masked_seeds: int) -> dict[str, Cell]:
-    """A cell without the mask in training, and one with it."""
-    return {
-        f"{name}_no_mask": Cell(config, range(seeds)),
-        f"{name}_mask": Cell(replace(config, mask=True), range(masked_seeds)),
-    }
-
-
 # The paper's configuration read in four ways, and two changes that hold its runs up.
 PAPER_CELLS = {
-    **_both("paper", CONFIG, 10, 10),
-    **_both("paper_b2048", B2048, 8, 8),
+    "paper_no_mask": cell(CONFIG, range(10)),
+    "paper_mask": cell(CONFIG, range(10), mask=True),
+    "paper_b2048_no_mask": cell(B2048, range(8)),
+    "paper_b2048_mask": cell(B2048, range(8), mask=True),
 }
 PAPER = Grid(
     "falls/paper",
     f"{COMMAND} training",
     PAPER_CELLS
     | {
-        **_both("averaged", replace(CONFIG, ties="average"), 5, 10),
-        "averaged_b2048_mask": Cell(replace(B2048, mask=True, ties="average"), range(10)),
-        **_both("positions", replace(CONFIG, equalize=False), 5, 5),
+        "averaged_no_mask": cell(CONFIG, range(5), ties="average"),
+        "averaged_mask": cell(CONFIG, range(10), mask=True, ties="average"),
+        "averaged_b2048_mask": cell(B2048, range(10), mask=True, ties="average"),
+        "positions_no_mask": cell(CONFIG, range(5), equalize=False),
+        "positions_mask": cell(CONFIG, range(5), mask=True, equalize=False),
     },
 )
 DEFAULTS = "paper_b2048_no_mask"  # the cell of ``TrainConfig``'s defaults, of Figs. 11 and 12
@@ -119,8 +113,8 @@ def over_picks(
         squeeze=False,
     )  # fmt: skip
     for axes, (title, cells) in zip(all_axes, panels.items()):
-        for (name, cell), colour in zip(cells.items(), (COLOURS["ranks"], WITHOUT_MASK)):
-            for number, (_, run) in enumerate(curves[curves["cell"] == cell].groupby("seed")):
+        for (name, shown), colour in zip(cells.items(), (COLOURS["ranks"], WITHOUT_MASK)):
+            for number, (_, run) in enumerate(curves[curves["cell"] == shown].groupby("seed")):
                 axes.plot(run["picks"], run[column], colour, linewidth=0.4, alpha=0.35)
                 if number == 0:
                     smooth = run[column].rolling(SMOOTH, min_periods=1).mean()

@@ -2,10 +2,11 @@
 
     python -m studies seamless
 
-The plan, ``data/seamless/PLAN.md``, says why its grid has these cells and seeds.
+The plan, ``data/seamless/PLAN.md``, says why its grid has these cells and seeds; those of its cells
+that are no longer here stand at revision ba9d78d1.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -13,30 +14,21 @@ import numpy as np
 import pandas as pd
 
 from studies import changes
-from studies.grid import Cell, Grid, read_grid, train_grid
+from studies.grid import Cell, Grid, cell, read_grid, train_grid
 from studies.results import COMMAND, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
 from unload import task
 from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
-from unload.agent.training import Training
 
 SHARE = 0.4  # j; the paper's start of 15 % and end of 60 % need about so much
 FIRST_SEED = 40
 SEEDS, FEW_SEEDS = range(FIRST_SEED, FIRST_SEED + 5), range(FIRST_SEED, FIRST_SEED + 3)
-CONFIG = TrainConfig(batch_size=256)
 MASKS = {"mask": True, "no_mask": False}
 # How equal coordinates are ranked: by the simulation's noise, by the items' order, or not at all.
-TIES = {"noise": {}, "order": {"position_noise": 0.0}, "averaged": {"ties": "average"}}
-
-
-def _cell(
-    mask: str, ties: str, change: Callable[[Training], None], seeds: Sequence[int], **fields
-) -> Cell:
-    config = replace(CONFIG, mask=MASKS[mask], **TIES[ties], **fields)
-    return Cell(config, seeds, change)
-
-
+NOISE = TrainConfig(batch_size=256)
+ORDER, AVERAGED = replace(NOISE, position_noise=0.0), replace(NOISE, ties="average")
+TIES = {"order": ORDER, "noise": NOISE, "averaged": AVERAGED}
 ANEW = partial(jam, share=SHARE)
 # Share of the free boxes that jam along episodes by the friction of a contact, by whether a box
 # stands in front, and by the number of those at the sides (``jam_tables.first_attempts``), when
@@ -46,39 +38,35 @@ BY_PLACE = {
     1.0: np.array(((0.01, 0.13, 0.47, 0.78), (0.04, 0.38, 0.83, 0.98))),
 }
 LASTS = 20  # successes of others within which a jam is drawn again, see ``jam_tables.again``
+UNTIL_SUCCESS, WEIGHT_1 = partial(jam, share=SHARE, lasts=1), partial(weigh, z=1.0)
 CELLS: dict[str, Cell] = {
     **{
-        f"{mask}_{ties}": _cell(mask, ties, ANEW, SEEDS)
-        for ties in ("order", "noise", "averaged")
-        for mask in MASKS
+        f"{name}_{ties}": cell(config, SEEDS, ANEW, mask=mask)
+        for ties, config in TIES.items()
+        for name, mask in MASKS.items()
     },
     **{
-        f"share_{share}_mask_order": _cell("mask", "order", partial(jam, share=share), FEW_SEEDS)
-        for share in (0.2, 0.3)
+        f"until_success_{name}_order": cell(ORDER, FEW_SEEDS, UNTIL_SUCCESS, mask=mask)
+        for name, mask in MASKS.items()
     },
-    **{
-        f"until_success_{mask}_order": _cell(
-            mask, "order", partial(jam, share=SHARE, lasts=1), FEW_SEEDS
-        )
-        for mask in MASKS
-    },
-    **{
-        f"weight_1_{mask}_{ties}": _cell(mask, ties, partial(weigh, z=1.0), FEW_SEEDS)
-        for mask, ties in (("mask", "noise"), ("no_mask", "noise"), ("mask", "order"))
-    },
-    "shuffled_mask_noise": _cell(
-        "mask", "noise", partial(changes.several, makes=(ANEW, changes.shuffled)), FEW_SEEDS
+    "weight_1_mask_noise": cell(NOISE, FEW_SEEDS, WEIGHT_1, mask=True),
+    "weight_1_no_mask_noise": cell(NOISE, FEW_SEEDS, WEIGHT_1),
+    "weight_1_mask_order": cell(ORDER, FEW_SEEDS, WEIGHT_1, mask=True),
+    "shuffled_mask_noise": cell(
+        NOISE, FEW_SEEDS, partial(changes.several, makes=(ANEW, changes.shuffled)), mask=True
     ),
-    "positions_mask_noise": _cell("mask", "noise", ANEW, FEW_SEEDS, equalize=False),
+    "positions_mask_noise": cell(NOISE, FEW_SEEDS, ANEW, mask=True, equalize=False),
     **{
-        f"measured_{friction}_{mask}_order": _cell(
-            mask, "order", partial(jam_by_place, shares=shares, lasts=LASTS), FEW_SEEDS
+        f"measured_{friction}_{name}_order": cell(
+            ORDER, FEW_SEEDS, partial(jam_by_place, shares=shares, lasts=LASTS), mask=mask
         )
         for friction, shares in BY_PLACE.items()
-        for mask in MASKS
+        for name, mask in MASKS.items()
     },
-    "b2048_mask_order": _cell("mask", "order", ANEW, SEEDS, batch_size=2048),
-    "b2048_no_mask_order": _cell("no_mask", "order", ANEW, SEEDS, batch_size=2048),
+    **{
+        f"b2048_{name}_order": cell(ORDER, SEEDS, ANEW, mask=mask, batch_size=2048)
+        for name, mask in MASKS.items()
+    },
 }
 EXPORTED = "b2048_no_mask_order", 41  # chosen afterwards among those like the paper's figures
 SEAMLESS = Grid("seamless/runs", f"{COMMAND} seamless", CELLS)
@@ -87,11 +75,11 @@ SEAMLESS = Grid("seamless/runs", f"{COMMAND} seamless", CELLS)
 def seamless_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
     """Train the cells, see ``train_grid``; export the run ``EXPORTED``."""
     kept = train_grid(SEAMLESS, cells, n_jobs)
-    cell, seed = EXPORTED
-    if cells is None or cell in cells:
-        config, change = replace(CELLS[cell].config, seed=seed), CELLS[cell].change
+    name, seed = EXPORTED
+    if cells is None or name in cells:
+        config, change = replace(CELLS[name].config, seed=seed), CELLS[name].change
         settings = settings_of_run(config, change=change)
-        run = RunFolder(kept / f"{cell}/seed_{seed}").result(config, settings)
+        run = RunFolder(kept / f"{name}/seed_{seed}").result(config, settings)
         export(run.curve["wall_time"])
 
 
@@ -105,12 +93,12 @@ def export(wall_time: Sequence[float]) -> None:
     Args:
         wall_time: of each point of its curve, s since the epoch.
     """
-    cell, seed = EXPORTED
-    curves = read_grid(SEAMLESS, [cell])
+    name, seed = EXPORTED
+    curves = read_grid(SEAMLESS, [name])
     curve = curves[curves["seed"] == seed].reset_index(drop=True)
-    for name, values in (
+    for exported, values in (
         ("loss_function_agent", curve["loss"]),
         ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
     ):
         table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
-        write_table(name, table.dropna(), "%.12g")
+        write_table(exported, table.dropna(), "%.12g")

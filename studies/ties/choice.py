@@ -20,17 +20,16 @@ import torch
 from studies import paths
 from studies.changes import without
 from studies.falls.cells import CONFIG
-from studies.falls.laboratory import SLOPES, TILTS, point, train_in_laboratory
+from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
 from studies.falls.long import LONG, UNTRAINED
 from studies.fingerprint import training_fingerprint
-from studies.grid import Cell, cell_of, read_policies
+from studies.grid import Cell, cell, cell_of, read_policies
 from studies.paper.training import PAPER
 from studies.results import COMMAND, code_of, keep_all, publish
 from studies.statistics import end_msr
 from studies.ties.noise import SPREAD, DriftingTies, drifting
 from studies.ties.training import TIES
 from unload import task
-from unload.agent.config import TrainConfig
 from unload.agent.greedy import Greedy, greedy_actions
 from unload.agent.policies import choosable
 from unload.agent.training import Training
@@ -204,29 +203,30 @@ def filled_at_deadlocks(run: Training) -> None:
 
 B256 = replace(CONFIG, batch_size=256)
 CHOICE_CELLS = {
-    f"choice_{choice}_memory_{memory}{'' if mask else '_no_mask'}": Cell(
-        replace(CONFIG, position_noise=0.0, mask=mask), CHOICE_SEEDS, choice_change(choice, memory)
+    f"choice_{choice}_memory_{memory}{'' if mask else '_no_mask'}": cell(
+        CONFIG, CHOICE_SEEDS, choice_change(choice, memory), position_noise=0.0, mask=mask
     )
     for choice, memory, mask in product(NOISE, NOISE, (False, True))
 }
 MASK_CELLS = {
     **{
-        f"episodes_{picks}{'' if mask else '_no_mask'}": Cell(
-            replace(B256, max_picks=picks, mask=mask), MASK_SEEDS
+        f"episodes_{picks}{'' if mask else '_no_mask'}": cell(
+            B256, MASK_SEEDS, max_picks=picks, mask=mask
         )
         for picks, mask in product((25, 500), (False, True))
     },
-    "no_deadlocks_stored_no_mask": Cell(replace(B256, mask=False), MASK_SEEDS, no_deadlocks_stored),
-    "filled_at_deadlocks_no_mask": Cell(replace(B256, mask=False), MASK_SEEDS, filled_at_deadlocks),
+    "no_deadlocks_stored_no_mask": cell(B256, MASK_SEEDS, no_deadlocks_stored, mask=False),
+    "filled_at_deadlocks_no_mask": cell(B256, MASK_SEEDS, filled_at_deadlocks, mask=False),
 }
 
 
-def run_laboratory(name: str, config: TrainConfig, change: Callable[[Training], None]) -> dict:
+def run_laboratory(name: str, planned: Cell, seed: int) -> dict:
     """Train a run of the laboratory, and evaluate its network in all ways."""
     trace: list[dict[str, float]] = []
-    run = train_in_laboratory(config, change, lambda run: trace.append(point(run)))
+    config = replace(planned.config, seed=seed)
+    run = train_in_laboratory(config, planned.change, lambda run: trace.append(point(run)))
     points, policy = pd.DataFrame(trace), run.policy()
-    row = {"cell": name, "seed": config.seed, "end": end_msr(run.curve.table())}
+    row = {"cell": name, "seed": seed, "end": end_msr(run.curve.table())}
     for noise, mask in WAYS:
         choices = evaluate_choice(policy, noise, mask, **FEW_LOADS)
         row[f"{noise}_{'mask' if mask else 'no_mask'}"] = choices["msr"]
@@ -255,15 +255,7 @@ def choice_laboratory_data(n_jobs: int = -1) -> None:
     """
     fingerprint = training_fingerprint()
     for name, cells in {"choice_laboratory": CHOICE_CELLS, "mask_laboratory": MASK_CELLS}.items():
-        questions = []
-        for cell_name, cell in cells.items():
-            question = {"cell": cell_name, "change": code_of(cell.change)}
-            for seed in cell.seeds:
-                config = replace(cell.config, seed=seed)
-                arguments = cell_name, config, cell.change
-                question |= {"fingerprint": fingerprint, **config.plain()}
-                questions.append((dict(question), arguments))
-        results = keep_all(f"ties/{name}", run_laboratory, questions, n_jobs)
+        results = keep_cells(f"ties/{name}", cells, n_jobs, run_laboratory)
         rows = pd.DataFrame([result.value for result in results])
         if name == "choice_laboratory":  # its environments show ties in the items' order
             rows = rows.drop(columns=[*TILTS, "tilt"])

@@ -4,7 +4,9 @@
 
 Twenty of them differ from the paper's configuration in their ties alone, which are broken by the
 items' order, or by the creep of settled PyBullet walls, measured once and frozen for a load. The
-code that made all of them stands at the same revision.
+code that made all of them stands at the same revision. It needs the whole Git history, which a
+shallow clone or a source archive lacks; ``data/ties/earlier.csv`` and ``earlier_runs.csv`` are
+therefore kept, and nothing else has to read the history.
 """
 
 import json
@@ -14,7 +16,7 @@ from io import StringIO
 import pandas as pd
 
 from studies import paths
-from studies.grid import Cell, Grid, write_curves
+from studies.grid import Grid, cell, write_curves
 from studies.paper.training import PAPER
 from studies.results import COMMAND, joined, write_provenance, write_table
 from studies.statistics import end_msr, fell
@@ -28,7 +30,7 @@ EARLIER = Grid(
     f"{NAME}_runs",
     MADE_BY,
     {
-        f"ties_by_{ties}_{mask}": Cell(PAPER.cells[f"paper_{mask}"].config, range(5))
+        f"ties_by_{ties}_{mask}": cell(PAPER.cells[f"paper_{mask}"].config, range(5))
         for ties in ("order", "drift")
         for mask in ("mask", "no_mask")
     },
@@ -41,28 +43,43 @@ def git(*arguments: str) -> str:
     return subprocess.run(command, check=True, capture_output=True, encoding="utf-8").stdout
 
 
+def check_history() -> None:
+    """Raise RuntimeError where the revision of these runs is not in this repository's history."""
+    try:
+        git("cat-file", "-e", f"{REVISION}^{{commit}}")
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise RuntimeError(
+            f"the history of {paths.ROOT} has no revision {REVISION}; expected a clone with its "
+            "whole history, as `git fetch --unshallow` makes of a shallow one"
+        ) from error
+
+
 def earlier_data() -> None:
     """Write ``ties/earlier.csv``, a row per run of the plan, and the curves of twenty.
 
     The rows hold ``cell``, ``seed`` and ``criterion.likeness``; of a run that went on from another
     one after 12 million picks (``interventions/…``) the ``end`` and whether it ``fell`` alone. The
     curves stand in ``ties/earlier_runs.csv``.
+
+    Raises:
+        RuntimeError: the revision is not in this repository's history.
     """
+    check_history()
     listed = git("ls-tree", "-r", "--name-only", REVISION, f"{FOLDER}/").split()
     rows, runs, records = [], {}, []
     for path in listed:
         folder, _, seed = path.removesuffix(".csv").rpartition("/seed_")
         if not (path.endswith(".csv") and folder):
             continue
-        cell = folder.removeprefix(f"{FOLDER}/")
+        name = folder.removeprefix(f"{FOLDER}/")
         curve = pd.read_csv(StringIO(git("show", f"{REVISION}:{path}")))
         whole = curve["picks"].iloc[0] <= 32_000
         measures = likeness(curve) if whole else {"end": end_msr(curve), "fell": fell(curve)}
-        rows.append({"cell": cell, "seed": int(seed), **measures})
+        rows.append({"cell": name, "seed": int(seed), **measures})
         record = path.replace(".csv", ".provenance.json")
         records.append(json.loads(git("show", f"{REVISION}:{record}")))
-        if cell in EARLIER.cells:
-            runs[f"{cell}/seed_{seed}"] = curve
+        if name in EARLIER.cells:
+            runs[f"{name}/seed_{seed}"] = curve
     write_table(NAME, pd.DataFrame(rows))
     write_curves(EARLIER, runs)
     settings = {"from": f"{REVISION}:{FOLDER}", "made by": records[0]["command"].split(" --")[0]}

@@ -5,12 +5,11 @@
 ``data/ties/PLAN.md`` says what each cell is for, and what was expected of it.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 from studies import changes
-from studies.grid import Cell, Grid
+from studies.grid import Grid, cell
 from studies.paper.training import B2048
 from studies.results import COMMAND
 from studies.seamless.jamming import jam
@@ -18,57 +17,57 @@ from studies.ties.noise import drifting
 from studies.ties.renewed import renewed
 
 SEEDS, FEW_SEEDS = range(60, 65), range(60, 63)
-RANKED_HERE = replace(B2048, batch_size=256, position_noise=0.0)
 MASKS = {"no_mask": False, "mask": True}
+FROZEN = replace(B2048, batch_size=256)  # ties are broken by the environments
+BROKEN_HERE = replace(FROZEN, position_noise=0.0)
 # ρ from one pick to the next along x, y and z, by how ties are broken.
 CORRELATIONS = {"anew": (0.0, 0.0, 0.0), "drifting": (0.965, 0.965, 0.997)}
-SHARES = (0.25, 0.4)  # of the free boxes, that jam at an attempt
+NOISE = {ties: partial(drifting, correlation=each) for ties, each in CORRELATIONS.items()}
+SHARES = (0.4, 0.25)  # of the free boxes, that jam at an attempt
+# The same with jams.
+JAMS = {
+    (ties, share): partial(changes.several, makes=(noise, partial(jam, share=share)))
+    for ties, noise in NOISE.items()
+    for share in SHARES
+}
 SWEPT = (0.8, 0.9, 0.965, 0.985, 0.997)  # ρ of all three axes
-
-
-def _cell(ties: str, seeds: Sequence[int] = SEEDS, share: float = 0.0, **fields) -> Cell:
-    """A cell whose ties are broken by noise that goes on, perhaps with jams."""
-    change = partial(drifting, correlation=CORRELATIONS[ties])
-    if share:
-        change = partial(changes.several, makes=(change, partial(jam, share=share)))
-    return Cell(replace(RANKED_HERE, **fields), seeds, change)
-
-
-def _frozen(**fields) -> Cell:
-    return Cell(replace(B2048, **fields), SEEDS)
-
-
 CELLS = {
     **{
-        f"{ties}_{name}": _cell(ties, mask=mask)
+        f"{ties}_{name}": cell(BROKEN_HERE, SEEDS, noise, mask=mask)
         for name, mask in MASKS.items()
-        for ties in CORRELATIONS
+        for ties, noise in NOISE.items()
     },
     **{
-        f"{ties}_jams_{share}_no_mask": _cell(ties, share=share)
-        for share in SHARES[::-1]
-        for ties in CORRELATIONS
+        f"{ties}_jams_{share}_no_mask": cell(BROKEN_HERE, SEEDS, JAMS[ties, share])
+        for share in SHARES
+        for ties in NOISE
     },
-    **{f"b2048_{ties}_no_mask": _cell(ties, batch_size=2048) for ties in CORRELATIONS},
     **{
-        f"rho_{rho}_no_mask": Cell(
-            RANKED_HERE, FEW_SEEDS, partial(drifting, correlation=(rho, rho, rho))
+        f"b2048_{ties}_no_mask": cell(BROKEN_HERE, SEEDS, noise, batch_size=2048)
+        for ties, noise in NOISE.items()
+    },
+    **{
+        f"rho_{rho}_no_mask": cell(
+            BROKEN_HERE, FEW_SEEDS, partial(drifting, correlation=(rho, rho, rho))
         )
         for rho in SWEPT
     },
-    **{f"frozen_{name}": _frozen(batch_size=256, mask=mask) for name, mask in MASKS.items()},
+    **{f"frozen_{name}": cell(FROZEN, SEEDS, mask=mask) for name, mask in MASKS.items()},
     **{
-        f"averaged_{name}": _frozen(batch_size=256, mask=mask, ties="average")
+        f"averaged_{name}": cell(FROZEN, SEEDS, mask=mask, ties="average")
         for name, mask in MASKS.items()
     },
-    "b2048_frozen_no_mask": _frozen(),
+    "b2048_frozen_no_mask": cell(B2048, SEEDS),
     **{
-        f"b2048_{ties}_jams_0.4_no_mask": _cell(ties, share=0.4, batch_size=2048)
-        for ties in CORRELATIONS
+        f"b2048_{ties}_jams_0.4_no_mask": cell(BROKEN_HERE, SEEDS, JAMS[ties, 0.4], batch_size=2048)
+        for ties in NOISE
     },
-    **{f"{ties}_jams_0.4_mask": _cell(ties, share=0.4, mask=True) for ties in CORRELATIONS},
     **{
-        f"renewed_{name}": Cell(replace(RANKED_HERE, mask=mask), SEEDS, renewed)
+        f"{ties}_jams_0.4_mask": cell(BROKEN_HERE, SEEDS, JAMS[ties, 0.4], mask=True)
+        for ties in NOISE
+    },
+    **{
+        f"renewed_{name}": cell(BROKEN_HERE, SEEDS, renewed, mask=mask)
         for name, mask in MASKS.items()
     },
 }

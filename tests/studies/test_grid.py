@@ -26,9 +26,9 @@ CONFIG = TrainConfig(
     picks=640, num_envs=8, batch_size=64, n_features=4, log_interval=20, replay_size=512
 )
 CELLS = {
-    "plain": grid.Cell(CONFIG, (0, 1)),
-    "averaged_mask": grid.Cell(replace(CONFIG, mask=True, ties="average"), (3,)),
-    "shuffled": grid.Cell(CONFIG, (0,), shuffled),
+    "plain": grid.cell(CONFIG, (0, 1)),
+    "averaged_mask": grid.cell(CONFIG, (3,), mask=True, ties="average"),
+    "shuffled": grid.cell(CONFIG, (0,), shuffled),
 }
 SMALL = grid.Grid("some/small", "make small", CELLS)
 
@@ -79,6 +79,17 @@ def test_published_runs_are_not_replaced_by_fewer(trained, monkeypatch):
     provenance = read_provenance(SMALL.name)
     assert (provenance["runs"], provenance["planned"]) == (4, 4)
     assert provenance["settings"]["averaged_mask"]["mask"] is True
+
+
+def test_runs_that_were_taken_out_need_not_be_published_again(trained, set_in):
+    """But no fewer than the others."""
+    for kept, runs in ((3, 4), (4, 4)):
+        set_in(grid, read_provenance=lambda name, kept=kept: {"runs": 9, "runs kept": kept})
+        grid.train_grid(SMALL, n_jobs=1)
+        assert read_provenance(SMALL.name)["runs"] == runs
+    set_in(grid, read_provenance=lambda name: {"runs": 9, "runs kept": 5})
+    with pytest.raises(ValueError, match="expected at least as many as the 5"):
+        grid.train_grid(SMALL, n_jobs=1)
 
 
 def test_what_is_measured_of_policies_is_published_with_them(trained):

@@ -1,6 +1,7 @@
 """Whether a run is like the paper's figures, part by part; and what is published of ties."""
 
 import re
+import subprocess
 from fnmatch import fnmatch
 
 import numpy as np
@@ -8,13 +9,12 @@ import pandas as pd
 import pytest
 
 from studies import paths
-from studies.grid import read_grid
+from studies.grid import published_runs, read_grid
 from studies.results import read_provenance, read_table
 from studies.ties import earlier, leak, training
 from studies.ties.criterion import FIG11, FIG12, READINGS, likeness, noisier_readings, scatter
-from studies.ties.laboratory import CELLS, mirrored_load
+from studies.ties.laboratory import CELLS
 from tests.studies.test_statistics import course
-from unload import stack_load, task
 
 # Of ten million picks in twenty windows: falls, rises, sinks slowly; the MSR becomes slower and
 # noisier after the loss's peak.
@@ -85,7 +85,12 @@ def test_the_cells_are_those_of_the_plan():
     assert not any(anew), "nothing is left of the noise before"
     seeds = {seed for cell in training.CELLS.values() for seed in cell.seeds}
     assert (min(seeds), max(seeds)) == (60, 64) and "seeds 60–64" in plan
-    assert [len(CELLS[name].seeds) for name in ("rho_0.0", "positions")] == [30, 40]
+    assert {len(cell.seeds) for cell in CELLS.values()} == {30}
+    published = read_table("ties/laboratory")
+    assert published.groupby("cell")["seed"].agg(set).to_dict() == {
+        name: set(cell.seeds) for name, cell in CELLS.items()
+    }
+    assert published_runs(read_provenance("ties/laboratory")) == len(published)
 
 
 def test_published_runs_are_whole_ones_of_the_grid():
@@ -114,8 +119,13 @@ def test_order_tells_which_box_is_the_upper_one(ties):
         assert told["upper"] == pytest.approx(told["pairs"] / 2, rel=0.3)
 
 
-def test_a_mirrored_load_exchanges_left_and_right():
-    load, mirrored = (make(np.random.default_rng(1)) for make in (stack_load, mirrored_load))
-    assert np.allclose(load.positions[:, 1] + mirrored.positions[:, 1], task.CONTAINER[1])
-    assert np.allclose(load.positions[:, ::2], mirrored.positions[:, ::2])
-    assert (load.sizes == mirrored.sizes).all()
+def test_a_clone_without_the_history_is_refused(own_data, tmp_path, monkeypatch):
+    """A shallow clone is another repository to Git, and so is one that is none."""
+    monkeypatch.setattr(paths, "ROOT", tmp_path)
+    message = f"no revision {earlier.REVISION}; expected a clone with its whole history"
+    with pytest.raises(RuntimeError, match=message):
+        earlier.earlier_data()
+    subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
+    with pytest.raises(RuntimeError, match=message):
+        earlier.earlier_data()
+    assert not [*own_data.rglob("earlier*")]
