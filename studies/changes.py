@@ -15,6 +15,7 @@ import numpy as np
 
 from unload import task
 from unload.agent.evaluation import Policy
+from unload.agent.replay import ReplayBuffer
 from unload.agent.training import Training
 from unload.env.container import ContainerEnv
 from unload.env.equalization import equalize
@@ -107,6 +108,22 @@ def ranked(observations: np.ndarray, averaged: tuple[int, ...]) -> np.ndarray:
     return seen
 
 
+def repeated(replay: ReplayBuffer, picks: dict[str, np.ndarray], rows: np.ndarray) -> dict:
+    """Some picks of a step, repeated so that as many are stored as otherwise.
+
+    Args:
+        replay: where they will be stored.
+        picks: of the step.
+        rows: (k,) int64, which of them; where there are none, what was stored last is repeated.
+    """
+    count = len(picks["rewards"])
+    if len(rows):
+        rows = np.resize(rows, count)
+    else:
+        picks, rows = replay.arrays, np.arange(replay.total - count, replay.total)
+    return {name: values.take(rows, axis=0, mode="wrap") for name, values in picks.items()}
+
+
 def successes_only(run: Training, start: int) -> None:
     """Store no failed pick from ``start`` picks on.
 
@@ -118,10 +135,7 @@ def successes_only(run: Training, start: int) -> None:
     def add_successes(**picks: np.ndarray) -> None:
         won, count = np.flatnonzero(picks["rewards"] > 0), len(picks["rewards"])
         if replay.total >= start and len(won) < count and (len(won) or replay.total):
-            rows = np.resize(won, count)
-            if not len(won):
-                picks, rows = replay.arrays, np.arange(replay.total - count, replay.total)
-            picks = {name: each.take(rows, axis=0, mode="wrap") for name, each in picks.items()}
+            picks = repeated(replay, picks, won)
         add(**picks)
 
     run.replay.add = add_successes

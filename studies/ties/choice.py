@@ -18,7 +18,7 @@ import pandas as pd
 import torch
 
 from studies import paths
-from studies.changes import without
+from studies.changes import repeated, without
 from studies.falls.cells import CONFIG
 from studies.falls.laboratory import SLOPES, TILTS, keep_cells, point, train_in_laboratory
 from studies.falls.long import LONG, UNTRAINED
@@ -27,7 +27,7 @@ from studies.grid import Cell, cell, cell_of, read_policies
 from studies.paper.training import PAPER
 from studies.results import COMMAND, code_of, keep_all, publish
 from studies.statistics import end_msr
-from studies.ties.noise import SPREAD, DriftingTies, drifting
+from studies.ties.noise import SPREAD, drifting
 from studies.ties.training import TIES
 from unload import task
 from unload.agent.greedy import Greedy, greedy_actions
@@ -37,10 +37,10 @@ from unload.env.equalization import equalize
 from unload.env.observation import POSITION_NOISE
 from unload.env.vector import ContainerVectorEnv
 from unload.network.peq import PEQNetwork
+from unload.support import checks
 
 NOISE = ("frozen", "anew")  # for a load, or at each pick
 WAYS = list(product(NOISE, (False, True)))  # noise and mask
-PLACE = (0, 1)  # the axes x and y
 LOADS = {"episodes": 100, "seed": 1000}  # containers that published networks choose in
 FEW_LOADS = LOADS | {"episodes": 16}  # and those of the laboratory
 CHOICE_SEEDS, MASK_SEEDS = range(7000, 7020), range(8000, 8020)
@@ -66,15 +66,14 @@ def evaluate_choice(
         since the last success, and of the others those by ``preference``: the network chooses an
         item that cannot be lifted also where ties share their mean rank.
     """
-    if noise not in NOISE:
-        raise ValueError(f"noise is {noise!r}; expected one of {NOISE}")
+    checks.one_of("noise", noise, NOISE)
     seeds = np.random.SeedSequence(seed).generate_state(episodes).tolist()
     envs = ContainerVectorEnv(episodes, position_noise=POSITION_NOISE if noise == "frozen" else 0.0)
     rng, rows = np.random.default_rng(seed), np.arange(episodes)
 
     def choose(positions: np.ndarray, allowed: np.ndarray, ties: str) -> np.ndarray:
         seen = equalize(positions, ties) if policy.equalize else positions
-        return greedy_actions(policy.network, seen if place else without(seen, PLACE), allowed)
+        return greedy_actions(policy.network, seen if place else without(seen), allowed)
 
     counts = dict.fromkeys(COUNTS, 0)
     observations, infos = envs.reset(seed=seeds)
@@ -127,34 +126,11 @@ def ask_network(name: str, policy: Greedy) -> list[dict]:
     ]
 
 
-def parted(run: Training, choice: float, memory: float) -> None:
-    """Let a network choose by other noise than it learns from.
-
-    Args:
-        run: see ``DriftingTies``.
-        choice: correlation from pick to pick of the noise that breaks ties at the choice.
-        memory: of that in the replay memory.
-    """
-    add = run.replay.add
-    drifting(run, (choice,) * 3)
-    stored, choose = DriftingTies(run, (memory,) * 3, "ties of the memory"), run.agent.choose
-    seen = np.empty(0)
-
-    def choose_and_note(observations: np.ndarray, *rest) -> np.ndarray:
-        nonlocal seen
-        seen = stored.observations()
-        return choose(observations, *rest)
-
-    run.agent.choose = choose_and_note
-    run.replay.add = lambda observations, **rest: add(observations=seen, **rest)
-
-
 def choice_change(choice: str, memory: str) -> Callable[[Training], None]:
     """The change of a laboratory run by its kinds of noise."""
     correlations = {"frozen": 1.0, "anew": 0.0}
-    if choice == memory:
-        return partial(drifting, correlation=(correlations[choice],) * 3)
-    return partial(parted, choice=correlations[choice], memory=correlations[memory])
+    memory_too = None if choice == memory else (correlations[memory],) * 3
+    return partial(drifting, correlation=(correlations[choice],) * 3, memory=memory_too)
 
 
 def no_deadlocks_stored(run: Training) -> None:
@@ -162,7 +138,7 @@ def no_deadlocks_stored(run: Training) -> None:
 
     Where all of a step are deadlocked, what was stored last is stored again.
     """
-    choose, add, replay = run.agent.choose, run.replay.add, run.replay
+    choose, add = run.agent.choose, run.replay.add
     deadlocked = np.zeros(run.config.num_envs, bool)
 
     def choose_and_note(*arguments) -> np.ndarray:
@@ -172,13 +148,7 @@ def no_deadlocks_stored(run: Training) -> None:
         return actions
 
     def add_others(**picks: np.ndarray) -> None:
-        others = np.flatnonzero(~deadlocked)
-        if len(others):
-            rows = np.resize(others, len(deadlocked))
-        else:
-            picks = replay.arrays
-            rows = np.arange(replay.total - len(deadlocked), replay.total)
-        add(**{name: values.take(rows, axis=0, mode="wrap") for name, values in picks.items()})
+        add(**repeated(run.replay, picks, np.flatnonzero(~deadlocked)))
 
     run.agent.choose, run.replay.add = choose_and_note, add_others
 

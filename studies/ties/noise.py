@@ -95,21 +95,27 @@ def _write(order, seen):
                 seen[env, order[env, axis, rank], axis] = LEVELS[rank]
 
 
-def drifting(run: Training, correlation: Sequence[float]) -> None:
-    """Let ties be broken by offsets that drift, in choosing and in learning alike.
+def drifting(
+    run: Training, correlation: Sequence[float], memory: Sequence[float] | None = None
+) -> None:
+    """Let ties be broken by offsets that drift, in choosing and in learning.
 
     Args:
         run: see ``DriftingTies``; its containers hold 128 items or more at every pick.
         correlation: ρ along x, y and z.
+        memory: of other offsets, which break the ties in the replay memory; what is chosen by is
+            learned from if None.
     """
     ties = DriftingTies(run, correlation)
+    others = None if memory is None else DriftingTies(run, memory, "ties of the memory")
     choose, add = run.agent.choose, run.replay.add
     seen = np.empty(0)
 
     def choose_by_ties(observations: np.ndarray, *rest) -> np.ndarray:
         nonlocal seen
-        seen = ties.observations()
-        return choose(seen, *rest)
+        chosen = ties.observations()
+        seen = chosen if others is None else others.observations()
+        return choose(chosen, *rest)
 
     run.agent.choose = choose_by_ties
     run.replay.add = lambda observations, **rest: add(observations=seen, **rest)
