@@ -5,8 +5,8 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from copy import deepcopy
 from functools import cache
 from pathlib import Path
@@ -19,7 +19,7 @@ from tqdm import tqdm
 from unload import task
 from unload.agent.checkpoint import RunFolder, TrainResult, settings_of_run
 from unload.agent.config import ENVS, TrainConfig
-from unload.agent.curve import Curve, Point
+from unload.agent.curve import Curve
 from unload.agent.dqn import DQN
 from unload.agent.greedy import Greedy
 from unload.agent.replay import ReplayBuffer
@@ -219,43 +219,39 @@ def train(
         folder.check_code(stack=stack, change=change, network=config.network)
     table = None if lifts is None else folder.check_foreign("lifts", lifts)
 
-    def keep_lifts() -> None:
-        try:
-            if table is not None:
-                shared_table().exchange(table)
-        except ValueError as error:
-            raise ValueError(f"lifts: {error}") from error
-
-    if folder.finished:  # to be read only, perhaps where nothing can be written
-        return folder.result(config, settings_of_run(config, stack, change))
-    keep_lifts()
-    with files.locked(folder.path), deferred_signals() as signals:
-        if folder.finished:  # by another process meanwhile
-            return folder.result(config, settings_of_run(config, stack, change))
-        run = Training(config, stack, change)
-        try:
-            folder.restore(run)
-            with closing(_points(run, folder, keep_lifts, progress, signals)) as points:
-                for point in points:
-                    answer = None if callback is None else callback(point._asdict())
-                    if isinstance(answer, (bool, np.bool_)) and not answer:
-                        run.agent.check_finite()
-                        folder.finish(run)
-                        break
-        finally:
-            run.rollout.close()
-            keep_lifts()
-        return folder.result(config, run.settings)
+    settings = settings_of_run(config, stack, change)
+    if not folder.finished:  # else it is only read, perhaps where nothing can be written
+        _share_lifts(table)
+        with files.locked(folder.path), deferred_signals() as signals:
+            if not folder.finished:  # by another process meanwhile
+                run = Training(config, stack, change)
+                try:
+                    folder.restore(run)
+                    _finish(run, folder, table, progress, callback, signals)
+                finally:
+                    run.rollout.close()
+                    _share_lifts(table)
+    return folder.result(config, settings)
 
 
-def _points(
+def _share_lifts(table: Path | None) -> None:
+    """Take in the lifts of a file, if one is given, and write those that it lacks."""
+    try:
+        if table is not None:
+            shared_table().exchange(table)
+    except ValueError as error:
+        raise ValueError(f"lifts: {error}") from error
+
+
+def _finish(
     run: Training,
     folder: RunFolder,
-    keep_lifts: Callable[[], None],
+    table: Path | None,
     progress: bool | TextIO,
+    callback: Callable | None,
     signals: list[int],
-) -> Generator[Point]:
-    """Train to the end, and finish the run; yield each point of its curve.
+) -> None:
+    """Train to the end, or until the callback returns False, and finish the run.
 
     However it is stopped before, there is a checkpoint of the last whole step, unless a weight
     is no longer finite.
@@ -276,7 +272,7 @@ def _points(
             if time.monotonic() - checkpoint_saved > CHECKPOINT_INTERVAL and not rollout.finished:
                 run.agent.check_finite()
                 folder.save(run)
-                keep_lifts()
+                _share_lifts(table)
                 checkpoint_saved = time.monotonic()
 
             if not run.curve.sums["picks"]:  # end_point has just emptied them
@@ -286,7 +282,9 @@ def _points(
                 if time.monotonic() - curve_saved > CURVE_INTERVAL:
                     folder.save_curve(run)
                     curve_saved = time.monotonic()
-                yield point
+                answer = None if callback is None else callback(point._asdict())
+                if isinstance(answer, (bool, np.bool_)) and not answer:
+                    break
             if signals:
                 raise KeyboardInterrupt(
                     f"stopped after {rollout.picks} picks; call train again with "
