@@ -1,4 +1,4 @@
-"""Container unloading via reinforcement learning: the paper's task, agent and figures.
+"""Container unloading via reinforcement learning: the paper's task and agent.
 
 Every name is imported when it is first used, because PyTorch alone takes seconds; so an order of
 picks needs none of the libraries that training does.

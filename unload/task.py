@@ -1,4 +1,4 @@
-"""The paper's numbers, each once and with its source.
+"""The paper's numbers, each once and with its source; and the version of unload.
 
 Lengths in metres, forces in newtons, times in seconds. The container's axes are
 x (depth, 0 at the rear wall and 7 at the entrance), y (width) and z (height).

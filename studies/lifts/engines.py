@@ -123,10 +123,9 @@ def both_rates(policy: Policy, arguments: dict) -> dict[str, float]:
     """
     lifts = paths.RUNS / "lifts" / f"mujoco_{physics_fingerprint()}.npz"
     first = evaluate(policy, **arguments)["success_rate"]
-    table = LiftTable(ENGINES[1])
-    table.exchange(lifts)
+    table = LiftTable.load(lifts, ENGINES[1]) if lifts.exists() else LiftTable(ENGINES[1])
     with mock.patch.object(vector, "shared_table", lambda: table):
         second = evaluate(policy, **arguments)["success_rate"]
-    table.exchange(lifts)
+    table.save(lifts)
     means = dict(zip(ENGINES, (float(first.mean()), float(second.mean()))))
     return means | {"containers": len(first), "differ": int((first != second).sum())}

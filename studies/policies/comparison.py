@@ -35,6 +35,7 @@ from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.network.weights import weights_file
 from unload.physics.bullet import SETTINGS
+from unload.physics.full import FullPhysics
 from unload.support import files
 
 # Of the cards: fresh containers of 500 picks each, of a seed that no other data uses.
@@ -79,7 +80,7 @@ CONDITIONS = {
     "boxes × 0.8": {"stack": SMALLER},
     "boxes × 1.2": {"stack": LARGER},
     # Boxes drift, and one on which nothing lies may be jammed between its neighbours.
-    "full, kept": FULL | {"after_pick": "keep"},
+    "full, kept": FULL | {"physics": FullPhysics("keep")},
     "full, restored": FULL,
 }
 # Who plays; of the others, every decision with boxes restored would be the table's.

@@ -66,6 +66,23 @@ def test_a_loss_that_is_not_finite_leaves_the_weights(rng, fused, name):
         agent.check_finite()
 
 
+def test_gradients_that_are_not_finite_leave_the_weights(rng):
+    """The loss alone does not tell: the slope of a square root at 0 is infinite."""
+
+    class Root(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.weight = torch.nn.Parameter(torch.zeros(3))
+
+        def forward(self, observations):
+            return torch.sqrt(observations.abs() @ self.weight)
+
+    agent = DQN(Root())
+    with pytest.raises(FloatingPointError, match="gradient of weight is not finite"):
+        agent.update(without_next(make_batch(rng)))
+    agent.check_finite()
+
+
 def test_what_is_no_network_setting_or_batch_is_refused(rng):
     for kind in (DQN, lambda network: Greedy(network, equalize=False)):
         with pytest.raises(TypeError, match="network is None; expected a torch.nn.Module"):
@@ -103,6 +120,10 @@ def test_a_batch_that_does_not_fit_is_refused(rng, fused, name, value, message):
 def test_a_next_state_without_a_choice_is_refused(rng):
     """Its loss was once infinite."""
     batch, agent = make_batch(rng), DQN(peq(), gamma=0.9)
+    for name in ("next_observations", "next_masks", "terminations"):
+        for wrong in (batch[name][:-1], batch[name].astype(np.int8)):
+            with pytest.raises((TypeError, ValueError), match=f"{name} (has shape|is .* int8)"):
+                agent.update(batch | {name: wrong})
     batch["next_masks"][7] = False
     batch["terminations"][7] = True
     agent.update(batch)

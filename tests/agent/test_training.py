@@ -10,13 +10,11 @@ import torch
 
 from tests.agent import runs
 from tests.agent.runs import CONTAINER, RUNS, HeightNetwork, assert_same, at_step, interrupt, metres
-from tests.load.walls import own_load
 from unload import TrainConfig, evaluate, load_policy, train
 from unload.agent.checkpoint import RunFolder
 from unload.agent.curve import Curve, Point
 from unload.agent.training import Training, warn_of_other_bits
 from unload.env.vector import ContainerVectorEnv
-from unload.physics.table import LiftTable
 from unload.support import files
 
 
@@ -122,31 +120,6 @@ def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
     assert copied == picks
 
 
-def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
-    """Also when one is stopped. The second run asks PyBullet nothing, and gives the same."""
-    lifts, kept = tmp_path / "lifts.npz", []
-    given = {
-        "config": TrainConfig(**CONTAINER | {"picks": 40}), "progress": False, "lifts": lifts,
-        "stack": lambda rng: own_load(rng, "continuous sizes"),
-        "callback": lambda point: kept.append(len(LiftTable.load(lifts))), "same_code": True,
-    }  # fmt: skip
-    for name in ("first", "second"):
-        table = LiftTable()
-        for place in ("unload.agent.training", "unload.env.vector"):
-            monkeypatch.setattr(f"{place}.shared_table", lambda table=table: table)
-        if name == "first":
-            with at_step(2, interrupt), pytest.raises(KeyboardInterrupt):
-                train(**given, run_dir=tmp_path / name)
-            stopped = len(LiftTable.load(lifts))
-            assert stopped == len(table) > 0
-            monkeypatch.setattr("unload.agent.training.CHECKPOINT_INTERVAL", 0)
-        train(**given, run_dir=tmp_path / name)
-        assert kept[-1] > stopped, "by the checkpoints, before the end"
-        assert len(LiftTable.load(lifts)) == len(table)
-        monkeypatch.setattr("unload.physics.table.LocalPhysics.simulate", None)
-    assert_same(tmp_path / "first", tmp_path / "second")
-
-
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
 def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
     fields = {"replay_size": replay_size, "picks": picks, "gradient_steps": 3}
@@ -180,9 +153,7 @@ def test_a_run_that_stops_being_finite_keeps_its_last_checkpoint(tmp_path, monke
         ({"callback": 3}, TypeError, "callback is 3; expected a function of a dict"),
         ({"change": 3}, TypeError, "change is 3; expected a function of a Training"),
         ({"progress": 3}, TypeError, "progress is 3; expected True, False or a text file"),
-        ({"lifts": "run/checkpoint.npz"}, ValueError, "lifts is 'run/checkpoint.npz', a file of"),
-        ({"lifts": "run/../run/config.json"}, ValueError, "lifts is .*, a file of the run; expec"),
-        ({"config": HIGHEST, "lifts": "lifts.npz"}, ValueError, "lifts is given; expected None"),
+        ({"config": HIGHEST, "stack": print}, ValueError, "stack is given; expected None"),
         ({"run_dir": ""}, ValueError, "run_dir is ''; expected a folder of the run's own"),
         ({"run_dir": "run/\udcff"}, ValueError, r"run_dir is 'run/\\udcff'; .* a name in UTF-8"),
         ({"run_dir": "run/\0"}, ValueError, r"run_dir is 'run/\\x00'; .* a name in UTF-8"),
@@ -197,20 +168,11 @@ def test_bad_arguments_are_refused(tmp_path, monkeypatch, given, error, message)
 
 
 @pytest.mark.needs("mkfifo")
-def test_a_pipe_or_a_link_to_a_file_of_the_run_is_refused(tmp_path):
-    """A pipe once hung; a table of lifts was once written in place of the checkpoint."""
-    config, run, lifts = TrainConfig(**CONTAINER), tmp_path / "run", tmp_path / "lifts.npz"
-    os.mkfifo(tmp_path / "fifo")
-    for target, refused in (("fifo", ".*"), ("run/checkpoint.npz", ", a file of the run")):
-        lifts.symlink_to(tmp_path / target)
-        with pytest.raises(ValueError, match=f"lifts is '.*lifts.npz'{refused}; expected"):
-            train(config, run, progress=False, lifts=lifts)
-        lifts.unlink()
-    assert not run.exists()
-    run.mkdir()
-    os.mkfifo(run / "config.json")
+def test_a_pipe_is_refused(tmp_path):
+    """It once hung."""
+    os.mkfifo(tmp_path / "config.json")
     with pytest.raises(ValueError, match="a file of run_dir is '.*config.json'; expected the name"):
-        train(config, run, progress=False)
+        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
 
 
 def test_a_folder_in_use_is_refused(tmp_path):
@@ -258,7 +220,7 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
 
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path)
-    usual = {"progress": False, "lifts": "lifts.npz", "callback": callback}
+    usual = {"progress": False, "callback": callback}
     with pytest.raises(OSError, match="no more"):
         train(config, "run", **usual)
     monkeypatch.chdir(tmp_path)

@@ -30,7 +30,6 @@ ALL = [container, HighestItemEnv, ContainerVectorEnv, HighestItemVectorEnv]
         (HighestItemEnv, {"position_noise": 1e300}, ValueError, r"is 1e\+300; .*\[0, 10.0\]"),
         (ContainerEnv, {"render_mode": "human"}, ValueError, "render_mode is 'human'"),
         (ContainerEnv, {"physics": "mujoco"}, ValueError, "physics is 'mujoco'; expected one of"),
-        (ContainerEnv, {"after_pick": "keep"}, ValueError, "after_pick is 'keep'; expected 'rest"),
         (ContainerVectorEnv, {"num_envs": 0}, ValueError, "num_envs is 0"),
         (ContainerVectorEnv, {"physics": "local"}, ValueError, "physics is 'local'; expected"),
         (ContainerEnv, {"stack": 3}, TypeError, "stack is 3"),

@@ -1,3 +1,4 @@
+from copy import deepcopy
 from functools import partial
 
 import gymnasium
@@ -13,6 +14,7 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import CONTACT_TOLERANCE
 from unload.load.picture import snapshot
 from unload.load.substacks import build_load
+from unload.physics.full import FullPhysics
 from unload.physics.local import LocalPhysics
 from unload.physics.table import TablePhysics
 
@@ -73,10 +75,28 @@ def test_the_reward_needs_the_threshold_whatever_physics_decides(monkeypatch):
         assert env.unwrapped.liftable().tolist() == [reward == 1] * 128
 
 
+def test_a_physics_that_is_put_in_is_left_open_and_the_first_one_closed():
+    env, mine = ContainerEnv("table"), TablePhysics()
+    first = env.physics
+    env.physics = mine
+    with pytest.raises(RuntimeError, match="the physics is closed"):
+        first.reset(build_load(np.zeros((2, 3, 4), int)))
+    env.close()
+    mine.reset(build_load(np.zeros((2, 3, 4), int)))
+    with pytest.raises(TypeError, match="physics is 'mine'; expected a Physics"):
+        ContainerEnv("table").physics = "mine"
+
+
+@pytest.mark.parametrize("make", [ContainerEnv, partial(ContainerVectorEnv, 2)])
+def test_environments_are_not_copied(make):
+    with pytest.raises(TypeError, match="cannot be copied or pickled"):
+        deepcopy(make())
+
+
 @pytest.mark.pybullet
 def test_drifting_boxes_are_seen_where_they_are():
     """And what has failed stays so. Few enough to be quick, because each of them is simulated."""
-    settings = {"physics": "full", "after_pick": "keep", "render_mode": "rgb_array"}
+    settings = {"physics": FullPhysics("keep"), "render_mode": "rgb_array"}
     env = make_env(**settings, stack=lambda rng: build_load(np.zeros((2, 3, 4), int)), max_picks=3)
     env.reset(seed=0)
     container = env.unwrapped
@@ -93,7 +113,7 @@ def test_drifting_boxes_are_seen_where_they_are():
     load, present = container.physics.load, container.physics.present
     places = container.observed_positions()
     assert reward == 1 and (snapshot(load, present, places) == env.render()).all()
-    with pytest.raises(ValueError, match="after_pick lets .*expected 'restore'"):
+    with pytest.raises(ValueError, match="lifts move other boxes; expected"):
         container.liftable()
 
 

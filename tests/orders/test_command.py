@@ -94,7 +94,7 @@ def test_an_order_is_written_before_a_picture_that_lacks_its_library(tmp_path, c
     for module in [name for name in sys.modules if name.startswith("unload.load.picture")]:
         monkeypatch.delitem(sys.modules, module)
     said = refused(capsys, "--output", tmp_path / "order.csv", "--picture", tmp_path / "order.png")
-    assert "--picture needs more than an order; expected matplotlib" in said
+    assert "--picture needs matplotlib, which is not installed; expected it: pip" in said
     assert len(pd.read_csv(tmp_path / "order.csv")) == 136
 
 

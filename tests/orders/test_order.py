@@ -74,7 +74,8 @@ def test_a_box_that_hangs_over_another_one_comes_out_first():
 @pytest.mark.parametrize(
     ("given", "error", "message"),
     [
-        ({"rule": reachable, "by": "stop"}, TypeError, "expected a function, and no by beside it"),
+        ({"rule": reachable, "by": "stop"}, ValueError, "by and rule are given; expected one"),
+        ({"by": ["stop"]}, TypeError, r"by is \['stop'\]; expected the name of a column"),
         ({"rule": 3}, TypeError, "rule is 3; expected a function"),
         ({"by": "stop"}, ValueError, "by is 'stop'; expected one of the list's other columns"),
         ({"rule": lambda load, _: [np.full(len(load), np.nan)]}, ValueError, "holds nan"),

@@ -9,7 +9,7 @@ import pytest
 
 from unload import Load, read_load, stack_load
 from unload.load.boxes import _SMALLEST_EDGE
-from unload.orders.packing_list import MOST
+from unload.orders.packing_list import MOST, ListError
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
 UNIT = "a,0,0,0,1,1,1"
@@ -197,6 +197,14 @@ def test_lists_that_are_no_load_are_refused_by_row_and_id(written, lines, messag
 def test_a_box_that_is_not_turned_by_quarters_is_refused(written, angle):
     path = written(f"{STACK[0]},180", f"{STACK[1]},{angle}", columns=f"id,{CORNERS},Rotation")
     with pytest.raises(ValueError, match=r"row 2 \(id 'b'\): .*Rotation"):
+        read_load(path)
+
+
+@pytest.mark.parametrize("text", ["", ",,\n,,\n", '"",""'])
+def test_files_without_a_name_are_refused(tmp_path, text):
+    path = tmp_path / "boxes.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ListError, match="boxes.csv (is not a readable list|holds empty cells)"):
         read_load(path)
 
 

@@ -62,16 +62,9 @@ class RunFolder:
             wanted = "expected a folder of the run's own, with a name in UTF-8"
             raise ValueError(f"run_dir is {str(run_dir)!r}; {wanted}")
         self.path = path.absolute()
-        self._paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
-        self._checkpoint_file, self.policy, self._curve_file, self._config_file = self._paths
+        paths = [checks.file("a file of run_dir", self.path / name) for name in FILES]
+        self._checkpoint_file, self.policy, self._curve_file, self._config_file = paths
         self._fresh: dict[str, Any] = {}  # what a run of it holds before its first step
-
-    def check_foreign(self, name: str, value: object) -> Path:
-        """Return the absolute path of a file that is an argument; raise if it is one of these."""
-        file = checks.file(name, value).absolute()
-        if file.resolve() in [path.resolve() for path in self._paths]:
-            raise ValueError(f"{name} is {str(value)!r}, a file of the run; expected another one")
-        return file
 
     @property
     def finished(self) -> bool:

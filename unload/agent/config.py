@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from unload import task
 from unload.env.equalization import TIES
 from unload.env.observation import MOST_NOISE, POSITION_NOISE
 from unload.network.factory import NETWORKS
@@ -95,8 +96,8 @@ class TrainConfig:
     env: str = "unload/Container-v0"
     picks: int = 20_000_000
     seed: int = 0
-    num_envs: int = 64
-    max_picks: int = 500
+    num_envs: int = task.NUM_ENVS
+    max_picks: int = task.MAX_PICKS
     learning_rate: float = 1e-3
     batch_size: int = 2048
     replay_size: int = 2**20

@@ -109,6 +109,11 @@ class DQN:
         count, items = observations.shape[:2]
         checks.shaped("actions", actions, (count,), np.dtype(np.int64))
         checks.shaped("rewards", batch["rewards"], (count,), np.dtype(np.float32))
+        if self.gamma > 0:
+            following = batch["next_observations"]
+            checks.shaped("next_observations", following, observations.shape, np.dtype(np.float32))
+            checks.shaped("next_masks", batch["next_masks"], (count, items), np.dtype(bool))
+            checks.shaped("terminations", batch["terminations"], (count,), np.dtype(bool))
         rows = np.arange(count) if rows is None else rows
         rows = checks.integer_array("rows", rows, (None,), count - 1)
         if not rows.size:

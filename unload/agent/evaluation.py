@@ -18,7 +18,7 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.full import Name
+from unload.physics.full import PhysicsName
 from unload.support import checks
 
 MOST_EPISODES = 10**6
@@ -45,10 +45,9 @@ def evaluate(
     policy: Policy,
     episodes: int = 20,
     seed: int = 0,
-    physics: Name | Physics = "table",
+    physics: PhysicsName | Physics = "table",
     mask: bool = True,
     max_picks: int | None = task.MAX_PICKS,
-    after_pick: str = "restore",
     equalize: bool = False,
     ties: str = "noise",
     position_noise: float = POSITION_NOISE,
@@ -71,7 +70,7 @@ def evaluate(
         max_picks: most picks per episode; fewer if the container is empty before, or if the
             mask excludes all items. With None it is unloaded completely, unless 1280 picks in a
             row fail.
-        after_pick, equalize, ties, position_noise, stack: of ``ContainerEnv``.
+        equalize, ties, position_noise, stack: of ``ContainerEnv``.
 
     Returns:
         One row per episode: ``success_rate``, ``unloaded`` (items), ``deadlocked``
@@ -96,8 +95,6 @@ def evaluate(
     }
     settings |= {"stack": stack, "max_picks": sys.maxsize if max_picks is None else max_picks}
     arrays = isinstance(physics, str) and physics == "table"
-    if arrays:
-        checks.one_of("after_pick", after_pick, ("restore",))
 
     # Each load has a seed of its own, so that it does not depend on how many are played at once;
     # only the table answers many containers in arrays.
@@ -109,7 +106,7 @@ def evaluate(
         if arrays:
             envs: VectorEnv = ContainerVectorEnv(len(seeds), **settings)
         else:
-            make = partial(ContainerEnv, physics, after_pick, **settings)
+            make = partial(ContainerEnv, physics, **settings)
             envs = SyncVectorEnv([make], autoreset_mode=AutoresetMode.SAME_STEP)
         with closing(envs):
             frames.append(_play(envs, policy, seeds, mask, give_up=max_picks is None))

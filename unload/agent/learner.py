@@ -67,6 +67,9 @@ class PlainLearner:
             total += loss.item() / len(targets)
         if not np.isfinite(total):
             raise FloatingPointError(f"the loss is {total}; expected a finite number")
+        for name, weight in self.network.named_parameters():
+            if weight.grad is not None and not weight.grad.isfinite().all():
+                raise FloatingPointError(f"the gradient of {name} is not finite; expected finite")
         self.optimizer.step()
         return total
 

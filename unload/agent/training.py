@@ -26,7 +26,6 @@ from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.load.boxes import Load, check_stack
 from unload.network.factory import make_network
-from unload.physics.table import shared_table
 from unload.support import checks, files
 
 CHECKPOINT_INTERVAL = 600.0  # seconds between two of them
@@ -130,14 +129,14 @@ class Training:
 
     def policy(self) -> Greedy:
         """Return a copy of what has been learned so far, with a card."""
-        config, settings = self.config, dict(self.settings)
+        config, settings, points = self.config, dict(self.settings), self.curve.points
         card = {
             "change": settings.pop("change"),
             "loads": settings.pop("stack") or ("the paper's" if config.env in ENVS else config.env),
             **{name: settings.pop(name) for name in ("engine",) if name in settings},
             "configuration": settings,
             "picks": self.rollout.picks,
-            "msr": {"at the end of its training": self.curve.points[-1].success_rate},
+            "msr": {"at the end of its training": points[-1].success_rate} if points else {},
         }
         return Greedy(deepcopy(self.agent.network), config.equalize, config.ties, card)
 
@@ -147,7 +146,6 @@ def train(
     run_dir: str | Path,
     progress: bool | TextIO = True,
     stack: Callable[[np.random.Generator], Load] | None = None,
-    lifts: str | Path | None = None,
     callback: Callable[[dict[str, float]], bool | None] | None = None,
     change: Callable[[Training], None] | None = None,
     same_code: bool = False,
@@ -183,7 +181,6 @@ def train(
         run_dir: folder of the run alone: its checkpoint, and what it leaves.
         progress: show a progress bar with speed, MSR and loss: on stdout, or in a text file.
         stack: makes the loads, as in ``ContainerEnv``; the paper's if None.
-        lifts: ``.npz`` file of lifts that were simulated, for runs, also side by side, to share.
         callback: is called with each new point of the curve, a dict by the columns of
             ``TrainResult.curve``. If it returns False, the run ends there, and is finished.
         change: is called with the ``Training`` before its first pick, and replaces methods.
@@ -209,52 +206,38 @@ def train(
         raise TypeError(f"callback is {callback!r}; expected a function of a dict")
     if change is not None and not callable(change):
         raise TypeError(f"change is {change!r}; expected a function of a Training")
-    for name, value in (("stack", stack), ("lifts", lifts)):
-        if value is not None and config.env == ENVS[1]:
-            raise ValueError(f"{name} is given; expected None for env={config.env!r}")
     if stack is not None:
         check_stack(stack)
+        if config.env == ENVS[1]:
+            raise ValueError(f"stack is given; expected None for env={config.env!r}")
     folder = RunFolder(run_dir)
     if not checks.boolean("same_code", same_code):
         folder.check_code(stack=stack, change=change, network=config.network)
-    table = None if lifts is None else folder.check_foreign("lifts", lifts)
 
     settings = settings_of_run(config, stack, change)
     if not folder.finished:  # else it is only read, perhaps where nothing can be written
-        _share_lifts(table)
         with files.locked(folder.path), deferred_signals() as signals:
             if not folder.finished:  # by another process meanwhile
                 run = Training(config, stack, change)
                 try:
                     folder.restore(run)
-                    _finish(run, folder, table, progress, callback, signals)
+                    _finish(run, folder, progress, callback, signals)
                 finally:
                     run.rollout.close()
-                    _share_lifts(table)
     return folder.result(config, settings)
-
-
-def _share_lifts(table: Path | None) -> None:
-    """Take in the lifts of a file, if one is given, and write those that it lacks."""
-    try:
-        if table is not None:
-            shared_table().exchange(table)
-    except ValueError as error:
-        raise ValueError(f"lifts: {error}") from error
 
 
 def _finish(
     run: Training,
     folder: RunFolder,
-    table: Path | None,
     progress: bool | TextIO,
     callback: Callable | None,
     signals: list[int],
 ) -> None:
     """Train to the end, or until the callback returns False, and finish the run.
 
-    However it is stopped before, there is a checkpoint of the last whole step, unless a weight
-    is no longer finite.
+    If it is stopped between two steps, there is a checkpoint of the last one, unless a weight is no
+    longer finite; after an error inside of a step there is the one before, if any.
     """
     rollout, whole = run.rollout, True
     checkpoint_saved, curve_saved = time.monotonic(), 0.0
@@ -272,7 +255,6 @@ def _finish(
             if time.monotonic() - checkpoint_saved > CHECKPOINT_INTERVAL and not rollout.finished:
                 run.agent.check_finite()
                 folder.save(run)
-                _share_lifts(table)
                 checkpoint_saved = time.monotonic()
 
             if not run.curve.sums["picks"]:  # end_point has just emptied them

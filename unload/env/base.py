@@ -52,6 +52,11 @@ class InOrder:
 
     _state = "not started"
 
+    def __reduce_ex__(self, protocol):
+        """Refuse to be copied or pickled, because both would step the same simulator."""
+        kind = type(self).__name__
+        raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
+
     def _check_open(self) -> None:
         if self._state == "closed":
             raise ClosedEnvironmentError("the environment is closed; make a new one")
@@ -69,11 +74,6 @@ class InOrder:
 
 class EpisodeEnv(InOrder, gymnasium.Env):
     """Base of single environments."""
-
-    def __reduce_ex__(self, protocol):
-        """Refuse to be copied or pickled, because both would step the same simulator."""
-        kind = type(self).__name__
-        raise TypeError(f"a {kind} cannot be copied or pickled; make another one with {kind}(...)")
 
     def _row(self, action: int) -> int:
         if isinstance(action, np.ndarray) and action.ndim == 0:

@@ -13,7 +13,8 @@ from unload.env.vector import ContainerVectorEnv
 from unload.load.boxes import Load
 from unload.load.substacks import stack_load
 from unload.physics.base import Physics
-from unload.physics.full import Name, make_physics
+from unload.physics.full import PhysicsName, make_physics
+from unload.support import checks
 
 
 class ContainerEnv(PickingEnv):
@@ -79,8 +80,7 @@ class ContainerEnv(PickingEnv):
             ``"full"`` (every box: seconds a pick) or ``"table"`` (``"local"``, remembered), which
             answers without a simulation if nothing rests on the chosen box (it moves by
             0.463053 m) or if three boxes or more do (0 m). Or a ``Physics`` of your
-            own, which the environment leaves open.
-        after_pick: for ``physics="full"``: ``"restore"`` or ``"keep"``.
+            own, such as ``FullPhysics("keep")``, which the environment leaves open.
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
@@ -97,7 +97,7 @@ class ContainerEnv(PickingEnv):
     Attributes:
         visible: (128,) int64, the item in each row of the observation, -1 in rows without.
         physics: what lifts; it has the ``load``, and which of its items are ``present``. Another
-            one may be put here before a reset.
+            one may be put here before a reset, and is left open, too.
 
     Raises:
         TypeError, ValueError: an argument, an action or a load is not as described.
@@ -111,8 +111,7 @@ class ContainerEnv(PickingEnv):
 
     def __init__(
         self,
-        physics: Name | Physics = "local",
-        after_pick: str = "restore",
+        physics: PhysicsName | Physics = "local",
         equalize: bool = False,
         ties: str = "noise",
         max_picks: int = task.MAX_PICKS,
@@ -122,7 +121,7 @@ class ContainerEnv(PickingEnv):
     ) -> None:
         settings = {"equalize": equalize, "ties": ties, "max_picks": max_picks}
         settings |= {"position_noise": position_noise, "stack": stack}
-        super().__init__(_OneContainer(physics, after_pick, settings), render_mode)
+        super().__init__(_OneContainer(physics, settings), render_mode)
 
     @property
     def visible(self) -> np.ndarray:
@@ -134,7 +133,9 @@ class ContainerEnv(PickingEnv):
 
     @physics.setter
     def physics(self, physics: Physics) -> None:
-        self._envs.physics = physics
+        checks.instance("physics", physics, Physics, "a Physics")
+        self._envs.close_physics()
+        self._envs.physics, self._envs.lent = physics, True
 
     def liftable(self) -> np.ndarray:
         """(128,) bool, which rows of the observation can be unloaded now.
@@ -144,7 +145,7 @@ class ContainerEnv(PickingEnv):
         """
         self._check_started()
         if not self.physics.exact:
-            raise ValueError("after_pick lets lifts move other boxes; expected 'restore'")
+            raise ValueError("lifts move other boxes; expected a physics that restores them")
         return self._envs.liftable()[0]
 
     def observed_positions(self) -> np.ndarray:
@@ -165,10 +166,10 @@ class ContainerEnv(PickingEnv):
 class _OneContainer(ContainerVectorEnv):
     """A vector environment of one container, whose lifts its own ``physics`` decides."""
 
-    def __init__(self, physics: Name | Physics, after_pick: str, settings: dict[str, Any]) -> None:
+    def __init__(self, physics: PhysicsName | Physics, settings: dict[str, Any]) -> None:
         super().__init__(1, autoreset_mode=AutoresetMode.DISABLED, **settings)
-        self.physics = make_physics(physics, after_pick)
-        self._keep_open = self.physics is physics
+        self.physics = make_physics(physics)
+        self.lent = self.physics is physics
 
     def observed_positions(self) -> np.ndarray:
         return self.physics.positions() + self._noise

@@ -32,7 +32,8 @@ class ContainerVectorEnv(PickingVectorEnv):
 
     Attributes:
         physics: what lifts.
-        table: the lifts that this process or ``physics`` knows, filled by unknown ones.
+        lent: whether it is the caller's, who closes it.
+        table: the lifts of a ``TablePhysics``, which adds unknown ones; empty for another physics.
         visible: (num_envs, 128) int32, the item in each row of the observations, -1 in rows
             without.
     """
@@ -49,7 +50,7 @@ class ContainerVectorEnv(PickingVectorEnv):
         super().__init__(num_envs, **settings)
         check_stack(stack)
         self._how_observed = self.equalize, self.ties == "average"
-        self.stack, self._keep_open = stack, isinstance(physics, LocalPhysics)
+        self.stack, self.lent = stack, isinstance(physics, LocalPhysics)
         if isinstance(physics, str):
             checks.one_of("physics", physics, ("table",))
             physics = TablePhysics(shared_table())
@@ -62,9 +63,13 @@ class ContainerVectorEnv(PickingVectorEnv):
         self._containers = containers.allocate(self.num_envs, 0, 0)
 
     def close_extras(self, **kwargs) -> None:
-        if not self._keep_open:  # a physics of the caller is the caller's to close
-            self.physics.close()
+        self.close_physics()
         super().close_extras(**kwargs)
+
+    def close_physics(self) -> None:
+        """Close the physics, unless it is the caller's."""
+        if not self.lent:
+            self.physics.close()
 
     @property
     def visible(self) -> np.ndarray:

@@ -16,7 +16,7 @@ CELLS_WIDE = 36
 CELLS_HIGH = 10  # of a row of substacks
 CELL = task.CONTAINER[1] / CELLS_WIDE  # m
 ROWS = 3  # bottom, mid, top
-WALLS = 12  # not in the paper: gives 938 ± 40 items, in its range of 800–1000
+WALLS = 12  # not in the paper: gives 938 ± 40 items, nearly always in its range of 800–1000
 DEPTH = task.CONTAINER[0] / WALLS  # m, of each box of 12 walls
 
 # Width and height of packages 0–12, in cells (Fig. 3).

@@ -61,8 +61,10 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
     check_stacked(load)
     if rule is None:
         rule = reachable if by is None else _by_stop(load, by)
-    elif by is not None or not callable(rule):
-        raise TypeError(f"rule is {rule!r}; expected a function, and no by beside it")
+    elif by is not None:
+        raise ValueError("by and rule are given; expected one of them")
+    elif not callable(rule):
+        raise TypeError(f"rule is {rule!r}; expected a function of a load and what is present")
     present, rows = np.ones(len(load), bool), []
     for pick in range(1, len(load) + 1):
         returned = rule(load, present.copy())
@@ -101,7 +103,8 @@ def _by_stop(load: Load, by: str) -> Rule:
 
 def _turns(load: Load, by: str) -> np.ndarray:
     """The stop of each box, (n,) float64, so that the lowest is the first; see ``by``."""
-    falling = str(by).startswith("-") and by not in load.extras
+    checks.instance("by", by, str, "the name of a column")
+    falling = by.startswith("-") and by not in load.extras
     if (name := by[1:] if falling else by) not in load.extras:
         raise ValueError(
             f"by is {by!r}; expected one of the list's other columns: {', '.join(load.extras)}"

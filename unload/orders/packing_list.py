@@ -26,6 +26,10 @@ TURNS = ("rotation", "yaw", "pitch", "roll")
 # What a column is, by its name in lower case.
 MEANINGS = {name: name for name in (*CENTRE, *CORNER, *SIZES, *TURNS, "id")}
 MEANINGS |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
+UNREADABLE = (
+    *(BadZipFile, LookupError, UnicodeError),
+    *(pd.errors.EmptyDataError, pd.errors.ParserError),
+)
 NUMBER = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
 
 
@@ -116,7 +120,7 @@ def read_load(
         return cells
 
     # A box turned otherwise than by quarter turns is none along the axes.
-    for turn in {*TURNS} & {*names}:
+    for turn in (name for name in TURNS if name in names):
         if (turned := np.flatnonzero(np.abs((numbers(turn) + 45) % 90 - 45) > 1e-3)).size:
             refuse(turned, f"a {names[turn]} that is no quarter turn; expected one")
 
@@ -165,12 +169,14 @@ def read_table(path: str | Path | pd.DataFrame) -> pd.DataFrame:
         file = checks.path("path", path)
         try:
             cells = (_excel if file.suffix.lower() == ".xlsx" else _csv)(file)
-        except (BadZipFile, LookupError, UnicodeError, pd.errors.ParserError) as error:
+        except UNREADABLE as error:
             wanted = "expected CSV in UTF-8, an .xlsx file, or a table that pandas has read"
             raise ListError(f"{file} is not a readable list: {error}; {wanted}") from error
         # Spreadsheets leave empty lines and columns around a table.
         cells = cells.fillna("").map(str.strip)
         cells = cells.loc[(cells != "").any(axis=1), (cells != "").any()]
+        if cells.empty:
+            raise ListError(f"{file} holds empty cells only; expected a line of names, and boxes")
         table = cells.iloc[1:].reset_index(drop=True).set_axis([*cells.iloc[0]], axis=1)
     _check("rows", len(table))
     _check("columns", table.shape[1])

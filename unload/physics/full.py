@@ -13,7 +13,7 @@ from unload.physics.situation import RESOLUTION
 from unload.physics.table import TablePhysics, shared_table
 from unload.support import checks
 
-Name = Literal["local", "full", "table"]
+PhysicsName = Literal["local", "full", "table"]
 
 _DEPOT = -100.0  # m, height of the floor far below on which removed boxes stay
 
@@ -103,20 +103,11 @@ class FullPhysics(Physics):
         return np.array([position for position, _ in self._poses])
 
 
-def make_physics(physics: Name | Physics, after_pick: str = "restore") -> Physics:
-    """The physics of a name, or the one that is given, which is its caller's to close.
-
-    Args:
-        physics: ``"local"``, ``"full"`` or ``"table"``, or a ``Physics`` that is open.
-        after_pick: of ``"full"``, see ``FullPhysics``.
-    """
-    if not isinstance(physics, Physics):
-        checks.one_of("physics", physics, get_args(Name))
-        if physics == "full":
-            return FullPhysics(after_pick)
-    if after_pick != "restore":
-        wanted = f"expected 'restore' for physics={physics!r}"
-        raise ValueError(f"after_pick is {after_pick!r}; {wanted}")
+def make_physics(physics: PhysicsName | Physics) -> Physics:
+    """The physics of a name; or the one that is given, which is its caller's to close."""
     if isinstance(physics, Physics):
         return physics
-    return LocalPhysics() if physics == "local" else TablePhysics(shared_table())
+    checks.one_of("physics", physics, get_args(PhysicsName))
+    if physics == "table":
+        return TablePhysics(shared_table())
+    return FullPhysics() if physics == "full" else LocalPhysics()

@@ -78,34 +78,24 @@ class LiftTable:
 
     def add(self, situation: Situation, distance: float) -> None:
         """Remember a distance in m, to the micrometre. A situation that is known keeps its own."""
-        new = np.array([_digest(situation)]), np.array([round(distance * 1e6)], np.int32)
+        digest = _digest(situation)
         with self._adding:
-            self._take_in(new)
-
-    def own(self) -> tuple[np.ndarray, np.ndarray]:
-        """The entries without the foreign ones."""
-        digests, micrometres = self.entries
-        own = ~np.isin(digests, self.foreign)
-        return digests[own], micrometres[own]
-
-    def _take_in(self, new: tuple[np.ndarray, np.ndarray]) -> None:
-        """Add entries in increasing order; a situation that is known keeps its own."""
-        digests, micrometres = self.entries
-        places = np.searchsorted(digests, new[0])
-        unknown = np.append(digests, np.uint64(0))[places] != new[0]  # 0 is no digest
-        digests = np.insert(digests, places[unknown], new[0][unknown])
-        self.entries = digests, np.insert(micrometres, places[unknown], new[1][unknown])
+            digests, micrometres = self.entries
+            if find_distance(digests, micrometres, digest) == UNKNOWN:
+                place = np.searchsorted(digests, digest)
+                new = np.insert(micrometres, place, round(distance * 1e6))
+                self.entries = np.insert(digests, place, digest), new
 
     def save(self, path: str | Path) -> None:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
-        digests, micrometres = self.own()
+        digests, micrometres = self.entries
+        own = ~np.isin(digests, self.foreign)
         arrays = {
-            "digests": digests,
-            "micrometres": micrometres,
+            "digests": digests[own],
+            "micrometres": micrometres[own],
             "settings": np.array(json.dumps(settings_of_lifts(self.engine))),
         }
-        # A link to a file that several runs share stays one.
-        files.write_arrays(Path(path).resolve(), arrays)
+        files.write_arrays(path, arrays)
 
     @classmethod
     def load(cls, path: str | Path, engine: str | None = None) -> "LiftTable":
@@ -124,30 +114,6 @@ class LiftTable:
 
         table.entries = arrays["digests"], arrays["micrometres"]
         return table
-
-    def exchange(self, path: str | Path) -> None:
-        """Take in the lifts of a file, and write those that it lacks; it may be missing.
-
-        Any number of processes may share one file: each waits for its turn, which it takes by
-        the folder ``<path>.lock``. A link is followed.
-
-        Raises:
-            ValueError: ``path`` does not end in ``.npz``; as ``load``. Nothing is changed then.
-            OSError: the file cannot be written.
-        """
-        path = Path(path).resolve()
-        if path.suffix != ".npz":
-            raise ValueError(f"{path} is no name of a lift table; expected one that ends in .npz")
-        with files.locked(f"{path}.lock", wait=True):
-            stored = LiftTable(self.engine)
-            if path.exists():
-                stored = LiftTable.load(path, self.engine)
-            count = len(stored)
-            with self._adding:
-                stored._take_in(self.own())
-                self._take_in(stored.entries)
-            if len(stored) > count:
-                stored.save(path)
 
 
 class TablePhysics(LocalPhysics):

@@ -173,5 +173,6 @@ def needed_for(what: str) -> Iterator[None]:
         names = [name for name in EXTRAS if name in said]
         if not names:
             raise
-        wanted = f'expected {names[0]}: pip install "unload[{EXTRAS[names[0]]}]"'
-        raise ModuleNotFoundError(f"{what} needs more than an order; {wanted}") from error
+        wanted = f'expected it: pip install "unload[{EXTRAS[names[0]]}]"'
+        message = f"{what} needs {names[0]}, which is not installed; {wanted}"
+        raise ModuleNotFoundError(message) from error

@@ -23,7 +23,7 @@ import numpy as np
 _LOGGER = logging.getLogger(__name__)
 _PACKAGE = Path(__file__).resolve().parents[1]
 # All that compiled functions are defined in, or take constants from.
-_SOURCES = ("task.py", "support/*.py", "load/*.py", "physics/*.py", "fast/*.py")
+_SOURCES = ("task.py", "support/compiled.py", "load/boxes.py", "physics/*.py", "fast/*.py")
 
 
 def compiled(function: Callable | None = None, plain: bool = False, **options) -> "Compiled":
