@@ -22,7 +22,7 @@ from unload.network.peq import PEQNetwork
 from unload.physics.situation import RESOLUTION, Situation
 from unload.physics.table import TablePhysics, shared_table
 
-# Every place of a box (Fig. 3): 12 walls of 3 rows and 4 columns of variant 0, of 1, and of 2.
+# Every place of a box (Fig. 3): 12 walls of variant 0 only, of 1 only, and of 2 only.
 GRID = np.concatenate([build_load(np.full((12, 3, 4), kind)).positions for kind in range(3)])
 
 
@@ -116,7 +116,7 @@ class Container(Task):
         return self.features(self.positions[left[rows]], self.load.container)
 
     def lift(self, item: int) -> float:
-        """Return how far a pull of 20 N for 0.3 s moves a box, in m; 0 for a row without one."""
+        """Return how far a pull of 20 N for 0.3 s moves a box, in m; 0 if the row holds no box."""
         here = self.load, self.present, item
         return self.physics.simulate(situation(*here)) if item >= 0 else 0.0
 

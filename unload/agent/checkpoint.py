@@ -40,7 +40,7 @@ def settings_of_run(
 ) -> dict:
     """What a run is: its configuration, and the names of its change and stack, None without.
 
-    Also the engine, where lifts are decided by another one than PyBullet.
+    Also the engine, if it is not PyBullet.
     """
     own = plain({"change": change, "stack": stack})
     other = {"engine": engine_of()} if engine_of() != ENGINES[0] and config.env != ENVS[1] else {}

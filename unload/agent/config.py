@@ -18,7 +18,7 @@ ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
 OPTIONS = {"ties": TIES, "network": tuple(NETWORKS)}
 MAY_BE_ZERO = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
-# Of the real numbers, which are 0 or larger.
+# Upper limits of the real numbers; the lower one is 0.
 HIGHEST = {
     "position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0,
     "learning_rate": 1e37,  # Adam's steps have to fit into float32
@@ -77,8 +77,8 @@ class TrainConfig:
         gamma: discount (Sec. III-E).
         beta: threshold of the smooth-L1 loss (Sec. III-G).
         network: ``"peq"`` (Sec. III-G), or a function ``(n_features, generator)`` that makes a
-            network of your own, see ``unload.network.factory.make_network``; that takes padded
-            rows for items in training.
+            network of your own, see ``unload.network.factory.make_network``. In training it is
+            called without ``present``, so that padded rows count as items.
         n_features: * n, features per item.
         equalize: whether observations are equalized (Sec. III-F).
         ties: * ``"noise"`` or ``"average"``, see ``unload.equalize``.
@@ -86,8 +86,8 @@ class TrainConfig:
         mask: * whether failed items are masked in training's choices, too.
         gradient_steps: * updates per step of all environments.
         target_update_interval: * picks, as in Stable-Baselines3; without effect if gamma is 0.
-        log_interval: * steps of all environments per point of the curve; 0 is replaced by a
-            hundredth of the run, at most 500, which ``replace`` with other picks keeps.
+        log_interval: * steps of all environments per point of the curve; 0 stands for a hundredth
+            of the run, at most 500. ``dataclasses.replace`` copies the number, not the 0.
 
     Raises:
         TypeError, ValueError: a field is not as described, or the picks are too few to learn from.
@@ -160,7 +160,6 @@ class TrainConfig:
     def seeds(self) -> tuple[int, int, int]:
         """Return the seeds of the environments, of exploration and batches, and of the weights.
 
-        The key keeps the loads apart from those that ``unload.evaluate`` draws with the same
-        seed.
+        The spawn key gives other loads than ``unload.evaluate`` draws with the same seed.
         """
         return tuple(np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(3).tolist())

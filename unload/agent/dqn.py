@@ -50,7 +50,7 @@ class DQN:
                 "fused_update is True; expected a PEQNetwork in float32 on the CPU with it"
             )
         self.gamma = checks.real("gamma", gamma, 0, 1)
-        # Of the arrays of a batch.
+        # Names of the arrays of a batch that an update reads.
         self._needed: tuple[str, ...] = ("observations", "actions", "rewards")
         if self.gamma > 0:
             self._needed += "next_observations", "next_masks", "terminations"

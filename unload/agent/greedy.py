@@ -28,7 +28,7 @@ def greedy_actions(
     """Do as ``best_actions`` the fastest way; masks may hold 0 and 1, observations any float."""
     observations, allowed = check_batch(observations, masks)
     observations = observations.astype(np.float32, copy=False)
-    if fused.applies(network):  # an item's own features decide: padded rows do not matter
+    if fused.applies(network):  # it reads each item alone, so that padded rows do not matter
         return fused.best_actions(fused.weights_of(network), observations, allowed)
     return best_actions(network, observations, allowed, present)
 

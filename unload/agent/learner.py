@@ -27,7 +27,8 @@ class PlainLearner:
     def __init__(self, network: torch.nn.Module, learning_rate: float, beta: float) -> None:
         self.network, self.beta = network, beta
         self.optimizer = torch.optim.Adam(network.parameters(), learning_rate)
-        # Adam has its moments before the first step: by one that changes nothing.
+        # A step with zero gradients makes Adam's moments, so that a checkpoint before the first
+        # update has them, too.
         for weight in network.parameters():
             weight.grad = torch.zeros_like(weight)
         self.optimizer.step()

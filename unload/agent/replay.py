@@ -7,7 +7,7 @@ class ReplayBuffer:
     """The last ``size`` picks, in arrays.
 
     What follows a pick is kept only if it is needed: with gamma = 0 the target is the
-    reward alone (Sec. III-E). The machine gives the arrays room as they are filled.
+    reward alone (Sec. III-E). The operating system gives the arrays memory as they are filled.
 
     Args:
         size: number of picks kept; older ones are overwritten.

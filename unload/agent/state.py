@@ -94,7 +94,7 @@ def _is_json(value: Any) -> bool:
 
 
 def _kind(value: Any) -> Any:
-    """Return the same for all that can be put back in each other's place; None for all else."""
+    """Return what is equal for two values if one can be put in the other's place; else None."""
     if type(value) is np.ndarray and value.dtype != object and value.flags.writeable:
         return value.shape, value.dtype
     if isinstance(value, torch.Tensor):
@@ -110,7 +110,7 @@ def _kind(value: Any) -> Any:
     if isinstance(value, gymnasium.Space):  # once it is asked, it draws from its own generator
         return value, str(value._np_random and value._np_random.bit_generator.state)
 
-    # What never changes where it stands has to be the same one as when the run began.
+    # What holds no state has to be the very same object as when the run began.
     room = type(value).__module__.partition(".")[0]
     if room in ("unload", "gymnasium") and not isinstance(value, gymnasium.Env):
         return value

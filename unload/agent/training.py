@@ -60,7 +60,7 @@ class Training:
         replay: the picks that the agent learns from.
         curve: the learning curve so far.
         rng: draws exploration and batches.
-        kept: arrays of its change by name, which are a part of the run's state.
+        kept: arrays that a change adds to the checkpoints, by name.
     """
 
     def __init__(
@@ -88,8 +88,8 @@ class Training:
         """Pick once in every environment, and learn from the picks before."""
         config, rollout = self.config, self.rollout
 
-        # The update is begun before the picks, because the fused one can then be computed while
-        # the environments step; it never learns from the picks of its own step.
+        # The update is begun before the picks, because the fused one can then be computed in other
+        # threads while the environments step. It never learns from the picks of its own step.
         enough = len(self.replay) >= min(config.batch_size, self.replay.size)
         updates = config.gradient_steps if enough else 0
         finish_update = self.start_update() if updates else None

@@ -181,7 +181,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         ``SAME_STEP``, ``infos["final_obs"]`` and ``infos["final_info"]`` hold the last ones then.
         """
         self._check_started()
-        # An episode has ended and the next one has not begun; SAME_STEP leaves none so.
+        # Environments whose episode has ended without a reset; with SAME_STEP there are none.
         waiting = self._emptied() | (self._picks == self.max_picks)
         if waiting.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
@@ -217,7 +217,7 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         return self._copy_observations(), rewards, terminations, truncations, infos | final
 
     def action_masks(self) -> np.ndarray:
-        """(num_envs, 128) bool, False for rows without a box or failed since the last success."""
+        """(num_envs, 128) bool, False for rows without a box, or failed since the last success."""
         self._check_started()
         return self._infos()["action_mask"].astype(bool)
 

@@ -84,10 +84,9 @@ class ContainerEnv(PickingEnv):
         equalize: give equalized observations (Alg. 1).
         ties: see ``unload.equalize``.
         max_picks: greatest length of an episode.
-        position_noise: standard deviation of that noise in m, at most 10; 0 also switches off
-            the 1 mm down. It applies where the boxes stay where they were put; ``"full"``
-            physics that is not restored drifts by itself, and its boxes are seen where
-            they are.
+        position_noise: standard deviation of that noise in m, at most 10; with 0 the boxes are not
+            lowered by 1 mm either. A physics that does not restore boxes after a lift has no such
+            noise, because its boxes drift: they are seen where they are.
         stack: makes a ``Load``, of any number of items and in a container of any size, from a
             ``numpy.random.Generator``. Each box stands on the floor or, within the load's
             ``contact_tolerance``, on another one: across a wider gap it would not hold it down.

@@ -24,9 +24,9 @@ class ContainerVectorEnv(PickingVectorEnv):
     See ``ContainerEnv`` for the task and for the arguments not explained here.
 
     Args:
-        physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Unless it is a
-            plain ``TablePhysics``, its ``simulate``, and no other method, is asked about each pick
-            whose outcome no earlier failure decides.
+        physics: ``"table"``, or a ``LocalPhysics`` of your own, which is left open. Of yours only
+            ``simulate`` is called, for each pick that does not repeat a failed one; a
+            ``TablePhysics`` is asked only what its table lacks.
             Single environments take any ``Physics``, each one of its own:
             ``SyncVectorEnv([lambda: ContainerEnv(Mine())] * num_envs)``.
 
@@ -137,7 +137,7 @@ class ContainerVectorEnv(PickingVectorEnv):
     def _pick(
         self, actions: np.ndarray, playing: np.ndarray
     ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-        # Not asked who is playing: ``step`` drops what is done in the others, and fills them anew.
+        # ``playing`` is not needed: ``step`` drops the rewards of the others, and refills them.
         items, distances = self._lift(actions)
         rewards = containers.unload_lifted(
             self._containers, actions, distances, *self._how_observed

@@ -1,8 +1,8 @@
 """Many containers in arrays: what a pick does in each of them, compiled.
 
-In a neat load no box moves, so the order of the boxes by distance is settled when the load is:
-the 128 nearest are the first 128 that are left, and a box that is unloaded makes room for the
-next one in that order, as long as there is one. So a pick touches these 128 at most.
+In a neat load no box moves, so the boxes are sorted by distance once. The 128 nearest are the
+first 128 that are left, and a box that is unloaded makes room for the next one in that order, as
+long as there is one. So a pick touches these 128 at most.
 """
 
 from typing import NamedTuple
@@ -28,8 +28,8 @@ class Containers(NamedTuple):
         present: (E, capacity) bool, False for items that have been unloaded.
         left, unloaded: (E,) int64, how many items are there, and how many have been taken out.
         seen: (E, capacity, 3) float32, the scaled positions as observed.
-        by_distance: (E, capacity) int32, the items, nearest first. After a re-sort, the remaining
-            items start at index ``unloaded``.
+        by_distance: (E, capacity) int32, the items, nearest first. Those that are left begin at
+            index ``unloaded`` when they are sorted anew.
         visible: (E, 128) int32, the item in each row of the observation, -1 in padded rows.
         values, ranks: (E, 3, 128) float32 and int32, scaled positions and ranks of the rows
             that hold an item.

@@ -34,7 +34,7 @@ _CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it 
 
 
 class _Weights(NamedTuple):
-    """The weights of a ``PEQNetwork``, float32, in its own memory: who changes one changes both.
+    """Views of the weights of a ``PEQNetwork``, float32: to write to them changes the network.
 
     Attributes:
         weight, bias: of the extractor, (n, 3) and (n,).

@@ -188,6 +188,7 @@ def _largest(samples, rows):
 
 @compiled
 def _start_chunk(largest, precision, block):
+    """Set the gradients to zero, and bound the rounding error of each feature's values."""
     block[_GRADIENT:] = 0
     for f in range(_BLOCK):
         scale = abs(block[_WX + f]) + abs(block[_WY + f]) + abs(block[_WZ + f])

@@ -78,8 +78,8 @@ def features(values, ranks, equalize, average, observation, items=task.N_VISIBLE
 
     Args:
         values, ranks: (axes, rows) float32 and int32.
-        equalize: whether to equalize, and, if so,
-        average: whether items in a tie share their mean rank.
+        equalize: write equalized ranks instead of the values.
+        average: give tied items their mean rank; only with ``equalize``.
         observation: (rows, axes) float32, filled.
         items: how many of the rows, the first ones, hold an item.
     """

@@ -73,8 +73,9 @@ class Load:
         ids: (n,) str, what a packing list calls the boxes; None without a list.
         container: (3,) float64, inner length, width and height in m; the paper's if not given.
         extras: name → (n,) array, what a packing list says besides; empty if not given.
-        contact_tolerance: m, up to 0.1; boxes this close above one another touch. What bridges two
-            boxes of measured heights touches both, though it stands on the higher one.
+        contact_tolerance: largest vertical gap in m, at most 0.1, across which a box still counts
+            as lying on another one. So a box on two supports of slightly different measured
+            heights touches both.
         contacts: which boxes touch, computed from positions and sizes.
 
     Raises:
@@ -141,7 +142,7 @@ class Load:
             raise BoxError(outside, f"reaches {place}; expected it {inside}")
         contacts = _find_contacts(low, high, tolerance)
 
-        # Nobody may change the arrays later, because contacts would no longer be theirs.
+        # The arrays are read-only from here on, because the contacts were computed from them.
         fields = {"positions": positions, "sizes": sizes, "container": container, **labels}
         for array in (*fields.values(), *extras.values(), *contacts):
             array.setflags(write=False)
@@ -150,7 +151,7 @@ class Load:
             object.__setattr__(self, name, value)
 
     def behind(self, present: np.ndarray) -> np.ndarray:
-        """Which boxes stand behind one of the present ones, (n,) bool each.
+        """Which boxes have one of the present ones in front of them, (n,) bool.
 
         In front of a box is what stands nearer to the door and overlaps it in y and z.
         """
@@ -158,7 +159,7 @@ class Load:
         return np.bincount(box[present[front]], minlength=len(self)) > 0
 
     def covered(self, present: np.ndarray) -> np.ndarray:
-        """Which boxes have one of the present ones on or over them, (n,) bool each."""
+        """Which boxes have one of the present ones on or over them, (n,) bool."""
         lower, upper = self.covers
         return np.bincount(lower[present[upper]], minlength=len(self)) > 0
 
@@ -201,7 +202,7 @@ def check_load(load: object, name: str = "load") -> None:
 def check_stacked(load: Load, name: str = "load") -> None:
     """Raise unless ``load`` is a ``Load`` whose boxes stand on the floor or on each other.
 
-    Where there is a gap between two boxes, the upper one would not hold the lower one down.
+    A box over a gap would not press on the one below.
     """
     check_load(load, name)
     bottom = load.positions[:, 2] - load.sizes[:, 2] / 2

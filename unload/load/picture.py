@@ -112,7 +112,8 @@ def numbered(load: Load, items: np.ndarray) -> bytes:
     low, high = corners(load, np.arange(len(load)))
     figure = _drawn(low, high, colours, (_WIDTH, _WIDTH * 0.6), 0.0, load.container)
 
-    # A number stands in the middle of a face that no box drawn later covers.
+    # A number stands in the middle of a face that no box drawn later covers: a point lies inside of
+    # a convex face if it is on the same side of all four edges.
     drawn = np.argsort(back_to_front(low, high))  # the place of each box in the order of drawing
     faces = _faces(low, high, load.container)
     for number, item in enumerate(dict.fromkeys(first.tolist()), 1):

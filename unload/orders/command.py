@@ -34,9 +34,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser("unload", description=DESCRIPTION, formatter_class=form)
     text = "CSV or Excel file; an example if missing"
     parser.add_argument("list", nargs="?", help=text)
-    text = (
-        "a column of numbers of stops: what can be reached, 1 before 2 (--by=-stop: the last first)"
-    )
+    text = "column of stop numbers: the lowest first, or the highest with --by=-COLUMN"
     parser.add_argument("--by", metavar="COLUMN", help=text)
     parser.add_argument("--output", help="CSV file; the screen if missing")
     text = "PNG file for a picture of the load, its first fifty picks numbered"

@@ -38,9 +38,9 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
 
     Args:
         load: see ``unload.read_load``.
-        by: a name in ``load.extras`` of numbers, such as ``"stop"``: what can be reached, the
-            lowest first, or with ``"-stop"`` the highest. Boxes of later stops come out early only
-            where they stand in the way of what can come out.
+        by: a name in ``load.extras`` of numbers, such as ``"stop"``: of the boxes that can be
+            reached the lowest stop comes first, or with ``"-stop"`` the highest. Boxes of later
+            stops come out early only if they stand in the way of an earlier one.
         rule: instead of ``reachable``, a function of the load and what is present that returns
             keys. What can be reached, the heaviest first::
 
@@ -86,8 +86,8 @@ def picking_order(load: Load, by: str | None = None, rule: Rule | None = None) -
 def _by_stop(load: Load, by: str) -> Rule:
     """The rule of an order by stops that can be carried out.
 
-    A box is due at the first of the stops of all that it stands in front of or lies on, and of all
-    that these keep from coming out; so no box comes out before its stop that need not.
+    A box is due at the earliest stop among itself and all boxes that cannot come out before it; so
+    a box leaves before its own stop only to free an earlier one.
     """
     due = _turns(load, by)
     blocked, blocking = np.hstack([load.fronts, load.covers])

@@ -148,7 +148,7 @@ def read_load(
     except BoxError as error:
         outside = np.abs(centres - container / 2) + sizes / 2 - container / 2
         argument = "container" if outside.max() > LARGEST_TOLERANCE else "tolerance"
-        if outside.max() > 2 * container.max():  # metres that are none
+        if outside.max() > 2 * container.max():  # so far outside that the unit must be wrong
             argument = "units"
         said = error.problem.startswith(("reaches", "overlap", "floats"))
         refuse(np.array(error.boxes), error.problem, argument if said else None)
@@ -211,7 +211,7 @@ def _excel(file: Path) -> pd.DataFrame:
 
 
 def _by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
-    """Names of columns by what they are; a column without a meaning is what its name says."""
+    """Map each meaning to its column; a column without one keeps its own name."""
     for name, meaning in columns.items():
         checks.one_of("columns", name, names)
         checks.one_of("columns", meaning, MEANINGS)

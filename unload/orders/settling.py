@@ -10,7 +10,7 @@ SLACK = 0.0005  # m, at each side of a face: physics makes boxes 1 mm narrower
 def settle(
     low: np.ndarray, sizes: np.ndarray, container: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How boxes change until they lie on what is below, clear of what is beside, and inside.
+    """Move and shrink boxes until they lie on what is below, clear of what is beside, and inside.
 
     Each box may be off by ``tolerance``, two of them by twice that from each other. Two boxes that
     share more of depth and of width lie one above the other; others stand side by side. A larger
@@ -60,7 +60,8 @@ def settle(
             level = np.minimum(top[box], top[others]) - np.maximum(moved[box, 2], moved[others, 2])
             before.append(others[beside & (level > OVERLAP)])
 
-        # Where the longest row through a box is too long, all boxes in it become a little smaller.
+        # The longest row through a box is the longest path in the graph of neighbours, followed
+        # forwards and backwards. If it is too long, all boxes in it become a little smaller.
         wide = sizes[:, axis]
         left, right = np.zeros(len(low)), np.zeros(len(low))
         for box, others in zip(order, before):

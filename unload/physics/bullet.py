@@ -60,7 +60,7 @@ def _pybullet() -> Any:
 
 
 def _version() -> str:
-    """Of PyBullet; without it that of the lifts that ship, because there can be no others."""
+    """Version of PyBullet; where it is missing, the one that made the shipped lifts."""
     try:
         return version("pybullet")
     except PackageNotFoundError:
@@ -211,8 +211,8 @@ class World:
         """
         steps = round(seconds / self.time_step)
         while steps:
-            # PyBullet makes many steps in a call, and the force lasts as long as the call does. It
-            # divides the time by their number, which is exact for powers of two.
+            # One call makes many steps, and the force lasts for the whole call. Their number is a
+            # power of two, because PyBullet divides the time by it, and only that is exact.
             many = 1 << (steps.bit_length() - 1)
             self.client.setPhysicsEngineParameter(
                 fixedTimeStep=many * self.time_step, numSubSteps=many

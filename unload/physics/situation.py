@@ -1,7 +1,7 @@
 """The situation of a box: the boxes that decide whether it can be lifted.
 
 A box is held down by what rests on it, directly or over others. It may rub against its
-neighbours in the same wall, and it can tip aside only what its surroundings let fall.
+neighbours in the same wall, and what lies on it slides or tips off only where they leave room.
 All else in the container is left out. The search is compiled, for ``unload.fast`` as well.
 """
 

@@ -36,9 +36,8 @@ def free_lift() -> float:
     return round(distance, 6)
 
 
-# How far a box of a load with nothing on top moves. PyBullet says the same to the micrometre,
-# whatever its size and neighbours, because physics makes boxes a millimetre narrower. Neighbours
-# that overlap by more than that, as those of no load do, would rub, and hold the box.
+# Physics makes boxes 1 mm narrower, so a box with nothing on top rubs against nothing, and moves
+# equally far in every load, whatever its size: PyBullet says the same to the micrometre.
 FREE_LIFT = free_lift()
 
 
@@ -120,8 +119,8 @@ class TablePhysics(LocalPhysics):
     """``LocalPhysics`` that remembers: a situation met before is looked up.
 
     A box with nothing on top moves by ``free_lift``, as PyBullet says. One with three or more
-    others on it, in the task, is held down, without a simulation: such situations hardly ever
-    repeat, and of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
+    others on it counts as held down and is not simulated: such situations hardly ever repeat, and
+    of those in ``data/lift_agreement.csv`` PyBullet lifts none by more than 4 cm.
 
     Args:
         table: filled by its engine as situations are met. Share one among environments to share

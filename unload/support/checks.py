@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-# Of an array: None on an axis admits any length, None alone any shape.
+# An expected shape: None on an axis admits any length, None instead of a tuple any shape.
 _Shape = tuple[int | None, ...] | None
 _Option = TypeVar("_Option")
 _LARGEST = np.iinfo(np.int64).max

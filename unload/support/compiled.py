@@ -29,12 +29,12 @@ _SOURCES = ("task.py", "support/compiled.py", "load/boxes.py", "physics/*.py", "
 def compiled(function: Callable | None = None, plain: bool = False, **options) -> "Compiled":
     """``numba.njit`` of a function in one of ``_SOURCES``, with a cache that follows all of them.
 
-    ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. A fresh installation
-    compiles for ten seconds, each function at its first call, which is logged when the folder is
-    made. Where none can be written, compiled code is kept in memory, with a warning.
+    ``options`` are those of ``numba.njit``, as in ``@compiled(nogil=True)``. Functions are compiled
+    at their first call, in a fresh installation for ten seconds in all; this is logged once, when
+    the folder is made. Where none can be written, compiled code is kept in memory, with a warning.
 
-    A ``plain`` function runs as it is written for as long as nothing has imported numba: an order
-    calls it a few times only.
+    A ``plain`` function runs in Python until something imports numba: an order of picks calls it
+    too seldom to be worth compiling.
     """
     if function is None:
         return partial(compiled, plain=plain, **options)  # type: ignore[return-value]

@@ -87,7 +87,7 @@ def _hash(content: bytes = b"") -> blake2b:
 def write_arrays(path: str | Path, arrays: dict[str, np.ndarray]) -> None:
     """Write an ``.npz`` file of plain arrays (nothing pickled) and of a ``digest`` of them.
 
-    The format has checksums of its own, but none of what says how much is to be read.
+    The format checks each array's bytes itself, but not the header that says how many to read.
     """
     held = {"digest": _digest_of_arrays(arrays)} | arrays  # first: damage may cut off the last
     write_atomically(path, lambda file: np.savez(file, allow_pickle=False, **held))
@@ -148,8 +148,7 @@ def locked(folder: str | Path, wait: bool = False) -> Iterator[None]:
         wait: until whoever holds the lock gives it back.
 
     Raises:
-        RuntimeError: another process, or another block of this one, holds the lock; not if
-            another process does and ``wait``.
+        RuntimeError: somebody else holds the lock, and not ``wait``.
         OSError: ``folder/lock`` is a link, or the file system has no locks, or no room.
     """
     folder = Path(folder)
