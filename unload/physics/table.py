@@ -89,7 +89,7 @@ class LiftTable:
         """Write the table as ``.npz``, in one atomic step; equal tables give equal bytes."""
         digests, micrometres = self.entries
         own = ~np.isin(digests, self.foreign)
-        arrays = {
+        arrays: dict[str, np.ndarray] = {
             "digests": digests[own],
             "micrometres": micrometres[own],
             "settings": np.array(json.dumps(settings_of_lifts(self.engine))),
