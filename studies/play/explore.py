@@ -61,9 +61,12 @@ class Explore(widgets.VBox):
                 name = 7 * len(control.description)  # pixels; its value takes 80
                 control.layout.width = f"{250 + 80 + name}px"
             control.observe(lambda _: self._show(), "value")
-        row = widgets.HBox(list(controls.values()), layout={"flex_flow": "row wrap"})
+        wrapped = {"flex_flow": "row wrap", "width": "100%"}
+        row = widgets.HBox(list(controls.values()), layout=wrapped)
         self._busy = widgets.HTML()
-        super().__init__([row, self._busy, self.picture])
+        # Not stretched to the width of the page, which would blur the picture.
+        aligned = {"align_items": "flex-start"}
+        super().__init__([row, self._busy, self.picture], layout=aligned)
         self._show()
 
     def _show(self) -> None:
