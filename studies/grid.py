@@ -22,7 +22,7 @@ from studies.networks import NETWORKS
 from studies.results import joined, read_provenance, read_table, write_provenance, write_table
 from studies.sweep import run_sweep
 from unload.agent.checkpoint import RunFolder, settings_of_run
-from unload.agent.config import EPSILON_FALLS, TrainConfig
+from unload.agent.config import EXPLORATION_FRACTION, TrainConfig
 from unload.agent.greedy import Greedy, policy_of, settings_of
 from unload.agent.training import Training
 from unload.network.weights import read_weights, write_weights
@@ -32,7 +32,7 @@ from unload.support import checks, files
 COLUMNS = {"success_rate": "{:.6g}", "loss": "{:.5g}"}
 # Fields that a configuration once had, with the one value that they had in all published runs.
 FORMER_FIELDS = {
-    "epsilon_fraction": EPSILON_FALLS, "shuffle_places": False, "checkpoint_interval": 60.0,
+    "epsilon_fraction": EXPLORATION_FRACTION, "shuffle_places": False, "checkpoint_interval": 60.0,
 }  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from studies.paper import tuning as search
 from studies.paper.visible_items import BINS
 from unload import task
 from unload.agent import policies
-from unload.agent.config import EPSILON_FALLS, TrainConfig
+from unload.agent.config import EXPLORATION_FRACTION, TrainConfig
 from unload.agent.evaluation import evaluate
 from unload.env import observation
 from unload.env.equalization import equalize
@@ -76,7 +76,7 @@ def constants() -> pd.DataFrame:
         ("learning rate μ", "IV-B", 1e-3, config.learning_rate),
         ("batch size b", "IV-B", 2048, config.batch_size),
         ("ε at first, at last", "IV-B", (1, 0), (config.epsilon_init, config.epsilon_final)),
-        ("ε falls during", "IV-B", 0.5, EPSILON_FALLS),
+        ("ε falls during", "IV-B", 0.5, EXPLORATION_FRACTION),
         ("replay", "IV-B", 2**20, config.replay_size),
     ]
     return table([(*row, row[2] == row[3]) for row in rows])

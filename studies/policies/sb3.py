@@ -25,7 +25,7 @@ from stable_baselines3.dqn.policies import DQNPolicy, QNetwork
 
 from studies.policies.comparison import LOADS, SEED
 from studies.results import COMMAND, keep_all, publish
-from unload.agent.config import EPSILON_FALLS, TrainConfig
+from unload.agent.config import EXPLORATION_FRACTION, TrainConfig
 from unload.agent.evaluation import Policy, evaluate
 from unload.agent.training import train
 from unload.network.peq import PEQNetwork
@@ -74,7 +74,7 @@ def dqn(config: TrainConfig, envs: VecEnv) -> DQN:
         train_freq=1,  # of all environments
         gradient_steps=config.gradient_steps,
         target_update_interval=config.target_update_interval,
-        exploration_fraction=EPSILON_FALLS,
+        exploration_fraction=EXPLORATION_FRACTION,
         exploration_initial_eps=config.epsilon_init,
         exploration_final_eps=config.epsilon_final,
         policy_kwargs={"net_arch": [config.n_features]},

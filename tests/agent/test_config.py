@@ -10,7 +10,7 @@ import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from unload import ContainerEnv, HighestItemEnv, TrainConfig, train
-from unload.agent.config import ENVS, EPSILON_FALLS, plain
+from unload.agent.config import ENVS, EXPLORATION_FRACTION, plain
 from unload.env.vector import ContainerVectorEnv
 
 
@@ -20,7 +20,7 @@ def test_the_papers_configuration_is_the_default():
     assert (config.batch_size, config.replay_size) == (2048, 2**20)
     assert (config.gamma, config.beta, config.equalize) == (0, 1, True)
     assert (config.network, config.n_features, config.max_picks, config.seed) == ("peq", 64, 500, 0)
-    assert (config.epsilon_init, config.epsilon_final, EPSILON_FALLS) == (1, 0, 0.5)
+    assert (config.epsilon_init, config.epsilon_final, EXPLORATION_FRACTION) == (1, 0, 0.5)
     assert (config.mask, config.gradient_steps, config.target_update_interval) == (False, 1, 10_000)
     assert ENVS == ("unload/Container-v0", "unload/HighestItem-v0")
 

@@ -9,7 +9,7 @@ import pytest
 
 from unload import Load, read_load, stack_load
 from unload.load.boxes import _SMALLEST_EDGE
-from unload.orders.packing_list import MOST, ListError
+from unload.orders.packing_list import LIMITS, ListError
 
 CORNERS = "x_min,y_min,z_min,size_x,size_y,size_z"
 UNIT = "a,0,0,0,1,1,1"
@@ -223,7 +223,7 @@ def test_columns_are_refused_by_their_names(written):
 def test_lists_of_more_than_a_container_holds_are_refused_before_memory_goes(written, tmp_path):
     """One cell at the far end of a sheet once took 7 GB, and a small archive may hold much."""
     table = pd.read_csv(written(*STACK))
-    long = pd.concat([table] * (MOST["rows"] // 2 + 1))
+    long = pd.concat([table] * (LIMITS["rows"] // 2 + 1))
     with pytest.raises(ValueError, match="the list has 3,002 rows; expected at most 3,000"):
         read_load(long)
     with pytest.raises(ValueError, match="the list has 207 columns; expected at most 200"):

@@ -19,7 +19,7 @@ from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
 FORMAT = 12  # of the checkpoints
-OTHER = "if another version of unload has written it, go on with that one; or remove it"
+IF_OTHER_VERSION = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 
 
@@ -99,11 +99,13 @@ class RunFolder:
         try:
             stored = files.read_arrays(self._checkpoint_file, checked=True)
         except ValueError as error:
-            raise ValueError(f"{error}; {OTHER}") from error
+            raise ValueError(f"{error}; {IF_OTHER_VERSION}") from error
         if not np.array_equal(stored.pop("format", None), FORMAT):
-            raise ValueError(f"{self._checkpoint_file} is not of format {FORMAT}; {OTHER}")
+            raise ValueError(
+                f"{self._checkpoint_file} is not of format {FORMAT}; {IF_OTHER_VERSION}"
+            )
         if (version := str(stored.pop("version", None))) != task.VERSION:
-            raise ValueError(f"{self._checkpoint_file} is of unload {version}; {OTHER}")
+            raise ValueError(f"{self._checkpoint_file} is of unload {version}; {IF_OTHER_VERSION}")
         try:
             self._check_same(dict(json.loads(str(stored.pop("settings")))), run.settings)
             put_back(run, stored)

@@ -17,13 +17,15 @@ from unload.support import checks
 ENVS = ("unload/Container-v0", "unload/HighestItem-v0")
 
 OPTIONS = {"ties": TIES, "network": tuple(NETWORKS)}
-MAY_BE_ZERO = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
+ZERO_ALLOWED = ("seed", "gradient_steps", "log_interval")  # of the whole numbers
 # Upper limits of the real numbers; the lower one is 0.
-HIGHEST = {
+UPPER_LIMITS = {
     "position_noise": MOST_NOISE, "epsilon_init": 1.0, "epsilon_final": 1.0, "gamma": 1.0,
     "learning_rate": 1e37,  # Adam's steps have to fit into float32
 }  # fmt: skip
-EPSILON_FALLS = 0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
+EXPLORATION_FRACTION = (
+    0.5  # K_ε / K, the share of the picks over which exploration falls (Sec. IV-B)
+)
 
 
 def plain(value: Any) -> Any:
@@ -122,9 +124,9 @@ class TrainConfig:
             if isinstance(field.default, bool):
                 value = checks.boolean(name, value)
             elif isinstance(field.default, int):
-                value = checks.integer(name, value, 0 if name in MAY_BE_ZERO else 1)
+                value = checks.integer(name, value, 0 if name in ZERO_ALLOWED else 1)
             elif isinstance(field.default, float):
-                value = checks.real(name, value, 0, HIGHEST.get(name, np.inf))
+                value = checks.real(name, value, 0, UPPER_LIMITS.get(name, np.inf))
             elif name == "env":
                 value = _registered(value)
             elif not (name == "network" and callable(value)):
@@ -154,7 +156,7 @@ class TrainConfig:
 
     def epsilon(self, picks: int) -> float:
         """Exploration rate after ``picks`` picks: linear from init to final, then constant."""
-        progress = min(1.0, picks / (EPSILON_FALLS * self.picks))
+        progress = min(1.0, picks / (EXPLORATION_FRACTION * self.picks))
         return self.epsilon_init + progress * (self.epsilon_final - self.epsilon_init)
 
     def seeds(self) -> tuple[int, int, int]:

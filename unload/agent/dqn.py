@@ -141,10 +141,10 @@ class DQN:
     @torch.no_grad()
     def _targets(self, batch: dict[str, np.ndarray]) -> np.ndarray:
         """r + γ max over the allowed actions of the target network, (batch,) float32."""
-        hopeless = ~batch["next_masks"].any(axis=1) & ~batch["terminations"]
-        if hopeless.any():
+        no_action = ~batch["next_masks"].any(axis=1) & ~batch["terminations"]
+        if no_action.any():
             raise ValueError(
-                f"next_masks is all zero in row {int(np.argmax(hopeless))}, which is not terminal; "
+                f"next_masks is all zero in row {int(np.argmax(no_action))}, which is not terminal; "
                 "expected at least one allowed action"
             )
         following = torch.from_numpy(batch["next_observations"])

@@ -127,8 +127,8 @@ def _play(
     while True:
         # An episode is over where the mask tells the policy that every item has failed.
         allowed = infos["action_mask" if mask else "item_mask"]
-        hopeless = ~allowed.any(axis=1)
-        running &= ~hopeless
+        all_failed = ~allowed.any(axis=1)
+        running &= ~all_failed
         if not running.any():
             break
 

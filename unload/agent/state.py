@@ -53,15 +53,15 @@ class Place(NamedTuple):
     value: Any
 
 
-def _walk(owner: Any, prefix: str = "", seen: set[int] | None = None) -> Iterator[Place]:
+def _walk(owner: Any, prefix: str = "", visited: set[int] | None = None) -> Iterator[Place]:
     """All that an object and its parts hold."""
-    seen = set() if seen is None else seen
-    seen.add(id(owner))  # parts share others, such as the network
+    visited = set() if visited is None else visited
+    visited.add(id(owner))  # parts share others, such as the network
     for key, value in _entries(owner):
         name = f"{prefix}{key}"
         if isinstance(value, (*PARTS, *GROUPS)) and not _is_json(value) or _has_methods(value):
-            if id(value) not in seen:
-                yield from _walk(value, f"{name}.", seen)
+            if id(value) not in visited:
+                yield from _walk(value, f"{name}.", visited)
         else:
             yield Place(name, owner, key, value)
     if _has_methods(owner):

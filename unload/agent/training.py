@@ -239,7 +239,7 @@ def _finish(
     If it is stopped between two steps, there is a checkpoint of the last one, unless a weight is no
     longer finite; after an error inside of a step there is the one before, if any.
     """
-    rollout, whole = run.rollout, True
+    rollout, step_complete = run.rollout, True
     checkpoint_saved, curve_saved = time.monotonic(), 0.0
     bar = tqdm(
         total=run.config.picks, initial=rollout.picks, unit="pick", unit_scale=True,
@@ -248,9 +248,11 @@ def _finish(
     )  # fmt: skip
     try:
         while not rollout.finished:
-            whole = False  # an error in a step leaves it half done, and nothing can be saved then
+            step_complete = (
+                False  # an error in a step leaves it half done, and nothing can be saved then
+            )
             run.step()
-            whole = True
+            step_complete = True
             bar.update(run.config.num_envs)
             if time.monotonic() - checkpoint_saved > CHECKPOINT_INTERVAL and not rollout.finished:
                 run.agent.check_finite()
@@ -275,13 +277,13 @@ def _finish(
         run.agent.check_finite()
         folder.finish(run)
     except FloatingPointError as error:
-        whole = False
+        step_complete = False
         raise FloatingPointError(
             f"after {rollout.picks} picks: {error}; the last checkpoint, if any, is kept"
         ) from error
     finally:
         bar.close()
-        if whole and not folder.finished and len(signals) < 2:
+        if step_complete and not folder.finished and len(signals) < 2:
             run.agent.check_finite()
             folder.save(run)
 

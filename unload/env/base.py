@@ -182,25 +182,25 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
         """
         self._check_started()
         # Environments whose episode has ended without a reset; with SAME_STEP there are none.
-        waiting = self._emptied() | (self._picks == self.max_picks)
-        if waiting.any() and self.autoreset_mode is AutoresetMode.DISABLED:
+        needs_reset = self._emptied() | (self._picks == self.max_picks)
+        if needs_reset.any() and self.autoreset_mode is AutoresetMode.DISABLED:
             raise ResetNeeded("an episode is finished; call reset with a reset_mask first")
-        highest = task.N_VISIBLE - 1
-        actions = checks.integer_array("actions", actions, (self.num_envs,), highest)
+        last_row = task.N_VISIBLE - 1
+        actions = checks.integer_array("actions", actions, (self.num_envs,), last_row)
 
         self._state = "broken off"  # until all is done
-        rewards, picked = self._pick(actions, ~waiting)
+        rewards, picked = self._pick(actions, ~needs_reset)
         self._picks += 1
-        if waiting.any():
-            rewards[waiting] = 0
-            self._begin(waiting, self._rngs)
+        if needs_reset.any():
+            rewards[needs_reset] = 0
+            self._begin(needs_reset, self._rngs)
         terminations, truncations = self._emptied(), self._picks == self.max_picks
 
         # What the last pick of an episode showed goes aside, as Gymnasium wants it.
         final: dict[str, Any] = {}
-        ended, began = terminations | truncations, waiting
+        ended, just_reset = terminations | truncations, needs_reset
         if ended.any() and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            last, began = self._copy_observations(), ended
+            last, just_reset = self._copy_observations(), ended
             observations = np.full(self.num_envs, None)
             for env in np.flatnonzero(ended):
                 observations[env] = last[env]
@@ -211,8 +211,8 @@ class PickingVectorEnv(InOrder, gymnasium.vector.VectorEnv):
 
         # The infos are the reset's where an episode has begun, and the pick's elsewhere.
         infos = _flagged(self._infos(), np.ones(self.num_envs, bool))
-        if not began.all():  # a reset has no infos about a pick
-            infos |= _flagged(picked, ~began)
+        if not just_reset.all():  # a reset has no infos about a pick
+            infos |= _flagged(picked, ~just_reset)
         self._state = "running"
         return self._copy_observations(), rewards, terminations, truncations, infos | final
 

@@ -92,11 +92,11 @@ def start_gradients(
     rows = np.arange(len(actions)) if rows is None else rows
     batch = [np.ascontiguousarray(array) for array in (rows, observations, actions, targets)]
     # One row per chunk, added up in order: the number of threads cannot change the sum.
-    partial = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
-    work = (np.zeros(1, np.int64), *batch, np.float32(beta), *weights, partial)
+    chunk_sums = np.empty((-(-rows.size // CHUNK), 8 * len(weights.bias) + 2), np.float32)
+    work = (np.zeros(1, np.int64), *batch, np.float32(beta), *weights, chunk_sums)
 
     # The caller's own thread takes part when it calls finish, and the others begin now.
-    threads = min(torch.get_num_threads(), len(partial) // _CHUNKS_PER_THREAD)
+    threads = min(torch.get_num_threads(), len(chunk_sums) // _CHUNKS_PER_THREAD)
     others = [_helpers(os.getpid()).submit(add_chunks, *work) for _ in range(1, threads)]
 
     def finish() -> np.ndarray:
@@ -104,7 +104,7 @@ def start_gradients(
         for other in others:
             other.result()
 
-        total = partial.sum(axis=0, dtype=np.float64) / rows.size
+        total = chunk_sums.sum(axis=0, dtype=np.float64) / rows.size
         if not np.isfinite(total).all():
             raise FloatingPointError(
                 f"the loss is {total[-1]} and its gradients are not all finite; "

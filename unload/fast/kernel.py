@@ -88,9 +88,9 @@ def _long_vectors(typing_context):
 
 @compiled(nogil=True)
 def add_chunks(
-    counter, rows, observations, actions, targets, beta, weight, bias, score, score_bias, partial
+    counter, rows, observations, actions, targets, beta, weight, bias, score, score_bias, chunk_sums
 ):
-    """Sum the gradients and losses of each chunk into its row of ``partial``.
+    """Sum the gradients and losses of each chunk into its row of ``chunk_sums``.
 
     Several threads may call this with the same ``counter``, and share the chunks.
     """
@@ -108,7 +108,7 @@ def add_chunks(
     # Each thread takes the next chunk until none is left.
     blocks = _blocks(weight, bias, score)
     chunk = _next_number(counter)
-    while chunk < len(partial):
+    while chunk < len(chunk_sums):
         chosen = rows[chunk * CHUNK : (chunk + 1) * CHUNK]
         picked, wanted = actions[chosen], targets[chosen]  # asks the memory for all at once
         largest = _largest(samples, chosen)
@@ -142,11 +142,13 @@ def add_chunks(
         for f in range(n):
             block, place = blocks[f // _BLOCK], f % _BLOCK
             for axis in range(3):
-                partial[chunk, 3 * f + axis] = block[_GRADIENT + axis * _BLOCK + place]
-            partial[chunk, 3 * n + f] = block[_GRADIENT + _CONSTANT + place]
+                chunk_sums[chunk, 3 * f + axis] = block[_GRADIENT + axis * _BLOCK + place]
+            chunk_sums[chunk, 3 * n + f] = block[_GRADIENT + _CONSTANT + place]
             for kind in range(4):
-                partial[chunk, (4 + kind) * n + f] = block[_SCORE_GRADIENT + kind * _BLOCK + place]
-        partial[chunk, 8 * n], partial[chunk, 8 * n + 1] = sum_slopes, sum_losses
+                chunk_sums[chunk, (4 + kind) * n + f] = block[
+                    _SCORE_GRADIENT + kind * _BLOCK + place
+                ]
+        chunk_sums[chunk, 8 * n], chunk_sums[chunk, 8 * n + 1] = sum_slopes, sum_losses
         chunk = _next_number(counter)
 
 

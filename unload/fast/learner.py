@@ -48,13 +48,13 @@ class FusedLearner:
     def step(self, gradients: np.ndarray) -> None:
         """Change all weights once by their float64 gradients, one array after the other."""
         self.steps += 1
-        corrections = [1 - decay**self.steps for decay in _DECAYS]
+        bias_corrections = [1 - decay**self.steps for decay in _DECAYS]
         flat = tuple(array.reshape(-1) for array in self.weights)  # the same memory
-        _step(flat, gradients, self.moments, self.learning_rate, *corrections)
+        _step(flat, gradients, self.moments, self.learning_rate, *bias_corrections)
 
 
 @compiled
-def _step(weights, gradients, moments, learning_rate, correction, correction2):
+def _step(weights, gradients, moments, learning_rate, bias_correction1, bias_correction2):
     """Adam's rule; changes the weights where they are."""
     mean, square = moments
     i = 0
@@ -63,6 +63,6 @@ def _step(weights, gradients, moments, learning_rate, correction, correction2):
             gradient = gradients[i]
             mean[i] += (1 - _DECAYS[0]) * (gradient - mean[i])
             square[i] += (1 - _DECAYS[1]) * (gradient * gradient - square[i])
-            size = np.sqrt(square[i] / correction2) + _EPSILON
-            part[place] -= learning_rate * (mean[i] / correction) / size
+            size = np.sqrt(square[i] / bias_correction2) + _EPSILON
+            part[place] -= learning_rate * (mean[i] / bias_correction1) / size
             i += 1

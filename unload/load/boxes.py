@@ -298,19 +298,19 @@ def _find(low, high, order, ends, tolerance):
                 if y0[j] > limit:
                     break  # j begins to the right of i, and so do all further ones
                 # Lengths of the stretches that both share; below 0 the gap between them.
-                upwards = min(z1[i], z1[j]) - max(z0[i], z0[j])
-                if upwards < -tolerance:
+                overlap_z = min(z1[i], z1[j]) - max(z0[i], z0[j])
+                if overlap_z < -tolerance:
                     continue
-                across = min(y1[i], y1[j]) - y0[j]
-                along = min(x1[i], x1[j]) - max(x0[i], x0[j])
-                if min(across, upwards, along) > OVERLAP:
+                overlap_y = min(y1[i], y1[j]) - y0[j]
+                overlap_x = min(x1[i], x1[j]) - max(x0[i], x0[j])
+                if min(overlap_y, overlap_z, overlap_x) > OVERLAP:
                     return rows[:count], order[i], order[j]
 
                 # They touch if they share depth, and besides either width or height.
-                if max(across, upwards) <= CONTACT_TOLERANCE or along <= CONTACT_TOLERANCE:
+                if max(overlap_y, overlap_z) <= CONTACT_TOLERANCE or overlap_x <= CONTACT_TOLERANCE:
                     continue
                 one, other = BESIDE, BESIDE  # what j is to i, and i to j
-                if across > CONTACT_TOLERANCE:
+                if overlap_y > CONTACT_TOLERANCE:
                     one, other = (ABOVE, BELOW) if z0[j] > z0[i] else (BELOW, ABOVE)
 
                 # Each pair is written down twice, because each box has a list of its own.

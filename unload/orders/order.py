@@ -89,7 +89,7 @@ def _by_stop(load: Load, by: str) -> Rule:
     A box is due at the earliest stop among itself and all boxes that cannot come out before it; so
     a box leaves before its own stop only to free an earlier one.
     """
-    due = _turns(load, by)
+    due = _stops(load, by)
     blocked, blocking = np.hstack([load.fronts, load.covers])
     for _ in range(len(load)):  # as long as the longest chain, at most
         np.minimum.at(due, blocking, due[blocked])
@@ -101,7 +101,7 @@ def _by_stop(load: Load, by: str) -> Rule:
     return rule
 
 
-def _turns(load: Load, by: str) -> np.ndarray:
+def _stops(load: Load, by: str) -> np.ndarray:
     """The stop of each box, (n,) float64, so that the lowest is the first; see ``by``."""
     checks.instance("by", by, str, "the name of a column")
     falling = by.startswith("-") and by not in load.extras

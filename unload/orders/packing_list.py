@@ -18,19 +18,19 @@ from unload.support import checks, files
 
 LOGGER = logging.getLogger(__name__)
 EXAMPLE = files.SHIPPED / "example.csv"  # of boxes in three walls
-MOST = {"rows": 3_000, "columns": 200, "bytes": 20_000_000}
+LIMITS = {"rows": 3_000, "columns": 200, "bytes": 20_000_000}
 UNITS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "in": 1 / 0.0254}  # of a unit in a metre
 CENTRE, CORNER = ("x", "y", "z"), ("x_min", "y_min", "z_min")
 SIZES = ("size_x", "size_y", "size_z")
-TURNS = ("rotation", "yaw", "pitch", "roll")
+ROTATIONS = ("rotation", "yaw", "pitch", "roll")
 # What a column is, by its name in lower case.
-MEANINGS = {name: name for name in (*CENTRE, *CORNER, *SIZES, *TURNS, "id")}
-MEANINGS |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
+COLUMN_NAMES = {name: name for name in (*CENTRE, *CORNER, *SIZES, *ROTATIONS, "id")}
+COLUMN_NAMES |= zip(("pos_x", "pos_y", "pos_z", "length", "width", "height"), CORNER + SIZES)
 UNREADABLE = (
     *(BadZipFile, LookupError, UnicodeError),
     *(pd.errors.EmptyDataError, pd.errors.ParserError),
 )
-NUMBER = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
+NUMBER_PATTERN = r"-?(0|[1-9]\d*)(\.\d+)?"  # no code with zeros in front
 
 
 class ListError(ValueError):
@@ -103,7 +103,7 @@ def read_load(
     container = checks.finite_array("container", container, (3,))
     checks.entries("columns", {} if columns is None else columns, ())
     table = read_table(path)
-    names = _by_meaning([*table], columns or {})
+    names = _columns_by_meaning([*table], columns or {})
     ids = table[names["id"]] if "id" in names else np.arange(1, len(table) + 1)
     ids = np.array([*map(str, ids)])
 
@@ -120,14 +120,14 @@ def read_load(
         return cells
 
     # A box turned otherwise than by quarter turns is none along the axes.
-    for turn in (name for name in TURNS if name in names):
+    for turn in (name for name in ROTATIONS if name in names):
         if (turned := np.flatnonzero(np.abs((numbers(turn) + 45) % 90 - 45) > 1e-3)).size:
             refuse(turned, f"a {names[turn]} that is no quarter turn; expected one")
 
     # Lengths in m, and x from the rear.
     place = CENTRE if {*CENTRE} <= {*names} else CORNER
     read = (*place, *SIZES, "id")
-    lengths = [numbers(name) / UNITS[_plain(names[name])[1] or units] for name in read[:6]]
+    lengths = [numbers(name) / UNITS[_split_unit(names[name])[1] or units] for name in read[:6]]
     centres, sizes = np.hsplit(np.stack(lengths, axis=1), 2)
     centres = centres if place is CENTRE else centres + sizes / 2
     if x_from == "door":
@@ -186,8 +186,8 @@ def read_table(path: str | Path | pd.DataFrame) -> pd.DataFrame:
 
 
 def _check(what: str, count: int) -> None:
-    if count > MOST[what]:
-        raise ListError(f"the list has {count:,} {what}; expected at most {MOST[what]:,}")
+    if count > LIMITS[what]:
+        raise ListError(f"the list has {count:,} {what}; expected at most {LIMITS[what]:,}")
 
 
 def _csv(file: Path) -> pd.DataFrame:
@@ -210,14 +210,14 @@ def _excel(file: Path) -> pd.DataFrame:
         return pd.read_excel(book, header=None, dtype=str, na_filter=False)
 
 
-def _by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
+def _columns_by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
     """Map each meaning to its column; a column without one keeps its own name."""
     for name, meaning in columns.items():
         checks.one_of("columns", name, names)
-        checks.one_of("columns", meaning, MEANINGS)
+        checks.one_of("columns", meaning, COLUMN_NAMES)
     by_meaning: dict[str, str] = {}
     for name in names:
-        meaning = MEANINGS.get(columns.get(name) or _plain(name)[0], name)
+        meaning = COLUMN_NAMES.get(columns.get(name) or _split_unit(name)[0], name)
         if meaning in by_meaning:
             raise ListError(f"the list has the columns {names}; expected one {meaning!r}")
         by_meaning[meaning] = name
@@ -229,7 +229,7 @@ def _by_meaning(names: list, columns: Mapping[str, str]) -> dict[str, str]:
     return by_meaning
 
 
-def _plain(name: object) -> tuple[str, str | None]:
+def _split_unit(name: object) -> tuple[str, str | None]:
     """A column's name in lower case without its unit, and the unit, None if it states none."""
     words = re.sub(r"[\W_]+", "_", str(name).lower()).strip("_")
     head, _, unit = words.rpartition("_")
@@ -238,6 +238,6 @@ def _plain(name: object) -> tuple[str, str | None]:
 
 def _extra(cells: pd.Series) -> np.ndarray:
     """Cells of another column: numbers where all are written as such, else as they are."""
-    if all(isinstance(cell, str) and re.fullmatch(NUMBER, cell) for cell in cells):
+    if all(isinstance(cell, str) and re.fullmatch(NUMBER_PATTERN, cell) for cell in cells):
         return pd.to_numeric(cells).to_numpy()
     return cells.to_numpy() if cells.dtype.kind in "biuf" else cells.to_numpy(object)

@@ -27,7 +27,7 @@ def settle(
         each; 0 where a box fits.
     """
     high, moved, edges = low + sizes, low.copy(), sizes.copy()
-    between = 2 * tolerance
+    pair_tolerance = 2 * tolerance
 
     # From the floor upwards, each box sinks or rises onto the highest one below it.
     top, order = high[:, 2].copy(), np.argsort(low[:, 2], kind="stable")
@@ -35,8 +35,10 @@ def settle(
         share = np.minimum(high[box], high[order[:count]]) - np.maximum(
             low[box], low[order[:count]]
         )
-        under = order[:count][(share[:, :2].min(axis=1) > between) & (share[:, 2] <= between)]
-        most = between if under.size else tolerance
+        under = order[:count][
+            (share[:, :2].min(axis=1) > pair_tolerance) & (share[:, 2] <= pair_tolerance)
+        ]
+        most = pair_tolerance if under.size else tolerance
         if abs(low[box, 2] - high[under, 2].max(initial=0)) <= most:
             moved[box, 2] = top[under].max(initial=0)
             top[box] = moved[box, 2] + sizes[box, 2]
@@ -49,9 +51,9 @@ def settle(
         for count, box in enumerate(order):
             others = order[:count]
             share = np.minimum(high[box], high[others]) - np.maximum(low[box], low[others])
-            beside = share[:, axis] <= between
+            beside = share[:, axis] <= pair_tolerance
             if axis == 0:  # along y otherwise, or nowhere
-                beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -between)
+                beside &= (share[:, 0] <= share[:, 1]) & (share[:, 1] > -pair_tolerance)
             else:  # what is apart along x needs nothing along y
                 depth = np.minimum(end_x[box], end_x[others]) - np.maximum(
                     moved[box, 0], moved[others, 0]

@@ -12,7 +12,10 @@ from unload.physics.bullet import DAMPING, FRICTION, SETTINGS, TIME_STEP, slim
 from unload.physics.situation import RESOLUTION, Situation
 
 STEP = TIME_STEP / 2  # s; its own contacts are soft, and a shorter step makes them firm enough
-THICK, WIDE = 0.5, 4.5  # m, half of the floor and the side walls across, and along them
+HALF_THICKNESS, HALF_WIDTH = (
+    0.5,
+    4.5,
+)  # m, half of the floor and the side walls across, and along them
 
 
 def settings() -> dict:
@@ -59,11 +62,15 @@ def _described(situation: Situation) -> str:
             parts.append(f'<geom type="box" {place} {size}/>')
 
     if situation.floor is not None:
-        at = _text("pos", (0, 0, situation.floor * RESOLUTION - THICK))
-        parts.append(f'<geom type="box" {at} {_text("size", (WIDE, WIDE, THICK))}/>')
+        at = _text("pos", (0, 0, situation.floor * RESOLUTION - HALF_THICKNESS))
+        parts.append(
+            f'<geom type="box" {at} {_text("size", (HALF_WIDTH, HALF_WIDTH, HALF_THICKNESS))}/>'
+        )
     for side in situation.sides:
-        at = _text("pos", (0, side * RESOLUTION + np.sign(side) * THICK, 0))
-        parts.append(f'<geom type="box" {at} {_text("size", (WIDE, THICK, WIDE))}/>')
+        at = _text("pos", (0, side * RESOLUTION + np.sign(side) * HALF_THICKNESS, 0))
+        parts.append(
+            f'<geom type="box" {at} {_text("size", (HALF_WIDTH, HALF_THICKNESS, HALF_WIDTH))}/>'
+        )
 
     # MuJoCo takes the larger friction of two bodies, Bullet their product.
     return f"""<mujoco>
