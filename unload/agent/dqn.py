@@ -143,8 +143,9 @@ class DQN:
         """r + γ max over the allowed actions of the target network, (batch,) float32."""
         no_action = ~batch["next_masks"].any(axis=1) & ~batch["terminations"]
         if no_action.any():
+            row = int(np.argmax(no_action))
             raise ValueError(
-                f"next_masks is all zero in row {int(np.argmax(no_action))}, which is not terminal; "
+                f"next_masks is all zero in row {row}, which is not terminal; "
                 "expected at least one allowed action"
             )
         following = torch.from_numpy(batch["next_observations"])
