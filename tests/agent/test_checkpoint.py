@@ -68,7 +68,7 @@ def checkpoint(tmp_path) -> Path:
 def test_a_checkpoint_of_another_version_is_refused(checkpoint):
     config, arrays = TrainConfig(**CONTAINER), files.read_arrays(checkpoint)
     for change, message in (
-        ({"format": np.array(9)}, "is not of format 12; if another version of unload"),
+        ({"format": np.array(9)}, "is not of format 13; if another version of unload"),
         ({"version": np.array("0.1.0")}, "is of unload 0.1.0; if another version of unl"),
         ({"settings": np.array("{")}, "JSONDecodeError"),
     ):

@@ -127,7 +127,7 @@ def test_the_physics_in_the_docstring_trains(full_load, tmp_path, monkeypatch):
 
 def test_functions_are_known_by_their_names_and_the_arguments_of_a_partial():
     bound = partial(train, "config", sizes=np.array([1, 2]), limits=(np.inf, -0.0), by={3: train})
-    assert plain({"change": bound, "network": HighestItemEnv, "other": object()}) == {
+    assert plain({"change": bound, "network": HighestItemEnv, "other": len}) == {
         "change": {
             "function": "unload.agent.training.train",
             "arguments": ["config"],
@@ -138,5 +138,7 @@ def test_functions_are_known_by_their_names_and_the_arguments_of_a_partial():
             },
         },
         "network": "unload.env.highest_item.HighestItemEnv",
-        "other": "builtins.object",
+        "other": "builtins.len",
     }
+    with pytest.raises(TypeError, match="known by its arguments, and one is .*; expected numbers"):
+        plain(partial(train, {1}))

@@ -6,6 +6,7 @@ import random
 import numpy as np
 import pytest
 import torch
+from gymnasium.wrappers.utils import RunningMeanStd
 from torch.nn.functional import dropout
 
 from tests.agent.runs import CONTAINER
@@ -100,6 +101,14 @@ REFUSED = {
     "function": own(lambda: counted, lambda run: setattr(run, "own", lambda: 0) or 0),
     "space": own(int, lambda run: run.rollout.envs.action_space.sample()[0]),
     "object": own(lambda: ValueError(), lambda run: 0),
+    "list of another class": own(lambda: type("Own", (list,), {})(), lambda run: 0),
+    "list that holds NumPy's numbers": own(list, lambda run: run.own.append(np.float64(0)) or 0),
+    "two keys of one name": own(lambda: {1: 0, "1": 0}, lambda run: 0),
+    "dates": own(lambda: np.zeros(1, "datetime64[s]"), lambda run: 0),
+    "method": own(lambda: Counter().next, lambda run: run.own()),
+    "method of a generator": own(lambda: np.random.default_rng(0).random, lambda run: run.own()),
+    "statistics of Gymnasium": own(RunningMeanStd, lambda run: 0),
+    "generator with children": own(np.random.default_rng, lambda run: run.own.spawn(1) and 0),
 }
 
 
@@ -126,9 +135,70 @@ def test_what_is_kept_goes_on_with_the_same_bits(name):
 def test_what_could_not_be_put_back_is_refused_by_name(name):
     with pytest.raises(
         ValueError,
-        match=r"^(own|kept|rollout.envs.action_space).* cannot be put back .*run.kept, or give",
+        match=r"^run.(own|kept|rollout.envs.action_space).* cannot be put back .*run.kept, or give",
     ):
         stopped_and_resumed(CONFIG, REFUSED[name])
+
+
+def average_of_views(run):
+    """At first the average is the weights themselves, into which it was once put back."""
+    run.average = dict(run.agent.network.state_dict())
+
+    def reward(picks, distances):
+        run.average = {name: 0.9 * value for name, value in run.average.items()}
+        return picks["rewards"]
+
+    run.reward = reward
+
+
+def other_entry(run):
+    run.stages = {"easy": {"bonus": 0.0}, "hard": {"bonus": 1.0}}
+    run.stage = run.stages["easy"]
+
+    def reward(picks, distances):
+        run.stage = run.stages["hard"]
+        return picks["rewards"] + np.float32(run.stage["bonus"])
+
+    run.reward = reward
+
+
+def frozen_later(run):
+    def reward(picks, distances):
+        run.agent.network.scorer.weight.requires_grad = False
+        return picks["rewards"]
+
+    run.reward = reward
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        (average_of_views, "run.average.extractor.weight"),
+        (other_entry, "run.stage"),
+        (frozen_later, "run.agent.network.scorer.weight"),
+    ],
+)
+def test_what_would_be_put_back_into_something_else_is_refused(change, name):
+    with pytest.raises(ValueError, match=f"^{name} cannot be put back"):
+        stopped_and_resumed(TrainConfig(**CONTAINER), change)
+
+
+def test_names_of_the_file_are_not_those_of_the_run_and_an_optimizer_may_count():
+    class Counting(torch.optim.SGD):
+        count = 0
+
+        def step(self, closure=None):
+            self.count += 1
+            self.param_groups[0]["lr"] = 0.1 / self.count
+            return super().step(closure)
+
+    def change(run):
+        run.torch = run.numbers = run.format = 0
+        learner = run.agent.learner
+        learner.optimizer = Counting(learner.network.parameters(), 0.1)
+        learner.optimizer.count = 0
+
+    assert_same(*stopped_and_resumed(TrainConfig(**CONTAINER, network=TwoLayers), change))
 
 
 def test_an_array_of_kept_may_be_held_in_a_closure():
@@ -142,6 +212,10 @@ def test_an_array_of_kept_may_be_held_in_a_closure():
         run.reward = reward
 
     assert_same(*stopped_and_resumed(CONFIG, change))
+
+
+class TwoLayers(PEQNetwork):
+    """A network without a fused twin."""
 
 
 class Forgetful(PEQNetwork):

@@ -18,7 +18,7 @@ from unload.network.factory import make_network
 from unload.physics.bullet import ENGINES, engine_of
 from unload.support import checks, files
 
-FORMAT = 12  # of the checkpoints
+FORMAT = 13  # of the checkpoints
 IF_OTHER_VERSION = "if another version of unload has written it, go on with that one; or remove it"
 FILES = ("checkpoint.npz", "policy.safetensors", "curve.csv", "config.json")
 

@@ -31,8 +31,10 @@ EXPLORATION_FRACTION = (
 def plain(value: Any) -> Any:
     """Return a value as JSON can hold it: a function by its qualified name.
 
-    A ``partial`` is its function and its arguments; anything else that JSON cannot hold is the name
-    of its type.
+    A ``partial`` is its function and its arguments, a callable object the name of its type.
+
+    Raises:
+        TypeError: it holds something else.
     """
     if isinstance(value, partial):
         parts = {"function": value.func, "arguments": value.args, "keywords": value.keywords}
@@ -47,6 +49,9 @@ def plain(value: Any) -> Any:
         return str(value)  # which strict JSON has no number for
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
+    if not callable(value):
+        wanted = "expected numbers, texts, arrays, functions, and lists and dicts of these"
+        raise TypeError(f"a run is known by its arguments, and one is {value!r}; {wanted}")
     named = value if hasattr(value, "__qualname__") else type(value)
     return f"{named.__module__}.{named.__qualname__}"
 

@@ -71,3 +71,14 @@ class Curve:
     def table(self) -> pd.DataFrame:
         """Return one row per point."""
         return pd.DataFrame(self.points, columns=Point._fields)
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return points and sums, for a checkpoint."""
+        points = np.array(self.points, np.float64).reshape(-1, len(Point._fields))
+        return {"points": points, "sums": np.array([*self.sums.values()], np.float64)}
+
+    def load_state(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take back what ``state`` returned."""
+        points = arrays["points"].tolist()
+        self.points = [Point(int(picks), *rest) for picks, *rest in points]
+        self.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))

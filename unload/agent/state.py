@@ -3,42 +3,55 @@
 The walk goes through a ``Training``, its parts, and their dicts, lists and networks. It keeps
 arrays, weights, generators and numbers. What cannot change is rebuilt with the run. Anything else
 is refused, unless an object has methods for it: ``state()``, which returns arrays by name, and
-``load_state(arrays)``.
+``load_state(arrays)``. Two names of one object have to stay so, because what is put back in place
+is put back for both.
 """
 
 import json
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from enum import Enum
+from functools import partial
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 import torch
+from gymnasium.envs.registration import EnvSpec
 
-from unload.agent.curve import Curve, Point
+from unload.agent.config import TrainConfig
 from unload.agent.dqn import DQN
 from unload.agent.learner import PlainLearner
 from unload.agent.replay import ReplayBuffer
 from unload.agent.rollout import Rollout
 from unload.env.base import PickingVectorEnv
 from unload.fast.containers import Containers
+from unload.fast.fused import Weights
 from unload.fast.learner import FusedLearner
+from unload.load.boxes import Load
 from unload.physics.bullet import World
 from unload.physics.local import LocalPhysics
+from unload.physics.table import LiftTable
 
 PARTS = (
-    *(DQN, FusedLearner, PlainLearner, ReplayBuffer, Rollout, Curve),
+    *(DQN, FusedLearner, PlainLearner, ReplayBuffer, Rollout),
     *(PickingVectorEnv, LocalPhysics),  # also of your own
+    *(torch.nn.Module, torch.optim.Optimizer),
 )
-GROUPS = (torch.nn.Module, torch.optim.Optimizer, dict, list)
-NUMBERS = (bool, int, float, np.generic)
 IN_PLACE = (np.ndarray, torch.Tensor, np.random.Generator, list)  # how these are put back
+# Equal if they hold the same; and objects of ours that hold no state of a run.
 CONSTANTS = (str, bytes, tuple, frozenset, Enum, np.dtype, torch.dtype, torch.device)
-REPLAY = "replay.arrays."
+STATELESS = (TrainConfig, EnvSpec, LiftTable, Load, Weights)
+# Of the replay memory, only what is filled is kept.
+REPLAY = {f"run.replay.arrays.{name}" for name in ReplayBuffer(0, 0, next_state=True).arrays}
 # Of an environment or physics that has methods of its own for the rest.
-OF_ENVS = ("_rngs", "_picks", "_containers", "_observations", "_highest", "physics")
+OF_ENVS = (
+    *("_rngs", "_picks", "_containers", "_observations", "_highest", "physics"),
+    *("max_picks", "equalize", "ties", "position_noise", "_how_observed"),
+)
 _OF_MODULES = vars(torch.nn.Module()).keys() - {"training"}
+_OF_OPTIMIZERS = vars(torch.optim.Adam([torch.zeros(1)])).keys()
 
 
 class Place(NamedTuple):
@@ -53,27 +66,40 @@ class Place(NamedTuple):
     value: Any
 
 
-def _walk(owner: Any, prefix: str = "", visited: set[int] | None = None) -> Iterator[Place]:
+class Met(NamedTuple):
+    """In place of an object that the walk has gone through before, by another name."""
+
+    before: str
+
+
+def _walk(owner: Any, name: str = "run", visited: dict[int, str] | None = None) -> Iterator[Place]:
     """All that an object and its parts hold."""
-    visited = set() if visited is None else visited
-    visited.add(id(owner))  # parts share others, such as the network
+    visited = {} if visited is None else visited
+    visited[id(owner)] = name
     for key, value in _entries(owner):
-        name = f"{prefix}{key}"
-        if isinstance(value, (*PARTS, *GROUPS)) and not _is_json(value) or _has_methods(value):
-            if id(value) not in visited:
-                yield from _walk(value, f"{name}.", visited)
+        place = f"{name}.{key}"
+        if not _has_parts(value):
+            yield Place(place, owner, key, value)
+        elif id(value) in visited:  # parts share others, such as the network
+            yield Place(place, owner, key, Met(visited[id(value)]))
         else:
-            yield Place(name, owner, key, value)
+            yield from _walk(value, place, visited)
     if _has_methods(owner):
-        yield Place(f"{prefix}state", None, None, owner)
+        yield Place(f"{name}.state", None, None, owner)
+
+
+def _has_parts(value: Any) -> bool:
+    group = type(value) in (dict, list) and not _is_list_of_numbers(value)
+    return group or isinstance(value, PARTS) or _has_methods(value)
 
 
 def _entries(owner: Any) -> Iterable[tuple[Any, Any]]:
     if isinstance(owner, list):
         return enumerate(owner)
-    if isinstance(owner, torch.optim.Optimizer):  # by the number of a parameter
-        return [*enumerate(owner.state.values()), ("groups", owner.param_groups)]
     entries = owner if isinstance(owner, dict) else vars(owner)
+    if isinstance(owner, torch.optim.Optimizer):  # by the number of a parameter
+        rest = [(name, value) for name, value in entries.items() if name not in _OF_OPTIMIZERS]
+        return [*enumerate(owner.state.values()), ("groups", owner.param_groups), *rest]
     if _has_methods(owner):  # which speak for all that is not the package's
         entries = {name: entries[name] for name in OF_ENVS if name in entries}
     if isinstance(owner, torch.nn.Module):
@@ -86,51 +112,81 @@ def _has_methods(value: Any) -> bool:
     return hasattr(value, "load_state") and not isinstance(value, type)
 
 
-def _is_json(value: Any) -> bool:
-    """Whether this is a number, or a list of numbers or of points, as JSON can hold them."""
-    if type(value) is list:
-        return all(map(_is_json, value))
-    return isinstance(value, (bool, int, float, Point))
+def _is_number(value: Any) -> bool:
+    """Whether this is a number of Python or NumPy, and of no class of the caller's."""
+    return type(value) in (bool, int, float) or isinstance(value, (np.bool_, np.number))
+
+
+def _is_list_of_numbers(value: Any) -> bool:
+    return type(value) is list and all(type(each) in (bool, int, float) for each in value)
 
 
 def _kind(value: Any) -> Any:
     """Return what is equal for two values if one can be put in the other's place; else None."""
-    if type(value) is np.ndarray and value.dtype != object and value.flags.writeable:
-        return value.shape, value.dtype
+    if type(value) is np.ndarray and value.dtype.kind in "biufc" and value.flags.writeable:
+        return value.shape, value.dtype, value.strides
     if isinstance(value, torch.Tensor):
-        return value.shape, value.dtype
-    if isinstance(value, np.random.Generator):  # of others the state is no JSON
-        return np.random.PCG64 if isinstance(value.bit_generator, np.random.PCG64) else None
-    if _has_methods(value) or isinstance(value, (Containers, list)):
+        return value.shape, value.dtype, value.stride(), value.requires_grad
+    if isinstance(value, np.random.Generator):
+        bits = value.bit_generator
+        if type(bits) is not np.random.PCG64:  # of others the state is no JSON
+            return None
+        return np.random.PCG64, bits.seed_seq.n_children_spawned  # type: ignore[attr-defined]
+    if _has_methods(value) or isinstance(value, Containers) or _is_list_of_numbers(value):
         return type(value)
-    if isinstance(value, NUMBERS):
-        return NUMBERS
+    if _is_number(value):
+        return "number"
     if value is None or isinstance(value, World):  # which is started when it is first needed
         return World
     if isinstance(value, gymnasium.Space):  # once it is asked, it draws from its own generator
         return value, str(value._np_random and value._np_random.bit_generator.state)
 
-    # What holds no state has to be the very same object as when the run began.
-    room = type(value).__module__.partition(".")[0]
-    if room in ("unload", "gymnasium") and not isinstance(value, gymnasium.Env):
-        return value
-    if callable(value) and room in ("builtins", "functools", "numpy"):
+    # What holds no state has to be the same as when the run began.
+    if isinstance(value, (Met, *STATELESS)) or _is_plain_function(value):
         return value
     with suppress(TypeError):  # a tuple of arrays, say, has no hash
         return (hash(value), value) if isinstance(value, CONSTANTS) else None
     return None
 
 
+def _is_plain_function(value: Any) -> bool:
+    """Whether this is a function, a class, or a method of an object whose state is gathered."""
+    while isinstance(value, partial):
+        value = value.func
+    room = type(value).__module__.partition(".")[0]
+    owner = getattr(value, "__self__", None)  # of a built-in function its module
+    known = type(owner).__module__.partition(".")[0] == "unload"
+    bound = not (owner is None or known or isinstance(owner, (ModuleType, type, *PARTS)))
+    return callable(value) and room in ("builtins", "numpy", "unload") and not bound
+
+
+def _place_in_memory(value: Any) -> tuple[int, int]:
+    """First and last byte of an array, a tensor, or any object that is put back in place."""
+    if isinstance(value, torch.Tensor):
+        value = value.detach().numpy()
+    if isinstance(value, np.ndarray) and value.size:
+        low, high = np.lib.array_utils.byte_bounds(value)
+        return low, high - 1
+    owner = value.bit_generator if isinstance(value, np.random.Generator) else value
+    return id(owner), id(owner)
+
+
 def kinds(run: Any) -> dict[str, tuple]:
     """What a ``Training`` holds, by name; of a fresh one, for ``gather`` to compare with.
 
-    Of what is put back in place, also the first name of the same object.
+    Of what is put back in place, also the first name of the same object. Arrays that overlap
+    otherwise have no kind, as what has the name of another part.
     """
     result: dict[str, tuple] = {}
-    first: dict[int, str] = {}
+    first: dict[tuple[int, int], str] = {}  # name by place in memory
     for name, _, _, value in _walk(run):
-        shared = first.setdefault(id(value), name) if isinstance(value, IN_PLACE) else name
-        result[name] = _kind(value), shared
+        kind, shared = _kind(value), name
+        if kind is not None and isinstance(value, IN_PLACE):
+            low, high = place = _place_in_memory(value)
+            shared = first.setdefault(place, name)
+            if any(low <= end and start <= high for start, end in first if (start, end) != place):
+                kind = None
+        result[name] = (None if name in result else kind), shared
     return result
 
 
@@ -164,14 +220,14 @@ def gather(run: Any, fresh: dict[str, tuple]) -> dict[str, np.ndarray]:
             parts = value._asdict() if isinstance(value, Containers) else value.state()
             arrays |= {f"{name}.{part}": np.asarray(array) for part, array in parts.items()}
         elif isinstance(value, np.ndarray):
-            arrays[name] = value[: len(run.replay)] if name.startswith(REPLAY) else value
-        elif isinstance(value, np.generic):
+            arrays[name] = value[: len(run.replay)] if name in REPLAY else value
+        elif isinstance(value, np.generic) and _is_number(value):
             arrays[name] = np.asarray(value)
         elif isinstance(value, torch.Tensor):
             arrays[name] = value.detach().numpy()
         elif isinstance(value, np.random.Generator):
             numbers[name] = value.bit_generator.state
-        elif isinstance(value, (*NUMBERS, list)):
+        elif _is_number(value) or isinstance(value, list):
             numbers[name] = value
     return arrays | {"numbers": np.array(json.dumps(numbers))}
 
@@ -194,7 +250,7 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
                 value.load_state(parts)
             else:
                 setattr(owner, key, Containers(**parts))
-        elif isinstance(value, NUMBERS):
+        elif _is_number(value):
             new = stored.pop(name)
             new = new[()] if isinstance(new, np.ndarray) else new
             if isinstance(owner, (dict, list)):
@@ -210,7 +266,6 @@ def put_back(run: Any, arrays: dict[str, np.ndarray]) -> None:
             elif isinstance(value, list):
                 value[:] = new
             else:
-                (value[: len(new)] if name.startswith(REPLAY) else value)[...] = new
+                (value[: len(new)] if name in REPLAY else value)[...] = new
     if stored:
         raise ValueError(f"it holds {', '.join(sorted(stored)[:5])}; expected nothing of the kind")
-    run.curve.points = [Point(*point) for point in run.curve.points]

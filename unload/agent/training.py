@@ -199,7 +199,8 @@ def train(
         FloatingPointError: the loss or a weight is no longer finite.
         KeyboardInterrupt: after Ctrl-C or SIGTERM, and a checkpoint; a second one stops at once.
     """
-    checks.instance("config", config, TrainConfig, "an unload.TrainConfig")
+    if type(config) is not TrainConfig:  # of a subclass, what it adds would not be a run's
+        raise TypeError(f"config is {config!r}; expected an unload.TrainConfig")
     if not isinstance(progress, bool) and not hasattr(progress, "write"):
         raise TypeError(f"progress is {progress!r}; expected True, False or a text file")
     if callback is not None and not callable(callback):

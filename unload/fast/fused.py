@@ -33,7 +33,7 @@ from unload.network.peq import PEQNetwork
 _CHUNKS_PER_THREAD = 8  # at least; below, waking a thread takes longer than it saves
 
 
-class _Weights(NamedTuple):
+class Weights(NamedTuple):
     """Views of the weights of a ``PEQNetwork``, float32: to write to them changes the network.
 
     Attributes:
@@ -54,14 +54,14 @@ def applies(network: torch.nn.Module) -> TypeGuard[PEQNetwork]:
     )
 
 
-def weights_of(network: PEQNetwork) -> _Weights:
+def weights_of(network: PEQNetwork) -> Weights:
     """The weights of a network for which ``applies`` holds."""
     weight, bias, score, score_bias = (p.detach().numpy() for p in _parameters(network))
-    return _Weights(weight, bias, score.reshape(4, -1), score_bias)
+    return Weights(weight, bias, score.reshape(4, -1), score_bias)
 
 
 def start_gradients(
-    weights: _Weights,
+    weights: Weights,
     observations: np.ndarray,
     actions: np.ndarray,
     targets: np.ndarray,
@@ -121,7 +121,7 @@ def _helpers(process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor()
 
 
-def best_actions(weights: _Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
+def best_actions(weights: Weights, observations: np.ndarray, allowed: np.ndarray) -> np.ndarray:
     """The allowed action of the highest value.
 
     The global features add the same to every item's score and tanh keeps the order, so
@@ -148,6 +148,6 @@ def best_actions(weights: _Weights, observations: np.ndarray, allowed: np.ndarra
 
 
 def _parameters(network: PEQNetwork) -> tuple[torch.Tensor, ...]:
-    """Parameters in the order of ``_Weights``; ``network.parameters()`` takes ten times as long."""
+    """Parameters in the order of ``Weights``; ``network.parameters()`` takes ten times as long."""
     extractor, scorer = network.extractor, network.scorer
     return extractor.weight, extractor.bias, scorer.weight, scorer.bias
