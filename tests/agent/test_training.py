@@ -112,16 +112,6 @@ def test_a_reward_of_ones_own_gets_the_distance():
     assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()
 
 
-@pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
-def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
-    copied = []
-    run = Training(TrainConfig(**CONTAINER | {"gamma": gamma}))
-    monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
-    while not run.rollout.finished:
-        run.step()
-    assert copied == picks
-
-
 def test_lifts_of_own_loads_are_kept_from_run_to_run(tmp_path, monkeypatch):
     """Also when one is stopped. The second run asks PyBullet nothing, and gives the same."""
     lifts, kept = tmp_path / "lifts.npz", []
@@ -213,12 +203,6 @@ def test_a_pipe_or_a_link_to_a_file_of_the_run_is_refused(tmp_path):
         train(config, run, progress=False)
 
 
-def test_a_folder_in_use_is_refused(tmp_path):
-    message = "in use by another process"
-    with files.locked(tmp_path), pytest.raises(RuntimeError, match=message):
-        train(TrainConfig(**CONTAINER), tmp_path, progress=False)
-
-
 def test_the_success_rate_counts_positive_rewards():
     """A task of one's own need not reward picks by ±1."""
     curve = Curve()
@@ -267,20 +251,6 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
     assert not list((tmp_path / "elsewhere").iterdir())
     train(config, tmp_path / "straight", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "run")
-
-
-@pytest.mark.parametrize("mask", [False, True])
-def test_the_bootstrap_maximum_obeys_the_mask(mask):
-    """A failed item is out of the next state's maximum, whether training masks choices or not."""
-    config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
-    run = Training(config)
-    for _ in range(20):
-        run.step()
-    stored = run.replay.arrays
-    failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
-    assert len(failed) > 10
-    assert not stored["next_masks"][failed, stored["actions"][failed]].any()
-    assert (run.rollout.allowed & (run.rollout.masks == 0)).any() == (not mask)
 
 
 @pytest.mark.parametrize("gamma", [0.0, 0.9])
