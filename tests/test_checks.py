@@ -118,38 +118,11 @@ def test_runs_that_differ_are_compared_in_a_sentence():
         assert by_checks.compare(*changed, losses, weights) == line
 
 
-def test_mistakes_that_show_later_are_noticed():
-    """In an emptied container, in the losses' type, and where the replay memory is full."""
-    torch.set_num_threads(1)
-    solved = importlib.import_module("unload.plain")
+def test_mistakes_in_the_algorithm_are_noticed():
+    """Each differs from the page in one thing; some show in an emptied container alone.
 
-    def as_in_textbooks(network, target, optimizer, picks, gamma):
-        """Multiplies by 1 - ended, where nothing is allowed and the best value is -inf."""
-        picks = [(*pick[:5], np.float32(pick[5])) for pick in picks]
-        columns = (torch.from_numpy(np.array(column)) for column in zip(*picks))
-        before, chosen, reward, after, free, ended = columns
-        with torch.no_grad():
-            best = target(after).masked_fill(~free, -torch.inf).amax(dim=1)
-        goal = reward + gamma * best * (1 - ended)
-        values = network(before).gather(1, chosen[:, None])[:, 0]
-        return torch.nn.functional.smooth_l1_loss(values, goal).item()
-
-    def returns_a_tensor(*given):
-        return torch.tensor(solved.update(*given))
-
-    def remembers_all(*given, size, **options):
-        return solved.masked_dqn(*given, **options)
-
-    for number, wrong, line in (
-        ("2", as_in_textbooks, "of update 1 with γ = 0.0 is nan where the episode has ended"),
-        ("2", returns_a_tensor, "it returns a Tensor; expected the loss as a float"),
-        ("3", remembers_all, f"positions, size = {by_checks.SMALL}: the losses differ from update"),
-    ):
-        assert line in judged(checks.exercise(f"04/{number}"), wrong)
-
-
-def test_small_mistakes_in_the_algorithm_are_noticed():
-    """Each differs from the page ``unload/plain.py`` in one thing."""
+    Others show in the losses' type, or where the replay memory is full.
+    """
     torch.set_num_threads(1)
 
     def ignores_the_mask(network, observations, allowed, epsilon, rng):
@@ -159,13 +132,17 @@ def test_small_mistakes_in_the_algorithm_are_noticed():
         picks = [(*pick[:5], np.False_) for pick in picks]
         return plain.update(network, target, optimizer, picks, gamma)
 
+    def returns_a_tensor(*given):
+        return torch.tensor(plain.update(*given))
+
+    def remembers_all(*given, size, **options):
+        return plain.masked_dqn(*given, **options)
+
     for number, wrong, line in (
         ("1", ignores_the_mask, "an item that the mask excludes"),
-        (
-            "2",
-            forgets_the_end,
-            "the loss of update 1 with γ = 0.0 is nan where the episode has ended",
-        ),
+        ("2", forgets_the_end, "of update 1 with γ = 0.0 is nan where the episode has ended"),
+        ("2", returns_a_tensor, "it returns a Tensor; expected the loss as a float"),
+        ("3", remembers_all, f"positions, size = {by_checks.SMALL}: the losses differ from update"),
     ):
         assert line in judged(checks.exercise(f"04/{number}"), wrong)
 

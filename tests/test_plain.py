@@ -14,7 +14,7 @@ from unload.agent.training import Training
 
 SETTINGS = [
     {"equalize": False},
-    {"replay_size": 100, "max_picks": 50},
+    {"replay_size": 100, "gamma": 0.9, "max_picks": 50},
     {"mask": True, "gamma": 0.5, "max_picks": 50},
 ]
 

@@ -4,49 +4,46 @@ import torch
 from torch.nn.functional import smooth_l1_loss
 
 from tests.agent.runs import make_batch, peq, weights, without_next
-from unload import DQN, Greedy
+from unload import DQN, Greedy, plain
 from unload.agent.learner import ROWS_PER_PASS, PlainLearner
 from unload.fast.learner import FusedLearner
 
 
-@pytest.mark.parametrize("beta", [1.0, 0.3])
 @pytest.mark.parametrize("gamma", [0.0, 0.9])
 @pytest.mark.parametrize("fused", [False, True])
-def test_an_update_is_one_plain_step_of_adam(rng, beta, gamma, fused):
-    """Against the whole batch at once, written down as the paper's equations have it.
-
-    The batch takes more than one pass.
+def test_an_update_is_that_of_the_page(rng, gamma, fused):
+    """Of a batch that takes more than one pass, from rows of a larger memory.
 
     The target network is a copy, also after it has followed once: learners change weights in place.
     """
     batch = make_batch(rng)
     assert len(batch["actions"]) > ROWS_PER_PASS
-    agent = DQN(peq(), learning_rate=0.01, gamma=gamma, beta=beta, fused_update=fused)
+    agent = DQN(peq(), learning_rate=0.01, gamma=gamma, fused_update=fused)
     assert type(agent.learner) is (FusedLearner if fused else PlainLearner)
     reference, target = peq(), peq()
     optimizer = torch.optim.Adam(reference.parameters(), lr=0.01)
+    given = batch if gamma else without_next(batch)
+    memory = {name: np.concatenate([array[:7], array]) for name, array in given.items()}
     for number in range(3):
         if number == 1:
             agent.update_target()
             target.load_state_dict(reference.state_dict())
-        following = target(torch.from_numpy(batch["next_observations"])).detach().numpy()
-        best = np.where(batch["next_masks"], following, -np.inf).max(axis=1)
-        bootstrap = gamma * best * ~batch["terminations"]
-        targets = torch.from_numpy((batch["rewards"] + bootstrap).astype(np.float32))
-        values = reference(torch.from_numpy(batch["observations"]))
-        chosen = values[torch.arange(len(values)), torch.from_numpy(batch["actions"])]
-        loss = smooth_l1_loss(chosen, targets, beta=beta)
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        given = batch if gamma else without_next(batch)
-        memory = {name: np.concatenate([array[:7], array]) for name, array in given.items()}
-        assert agent.update(memory, np.arange(7, 157)) == pytest.approx(loss.item(), rel=1e-5)
+        loss = plain.update(reference, target, optimizer, [*zip(*batch.values())], gamma)
+        assert agent.update(memory, np.arange(7, 157)) == pytest.approx(loss, rel=1e-5)
         for mine, theirs in zip(agent.network.parameters(), reference.parameters()):
             # Adam hides a constant factor of the gradients; the fused ones are not kept.
             assert fused or torch.allclose(mine.grad, theirs.grad, rtol=1e-4, atol=1e-6)
     for mine, theirs in zip(weights(agent.network), weights(reference)):
         assert torch.allclose(mine, theirs, atol=2e-5)
+
+
+@pytest.mark.parametrize("fused", [False, True])
+def test_beta_is_where_the_loss_becomes_linear(rng, fused):
+    batch = without_next(make_batch(rng))
+    values = peq()(torch.from_numpy(batch["observations"]))
+    chosen = values.gather(1, torch.from_numpy(batch["actions"])[:, None])[:, 0]
+    loss = smooth_l1_loss(chosen, torch.from_numpy(batch["rewards"]), beta=0.3)
+    assert DQN(peq(), beta=0.3, fused_update=fused).update(batch) == pytest.approx(loss.item())
 
 
 @pytest.mark.parametrize("fused", [False, True])

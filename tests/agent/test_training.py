@@ -110,16 +110,6 @@ def test_a_reward_of_ones_own_gets_the_distance():
     assert np.isnan(run.rollout.pick(np.zeros(4, int))[1]).all()
 
 
-@pytest.mark.parametrize(("gamma", "picks"), [(0.9, list(range(24, 201, 24))), (0.0, [])])
-def test_the_target_network_follows_once_an_interval(monkeypatch, gamma, picks):
-    copied = []
-    run = Training(TrainConfig(**CONTAINER | {"gamma": gamma}))
-    monkeypatch.setattr(run.agent, "update_target", lambda: copied.append(run.rollout.picks))
-    while not run.rollout.finished:
-        run.step()
-    assert copied == picks
-
-
 @pytest.mark.parametrize(("replay_size", "picks"), [(100, 20), (8, 12)])
 def test_a_run_of_the_fewest_picks_learns_in_its_last_step(replay_size, picks):
     fields = {"replay_size": replay_size, "picks": picks, "gradient_steps": 3}
@@ -229,20 +219,6 @@ def test_whatever_a_callback_raises_loses_no_pick(tmp_path, monkeypatch, picks):
     assert not list((tmp_path / "elsewhere").iterdir())
     train(config, tmp_path / "straight", progress=False)
     assert_same(tmp_path / "straight", tmp_path / "run")
-
-
-@pytest.mark.parametrize("mask", [False, True])
-def test_the_bootstrap_maximum_obeys_the_mask(mask):
-    """A failed item is out of the next state's maximum, whether training masks choices or not."""
-    config = TrainConfig(**CONTAINER | {"gamma": 0.9, "mask": mask, "epsilon_final": 1.0})
-    run = Training(config)
-    for _ in range(20):
-        run.step()
-    stored = run.replay.arrays
-    failed = np.flatnonzero(stored["rewards"][: len(run.replay)] < 0)
-    assert len(failed) > 10
-    assert not stored["next_masks"][failed, stored["actions"][failed]].any()
-    assert (run.rollout.allowed & (run.rollout.masks == 0)).any() == (not mask)
 
 
 @pytest.mark.parametrize("gamma", [0.0, 0.9])

@@ -1,4 +1,3 @@
-import errno
 import json
 import os
 import re
@@ -18,29 +17,6 @@ ROOT = Path(__file__).resolve().parents[2]
 # Other processes import the module alone: the package takes seconds.
 ALONE = os.path.dirname(files.__file__)
 ARRAYS = {"a": np.arange(6).reshape(2, 3), "b": np.array("text"), "c": np.array([True, False])}
-
-
-def test_a_failed_write_leaves_the_old_file(tmp_path):
-    """Until it ends, the new content stands beside it."""
-    path = tmp_path / "file"
-    files.write_text(path, "old")
-
-    def write(file):
-        file.write(b"half of the n")
-        assert {*tmp_path.iterdir()} == {path, tmp_path / "file.partial"}
-        assert path.read_text(encoding="utf-8") == "old"
-        raise OSError(errno.ENOSPC, "disk full")
-
-    with pytest.raises(OSError, match="cannot write this file: disk full: '.*/file'$"):
-        files.write_atomically(path, write)
-    assert path.read_text(encoding="utf-8") == "old" and [path] == [*tmp_path.iterdir()]
-
-
-def test_what_a_killed_writer_left_is_overwritten(tmp_path):
-    (tmp_path / "file.partial").write_bytes(b"half of something longer")
-    files.write_text(tmp_path / "file", "whole")
-    assert (tmp_path / "file").read_text(encoding="utf-8") == "whole"
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_what_is_no_file_of_plain_arrays_is_neither_read_nor_written(tmp_path):
