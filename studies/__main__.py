@@ -11,9 +11,8 @@ from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
 from studies.results import COMMAND
-from studies.seamless import jam_tables, mujoco_jams
 from studies.seamless import training as seamless
-from studies.ties import choice, creep, earlier, leak
+from studies.ties import choice, earlier, leak
 from studies.ties import laboratory as ties_laboratory
 from studies.ties import training as ties
 
@@ -60,12 +59,9 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "sb3": ("agents of Stable-Baselines3, trained for minutes", sb3, JOBS),
     "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
-    "jams": ("jams in seamless walls, every box simulated", jam_tables.both_data, JOBS),
-    "mujoco_jams": ("the same with MuJoCo", mujoco_jams.mujoco_data, JOBS),
     "seamless": (
         "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.CELLS)
     ),
-    "creep": ("how long the order of equals lasts in PyBullet", creep.creep_data, JOBS),
     "leak": ("what ties by the items' order tell a network", leak.leak_data, JOBS),
     "ties_laboratory": (
         "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS

@@ -31,13 +31,13 @@ ORDER, AVERAGED = replace(NOISE, position_noise=0.0), replace(NOISE, ties="avera
 TIES = {"order": ORDER, "noise": NOISE, "averaged": AVERAGED}
 ANEW = partial(jam, share=SHARE)
 # Share of the free boxes that jam along episodes by the friction of a contact, by whether a box
-# stands in front, and by the number of those at the sides (``jam_tables.first_attempts``), when
-# 17 of 20 episodes had been played.
+# stands in front, and by the number of those at the sides (``seamless/jam_first``), when 17 of 20
+# episodes had been played.
 BY_PLACE = {
     0.64: np.array(((0.0, 0.05, 0.15, 0.52), (0.0, 0.12, 0.5, 0.68))),
     1.0: np.array(((0.01, 0.13, 0.47, 0.78), (0.04, 0.38, 0.83, 0.98))),
 }
-LASTS = 20  # successes of others within which a jam is drawn again, see ``jam_tables.again``
+LASTS = 20  # successes of others within which a jam is drawn again, see ``seamless/jam_again``
 UNTIL_SUCCESS, WEIGHT_1 = partial(jam, share=SHARE, lasts=1), partial(weigh, z=1.0)
 CELLS: dict[str, Cell] = {
     **{

@@ -1,13 +1,13 @@
-"""Where runs end, by how ties are broken and how long an order of equals lasts; single runs."""
+"""How long an order of equals lasts; where runs end, by how ties are broken; single runs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, ScalarFormatter
 
 from studies.falls.long import LONG
 from studies.grid import Grid, read_grid
@@ -20,6 +20,7 @@ from studies.ties.earlier import EARLIER
 from studies.ties.laboratory import RHOS
 from studies.ties.training import SWEPT, TIES
 from unload.agent.greedy import Greedy
+from unload.physics.bullet import GAP
 
 PICKS = 20_000_000  # of a run
 # How ties are broken, in the order of the figure, and the cells of b = 256 that do so, without
@@ -36,6 +37,52 @@ KINDS: dict[str, list[tuple[Grid, str]]] = {
 
 # What becomes of a pick, from the left, and its colour.
 OUTCOMES = {"unloaded": "#4c9f70", "deadlocked": "0.25", "preference": "C1", "noise": "C0"}
+
+
+def durations(table: pd.DataFrame) -> pd.DataFrame:
+    """How long the order of equals lasts in PyBullet worlds that go on.
+
+    Args:
+        table: ``ties/noise``. It has a row per world, moment, lag in picks and axis. Of the boxes
+            that nobody touches and that share their place along the axis, within a wall, with
+            others: how many ``boxes`` there are; ``rms``, how far they move along it meanwhile, in
+            mm, without the mean of their group; ``spearman``, the mean rank correlation of their
+            offsets then and later.
+
+    Returns:
+        Means of these measures with the package's gap, by ``walls``, ``axis`` and ``lag``.
+    """
+    usual = table[table["gap"] == GAP]
+    return usual.groupby(["walls", "axis", "lag"])[["boxes", "rms", "spearman"]].mean()
+
+
+@styled
+def draw_durations(table: pd.DataFrame, drift: Sequence[float]) -> Figure:
+    """How long the order among equals lasts, by axis, beside noise that drifts.
+
+    Args:
+        table: see ``durations``.
+        drift: of this noise, the correlation from one pick to the next along x, y and z.
+    """
+    figure, panels = plt.subplots(1, 3, figsize=(8.4, 3), sharey=True)
+    found, lags = durations(table)["spearman"], np.unique(table["lag"])
+    every = np.arange(1, lags[-1] + 1)
+    for axes, axis, correlation in zip(panels, "xyz", drift):
+        for walls, marker, label in ((3, "o-", "three walls"), (12, "s-", "a whole container")):
+            measured = found[walls, axis]
+            hollow = None if walls == 3 else "none"
+            axes.plot(measured.index, measured, marker, color="0.25", mfc=hollow, ms=4, label=label)
+        drifting = correlation**every
+        axes.plot(every, drifting, "--", color=COLOURS["ranks"], label="drifting noise")
+        axes.axhline(0, color="0.6", linewidth=0.8)
+        axes.set(title=f"along {axis}; drift: ρ = {correlation:g}", ylim=(-0.2, 1.05))
+        axes.set(xscale="log", xticks=lags[::2])
+        axes.xaxis.set_major_formatter(ScalarFormatter())
+        axes.minorticks_off()
+    panels[0].set_ylabel("rank correlation")
+    panels[1].set_xlabel("picks in between")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
 
 
 def read_by_ties() -> pd.DataFrame:

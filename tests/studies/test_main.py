@@ -55,6 +55,8 @@ def test_what_nothing_can_run_with_is_refused_in_one_line(called, capsys):
 def test_every_provenance_names_a_command_of_today():
     for path in paths.DATA.rglob("provenance.json"):
         for name, record in files.read_json(path).items():
+            if "program" in record:  # which has left, and stands at the revision named there
+                continue
             today = record.get("present_command", record["command"]).split()
             assert today[:2] == ["python", "-m"], (path, name)
             if today[2] == "studies":
