@@ -6,13 +6,13 @@ from functools import partial
 
 from studies.falls import laboratory, long
 from studies.grid import train_grid
-from studies.heap import greed, table
+from studies.heap import table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
 from studies.results import COMMAND
 from studies.seamless import training as seamless
-from studies.ties import choice, earlier, leak
+from studies.ties import choice
 from studies.ties import laboratory as ties_laboratory
 from studies.ties import training as ties
 
@@ -62,7 +62,6 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "seamless": (
         "walls in which boxes jam", partial(train_grid, seamless.SEAMLESS), some(seamless.CELLS)
     ),
-    "leak": ("what ties by the items' order tell a network", leak.leak_data, JOBS),
     "ties_laboratory": (
         "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS
     ),
@@ -73,9 +72,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         "noise at the choice or in the memory, the mask in training: the laboratory",
         choice.choice_laboratory_data, JOBS,
     ),
-    "earlier": ("runs of the first plan, from this repository's history", earlier.earlier_data, {}),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
-    "greed": ("heaps pick by pick", greed.greed_data, JOBS),
 }  # fmt: skip
 
 

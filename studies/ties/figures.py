@@ -16,9 +16,8 @@ from studies.statistics import PAPER_MSR, PAPER_START, WINDOW_PICKS, by_run, win
 from studies.style import COLOURS, WITHOUT_MASK, styled
 from studies.ties.choice import COUNTS, WAYS, evaluate_choice
 from studies.ties.criterion import WORDS, likeness, open_course
-from studies.ties.earlier import EARLIER
 from studies.ties.laboratory import RHOS
-from studies.ties.training import SWEPT, TIES
+from studies.ties.training import EARLIER, SWEPT, TIES
 from unload.agent.greedy import Greedy
 from unload.physics.bullet import GAP
 
