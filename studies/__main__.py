@@ -50,7 +50,7 @@ def sb3(n_jobs: int) -> None:
 # Part → summary, what makes its data, and its options.
 PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
-    "engines": ("lifts and MSRs by a second engine", engines.engines_data, JOBS),
+    "engines": ("lifts by a second engine", engines.engines_data, {}),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
     "tuning": ("Figs. 8–10", partial(train_grid, tuning.TUNING), JOBS),
     "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),
