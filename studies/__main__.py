@@ -52,7 +52,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "lifts": ("the lift table, and the physics that it stands for", lifts, JOBS),
     "engines": ("lifts by a second engine", engines.engines_data, {}),
     "observation": ("Figs. 4–6", visible_items.observation_data, {}),
-    "tuning": ("Figs. 8–10", partial(train_grid, tuning.TUNING), JOBS),
+    "tuning": ("Figs. 8–10", tuning.tuning_data, JOBS),
     "training": ("Figs. 11 and 12", training.training_data, some(training.PAPER.cells)),
     "variants": ("other networks and rewards", variants.variants_data, JOBS),
     "policies": ("policies compared", policies, JOBS),
@@ -60,7 +60,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
     "laboratory": ("why runs fall: the laboratory", laboratory.laboratory_data, JOBS),
     "fresh": ("why runs fall: fresh seeds", laboratory.fresh_data, JOBS),
     "seamless": (
-        "walls in which boxes jam", partial(train_grid, seamless.SEAMLESS), some(seamless.CELLS)
+        "seamless walls, in which boxes jam", seamless.seamless_data, some(seamless.CELLS)
     ),
     "ties_laboratory": (
         "how long an order of equals lasts: the laboratory", ties_laboratory.laboratory_data, JOBS
@@ -84,9 +84,10 @@ def paper(n_jobs: int) -> None:
 
 ALL = {"paper": ("all of them", paper, JOBS)}
 DESCRIPTION = """
-The data behind the figures, computed and kept in ``data/`` with its provenance. What has been
-computed is kept in ``runs/``: a command that was stopped goes on where it was, and what is
-finished is not repeated. Each training run writes its progress to ``log.txt`` in its folder.
+The data behind the paper's figures, computed and kept in ``data/`` with its provenance.
+File names and columns are those that the paper's own plots read. What has been computed is
+kept in ``runs/``: a command that was stopped goes on where it was, and what is finished is
+not repeated. Each training run writes its progress to ``log.txt`` in its folder there.
 """
 
 

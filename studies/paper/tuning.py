@@ -12,12 +12,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from studies.grid import Cell, Grid, read_grid
+from studies import paths
+from studies.grid import Cell, Grid, read_grid, train_grid
 from studies.results import COMMAND
 from studies.style import COLOURS, styled
 from unload import task
 from unload.agent.config import TrainConfig
 from unload.env.highest_item import GRID
+from unload.support import files
 
 LEARNING_RATES = (1e-1, 1e-2, 1e-3)
 BATCH_SIZES = (64, 256, 1024, 2048)
@@ -26,6 +28,17 @@ STEPS = 3000  # K, one pick in each of 64 environments and one update per step
 # Of all runs; they differ in batch size b, learning rate μ, seed, and with or without FE.
 CONFIG = TrainConfig(
     env="unload/HighestItem-v0", picks=STEPS * task.NUM_ENVS, equalize=True, log_interval=1
+)
+# What the paper's plots read of the search: its folder, the column, batch size, learning rate, run.
+SHOWN = (
+    ("with", "hitrate", 1024, 1e-1, 6),
+    ("with", "hitrate", 1024, 1e-2, 7),
+    ("with", "hitrate", 1024, 1e-3, 5),
+    ("with", "hitrate", 64, 1e-3, 9),
+    ("with", "hitrate", 256, 1e-3, 9),
+    ("with", "hitrate", 2048, 1e-3, 6),
+    ("with", "loss", 2048, 1e-3, 6),
+    ("without", "loss", 2048, 1e-3, 8),
 )
 
 SMOOTHING_STEPS = 25  # of the running means
@@ -68,6 +81,33 @@ def tuning_grid(
 
 
 TUNING = tuning_grid()
+
+
+def tuning_data(n_jobs: int = -1) -> None:
+    """Train the search, see ``train_grid``, and write what the paper's plots read of it."""
+    train_grid(TUNING, n_jobs=n_jobs)
+    export_tuning()
+
+
+def export_tuning() -> None:
+    """Write the curves that the paper's plots read of the published search.
+
+    ``dummy_sim_{with,without}_hist_equal/{hitrate,loss}_curve_bz_<b>_lr_<μ>_agent_<run>.csv``: a
+    value per step and no header; the loss before the first update is ``nan``, which the plots
+    leave out.
+    """
+    for fe, kind, batch_size, rate, run in SHOWN:
+        cell = tuning_cell(batch_size, rate, fe == "with")
+        curves = read_grid(TUNING, [cell])
+        name = f"{kind}_curve_bz_{batch_size}_lr_{rate:g}_agent_{run}.csv"
+        column = {"hitrate": "success_rate", "loss": "loss"}[kind]
+        values = curves.loc[curves["seed"] == run, column]
+        files.write_text(
+            paths.DATA / f"dummy_sim_{fe}_hist_equal" / name,
+            values.to_csv(
+                index=False, header=False, na_rep="nan", float_format="%.6g", lineterminator="\n"
+            ),
+        )
 
 
 def read_curves(

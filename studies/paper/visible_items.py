@@ -16,6 +16,7 @@ from studies.style import styled
 from unload.env import observation
 from unload.env.equalization import equalize
 
+FOLDER = "obs_hist_equal"  # of the paper's own plots
 SEED = 0  # of the load
 # Fig. 5: the paper's histogram. The edges lie just outside [-1, 1].
 BINS = np.linspace(-1.001, 1.001, 111)
@@ -32,8 +33,8 @@ def observation_data() -> None:
         name: pd.DataFrame(positions[:, [0, 2]], columns=["x", "y"])
         for name, positions in result.value.items()
     }
-    name, command = "obs_hist_equal/observation", f"{COMMAND} observation"
-    publish(name, tables, command, {"seed": SEED}, [result], float_format="%.6f")
+    name, command, settings = f"{FOLDER}/observation", f"{COMMAND} observation", {"seed": SEED}
+    publish(name, tables, command, settings, [result], float_format="%.6f")
 
 
 def _positions() -> dict[str, np.ndarray]:

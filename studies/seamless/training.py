@@ -6,15 +6,19 @@ The plan, ``data/seamless/PLAN.md``, says why its grid has these cells and seeds
 that are no longer here stand at revision ba9d78d1.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 
 from studies import changes
-from studies.grid import Cell, Grid, cell
-from studies.results import COMMAND
+from studies.grid import Cell, Grid, cell, read_grid, train_grid
+from studies.results import COMMAND, write_table
 from studies.seamless.jamming import jam, jam_by_place, weigh
+from unload import task
+from unload.agent.checkpoint import RunFolder, settings_of_run
 from unload.agent.config import TrainConfig
 
 SHARE = 0.4  # j; the paper's start of 15 % and end of 60 % need about so much
@@ -64,4 +68,37 @@ CELLS: dict[str, Cell] = {
         for name, mask in MASKS.items()
     },
 }
+EXPORTED = "b2048_no_mask_order", 41  # chosen afterwards among those like the paper's figures
 SEAMLESS = Grid("seamless/runs", f"{COMMAND} seamless", CELLS)
+
+
+def seamless_data(cells: Sequence[str] | None = None, n_jobs: int = -1) -> None:
+    """Train the cells, see ``train_grid``; export the run ``EXPORTED``."""
+    kept = train_grid(SEAMLESS, cells, n_jobs)
+    name, seed = EXPORTED
+    if cells is None or name in cells:
+        config, change = replace(CELLS[name].config, seed=seed), CELLS[name].change
+        settings = settings_of_run(config, change=change)
+        run = RunFolder(kept / f"{name}/seed_{seed}").result(config, settings)
+        export(run.curve["wall_time"])
+
+
+def export(wall_time: Sequence[float]) -> None:
+    """Write a published run as TensorBoard exports it, which the paper's plots read.
+
+    ``loss_function_agent.csv`` has the loss, ``total_rew_function_agent.csv`` the rewards summed
+    over an episode of 500 picks, a mean over the environments; both have the columns ``Wall time``,
+    ``Step`` and ``Value``.
+
+    Args:
+        wall_time: of each point of its curve, s since the epoch.
+    """
+    name, seed = EXPORTED
+    curves = read_grid(SEAMLESS, [name])
+    curve = curves[curves["seed"] == seed].reset_index(drop=True)
+    for exported, values in (
+        ("loss_function_agent", curve["loss"]),
+        ("total_rew_function_agent", (2 * curve["success_rate"] - 1) * task.MAX_PICKS),
+    ):
+        table = pd.DataFrame({"Wall time": wall_time, "Step": curve["picks"], "Value": values})
+        write_table(exported, table.dropna(), "%.12g")

@@ -1,6 +1,7 @@
 """The paper's numbers beside ours, its training, and its search: data, plots and measures."""
 
 from dataclasses import replace
+from shutil import copy
 
 import numpy as np
 import pytest
@@ -46,8 +47,8 @@ def test_a_search_is_published_as_one_table(own_data, set_in):
     """Of two batch sizes, two runs each."""
     set_in(grid, training_fingerprint=lambda networks: "f")
     small = tuning_grid([1e-3], [8, 16], runs=2, equalize=[True], steps=20)
-    set_in(tuning, TUNING=small)
-    grid.train_grid(small, n_jobs=1)
+    set_in(tuning, TUNING=small, SHOWN=(("with", "loss", 8, 1e-3, 1),))
+    tuning.tuning_data(n_jobs=1)
     names = {path.name for path in own_data.iterdir() if path.is_file()}
     assert names == {"tuning.csv", "provenance.json"}
     table = read_table("tuning")
@@ -57,6 +58,19 @@ def test_a_search_is_published_as_one_table(own_data, set_in):
     summary = tuning.tuning_summary().set_index("batch_size")
     mean = np.mean([run.mean() for run in curves.values()])
     assert summary.loc[8, "final_msr"] == pytest.approx(mean)
+    (path,) = (own_data / "dummy_sim_with_hist_equal").iterdir()
+    assert path.name == "loss_curve_bz_8_lr_0.001_agent_1.csv"
+
+
+def test_committed_files_of_the_papers_plots_are_those_of_the_tables(own_data):
+    committed = paths.ROOT / "data"
+    copy(committed / "tuning.csv", own_data)
+    tuning.export_tuning()
+    written = {path.relative_to(own_data) for path in own_data.glob("dummy_sim_*/*")}
+    assert written == {path.relative_to(committed) for path in committed.glob("dummy_sim_*/*")}
+    assert len(written) == 8
+    for path in written:
+        assert (own_data / path).read_bytes() == (committed / path).read_bytes()
 
 
 def test_chance_counts_all_others(monkeypatch):

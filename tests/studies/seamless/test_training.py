@@ -4,8 +4,10 @@ import re
 from dataclasses import replace
 from fnmatch import fnmatch
 from functools import partial
+from shutil import copytree
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from studies import paths
@@ -14,10 +16,13 @@ from studies.grid import read_grid
 from studies.results import read_table
 from studies.seamless import training
 from studies.seamless.jamming import jam, neighbours
-from studies.seamless.training import CELLS, FIRST_SEED
+from studies.seamless.training import CELLS, EXPORTED, FIRST_SEED
+from studies.statistics import seamless_plan
 from unload import task
 from unload.agent.training import Training
 from unload.load.boxes import BESIDE, Load
+
+NAMES = [f"{name}.csv" for name in ("loss_function_agent", "total_rew_function_agent")]
 
 
 def test_the_jams_of_the_next_episode_are_others():
@@ -80,6 +85,18 @@ def test_the_first_episode_of_a_published_run_is_trained_again(name):
     assert published["seed"] == FIRST_SEED
     for column in ("picks", "success_rate", "loss"):
         assert found[column] == pytest.approx(published[column], rel=1e-4)
+
+
+def test_the_exported_run_is_the_published_one_and_like_the_papers(tmp_path, monkeypatch):
+    curves = read_grid(training.SEAMLESS, cells=[EXPORTED[0]])
+    found = seamless_plan(curves[curves["seed"] == EXPORTED[1]])
+    assert found["fig11"] and found["fig12"]
+    committed = paths.DATA
+    copytree(committed / "seamless", tmp_path / "seamless")
+    monkeypatch.setattr(paths, "DATA", tmp_path)
+    training.export(pd.read_csv(committed / NAMES[1])["Wall time"])
+    for name in NAMES:
+        assert (tmp_path / name).read_bytes() == (committed / name).read_bytes()
 
 
 def test_measured_jams_are_those_of_the_published_table():
