@@ -6,7 +6,7 @@ from functools import partial
 
 from studies.falls import laboratory, long
 from studies.grid import train_grid
-from studies.heap import table
+from studies.heap import greed, table
 from studies.lifts import agreement, engines, lift_table
 from studies.paper import training, tuning, visible_items
 from studies.policies import comparison, variants
@@ -73,6 +73,7 @@ PARTS: dict[str, tuple[str, Callable, dict]] = {
         choice.choice_laboratory_data, JOBS,
     ),
     "heap": ("heaps, of which a rake picks several boxes at once", table.heap_data, JOBS),
+    "greed": ("heaps pick by pick", greed.greed_data, JOBS),
 }  # fmt: skip
 
 

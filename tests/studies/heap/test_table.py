@@ -7,7 +7,7 @@ import torch
 
 from studies import paths
 from studies.heap import env as heap_env
-from studies.heap import figures, generate, picture, recording
+from studies.heap import generate, picture, recording
 from studies.heap import table as study
 from studies.heap.learning import load_networks, save_networks
 from studies.heap.network import FateNetwork
@@ -114,17 +114,3 @@ def test_both_rounds_are_recorded_and_learned_and_kept(own_data, set_in, pile):
     written = published.read_bytes()
     make_networks()
     assert published.read_bytes() == written and len(learned) == 4, "all of it was kept"
-
-
-def test_nets_join_the_rules_picks_and_the_networks(set_in):
-    """Two heaps, three picks: the rule brings 1, 2, 3 or 2, 4, 6, the networks 10 a pick."""
-    set_in(figures, MAX_PICKS=3, PARTS={"first": (1, 1)})
-    rows = [(heap, 3, pick, (heap + 1) * pick, 0) for heap in (0, 1) for pick in (1, 2, 3)]
-    rows += [(heap, 1, pick, 12, 2) for heap in (0, 1) for pick in (2, 3)]
-    frame = pd.DataFrame(rows, columns=["heap", "rule_picks", "pick", "boxes", "falls"])
-    whole = figures.nets(frame, (1, 3))
-    assert whole[3].tolist() == [6, 12] and whole[1].tolist() == [21, 22]
-    assert figures.nets(frame, (3, 3))[1].tolist() == [10, 10]
-    found = figures.ratios(frame)
-    assert found.loc[("first", 1), "ratio"] == 1
-    assert found.loc[("all 15 picks", 1), "ratio"] == pytest.approx(43 / 18)
