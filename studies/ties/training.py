@@ -13,8 +13,7 @@ from studies.grid import Grid, cell
 from studies.paper.training import B2048, PAPER
 from studies.results import COMMAND
 from studies.seamless.jamming import jam
-from studies.ties.noise import drifting
-from studies.ties.renewed import renewed
+from studies.ties.noise import drifting, renewed
 
 SEEDS, FEW_SEEDS = range(60, 65), range(60, 63)
 MASKS = {"no_mask": False, "mask": True}

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from studies.falls.cells import CONFIG
-from studies.ties.noise import DriftingTies, drifting
-from studies.ties.renewed import renewed
+from studies.ties.noise import DriftingTies, drifting, renewed
 from tests.agent.runs import assert_same, at_step, interrupt
 from unload import train
 from unload.agent.training import Training
