@@ -113,4 +113,7 @@ def published_data(n_jobs: int = -1) -> None:
 
 def _judge(name: str, config: TrainConfig, network: PEQNetwork) -> dict:
     row = {"cell": cell_of(name), "seed": int(name.rpartition("_")[2])}
-    return row | measures.judged_blanked(network, config, loads=LOADS)
+    return row | {
+        f"judged_{name}": measures.judged(network, config, blank, loads=LOADS)
+        for name, blank in measures.BLANKED.items()
+    }

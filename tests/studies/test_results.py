@@ -13,16 +13,14 @@ from joblib import Parallel, delayed
 
 from studies import paths, results
 from studies.falls.long import LONG
-from studies.grid import published_runs, read_grid, recorded_config
+from studies.grid import published_runs, read_grid
 from studies.paper.training import PAPER
 from studies.paper.tuning import TUNING
 from studies.policies.variants import GRIDS
 from studies.results import kept, measured, publish, read_provenance, read_table, revision
 from studies.seamless.training import SEAMLESS
 from studies.ties.training import TIES
-from unload import TrainConfig
 from unload.physics.bullet import engine_of
-from unload.support import files
 
 PUBLISHED = {grid.name: grid for grid in (PAPER, TUNING, LONG, SEAMLESS, *GRIDS.values())}
 RECORDED = PUBLISHED | {TIES.name: TIES}  # not all of its runs were made
@@ -189,45 +187,18 @@ def test_the_projects_own_commit_is_its_revision(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_the_settings_of_published_runs_are_their_configurations(name):
-    """Those that stand beside them train the runs again."""
+    """Those that stand beside them train the runs again.
+
+    A network of the studies stood there with a digest of its file as it was then.
+    """
     record = read_provenance(name)
-    recorded = {cell: recorded_config(fields) for cell, fields in record["settings"].items()}
+    recorded = dict(record["settings"])
     for cell, plan in RECORDED[name].cells.items():
-        assert recorded.pop(cell) == replace(plan.config, seed=plan.seeds[0])
+        fields = recorded.pop(cell)
+        fields["network"] = fields["network"].split()[0]
+        assert replace(plan.config, seed=plan.seeds[0]).plain().items() <= fields.items()
     # Of a grid from which cells were taken out, their settings are kept.
     assert bool(recorded) == (published_runs(record) < record["runs"])
-
-
-def test_every_recorded_configuration_is_built_again():
-    """Of whatever is published, wherever in its settings it stands."""
-    found = []
-
-    def build(settings: dict) -> None:
-        if "batch_size" in settings and "network" in settings:
-            config = recorded_config(settings)
-            found.append(config)
-            for name, value in config.plain().items():
-                assert name == "network" or settings[name] == value
-            assert config.plain()["network"] == settings["network"].split()[0]
-            return
-        for entry in settings.values():
-            if isinstance(entry, dict):
-                build(entry)
-
-    for path in paths.DATA.rglob("provenance.json"):
-        for record in files.read_json(path).values():
-            build(record["settings"])
-    assert len(found) > 100 and len({config.network for config in found}) == 3
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("epsilon_fraction", 0.4), ("shuffle_places", True), ("checkpoint_interval", 0.0)],
-)
-def test_a_recorded_configuration_that_no_run_can_have_any_more_is_refused(name, value):
-    settings = TrainConfig().plain() | {name: value}
-    with pytest.raises(ValueError, match=f"{name} is {value}; expected .* no such field any more"):
-        recorded_config(settings)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

@@ -11,7 +11,7 @@ import torch
 from studies import paths
 from studies.falls import cells, laboratory, long, measures
 from studies.falls.laboratory import CONFIG
-from studies.grid import published_runs, read_policies, recorded_config
+from studies.grid import published_runs, read_policies
 from studies.paper.training import PAPER
 from studies.policies.margin import own_scores
 from studies.results import read_provenance, read_table
@@ -70,7 +70,7 @@ def test_the_published_runs_are_those_of_the_cells_and_of_the_configuration(name
     seeds = {cell: sorted(group["seed"]) for cell, group in read_table(name).groupby("cell")}
     assert seeds == {name: list(cell.seeds) for name, cell in planned.items()}
     record = read_provenance(name)
-    assert recorded_config(record["settings"]["config"]) == CONFIG
+    assert CONFIG.plain().items() <= record["settings"]["config"].items()
     assert published_runs(record) == sum(map(len, seeds.values()))
 
 
